@@ -250,7 +250,7 @@ def test_what_the_interface_publishes_goes_nowhere_and_says_so(
     wait(root.ready)
     wait(root.publish)
     wait(lambda: "reaches no robot" in root.problem())
-    wait(lambda: "is a recording, which answers nobody" in root.served())
+    wait(lambda: "is a recording, which answers no requests" in root.served())
 
 
 def test_to_the_robot_only_when_told(live: Bench, drive: Path, wait: Any) -> None:

@@ -1,8 +1,7 @@
-"""Recordings: writing topics to a file, and playing files back."""
+"""Recordings: record topics to a file, and play files back."""
 
 from rosglass.bags.bag import Bag, BagMessage, Channel, open_bag
-from rosglass.bags.playback import Playback
-from rosglass.bags.player import Player, PlayerState
+from rosglass.bags.player import Playback, Player, PlayerState
 from rosglass.bags.recorder import Recorder, RecordingStatus
 from rosglass.bags.replay_node import ReplayNode
 

@@ -1,4 +1,4 @@
-"""MCAP recordings (https://mcap.dev/spec), written with the ``mcap`` package.
+"""MCAP recordings (https://mcap.dev/spec), read and written with the ``mcap`` package.
 
 Profiles and metadata: https://mcap.dev/spec/registry, and what rosbag2 and the ``mcap`` command
 write when they convert a ROS 1 bag.
@@ -6,24 +6,251 @@ write when they convert a ROS 1 bag.
 
 from __future__ import annotations
 
+import io
+import logging
+import struct
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.reader import SeekingReader
+from mcap.records import Channel as ChannelRecord
+from mcap.records import Chunk, ChunkIndex, Message, Schema
+from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 import rosglass
-from rosglass.bags.qos_text import write_profiles
-from rosglass.bags.recording_file import RecordingFile
-from rosglass.comm import Durability
+from rosglass.bags.bag import (
+    Channel,
+    RecordingFile,
+    ScannedBag,
+    by_time,
+    decompress,
+    merge_chunks,
+    read_profiles,
+    write_profiles,
+)
+from rosglass.comm import Durability, QoS
+from rosglass.errors import BagError, InvalidNameError
 from rosglass.interfaces import full_text, ros1_name
+from rosglass.interfaces.names import join_name
 from rosglass.messages import OpaqueType
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Iterator, Sequence
+    from pathlib import Path
 
-    from rosglass.comm import QoS, Sample
+    from rosglass.comm import Sample
     from rosglass.messages import MessageType
 
-__all__ = ["McapFile"]
+__all__ = ["McapBag", "McapFile"]
+
+
+_log = logging.getLogger("rosglass.bags")
+_WIRES = {"cdr": "cdr", "ros1": "ros1"}
+#: The headers of a record (opcode, length) and of a message (channel, sequence, two times).
+_record_header = struct.Struct("<BQ")
+_message_header = struct.Struct("<HIQQ")
+_LANGUAGES = {"ros2msg": "msg", "ros1msg": "msg", "ros2idl": "idl"}
+
+
+class McapBag(ScannedBag):
+    """An MCAP file with ROS 1 or ROS 2 messages.
+
+    Topics in other encodings (JSON, Protobuf) are left out and named in :attr:`problem`.
+
+    Raises:
+        BagError: It cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        try:
+            self._file = path.open("rb")
+        except OSError as error:
+            raise BagError(f"{path} cannot be read: {error.strerror}") from error
+        self._foreign: dict[str, str] = {}
+        self._chunks: list[ChunkIndex] = []
+        self._problems = ""
+        try:
+            self._index()
+        except BaseException:
+            self._file.close()
+            raise
+        self._merge_channels()
+        if self._foreign:
+            names = ", ".join(f"{topic} ({what})" for topic, what in sorted(self._foreign.items()))
+            self._add_problem(f"these topics are not ROS messages and are left out: {names}")
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def _index(self) -> None:
+        summary = None
+        try:
+            summary = SeekingReader(self._file).get_summary()
+        except Exception:  # damaged data may raise anything
+            self._add_problem("it was not closed properly: its end is missing or damaged")
+        if summary is not None and summary.statistics is not None and summary.channels:
+            # A damaged index may name a chunk several times.
+            chunks = {index.chunk_start_offset: index for index in summary.chunk_indexes}
+            self._chunks = sorted(
+                chunks.values(), key=lambda c: (c.message_start_time, c.chunk_start_offset)
+            )
+            counts = summary.statistics.channel_message_counts
+            for number, channel in summary.channels.items():
+                schema = summary.schemas.get(channel.schema_id)
+                self._add(number, channel, schema, counts.get(number, 0))
+            self.start = summary.statistics.message_start_time
+            self.end = summary.statistics.message_end_time
+            return
+        first = last = -1
+        for _, time, _ in self._scan():
+            first = time if first < 0 else min(first, time)
+            last = max(last, time)
+        self.start, self.end = max(first, 0), max(last, 0)
+        if not self._known and not self._foreign and last < 0 and not self.problem:
+            self._add_problem("it holds no messages")
+
+    def _read(
+        self, wanted: Collection[int], start: int | None, end: int | None
+    ) -> Iterator[tuple[int, int, bytes]]:
+        if not self._chunks:
+            yield from by_time(self._scan())
+            return
+        # Each pass opens the file, as passes may overlap.
+        with self.path.open("rb") as file:
+            yield from merge_chunks(
+                (index.message_start_time, self._indexed(file, index))
+                for index in self._chunks
+                if (start is None or index.message_end_time >= start)
+                and (end is None or index.message_start_time < end)
+                and not (
+                    index.message_index_offsets
+                    and index.message_index_offsets.keys().isdisjoint(wanted)
+                )
+            )
+
+    def _indexed(self, file: BinaryIO, index: ChunkIndex) -> Iterator[tuple[int, int, bytes]]:
+        """Yield the messages of an indexed chunk."""
+        try:
+            file.seek(index.chunk_start_offset)
+            chunk = next(StreamReader(file, skip_magic=True, emit_chunks=True).records)
+            if not isinstance(chunk, Chunk):
+                raise BagError("the index names a chunk, and there is none")
+        except Exception as error:  # damaged data may raise anything
+            self._leave_out(index.chunk_start_offset, error)
+            return
+        for record in self._unpacked(chunk, index.chunk_start_offset):
+            if isinstance(record, tuple):
+                yield record
+
+    def _scan(self) -> Iterator[tuple[int, int, bytes]]:
+        """Read messages and channels from the start, up to the end or the first damage."""
+        schemas: dict[int, Any] = {}
+        with self.path.open("rb") as file:
+            try:
+                # The reader checks magic numbers and lengths, and raises for a truncated record.
+                for record in self._record_headers(file):
+                    if isinstance(record, tuple):
+                        yield record
+                    elif isinstance(record, Schema):
+                        schemas[record.id] = record
+                    elif record.id not in self._known:
+                        self._add(record.id, record, schemas.get(record.schema_id), -1)
+            except Exception as error:  # damaged data may raise anything
+                if not self._known and not self._foreign:
+                    raise BagError(
+                        f"{self.path} is no MCAP file, or damaged at its beginning: {error}"
+                    ) from error
+
+    def _record_headers(
+        self, file: BinaryIO
+    ) -> Iterator[Schema | ChannelRecord | tuple[int, int, bytes]]:
+        """Yield schemas, channels and messages in the order of the file."""
+        offset = file.tell()
+        for record in StreamReader(file, emit_chunks=True).records:
+            if isinstance(record, Chunk):
+                yield from self._unpacked(record, offset)
+            elif isinstance(record, Message):
+                yield record.channel_id, record.log_time, record.data
+            elif isinstance(record, (Schema, ChannelRecord)):
+                yield record
+            offset = file.tell()
+
+    def _unpacked(
+        self, chunk: Chunk, offset: int
+    ) -> Iterator[Schema | ChannelRecord | tuple[int, int, bytes]]:
+        """Yield the content of a chunk, up to the first damage.
+
+        The package's own reader trusts declared sizes, and lists all records in memory.
+        """
+        try:
+            data = decompress(chunk.compression, chunk.data, chunk.uncompressed_size)
+            place = 0
+            while place < len(data):
+                opcode, size = _record_header.unpack_from(data, place)
+                place += _record_header.size
+                end = place + size
+                if not opcode or end > len(data):
+                    raise BagError(
+                        f"no record is at byte {place - _record_header.size} of its content"
+                    )
+                if opcode == Opcode.MESSAGE:
+                    number, _, time, _ = _message_header.unpack_from(data, place)
+                    yield number, time, data[place + _message_header.size : end]
+                elif opcode == Opcode.SCHEMA:
+                    yield Schema.read(ReadDataStream(io.BytesIO(data[place:end])))
+                elif opcode == Opcode.CHANNEL:
+                    yield ChannelRecord.read(ReadDataStream(io.BytesIO(data[place:end])))
+                place = end
+        except Exception as error:  # damaged data may raise anything
+            self._leave_out(offset, error)
+
+    def _add(self, number: int, channel: Any, schema: Any, count: int) -> None:
+        wire = _WIRES.get(channel.message_encoding)
+        language = "" if schema is None else _LANGUAGES.get(schema.encoding, "")
+        if wire is None or schema is None or (schema.encoding and not language):
+            what = channel.message_encoding or "no encoding"
+            if schema is not None and schema.encoding:
+                what += f" described by {schema.encoding}"
+            self._foreign[channel.topic] = what
+            return
+        try:
+            name = join_name(schema.name)
+        except InvalidNameError:
+            self._foreign[channel.topic] = f"type {schema.name!r:.80}"
+            return
+        metadata = channel.metadata
+        offered: tuple[QoS, ...]
+        if wire == "ros1":
+            offered = (QoS.latched(),) if metadata.get("latching", "") in ("1", "true") else ()
+        else:
+            offered = read_profiles(metadata.get("offered_qos_profiles", ""))
+        self._known[number] = Channel(
+            channel.topic,
+            name,
+            wire,
+            schema.data.decode("utf-8", "replace"),
+            language or "msg",
+            metadata.get("md5sum" if wire == "ros1" else "topic_type_hash", ""),
+            offered,
+            count,
+        )
+
+    def _add_problem(self, problem: str) -> None:
+        self._problems = f"{self._problems}; {problem}" if self._problems else problem
+        _log.warning("%s: %s", self.path, problem)
+        self._update_problem()
+
+    def _leave_out(self, offset: int, error: Exception) -> None:
+        self._left_out.add(f"at byte {offset}", error)
+        self._update_problem()
+
+    def _update_problem(self) -> None:
+        self.problem = "; ".join(filter(None, (self._problems, self._left_out.words())))
+
 
 _COMPRESSIONS = {
     "none": CompressionType.NONE,
@@ -33,10 +260,10 @@ _COMPRESSIONS = {
 
 
 class McapFile(RecordingFile):
-    """An MCAP file with messages of one world.
+    """An MCAP file that is being written, with messages of one ROS.
 
     Args:
-        file: Where to write; closed at the end.
+        file: File to write; closed at the end.
         wire: ``cdr`` or ``ros1``.
         compression: ``none``, ``lz4`` or ``zstd``.
     """
@@ -51,7 +278,7 @@ class McapFile(RecordingFile):
     def channel(
         self, topic: str, kind: MessageType, offered: Sequence[QoS], publisher: bytes
     ) -> int:
-        """Announce messages of a topic; see :meth:`RecordingFile.channel`."""
+        """Add a channel; see :meth:`RecordingFile.channel`."""
         ros1 = self._wire == "ros1"
         name, language = (ros1_name(kind.name), "ros1msg") if ros1 else (kind.name, "ros2msg")
         text = kind.text if isinstance(kind, OpaqueType) else full_text(kind.definition)
@@ -81,7 +308,7 @@ class McapFile(RecordingFile):
         self._writer.flush()
 
     def size(self) -> int:
-        """Return how many bytes the file has by now."""
+        """Return the size of the file in bytes."""
         return self._file.tell()
 
     def finish(self) -> None:

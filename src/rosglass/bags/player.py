@@ -1,4 +1,4 @@
-"""Playing recordings back, at their own pace or another."""
+"""Playing recordings at any speed, with pause, seek and loop."""
 
 from __future__ import annotations
 
@@ -20,61 +20,23 @@ if TYPE_CHECKING:
     from rosglass.bags.bag import Bag, BagMessage, Channel
     from rosglass.comm import Node, Publisher
 
-__all__ = ["Player", "PlayerState", "PlayerStatus"]
-
-
-class PlayedTime:
-    """Seconds by which ages are told; none pass while a recording stands still.
-
-    They never run back, so that nothing old becomes new: to go to another place of the recording
-    makes what is shown older by the distance. Methods may be called in any thread.
-    """
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._value, self._since, self._speed = 0.0, time.monotonic(), 0.0
-
-    def run(self, rate: float) -> None:
-        """Pass at a recording's rate from now on, 0 for not at all.
-
-        Never faster than for the operator: at ten times the speed, what is shown once per second
-        would look ten seconds old.
-        """
-        with self._lock:
-            self._settle()
-            self._speed = min(rate, 1.0)
-
-    def jump(self, seconds: float) -> None:
-        """Pass by the distance to another place, in either direction."""
-        with self._lock:
-            self._value += abs(seconds)
-
-    def now(self) -> float:
-        """Return the seconds since the beginning."""
-        with self._lock:
-            self._settle()
-            return self._value
-
-    def _settle(self) -> None:
-        now = time.monotonic()
-        self._value += (now - self._since) * self._speed
-        self._since = now
+__all__ = ["Playback", "Player", "PlayerState", "PlayerStatus"]
 
 
 _log = logging.getLogger("rosglass.bags")
 _NS = 1_000_000_000
 #: Longest sleep in seconds.
-_NAP = 0.5
-#: Seconds that a lap of a loop lasts at least, however short the recording is.
-_SHORTEST_LAP_S = 0.1
+_MAX_SLEEP_S = 0.5
+#: Shortest duration of a loop in seconds, for very short recordings.
+_MIN_LOOP_S = 0.1
 #: Seconds that closing waits for the player's thread.
-_PATIENCE = 5.0
-#: Undecodable messages that are logged for each topic.
-_MAX_BAD = 3
+_CLOSE_TIMEOUT_S = 5.0
+#: Number of failed messages that are logged for each topic.
+_MAX_LOGGED = 3
 
 
 class PlayerState(Enum):
-    """What a player does."""
+    """The state of a player."""
 
     STARTING = "starting"
     PLAYING = "playing"
@@ -85,14 +47,14 @@ class PlayerState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class PlayerStatus:
-    """How playing is going.
+    """The progress of a player.
 
     Attributes:
-        state: What the player does.
+        state: The state.
         position: Seconds since the recording's first message.
         sent: Messages sent so far.
-        lag: Seconds by which sending is behind, because a message takes longer than its pause.
-        rate: How fast time passes.
+        lag: Seconds by which sending is late, because messages take longer than the time between.
+        rate: Speed; 2 is twice as fast.
     """
 
     state: PlayerState
@@ -103,37 +65,35 @@ class PlayerStatus:
 
 
 class Player(Handle):
-    """Publishes what a recording holds, until its end or until it is closed.
+    """Publishes the messages of a recording, until its end or until it is closed.
 
-    ROS 1 recordings are played to ROS 2 graphs and the reverse, too: messages are translated on
-    the way.
+    Messages of ROS 1 recordings are translated for ROS 2 graphs, and the reverse.
 
     Args:
-        node: Who publishes.
+        node: Node that publishes.
         bag: The recording; the player does not close it.
-        topics: Which topics; empty for all.
-        exclude: Regular expression; topics whose whole name matches are left out.
+        topics: Topics to play; empty for all.
+        exclude: Regular expression; topics whose full name matches are left out.
         remap: New names of topics.
-        rate: How fast time passes: 2 is twice as fast.
-        loop: Whether to begin again at the end. A lap lasts as long as what was selected, whenever
-            its last message comes, and 0.1 s at least.
-        clock: Publish ``/clock`` so many times a second, so that nodes with ``use_sim_time``
-            follow the recording; 0 for not at all. A recorded ``/clock`` is left out then.
-        start: Seconds into the recording at which to begin.
+        rate: Speed; 2 is twice as fast.
+        loop: Whether to start again at the end. A loop lasts as long as the selected part of the
+            recording, even if its last message is earlier, and at least 0.1 s.
+        clock: Rate in Hz at which to publish ``/clock``, so that nodes with ``use_sim_time``
+            follow the recording; 0 to publish none. A recorded ``/clock`` is left out then.
+        start: Start position in seconds.
         duration: Seconds of the recording to play; None for all.
-        delay: Seconds to wait before the first message, so that subscriptions are linked.
-        paused: Whether to begin paused.
+        delay: Seconds to wait before the first message, so that subscriptions can match.
+        paused: Whether to start paused.
         hold: Whether to pause at the end, for :meth:`seek` and :meth:`resume`, instead of ending.
         context: After :meth:`seek`, the newest message of each topic is sent at once if it is not
-            older than so many seconds: what a display showed at that place.
+            older than this, in seconds: what a display showed at that position.
 
     Attributes:
-        channels: What is played.
-        problems: What is not played and why, and what else publishes there, by topic.
-        played: How much time has passed for those who watch.
+        channels: The channels that are played.
+        problems: Why topics are not played, and which other nodes publish there, by topic.
 
     Raises:
-        BagError: An argument makes no sense, or nothing is left to play.
+        BagError: An argument is invalid, or nothing is left to play.
     """
 
     def __init__(
@@ -165,16 +125,18 @@ class Player(Handle):
         self._rate, self._loop = float(rate), loop
         self._begin = bag.start + int(start * _NS)
         self._end = None if duration is None else self._begin + int(duration * _NS)
-        #: Where what was selected ends.
+        #: End of the selected part.
         self._last = bag.end if self._end is None else min(self._end, bag.end)
         self._delay, self._hold, self._context = delay, hold, int(context * _NS)
         self.problems: dict[str, str] = {}
-        self.played = PlayedTime()
         self.channels = self._choose(topics, exclude, clock)
         self._send: dict[Channel, Callable[[bytes], None]] = {}
         self._publishers: list[Publisher] = []
-        self._bad: dict[str, int] = {}
+        self._failed: dict[str, int] = {}
+        #: Guards the state below; notified when it changes.
         self._lock = threading.Condition()
+        #: The viewer's time: a value in seconds, the monotonic time it is of, and its speed.
+        self._played = (0.0, time.monotonic(), 0.0)
         self._paused, self._closed, self._finished = paused, False, False
         self._started = False
         self._steps = 0
@@ -188,7 +150,7 @@ class Player(Handle):
         try:
             self._advertise(remap or {})
         except BaseException:
-            self._withdraw()
+            self._close_publishers()
             raise
         self._thread = threading.Thread(target=self._run, name="player", daemon=True)
         self._thread.start()
@@ -201,21 +163,32 @@ class Player(Handle):
 
     @property
     def moment(self) -> int:
-        """Where it is, as recorded: nanoseconds since the Unix epoch."""
+        """The position as recorded, in nanoseconds since the Unix epoch."""
         return self._position
 
     @property
+    def played(self) -> float:
+        """A monotonic time in seconds that measures the age of messages for a viewer.
+
+        It stands still while the player is paused. It never runs backwards, so that nothing old
+        becomes new: seeking adds the distance. It passes at real time at most: at ten times the
+        speed, a topic of 1 Hz would look ten seconds old.
+        """
+        with self._lock:
+            return self._read_played(time.monotonic())
+
+    @property
     def is_paused(self) -> bool:
-        """Whether time stands still."""
+        """Whether it is paused."""
         return self._paused
 
     @property
     def loop(self) -> bool:
-        """Whether it begins again at the end."""
+        """Whether it starts again at the end."""
         return self._loop
 
     def status(self) -> PlayerStatus:
-        """Return what the player does now."""
+        """Return the state and progress."""
         with self._lock:
             if self._closed:
                 state = PlayerState.CLOSED
@@ -228,15 +201,15 @@ class Player(Handle):
             return PlayerStatus(state, self.position, self._sent, self._lag, self._rate)
 
     def pause(self) -> None:
-        """Let time stand still."""
+        """Pause."""
         self._change(paused=True)
 
     def resume(self) -> None:
-        """Go on after :meth:`pause`."""
+        """Continue after :meth:`pause`."""
         self._change(paused=False)
 
     def step(self) -> None:
-        """Send one message more, and stay paused."""
+        """Send the next message, and stay paused."""
         with self._lock:
             self._steps += 1
             self._paused = True
@@ -244,7 +217,7 @@ class Player(Handle):
             self._lock.notify_all()
 
     def set_rate(self, rate: float) -> None:
-        """Let time pass faster or slower from now on; raises BagError."""
+        """Set the speed; raises BagError if it is invalid."""
         _check("rate", rate, 1e-3, 1e3)
         with self._lock:
             self._rate = float(rate)
@@ -252,15 +225,15 @@ class Player(Handle):
             self._lock.notify_all()
 
     def set_loop(self, loop: bool) -> None:
-        """Begin again at the end, or not."""
+        """Set whether to start again at the end."""
         with self._lock:
             self._loop = loop
 
     def seek(self, seconds: float) -> None:
-        """Go on at another place of the recording; latched messages from before are sent again.
+        """Move to a position in seconds; earlier latched messages are sent again.
 
         Raises:
-            BagError: The recording has no such place.
+            BagError: The recording has no such position.
         """
         _check("position", seconds, 0.0, max(self._bag.duration, 0.0))
         with self._lock:
@@ -286,8 +259,8 @@ class Player(Handle):
             self._closed = True
             self._lock.notify_all()
         if self._thread is not threading.current_thread():
-            self._thread.join(_PATIENCE)
-        self._withdraw()
+            self._thread.join(_CLOSE_TIMEOUT_S)
+        self._close_publishers()
 
     def _choose(self, topics: Iterable[str], exclude: str, clock: float) -> tuple[Channel, ...]:
         if isinstance(topics, str):
@@ -327,8 +300,8 @@ class Player(Handle):
                 _log.warning("%s is not played: %s", channel.topic, error)
         self.channels = tuple(c for c in self.channels if c in self._send)
         if not self.channels:
-            told = "; ".join(f"{topic}: {why}" for topic, why in self.problems.items())
-            raise BagError(f"{self._bag.path} has nothing to play{': ' + told if told else ''}")
+            reasons = "; ".join(f"{topic}: {why}" for topic, why in self.problems.items())
+            raise BagError(f"{self._bag.path} has nothing to play{reasons and ': ' + reasons}")
         if self._clock_period:
             self._clock = self._node.create_publisher(
                 "/clock", "rosgraph_msgs/msg/Clock", QoS.clock()
@@ -349,7 +322,7 @@ class Player(Handle):
             return publisher.publish_serialized
         return lambda data: publisher.publish_serialized(convert(data))
 
-    def _withdraw(self) -> None:
+    def _close_publishers(self) -> None:
         for publisher in self._publishers:
             publisher.close()
 
@@ -358,11 +331,11 @@ class Player(Handle):
             self._lock.wait_for(lambda: self._closed, self._delay)
             self._started = True
             self._set_anchor(self._begin)
-        self._look_around()
+        self._check_publishers()
         try:
             self._play(self._begin)
         except NodeClosedError:
-            pass  # the node went first
+            pass  # the node was closed first
         except Exception as error:
             self.problems[""] = str(error)
             _log.exception("playing %s failed", self._bag.path)
@@ -370,38 +343,38 @@ class Player(Handle):
             self._finished = True
             self._lock.notify_all()
 
-    def _look_around(self) -> None:
-        """Note who else publishes: mixing a recording with a robot's own data is dangerous."""
+    def _check_publishers(self) -> None:
+        """Warn of other publishers: mixing a recording with a robot's own data is dangerous."""
         ours = {publisher.topic for publisher in self._publishers}
         me = self._node.resolve(self._node.name)
         for topic in sorted(ours):
             others = {p.node.full for p in self._node.publishers(topic)} - {me}
             if others:
-                told = f"{', '.join(sorted(others))} publishes here, too: messages get mixed"
-                self.problems.setdefault(topic, told)
-                _log.warning("%s: %s", topic, told)
+                problem = f"{', '.join(sorted(others))} publishes here, too: messages get mixed"
+                self.problems.setdefault(topic, problem)
+                _log.warning("%s: %s", topic, problem)
 
     def _play(self, start: int) -> None:
-        place: int | None = start
-        while place is not None and not self._closed:
+        position: int | None = start
+        while position is not None and not self._closed:
             if self._clock:
-                self._tell_time()
-            if place > self._bag.start:
-                self._send_context(place)
-            place = self._pass(place)
-            if place is None and self._loop and not self._closed:
-                place = self._begin
+                self._publish_clock()
+            if position > self._bag.start:
+                self._send_context(position)
+            position = self._play_from(position)
+            if position is None and self._loop and not self._closed:
+                position = self._begin
                 with self._lock:
-                    self._jump(place)
+                    self._jump(position)
 
-    def _pass(self, start: int) -> int | None:
-        """Play from a place to the end; returns where to go on if there was a seek."""
-        again_at = time.monotonic() + _SHORTEST_LAP_S
+    def _play_from(self, start: int) -> int | None:
+        """Play from a position to the end; return the target of a seek, if there was one."""
+        again_at = time.monotonic() + _MIN_LOOP_S
         for message in self._bag.messages(self.channels, start, self._end):
             if not self._wait_for(message.time):
                 return self._take_target()
             self._publish(message)
-        if self._loop and not self._wait_for_lap(again_at):
+        if self._loop and not self._wait_for_loop(again_at):
             return self._take_target()
         with self._lock:
             holds = self._hold and not self._loop
@@ -410,9 +383,9 @@ class Player(Handle):
                 self._position = self._last
                 self._set_anchor(self._position)
         if holds and self._clock:
-            self._tell_time()
+            self._publish_clock()
         with self._lock:
-            # At the end, a player that was paused can still be sent elsewhere.
+            # A player that is paused at the end can still seek.
             self._lock.wait_for(
                 lambda: self._closed or self._target is not None or not self._paused
             )
@@ -420,8 +393,8 @@ class Player(Handle):
                 self._target = self._begin
         return self._take_target()
 
-    def _wait_for_lap(self, again_at: float) -> bool:
-        """Wait until the next lap is due; returns False when something else is to be done."""
+    def _wait_for_loop(self, again_at: float) -> bool:
+        """Wait until the next loop is due; return False if it was closed or sought instead."""
         if not self._wait_for(self._last, is_message=False):
             return False
         with self._lock:
@@ -429,7 +402,7 @@ class Player(Handle):
             return not self._lock.wait_for(lambda: self._closed or self._target is not None, left)
 
     def _wait_for(self, moment: int, *, is_message: bool = True) -> bool:
-        """Wait until a message is due; returns False when something else is to be done."""
+        """Wait until a message is due; return False if it was closed or sought instead."""
         while True:
             with self._lock:
                 if self._closed or self._target is not None:
@@ -440,56 +413,56 @@ class Player(Handle):
                         self._steps -= is_message
                         self._jump(moment)
                         return True
-                    self._lock.wait(_NAP)
+                    self._lock.wait(_MAX_SLEEP_S)
                     self._set_anchor(self._position)
                     continue
-                place = self._place(now)
-                left = (moment - place) / _NS / self._rate
+                position = self._position_at(now)
+                left = (moment - position) / _NS / self._rate
                 if left <= 0:
                     self._position, self._lag = moment, -left
                     return True
-                self._position = max(self._position, place)
+                self._position = max(self._position, position)
                 tick = self._clock_due - now if self._clock else left
                 if tick > 0:
-                    self._lock.wait(min(left, tick, _NAP))
+                    self._lock.wait(min(left, tick, _MAX_SLEEP_S))
                     continue
-            self._tell_time()
+            self._publish_clock()
 
     def _publish(self, message: BagMessage) -> None:
         if self._clock and time.monotonic() >= self._clock_due:
-            self._tell_time()
+            self._publish_clock()
         try:
             self._send[message.channel](message.data)
         except NodeClosedError:
             raise
         except Error as error:
             topic = message.channel.topic
-            self._bad[topic] = self._bad.get(topic, 0) + 1
-            self.problems[topic] = f"{self._bad[topic]} messages not played, the last: {error}"
-            if self._bad[topic] <= _MAX_BAD:
+            self._failed[topic] = self._failed.get(topic, 0) + 1
+            self.problems[topic] = f"{self._failed[topic]} messages not played, the last: {error}"
+            if self._failed[topic] <= _MAX_LOGGED:
                 _log.warning("%s: a message is not played: %s", topic, error)
             return
         self._sent += 1
 
-    def _tell_time(self) -> None:
+    def _publish_clock(self) -> None:
         assert self._clock is not None
         seconds, rest = divmod(self._position, _NS)
-        words = ("secs", "nsecs") if self._node.wire == "ros1" else ("sec", "nanosec")
-        self._clock.publish(clock={words[0]: seconds, words[1]: rest})
+        names = ("secs", "nsecs") if self._node.wire == "ros1" else ("sec", "nanosec")
+        self._clock.publish(clock=dict(zip(names, (seconds, rest), strict=True)))
         self._clock_due = time.monotonic() + self._clock_period
 
-    def _send_context(self, place: int) -> None:
-        """Send what a display shows of what came before the place where playing begins."""
+    def _send_context(self, start: int) -> None:
+        """Send the earlier messages that a display shows at a start position."""
         latched: list[Channel] = []
         others: list[Channel] = []
         for channel in self.channels:
             kept = channel.profile().durability is Durability.TRANSIENT_LOCAL
             (latched if kept else others).append(channel)
         last: dict[Channel, BagMessage] = {}
-        for message in self._bag.messages(latched, None, place) if latched else ():
+        for message in self._bag.messages(latched, None, start) if latched else ():
             last[message.channel] = message
         if others and self._context:
-            for message in self._bag.messages(others, place - self._context, place):
+            for message in self._bag.messages(others, start - self._context, start):
                 last[message.channel] = message
         for message in sorted(last.values(), key=lambda message: message.time):
             self._publish(message)
@@ -509,15 +482,22 @@ class Player(Handle):
             self._lock.notify_all()
 
     def _jump(self, position: int) -> None:
-        self.played.jump((position - self._position) / _NS)
+        value, at, speed = self._played
+        self._played = (value + abs(position - self._position) / _NS, at, speed)
         self._position = position
         self._set_anchor(position)
 
     def _set_anchor(self, position: int) -> None:
-        self._anchor = (time.monotonic(), position)
-        self.played.run(self._rate if self._started and not self._paused else 0.0)
+        now = time.monotonic()
+        self._anchor = (now, position)
+        runs = self._started and not self._paused
+        self._played = (self._read_played(now), now, min(self._rate, 1.0) if runs else 0.0)
 
-    def _place(self, now: float) -> int:
+    def _read_played(self, now: float) -> float:
+        value, at, speed = self._played
+        return value + (now - at) * speed
+
+    def _position_at(self, now: float) -> int:
         began, position = self._anchor
         return position + int((now - began) * self._rate * _NS)
 
@@ -526,3 +506,133 @@ def _check(what: str, value: Any, low: float, high: float) -> None:
     good = isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(value)
     if not good or not low <= value <= high:
         raise BagError(f"{what} must be a number from {low:g} to {high:g}, got {value!r}")
+
+
+#: Rate of ``/clock`` in Hz.
+_CLOCK_HZ = 100.0
+
+
+class Playback(Handle):
+    """Plays a recording, which pauses at its end or starts again.
+
+    Args:
+        node: Node that publishes.
+        bag: The recording; closed together with this, also if it cannot be played.
+        rate: Speed; 2 is twice as fast.
+        loop: Whether to start again at the end.
+        paused: Whether to start paused.
+        topics: Topics to play; empty for all.
+        clock: Whether to publish ``/clock``, unless it was recorded.
+        delay: Seconds until the first message.
+        context: As for :class:`Player`.
+
+    Attributes:
+        path: Path of the recording.
+        start: Time of its start, in nanoseconds since the Unix epoch.
+        duration: Its length in seconds.
+        has_clock: Whether ``/clock`` was recorded.
+
+    Raises:
+        BagError: It holds nothing to play, or an argument is invalid.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        bag: Bag,
+        *,
+        rate: float = 1.0,
+        loop: bool = False,
+        paused: bool = False,
+        topics: Iterable[str] = (),
+        clock: bool = False,
+        delay: float = 1.0,
+        context: float = 0.0,
+    ) -> None:
+        self.path, self._bag = bag.path, bag
+        self.start, self.duration = bag.start, max(bag.duration, 0.0)
+        self.has_clock = any(channel.topic == "/clock" for channel in bag.channels)
+        try:
+            self._player = Player(
+                node,
+                bag,
+                rate=rate,
+                loop=loop,
+                paused=paused,
+                topics=topics,
+                clock=_CLOCK_HZ if clock and not self.has_clock else 0.0,
+                delay=delay,
+                hold=True,
+                context=context,
+            )
+        except BaseException:
+            bag.close()
+            raise
+
+    @property
+    def position(self) -> float:
+        """Seconds since the start."""
+        return self._player.position
+
+    @property
+    def moment(self) -> int:
+        """The position as recorded, in nanoseconds since the Unix epoch."""
+        return self._player.moment
+
+    @property
+    def played(self) -> float:
+        """A monotonic time in seconds for viewers; see :attr:`Player.played`."""
+        return self._player.played
+
+    @property
+    def is_playing(self) -> bool:
+        """Whether it plays."""
+        running = self._player.status().state in {PlayerState.STARTING, PlayerState.PLAYING}
+        return running and not self._player.is_paused
+
+    @property
+    def is_at_end(self) -> bool:
+        """Whether it has paused at the end."""
+        return not self.is_playing and self.position >= self.duration
+
+    @property
+    def rate(self) -> float:
+        """The speed; 2 is twice as fast."""
+        return self._player.status().rate
+
+    @property
+    def loop(self) -> bool:
+        """Whether it starts again at the end."""
+        return self._player.loop
+
+    @property
+    def problem(self) -> str:
+        """What is not played, and why; empty if everything is."""
+        problems = dict(self._player.problems)
+        parts = [self._bag.problem, *(f"{t}: {why}" if t else why for t, why in problems.items())]
+        return "; ".join(filter(None, parts))
+
+    def play(self) -> None:
+        """Play; from the start if the end was reached."""
+        self._player.resume()
+
+    def pause(self) -> None:
+        """Pause."""
+        self._player.pause()
+
+    def seek(self, seconds: float) -> None:
+        """Move to a position in seconds; raises BagError if there is none."""
+        self._player.seek(seconds)
+
+    def set_rate(self, rate: float) -> None:
+        """Set the speed; raises BagError if it is invalid."""
+        self._player.set_rate(rate)
+
+    def set_loop(self, loop: bool) -> None:
+        """Set whether to start again at the end instead of pausing."""
+        self._player.set_loop(loop)
+
+    def close(self) -> None:
+        """Stop; safe to call twice."""
+        self._player.close()
+        self._bag.close()

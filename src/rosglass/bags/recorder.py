@@ -1,4 +1,4 @@
-"""Recording topics into a file: MCAP, or a ROS 1 bag."""
+"""Recording topics to a file: MCAP, or a ROS 1 bag."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ from concurrent.futures import wait
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
-from rosglass.bags.recording_file import create
 from rosglass.comm import IMMEDIATE, Handle, QoS
 from rosglass.comm.names import similar
 from rosglass.errors import BagError, Error, NodeClosedError
@@ -23,33 +22,82 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Iterable
 
+    from rosglass.bags.bag import RecordingFile
     from rosglass.comm import Node, Promise, Sample, Subscription
     from rosglass.messages import MessageType
 
-__all__ = ["Recorder", "RecordingStatus"]
+__all__ = ["DEFAULT_COMPRESSION", "Recorder", "RecordingStatus", "create"]
+
+
+#: The compressions of each format, and its default.
+_COMPRESSIONS = {".mcap": ("zstd", "lz4", "none"), ".bag": ("none", "lz4", "bz2")}
+DEFAULT_COMPRESSION = {".mcap": "zstd", ".bag": "none"}
+
+
+def create(path: Path, wire: str, compression: str) -> RecordingFile:
+    """Return a new recording: a ROS 1 bag for ``.bag``, MCAP for any other name.
+
+    Args:
+        path: The file; it must not exist.
+        wire: Wire format of all messages, ``cdr`` or ``ros1``.
+        compression: ``zstd`` (MCAP), ``lz4``, ``bz2`` (ROS 1 bags) or ``none``; empty for the
+            format's own.
+
+    Raises:
+        BagError: The file cannot be written, or cannot hold such messages.
+    """
+    kind = ".bag" if path.suffix == ".bag" else ".mcap"
+    compression = compression or DEFAULT_COMPRESSION[kind]
+    if compression not in _COMPRESSIONS[kind]:
+        raise BagError(
+            f"{kind} files have no compression {compression!r}: {', '.join(_COMPRESSIONS[kind])}"
+        )
+    if kind == ".bag" and wire != "ros1":
+        raise BagError(f"{path} would be a ROS 1 bag, and this is ROS 2: name it .mcap")
+    try:
+        file = path.open("xb")
+    except OSError as error:
+        hints = {
+            FileExistsError: "; choose another name",
+            FileNotFoundError: f": make the folder {path.parent} first",
+        }
+        hint = hints.get(type(error), "")
+        raise BagError(f"{path} cannot be written: {error.strerror}{hint}") from error
+    return _make(path, file, wire, compression)
+
+
+def _make(path: Path, file: BinaryIO, wire: str, compression: str) -> RecordingFile:
+    if path.suffix == ".bag":
+        from rosglass.bags.ros1_bag_file import Ros1BagFile  # noqa: PLC0415 - slow to import
+
+        return Ros1BagFile(path, file, compression)
+    from rosglass.bags.mcap_file import McapFile  # noqa: PLC0415 - the library is an extra
+
+    return McapFile(file, wire, compression)
+
 
 _log = logging.getLogger("rosglass.bags")
-#: Seconds between two writes of the chunk in progress: half of what a crash may cost, as a busy
-#: machine comes late.
+#: Seconds between two writes of the chunk in progress: half of the loss in a crash, as a busy
+#: machine may be late.
 _FLUSH_INTERVAL_S = 0.5
 #: Samples that a subscription keeps while the writer is busy.
 _DEPTH = 1000
-#: Seconds that the robot may take to tell a definition, and that closing still waits for it.
-_FETCH, _LAST_FETCH = 5.0, 2.0
-#: Seconds that closing waits for what was received to be written.
-_PATIENCE = 60.0
+#: Timeouts in seconds for fetching a definition from the robot, and the same while closing.
+_FETCH_TIMEOUT_S, _LAST_FETCH_TIMEOUT_S = 5.0, 2.0
+#: Seconds that closing waits for received messages to be written.
+_CLOSE_TIMEOUT_S = 60.0
 
 
 @dataclass(frozen=True, slots=True)
 class RecordingStatus:
-    """How a recording is doing.
+    """The progress of a recording.
 
     Attributes:
         topics: Messages written, by topic.
-        dropped: Messages that came faster than they could be written.
-        size: Bytes in the file so far.
+        dropped: Messages that were received faster than they could be written.
+        size: Size of the file in bytes.
         duration: Seconds since the start.
-        problems: What keeps topics from being recorded, in words, by topic.
+        problems: Why topics are not recorded, by topic.
     """
 
     topics: dict[str, int]
@@ -60,34 +108,34 @@ class RecordingStatus:
 
     @property
     def messages(self) -> int:
-        """Messages written in all."""
+        """Total number of messages written."""
         return sum(self.topics.values())
 
 
 class Recorder(Handle):
-    """Writes topics into a file, each as its publishers offer it, until it is closed.
+    """Records topics to a file, with QoS profiles compatible with their publishers, until closed.
 
     Messages are stored as received, with the definitions of their types, so that the file can be
-    played anywhere; types that nobody can describe are stored by name and hash. Messages of a type
-    that the robot has to be asked for wait for its answer. What the file holds is complete up to a
-    second before the program is killed; rosbag wants a ROS 1 bag reindexed then.
+    played anywhere; types whose definition is unknown are stored by name and hash. Messages of a
+    type whose definition is fetched from the robot are held until it answers. If the program is
+    killed, the file lacks at most the last second; a ROS 1 bag needs ``rosbag reindex`` then.
 
     Args:
-        node: Where to listen.
-        path: File to write; it must not exist. From ROS 1, a name that ends with ``.bag`` makes a
-            ROS 1 bag; any other makes an MCAP file.
-        topics: Names of topics, absolute or relative; empty for all that there are and that
-            appear later, hidden ones excepted.
-        include: Regular expression; topics whose whole name matches are recorded as well.
-        exclude: Regular expression; topics whose whole name matches are never recorded.
-        hidden: Whether hidden topics (of actions, say) are among "all".
+        node: Node that subscribes.
+        path: File to write; it must not exist. In ROS 1, a name that ends with ``.bag`` creates a
+            ROS 1 bag; any other creates an MCAP file.
+        topics: Names of topics, absolute or relative; empty for all topics, present and future,
+            except hidden ones.
+        include: Regular expression; topics whose full name matches are recorded as well.
+        exclude: Regular expression; topics whose full name matches are never recorded.
+        hidden: Whether "all" includes hidden topics, such as those of actions.
         compression: ``zstd`` (MCAP only), ``lz4``, ``bz2`` (ROS 1 bags only) or ``none``; empty for
-            ``zstd`` in MCAP, and none in ROS 1 bags, as ``rosbag record`` has it.
-        memory: Bytes of messages that may wait for the disk, or for their type; what comes beyond
-            is dropped, counted and logged.
+            ``zstd`` in MCAP and ``none`` in ROS 1 bags, as with ``rosbag record``.
+        memory: Bytes of messages that may wait for the disk or for their type; further ones are
+            dropped, counted and logged.
 
     Raises:
-        BagError: The file cannot be written, or an argument makes no sense.
+        BagError: The file cannot be written, or an argument is invalid.
         InvalidNameError: A topic's name breaks ROS's rules.
     """
 
@@ -122,22 +170,22 @@ class Recorder(Handle):
         self._failed: dict[str, str] = {}
         self._counts: dict[str, int] = {}
         self._channels: dict[tuple[str, str, str, bytes], int] = {}
-        #: Definitions that the robot is asked for, and the messages that wait for them.
+        #: Definitions being fetched from the robot, and the messages that wait for them.
         self._fetches: dict[tuple[str, str], Promise[Any]] = {}
         self._held: dict[tuple[str, str], list[tuple[str, Sample]]] = {}
         self._closed = False
         self._file = create(self.path, node.wire, compression)
         self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
         self._thread.start()
-        self._graph = node.on_graph_change(self._follow)
-        self._follow()
+        self._graph = node.on_graph_change(self._on_graph_change)
+        self._on_graph_change()
 
     def status(self) -> RecordingStatus:
-        """Return counts as of now.
+        """Return the progress.
 
         Raises:
-            BagError: The disk is full, or the file cannot be written for another reason; nothing
-                more is recorded.
+            BagError: The disk is full, or the file cannot be written for another reason; recording
+                has stopped.
         """
         if self._failure:
             raise BagError(self._failure)
@@ -149,12 +197,12 @@ class Recorder(Handle):
             }
             types = Counter(topic for topic, _ in self._subscriptions)
             for (topic, _), subscription in self._subscriptions.items():
-                # Each of several is told that the others are there.
-                told = types[topic] > 1 and subscription.type is not None
-                if subscription.problem and not told:
+                # Where a topic has several types, each subscription reports the others as problem.
+                is_one_of_several = types[topic] > 1 and subscription.type is not None
+                if subscription.problem and not is_one_of_several:
                     problems[topic] = subscription.problem
             for topic in sorted(self._topics - types.keys() - problems.keys()):
-                problems[topic] = f"nobody publishes it{self._guess(topic)}"
+                problems[topic] = f"no publisher{self._find_similar(topic)}"
             counts = {topic: self._counts.get(topic, 0) for topic in sorted(types)}
             duration = time.monotonic() - self._started
             return RecordingStatus(counts, self._dropped, self._size, duration, problems)
@@ -175,13 +223,13 @@ class Recorder(Handle):
             subscription.close()
         with self._lock:
             self._lock.notify_all()
-        self._thread.join(_PATIENCE)
+        self._thread.join(_CLOSE_TIMEOUT_S)
         if self._thread.is_alive():
-            raise BagError(f"{self.path} is cut short: the disk does not take it")
+            raise BagError(f"{self.path} is incomplete: the disk is too slow or blocked")
         if self._failure:
             raise BagError(self._failure)
 
-    def _follow(self) -> None:
+    def _on_graph_change(self) -> None:
         try:
             found = self._node.topics()
         except NodeClosedError:
@@ -190,7 +238,7 @@ class Recorder(Handle):
             if not self._wants(topic):
                 continue
             types = {p.type for p in self._node.publishers(topic)}
-            # In ROS 1, a connection says what is sent, and the master may not know.
+            # In ROS 1, the connection announces the type; the master may not know it.
             for type_name in sorted(types) if self._ros2 else ("",):
                 self._subscribe(topic, type_name)
 
@@ -206,7 +254,7 @@ class Recorder(Handle):
             chosen = not self._topics and (self._hidden or not hidden)
         return chosen and bool(self._node.publishers(topic))
 
-    def _guess(self, topic: str) -> str:
+    def _find_similar(self, topic: str) -> str:
         with suppress(NodeClosedError):
             known = [name for name in self._node.topics() if self._node.publishers(name)]
             return similar(topic, known)
@@ -214,14 +262,14 @@ class Recorder(Handle):
 
     def _subscribe(self, topic: str, type_name: str) -> None:
         with self._lock:
-            # Two changes of the graph may be looked at at once.
+            # Graph changes may be handled concurrently.
             if self._closed or (topic, type_name) in self._begun:
                 return
             self._begun.add((topic, type_name))
         try:
             subscription = self._open(topic, type_name or None)
             if subscription.type is None and type_name:
-                # Its definition is not here: what comes until the robot has told it counts, too.
+                # Record as bytes until the definition is fetched.
                 subscription.close()
                 subscription = self._open(topic, OpaqueType(type_name))
         except Error as error:
@@ -266,7 +314,7 @@ class Recorder(Handle):
             while True:
                 with self._lock:
                     self._lock.wait_for(
-                        lambda: self._queue or self._closed or self._told(),
+                        lambda: self._queue or self._closed or self._fetched_types(),
                         flush_at - time.monotonic(),
                     )
                     batch, closed = list(self._queue), self._closed
@@ -278,12 +326,12 @@ class Recorder(Handle):
                     if not self._hold(topic, sample):
                         self._write(topic, sample, sample.type)
                 if closed and not batch:
-                    wait([self._fetches[key] for key in self._held], _LAST_FETCH)
-                for key in self._told() if not closed or batch else list(self._held):
+                    wait([self._fetches[key] for key in self._held], _LAST_FETCH_TIMEOUT_S)
+                for key in self._fetched_types() if not closed or batch else list(self._held):
                     self._release(key)
                 if lost:
-                    told = ", ".join(f"{count} of {topic}" for topic, count in lost.items())
-                    _log.warning("%s: too much for the disk, lost %s", self.path, told)
+                    counts = ", ".join(f"{count} of {topic}" for topic, count in lost.items())
+                    _log.warning("%s: the disk is too slow, dropped %s", self.path, counts)
                 if time.monotonic() >= flush_at:
                     self._file.flush()
                     flush_at = time.monotonic() + _FLUSH_INTERVAL_S
@@ -300,9 +348,9 @@ class Recorder(Handle):
                 self._file.close()
 
     def _hold(self, topic: str, sample: Sample) -> bool:
-        """Keep a message whose type is not known yet; returns whether that was necessary."""
+        """Hold a message whose definition is being fetched; return whether it is held."""
         kind = sample.type
-        # ROS 1's publishers have told their definitions already, or never will.
+        # ROS 1 publishers send their definition when they connect, or never.
         if not isinstance(kind, OpaqueType) or not self._ros2:
             return False
         key = (kind.name, kind.rihs01)
@@ -311,7 +359,7 @@ class Recorder(Handle):
         if key not in self._fetches:
             try:
                 self._fetches[key] = self._node.fetch_type_async(
-                    kind.name, hash=kind.rihs01, timeout=_FETCH
+                    kind.name, hash=kind.rihs01, timeout=_FETCH_TIMEOUT_S
                 )
             except Error as error:
                 self._failed[topic] = f"recorded as bytes: {error}"
@@ -320,12 +368,12 @@ class Recorder(Handle):
             self._held.setdefault(key, []).append((topic, sample))
         return True
 
-    def _told(self) -> list[tuple[str, str]]:
-        """Return the types that messages wait for no longer."""
+    def _fetched_types(self) -> list[tuple[str, str]]:
+        """Return the types whose fetch is done, and whose messages are held."""
         return [key for key in self._held if self._fetches[key].done()]
 
     def _release(self, key: tuple[str, str]) -> None:
-        """Write the messages that waited for a type, which may have remained unknown."""
+        """Write the messages that were held for a type, whether it was fetched or not."""
         with self._lock:
             held = self._held.pop(key)
         fetch, known, reason = self._fetches[key], None, ""
@@ -349,13 +397,13 @@ class Recorder(Handle):
         self._counts[topic] = self._counts.get(topic, 0) + 1
 
     def _key(self, topic: str, sample: Sample) -> tuple[str, str, str, bytes]:
-        """Return what a channel of the file has in common."""
+        """Return the key of a message's channel in the file."""
         kind = sample.type
-        told = kind.rihs01 if self._ros2 else kind.md5
-        return topic, kind.name, told, sample.publisher if self._file.by_publisher else b""
+        type_hash = kind.rihs01 if self._ros2 else kind.md5
+        return topic, kind.name, type_hash, sample.publisher if self._file.by_publisher else b""
 
     def _offered(self, topic: str, sample: Sample) -> list[QoS]:
-        """Return the quality of service of those who may have sent a message."""
+        """Return the QoS profiles of the publishers that may have sent a message."""
         publishers = self._node.publishers(topic)
         if self._file.by_publisher:
             name = sample.publisher.decode(errors="replace")

@@ -1,4 +1,4 @@
-"""A recording in a robot's place: ``rosglass.connect("replay:drive.mcap")``."""
+"""A recording instead of a robot: ``rosglass.connect("replay:drive.mcap")``."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, quote, unquote
 
 from rosglass.bags.bag import open_bag
-from rosglass.bags.playback import Playback
+from rosglass.bags.player import Playback
 from rosglass.comm import (
     IMMEDIATE,
     ConnectionState,
@@ -40,36 +40,36 @@ if TYPE_CHECKING:
 
 __all__ = ["ReplayNode", "connect_replay", "replay_url"]
 
-#: How the address of a recording begins.
+#: The beginning of a recording's URL.
 _SCHEME = "replay:"
-#: Seconds until the first message: subscriptions are made meanwhile.
+#: Seconds until the first message, in which subscriptions are created.
 _DELAY_S = 0.5
-#: Seconds of which the newest messages are shown at a place that was sought out.
+#: Seconds before the target of a seek whose newest messages are sent.
 _CONTEXT_S = 3.0
 _OPTIONS = "rate=2, loop=true, paused=true"
 
 
 class ReplayNode(Ros2Node):
-    """A node to which a recording is played.
+    """A node that receives a recording.
 
-    Its subscriptions receive what was recorded, its clock shows the recording's time, and what it
-    publishes is sent nowhere. A recorded ``/clock`` is the time; without one, the times at which
-    the messages were recorded.
+    Its subscriptions receive the recorded messages, its clock follows the recording, and its own
+    messages are discarded. The time is that of a recorded ``/clock``, or else the time at which
+    each message was recorded.
 
     Args:
         path: The recording.
-        url: What it was connected with.
+        url: URL that it was created with.
         name: Base name.
         namespace: Absolute namespace.
-        rate: How fast time passes.
-        loop: Whether to begin again at the end; otherwise it pauses there.
-        paused: Whether to begin paused.
+        rate: Speed; 2 is twice as fast.
+        loop: Whether to start again at the end; it pauses there otherwise.
+        paused: Whether to start paused.
 
     Attributes:
-        playback: Controls the time.
+        playback: Controls pausing, seeking and speed.
 
     Raises:
-        BagError: It cannot be read, or the rate is none.
+        BagError: The recording cannot be read, or the rate is invalid.
     """
 
     def __init__(
@@ -96,14 +96,14 @@ class ReplayNode(Ros2Node):
             raise
         self._played = _ReplayWire(local, wire)
         self._played.arrival = lambda: self.clock.now().nanoseconds
-        self._stage = _Stage(self._played, url, "recording")
-        self._recorded_types = _RecordedTypes(url, 1 if ros1 else 2, self._stage.types)
+        self._recording_node = _RecordingNode(self._played, url, "recording")
+        self._recorded_types = _RecordedTypes(url, 1 if ros1 else 2, self._recording_node.types)
         self._core.types = self._recorded_types
         self._core.create_writer = lambda *_: _DiscardingWriter()
         self._core.clock.simulate(True)
         try:
             self.playback = Playback(
-                self._stage,
+                self._recording_node,
                 bag,
                 rate=rate,
                 loop=loop,
@@ -113,42 +113,42 @@ class ReplayNode(Ros2Node):
                 context=_CONTEXT_S,
             )
             if not self.playback.has_clock:
-                # The clock ticks; messages came in between.
+                # The clock advances in steps; messages were recorded between them.
                 self._played.arrival = lambda: self.playback.moment
                 self._core.clock.advance(Time(self.playback.start))
             super().create_subscription(
                 "/clock", "rosgraph_msgs/msg/Clock", qos=QoS.clock(),
-                raw_callback=self._on_tick, executor=IMMEDIATE,
+                raw_callback=self._on_clock, executor=IMMEDIATE,
             )  # fmt: skip
         except BaseException:
             super().close()
-            self._stage.close()
+            self._recording_node.close()
             raise
         self._path = path
 
     def choose(self, topics: Iterable[str]) -> None:
-        """Play these topics only; all when there are none."""
+        """Play these topics only; all topics if there are none."""
         self._played.choose({self.resolve(topic) for topic in topics})
 
     def status(self) -> Status:
-        """Return which recording is played."""
+        """Return the state: connected, with the path of the recording."""
         found = super().status()
         if found.state is not ConnectionState.CONNECTED:
             return found
         return Status(ConnectionState.CONNECTED, f"playing the recording {self._path}")
 
     def steady(self) -> float:
-        """Return seconds that pass only while the recording is played."""
+        """Return a monotonic time in seconds that stands still while the recording is paused."""
         return self.playback.played
 
     def create_publisher(
         self, topic: str, type: str | MessageType, qos: QoS | int = 10
     ) -> Publisher:
-        """Return a publisher whose messages reach nobody, and which says so."""
+        """Return a publisher whose messages are discarded, which its problem states."""
         self._core.check_open()
         kind = self._core.types.message(type)
         profile = qos if isinstance(qos, QoS) else QoS(depth=qos)
-        return _UnheardPublisher(self._core, self.resolve(topic), kind, profile)
+        return _DiscardingPublisher(self._core, self.resolve(topic), kind, profile)
 
     def create_subscription(
         self,
@@ -164,13 +164,13 @@ class ReplayNode(Ros2Node):
         """Subscribe to a topic; arguments and errors as for every node."""
         recorded, known = self._played.recorded(self.resolve(topic)), type
         if recorded and (type is None or isinstance(type, str)):
-            # Known at once, also while the topic is left out: a recording that is paused sends
-            # nothing a second time.
+            # The type is known at once, even of a topic that is not selected: a paused recording
+            # sends nothing twice.
             known = recorded[0].type if type is None else type
             if callback is None:
                 known = self._recorded_types.find_opaque(known) or known
         profile = qos if isinstance(qos, QoS) else QoS(depth=qos)
-        # ROS 1 sends what is latched to every subscriber, and what was not recorded is no conflict.
+        # ROS 1 sends latched messages to every subscriber; an unrecorded QoS is no conflict.
         if self.wire == "ros1" or self.resolve(topic) in self._unprofiled:
             profile = replace(profile, durability=Durability.BEST_AVAILABLE)
         qos = profile.for_subscription([info.qos for info in recorded])
@@ -192,13 +192,13 @@ class ReplayNode(Ros2Node):
         node: str | NodeName | None = None,  # noqa: ARG002 - the recording has no nodes
         timeout: float | None = 5.0,  # noqa: ARG002 - it answers at once
     ) -> MessageType:
-        """Return a type as it was recorded, else as this machine knows it."""
+        """Return a type as recorded, or else as defined on this machine."""
         return self._core.types.message(name, hash)
 
     def close(self) -> None:
         """Stop playing; safe to call twice."""
         self.playback.close()
-        self._stage.close()
+        self._recording_node.close()
         super().close()
 
     # A recording answers no requests.
@@ -213,18 +213,18 @@ class ReplayNode(Ros2Node):
 
     def _unsupported(self, what: str) -> UnsupportedError:
         return UnsupportedError(
-            f"{what}: {self.playback.path} is a recording, which answers nobody"
+            f"{what}: {self.playback.path} is a recording, which answers no requests"
         )
 
-    def _on_tick(self, sample: Sample) -> None:
+    def _on_clock(self, sample: Sample) -> None:
         self._core.clock.advance(Time(sample.message().clock.nanoseconds))
 
 
-class _Stage(Ros2Node):
-    """The node that publishes what was recorded.
+class _RecordingNode(Ros2Node):
+    """The node that publishes the recorded messages.
 
     Attributes:
-        types: What it publishes.
+        types: Types of its publishers.
     """
 
     def __init__(self, middleware: LocalMiddleware, url: str, name: str) -> None:
@@ -241,17 +241,18 @@ class _Stage(Ros2Node):
 
 
 class _ReplayWire(LocalMiddleware):
-    """A node's end of the wire between a recording and those who watch it.
+    """A connection to the graph between a recording and its viewer.
 
     Args:
         url: ``local://NAME``.
         wire: Wire format of the recording.
 
     Attributes:
-        arrival: Returns when a message that is sent now arrived, nanoseconds since the Unix epoch.
+        arrival: Returns the time of reception for a message that is sent now, in nanoseconds since
+            the Unix epoch.
     """
 
-    # Recorded are messages that were received, whatever was asked for then.
+    # The messages were received when they were recorded, whatever their profiles.
     matches_qos = False
 
     arrival: Callable[[], int] = time.time_ns
@@ -266,11 +267,11 @@ class _ReplayWire(LocalMiddleware):
         return self._writers[-1]
 
     def stamp(self) -> tuple[int, int | None]:
-        """Return when the sample that is sent now was recorded."""
+        """Return the time at which the sample that is sent now was recorded."""
         return self.arrival(), None
 
     def choose(self, topics: set[str]) -> None:
-        """Show these topics, and ``/clock``; all when there are none."""
+        """Announce these topics and ``/clock``; all topics if there are none."""
         for writer in self._writers:
             if not topics or writer.info.name in {*topics, "/clock"}:
                 writer.show()
@@ -278,17 +279,17 @@ class _ReplayWire(LocalMiddleware):
                 writer.hide()
 
     def recorded(self, topic: str) -> list[EndpointInfo]:
-        """Return the publishers of a topic, also while it is left out."""
+        """Return the publishers of a topic, even if it is not announced."""
         return [writer.info for writer in self._writers if writer.info.name == topic]
 
 
 class _RecordedTypes(Types):
-    """Finds types as they were recorded, others in the library.
+    """Finds types as recorded, and others in the library.
 
     Args:
-        url: The node's URL, for messages.
-        ros: The ROS of the recording.
-        recorded: The types that are played.
+        url: URL of the node, for error texts.
+        ros: ROS version of the recording.
+        recorded: Types of the recording.
     """
 
     def __init__(self, url: str, ros: int, recorded: list[MessageType]) -> None:
@@ -306,17 +307,17 @@ class _RecordedTypes(Types):
         return super().message(wanted, hash)
 
     def opaque(self, name: str, hash: str, reason: str) -> OpaqueType:
-        """Return what stands for a message type without definition."""
+        """Return a placeholder for a message type without definition."""
         found = self._find_recorded(name, hash)
         return found if isinstance(found, OpaqueType) else super().opaque(name, hash, reason)
 
     def find_opaque(self, name: str) -> OpaqueType | None:
-        """Return what stands for a type that was recorded without definition."""
+        """Return the placeholder of a type that was recorded without definition."""
         found = self._find_recorded(join_name(name), "")
         return found if isinstance(found, OpaqueType) else None
 
     def request(self, *_: Any) -> str:
-        """Say that no robot is there to be asked."""
+        """Return why the type cannot be requested from a robot."""
         return "a recording cannot be asked for it"
 
     def _find_recorded(self, name: str, hash: str) -> MessageType | None:
@@ -326,28 +327,28 @@ class _RecordedTypes(Types):
         return None
 
 
-class _UnheardPublisher(Publisher):
-    """Checks what an interface publishes while it shows a recording."""
+class _DiscardingPublisher(Publisher):
+    """A publisher that checks messages but discards them."""
 
     @property
     def problem(self) -> str:
-        """Why no robot gets anything."""
+        """Why no robot receives its messages."""
         return "this is a recording: what is published reaches no robot"
 
     @property
     def hint(self) -> str:
-        """Nothing: the recording has no subscriptions."""
+        """Empty: a recording has no subscriptions."""
         return ""
 
 
 class _DiscardingWriter(Writer):
-    """The sending end of a publisher without robot."""
+    """A writer that discards its samples."""
 
     def write(self, data: bytes | bytearray) -> None:
-        """Send nothing."""
+        """Discard the payload."""
 
     def subscribers(self) -> list[EndpointInfo]:
-        """Return none."""
+        """Return no subscribers."""
         return []
 
     def close(self) -> None:
@@ -357,7 +358,7 @@ class _DiscardingWriter(Writer):
 def connect_replay(url: str, name: str, namespace: str) -> ReplayNode:
     """Connect to a recording: ``replay:drive.mcap``, ``replay:/data/drive.bag?rate=2&loop=true``.
 
-    In the path, ``%3F``, ``%23`` and ``%25`` are ``?``, ``#`` and ``%``, as in every URL.
+    In the path, ``%3F``, ``%23`` and ``%25`` stand for ``?``, ``#`` and ``%``, as in every URL.
 
     Raises:
         ConversionError: An option is not valid.
@@ -382,6 +383,6 @@ def connect_replay(url: str, name: str, namespace: str) -> ReplayNode:
 
 
 def replay_url(path: str) -> str:
-    """Return the address of a recording, whatever characters its path has."""
-    # What is no part of a URL's syntax stays readable.
+    """Return the URL of a recording, with special characters of its path escaped."""
+    # Escape only the characters of the URL's syntax, to keep it readable.
     return _SCHEME + "".join(quote(c, safe="") if c in "?#%" else c for c in path)

@@ -17,9 +17,7 @@ from rosbags.rosbag1.reader import decompressors
 from rosbags.rosbag2 import reader as rosbag2_reader
 from rosbags.rosbag2 import storage_mcap
 
-from rosglass.bags.bag import Bag, BagMessage, Channel
-from rosglass.bags.chunks import LeftOut, decompress
-from rosglass.bags.qos_text import profile
+from rosglass.bags.bag import Bag, BagMessage, Channel, LeftOut, decompress, parse_profile
 from rosglass.comm import QoS
 from rosglass.comm.text_files import check_yaml, read_text
 from rosglass.errors import BagError
@@ -30,11 +28,11 @@ if TYPE_CHECKING:
 
 __all__ = ["RosbagsBag"]
 
-#: Bytes of a metadata.yaml.
-_MOST_METADATA = 64 * 2**20
-#: Bytes that stay free where files that are compressed as a whole are unpacked.
-_FREE = 2**30
-#: Bytes of these that are unpacked at a time.
+#: Size limit of a metadata.yaml in bytes.
+_MAX_METADATA = 64 * 2**20
+#: Disk space in bytes to leave free when a whole file is decompressed.
+_MIN_FREE = 2**30
+#: Bytes of it that are decompressed at a time.
 _PIECE = 4 * 2**20
 
 
@@ -50,27 +48,27 @@ class RosbagsBag(Bag):
         try:
             _check_metadata(path / "metadata.yaml")
             _check_databases(path)
-            # AnyReader refuses whole bags for one definition that is missing or wrong.
+            # AnyReader refuses a whole bag for one missing or wrong definition.
             self._reader: Any = Reader(path) if path.suffix == ".bag" else AnyReader([path])
             self._reader.open()
         except BagError:
             raise
-        except Exception as error:  # whatever the damage leads to, in whichever library below
+        except Exception as error:  # damaged data may raise anything in the libraries
             raise BagError(
-                f"{path} cannot be read as a recording: {_words(error)}; there are MCAP files "
+                f"{path} cannot be read as a recording: {_describe(error)}; there are MCAP files "
                 "(.mcap), ROS 2 bags (a folder with metadata.yaml, .db3) and ROS 1 bags (.bag)"
             ) from error
         self._open = True
         self._left_out = LeftOut(path, "message")
         try:
-            self._limit()
+            self._limit_decompression()
             self._index()
-        except Exception as error:  # metadata of other kinds than the format has
+        except Exception as error:  # metadata of wrong types
             self.close()
-            raise BagError(f"{path} is damaged: {_words(error)}") from error
+            raise BagError(f"{path} is damaged: {_describe(error)}") from error
 
-    def _limit(self) -> None:
-        """Have nothing decompressed beyond the limit."""
+    def _limit_decompression(self) -> None:
+        """Decompress chunks and messages here, within the limit."""
         self._by_message = False
         if isinstance(self._reader, Reader):
             self._reader.chunks = {
@@ -125,8 +123,8 @@ class RosbagsBag(Bag):
                         self.problem = self._left_out.words()
                         continue
                 yield BagMessage(channel, time, content)
-        except Exception as error:  # whatever the damage leads to
-            raise BagError(f"{self.path} is damaged: {_words(error)}") from error
+        except Exception as error:  # damaged data may raise anything
+            raise BagError(f"{self.path} is damaged: {_describe(error)}") from error
 
     def close(self) -> None:
         """Close the files."""
@@ -136,22 +134,22 @@ class RosbagsBag(Bag):
 
 
 def _check_metadata(path: Path) -> None:
-    """Raise YAMLError where YAML in a bag's metadata stands for more than it may."""
+    """Raise YAMLError if a bag's metadata expands beyond the limits of :func:`check_yaml`."""
     import yaml  # noqa: PLC0415 - for few recordings
 
     if path.is_file():
-        text, _ = read_text(path, _MOST_METADATA)
+        text, _ = read_text(path, _MAX_METADATA)
         check_yaml(text)
         for event in yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
-            # Profiles are YAML in a text of YAML.
+            # QoS profiles are YAML inside YAML.
             if isinstance(event, yaml.ScalarEvent) and "*" in event.value:
                 check_yaml(event.value)
 
 
 def _check_databases(path: Path) -> None:
-    """Raise YAMLError where profiles in a bag's SQLite files stand for more than they may."""
+    """Raise YAMLError if QoS profiles in a bag's SQLite files expand beyond the limits."""
     for file in path.iterdir() if path.is_dir() else [path]:
-        # What is no database, or has no such column, is the package's to refuse or to read.
+        # The rosbags package handles files that are no database or lack this column.
         with suppress(sqlite3.Error):
             uri = f"{file.resolve().as_uri()}?immutable=1"
             with closing(sqlite3.connect(uri, uri=True)) as database:
@@ -160,29 +158,29 @@ def _check_databases(path: Path) -> None:
 
 
 def _unpack(packed: Any, file: Any) -> None:
-    """Unpack a file of a ROS 2 bag into the folder for temporary files, as far as there is room."""
+    """Decompress a file of a ROS 2 bag into a temporary folder while the disk has room."""
     folder = Path(file.name).parent
     while piece := packed.read(_PIECE):
-        if shutil.disk_usage(folder).free < _FREE + len(piece):
+        if shutil.disk_usage(folder).free < _MIN_FREE + len(piece):
             raise BagError(
                 f"{packed.name} holds more than {file.tell()} bytes, for which there is no room in "
-                f"{folder.parent}: {_FREE} bytes stay free there; if it can be trusted to be that "
-                "large, let TMPDIR name a folder on a larger disk"
+                f"{folder.parent}: {_MIN_FREE} bytes stay free there; if it can be trusted to be "
+                "that large, set TMPDIR to a folder on a larger disk"
             )
         file.write(piece)
     file.flush()
     _check_databases(Path(file.name))
 
 
-# The package decompresses MCAP in a folder without a limit; it compares the sizes afterwards.
+# The package decompresses MCAP in a folder without a limit, and compares sizes afterwards.
 for _kind in ("lz4", "zstd"):
     storage_mcap.DECOMPRESSORS[_kind] = partial(decompress, _kind)
-# So it does with files that are compressed as a whole, which it unpacks before anything is read.
+# The same for files that are compressed as a whole, which it decompresses first.
 rosbag2_reader.shutil = SimpleNamespace(copyfileobj=_unpack)  # type: ignore[assignment,attr-defined]
 
 
 def _chunk(offset: int, decompressor: Any, data: bytes) -> bytes:
-    """Decompress a chunk of a ROS 1 bag, of which the package keeps no size."""
+    """Decompress a chunk of a ROS 1 bag; the package does not keep its size."""
     kinds = {known: kind for kind, known in decompressors.items()}
     try:
         return decompress(kinds[decompressor], data, None)
@@ -190,7 +188,7 @@ def _chunk(offset: int, decompressor: Any, data: bytes) -> bytes:
         raise BagError(f"the chunk at byte {offset}: {error}") from error
 
 
-def _words(error: Exception) -> str:
+def _describe(error: Exception) -> str:
     return str(error) or type(error).__name__
 
 
@@ -200,7 +198,7 @@ def _channel(connection: Any, wire: str) -> Channel:
     if wire == "ros1":
         offered = (QoS.latched(),) if extra.latching else ()
     else:
-        offered = tuple(_profile(qos) for qos in extra.offered_qos_profiles)
+        offered = tuple(_parse_profile(qos) for qos in extra.offered_qos_profiles)
     return Channel(
         connection.topic,
         join_name(connection.msgtype),
@@ -212,9 +210,9 @@ def _channel(connection: Any, wire: str) -> Channel:
     )
 
 
-def _profile(qos: Any) -> QoS:
+def _parse_profile(qos: Any) -> QoS:
     parts = {
         key: value._asdict() if hasattr(value, "_asdict") else getattr(value, "name", value)
         for key, value in qos._asdict().items()
     }
-    return profile({k: v.lower() if isinstance(v, str) else v for k, v in parts.items()})
+    return parse_profile({k: v.lower() if isinstance(v, str) else v for k, v in parts.items()})

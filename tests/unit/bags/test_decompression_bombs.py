@@ -35,7 +35,7 @@ from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
 from rosglass.bags import open_bag
-from rosglass.bags.chunks import CHUNK_LIMIT, decompress
+from rosglass.bags.bag import CHUNK_LIMIT, decompress
 from rosglass.errors import BagError
 
 STRING = "std_msgs/msg/String"

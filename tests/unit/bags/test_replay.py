@@ -202,7 +202,9 @@ def test_what_is_published_reaches_nobody_and_says_so(drive, play):
     with pytest.raises(NodeClosedError):
         publisher.publish(data="stop")
     assert found == []
-    with pytest.raises(UnsupportedError, match=r"drive\.mcap is a recording, which answers nobody"):
+    with pytest.raises(
+        UnsupportedError, match=r"drive\.mcap is a recording, which answers no requests"
+    ):
         node.create_service_client("/reset", "std_srvs/srv/Trigger")
 
 

@@ -9,7 +9,7 @@ from rosbags.rosbag1 import Reader
 
 from rosglass import load
 from rosglass.bags import open_bag
-from rosglass.bags.recording_file import create
+from rosglass.bags.recorder import create
 from rosglass.comm import QoS, Sample
 from rosglass.errors import BagError
 
