@@ -1,8 +1,7 @@
-"""Relaying topics, services and actions between two worlds, ROS 1 and ROS 2 among them."""
+"""Relay topics, services and actions between two ROS graphs, also between ROS 1 and ROS 2."""
 
-from rosglass.bridge.bridge import Bridge
+from rosglass.bridge.bridge import Bridge, SurveyEntry, survey
+from rosglass.bridge.relays import BridgeStatus, RelayStatus
 from rosglass.bridge.rules import Direction, Rule
-from rosglass.bridge.status import BridgeStatus, RelayStatus
-from rosglass.bridge.survey import SurveyEntry, survey
 
 __all__ = ["Bridge", "BridgeStatus", "Direction", "RelayStatus", "Rule", "SurveyEntry", "survey"]

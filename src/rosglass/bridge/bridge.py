@@ -1,80 +1,101 @@
-"""Relaying topics, services and actions between two worlds."""
+"""Bridges between two ROS graphs, and a survey of what they would relay."""
 
 from __future__ import annotations
 
 import logging
 import threading
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rosglass.bridge.action_relay import ActionRelay
-from rosglass.bridge.routes import Routes
+from rosglass.bridge.relays import (
+    ActionRelay,
+    BridgeStatus,
+    RelayStatus,
+    ServiceRelay,
+    TopicRelay,
+    service_notes,
+    topic_notes,
+)
 from rosglass.bridge.rules import Rules
-from rosglass.bridge.service_relay import ServiceRelay
-from rosglass.bridge.side import Side
-from rosglass.bridge.status import BridgeStatus, RelayStatus
-from rosglass.bridge.topic_relay import TopicRelay
+from rosglass.bridge.side import Routes, Side
 from rosglass.comm import IMMEDIATE, ConnectionState, Handle, Node, QoS, Worker
 from rosglass.comm.names import similar
 from rosglass.comm.promise import check_timeout
-from rosglass.errors import ArgumentError, Error, InvalidNameError, NodeClosedError
+from rosglass.errors import (
+    ArgumentError,
+    Error,
+    InvalidNameError,
+    NodeClosedError,
+    UnsupportedError,
+)
+from rosglass.messages import (
+    ActionTranslation,
+    ActionType,
+    MessageType,
+    OpaqueType,
+    ServiceTranslation,
+    Translation,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping
+    from collections.abc import Callable, Collection, Iterable, Mapping
 
     from rosglass.bridge.rules import Rule
-    from rosglass.comm import Publisher
+    from rosglass.comm import ActionClient, Publisher, ServiceClient, Subscription
+    from rosglass.messages import ServiceType
 
-__all__ = ["Bridge"]
+__all__ = ["Bridge", "SurveyEntry", "survey"]
+
 
 _log = logging.getLogger("rosglass.bridge")
-#: Seconds between two looks when no graph changes.
-_PAUSE = 0.5
-#: Seconds that who has gone may take to come back: a restart keeps its relay.
-_GONE = 3.0
-#: Seconds between two words about itself.
-_TELL = 5.0
+#: Seconds between two updates when no graph changes.
+_UPDATE_INTERVAL_S = 0.5
+#: Seconds that a relay is kept without sources, for nodes that restart.
+_RESTART_TIME_S = 3.0
+#: Seconds between two messages on ``~/statistics``.
+_STATISTICS_INTERVAL_S = 5.0
 _STRING = "std_msgs/msg/String"
 #: The topics of an action in ROS 1.
 _PARTS = ("goal", "cancel", "status", "result", "feedback")
 
 
 class Bridge(Handle):
-    """Relays topics, services and actions between two worlds, until it is closed.
+    """Relays topics, services and actions between two ROS graphs, until it is closed.
 
-    What is published in one world is published in the other as well, as long as somebody there
-    subscribes to it; a service, or action, that is offered in one can be used in the other. Where
-    one is ROS 1 and the other ROS 2, messages are translated. What the bridge publishes itself is
-    never relayed back, nor is what another bridge between the same two worlds publishes: of
-    several, one relays a topic, and another takes over when it ends. They know each other by their
-    nodes: both have one base name, which nobody else has. Where bridges form a ring, the one that
-    would take something back to a world where it has been says so, and does not.
+    Messages published in one graph are published in the other as long as it has subscribers;
+    services and actions offered in one can be used in the other. Between ROS 1 and ROS 2, messages
+    are translated. The bridge does not relay its own messages back, nor those of other bridges
+    between the same two graphs: of several, one relays a topic, and another takes over when it
+    ends. They recognize each other by their nodes: both nodes of a bridge have the same base name,
+    which no other node has. Where bridges form a ring, the one that would relay something to a
+    graph where it has been reports that as a problem, and does not relay it.
 
-    Both nodes may lose their connections and find them again. The bridge does not close them.
+    Both nodes may lose and regain their connections. The bridge does not close them.
 
     Args:
-        node_a: A node in the first world.
-        node_b: A node in the second world.
-        topics: What is relayed: ``/scan`` (both ways: wherever it is published), ``/scan->`` (from
-            the first world to the second), ``/cmd_vel<-``, ``/scan:=/front/scan`` (called
-            otherwise in the second world), patterns such as ``/camera/*``, ``*`` for all.
-        services: The same for services; ``->`` is for those offered in the first world.
-        actions: The same for actions. Their topics in ROS 1 are not relayed by themselves then.
-        exclude: Regular expression; what matches as a whole is left out.
-        types: Types of topics, services or actions that nobody publishes, or tells the type of,
-            yet. Such
-            a topic is relayed from the beginning, so that not even its first message is missed.
-        qos: Profile at both ends of each topic; None for what fits.
-        keep: Whether to subscribe to topics even while nobody in the other world does.
+        node_a: A node in the first graph.
+        node_b: A node in the second graph.
+        topics: Topics to relay: ``/scan`` (in both directions, from where it is published),
+            ``/scan->`` (from the first graph to the second), ``/cmd_vel<-``,
+            ``/scan:=/front/scan`` (renamed in the second graph), patterns such as ``/camera/*``,
+            ``*`` for all.
+        services: The same for services; ``->`` is for those offered in the first graph.
+        actions: The same for actions, whose topics in ROS 1 are not relayed as topics then.
+        exclude: Regular expression; full names that match are left out.
+        types: Types of topics, services or actions that have no publisher or server yet. Such a
+            topic is relayed from the start, so that its first message is not lost.
+        qos: Profile at both ends of each topic; None for compatible ones.
+        keep: Whether to subscribe to topics even without subscribers in the other graph.
         timeout: Seconds that servers have to answer, and to accept goals.
-        memory: Bytes of each topic that may wait while the other world is slow; beyond, the oldest
-            messages are dropped and counted.
+        memory: Queue size of each topic in bytes while the other graph is slow; beyond it, the
+            oldest messages are dropped and counted.
 
     Raises:
-        InvalidNameError: A name, or pattern, makes no sense, nothing is to be relayed, or the nodes
-            have two names.
-        ArgumentError: Another argument makes no sense.
+        InvalidNameError: A name or pattern is invalid, nothing is to be relayed, or the nodes have
+            different names.
+        ArgumentError: Another argument is invalid.
         NodeClosedError: A node is closed.
     """
 
@@ -100,16 +121,16 @@ class Bridge(Handle):
             raise ArgumentError("node_b", node_b, "another node than node_a", "Bridge")
         if node_a.name != node_b.name:
             raise InvalidNameError(
-                f"both nodes of a bridge need one name, by which other bridges know them; these "
-                f"are {node_a.name} and {node_b.name}"
+                f"both nodes of a bridge need the same name, by which other bridges recognize "
+                f"them; these are {node_a.name} and {node_b.name}"
             )
         if node_a.url == node_b.url:
-            raise ArgumentError("node_b", node_b.url, "another world than node_a's", "Bridge")
+            raise ArgumentError("node_b", node_b.url, "another graph than node_a's", "Bridge")
         check_timeout(timeout, "Bridge")
         if isinstance(memory, bool) or not isinstance(memory, int) or memory < 1:
             raise ArgumentError("memory", memory, "a number of bytes", "Bridge")
         self._topics = Rules(topics, exclude)
-        #: By kind: what has servers.
+        #: The rules for services and actions.
         self._offers = {"action": Rules(actions, exclude), "service": Rules(services, exclude)}
         every = (self._topics, *self._offers.values())
         if not any(every):
@@ -126,24 +147,25 @@ class Bridge(Handle):
         self._qos, self._keep, self._timeout, self._memory = qos, keep, timeout, memory
         self._sides = (Side(node_a, 0), Side(node_b, 1))
         self._sides[0].other, self._sides[1].other = self._sides[1], self._sides[0]
+        #: Guards the relays and refusals, which the bridge's thread changes.
         self._lock = threading.Lock()
         self._relays: dict[tuple[int, str], TopicRelay] = {}
-        #: By kind, world and name.
+        #: By kind, number of the graph and name.
         self._callable: dict[tuple[str, int, str], ServiceRelay | ActionRelay] = {}
         self._missed: dict[tuple[str, int, str], float] = {}
-        #: What cannot be relayed at all, by kind, world and name.
+        #: What cannot be relayed, by kind, number of the graph and name.
         self._refused: dict[tuple[str, int, str], RelayStatus] = {}
         self._missing: set[tuple[str, int, str]] = set()
-        self._tellers: list[Publisher] = []
-        self._told_at = 0.0
+        self._statistics: list[Publisher] = []
+        self._published_at = 0.0
         self._closed = False
         for side in self._sides:
-            # Shows the bridge to those beside it, too.
-            teller = side.node.create_publisher(
+            # Other bridges recognize this one by this topic.
+            publisher = side.node.create_publisher(
                 f"{side.name.full}/statistics", _STRING, QoS.latched()
             )
-            self._tellers.append(teller)
-        self._worker = Worker("bridge", self._follow, _PAUSE)
+            self._statistics.append(publisher)
+        self._worker = Worker("bridge", self._update, _UPDATE_INTERVAL_S)
         for side in self._sides:
             side.routes = Routes(side.node, self._worker.wake)
         self._handles = []
@@ -155,7 +177,7 @@ class Bridge(Handle):
         self._worker.wake()
 
     def status(self) -> BridgeStatus:
-        """Return how it is doing."""
+        """Return the status of the bridge and its relays."""
         with self._lock:
             relays: list[Any] = [*self._relays.values(), *self._callable.values()]
             refused = list(self._refused.values())
@@ -168,7 +190,7 @@ class Bridge(Handle):
         return BridgeStatus((*found, *refused), (worlds[0], worlds[1]))
 
     def close(self) -> None:
-        """Stop relaying; safe to call twice, and with the worlds gone."""
+        """Stop relaying; safe to call twice."""
         if self._closed:
             return
         self._closed = True
@@ -181,40 +203,40 @@ class Bridge(Handle):
             self._callable.clear()
         for relay in relays:
             relay.close()
-        for teller in self._tellers:
-            teller.close()
+        for publisher in self._statistics:
+            publisher.close()
         for side in self._sides:
             if side.routes is not None:
                 side.routes.close()
 
     # -- on the worker's thread ------------------------------------------------------------------
 
-    def _follow(self, _: bool) -> None:
+    def _update(self, _: bool) -> None:
         if self._closed:
             return
         try:
             for side in self._sides:
-                side.look()
+                side.update()
             for side in self._sides:
-                side.listen()
+                side.follow_routes()
             for side in self._sides:
                 self._follow_topics(side)
                 for kind in self._offers:
                     self._follow_servers(side, kind)
             for side in self._sides:
-                side.tell()
-            self._miss("topic", self._topics, self._relays)
+                side.publish_routes()
+            self._report_missing("topic", self._topics, self._relays)
             for kind, rules in self._offers.items():
                 there = {key[1:] for key in self._callable if key[0] == kind}
-                self._miss(kind, rules, there)
-            self._tell()
+                self._report_missing(kind, rules, there)
+            self._publish_statistics()
         except NodeClosedError:
-            return  # the node went first
+            return  # the node was closed first
 
     def _follow_topics(self, side: Side) -> None:
         names = {*side.node.topics(), *self._topics.named(side.number)}
         names |= {name for number, name in self._relays if number == side.number}
-        parts = self._parts_of_actions(side)
+        parts = self._action_topics(side)
         for name in sorted(names - parts):
             other = self._topics.other_name(side.number, name)
             if not other:
@@ -225,11 +247,11 @@ class Bridge(Handle):
             kind = self._type_of(side, name, other)
             wanted = bool(kind or side.sources(publishers) or (relay is not None and relay.alive))
             if not wanted and relay is not None and not side.connected:
-                wanted = True  # who is there is not known: what works goes on
-            wanted = self._settled("topic", key, wanted, relay is not None)
-            self._refuse("topic", key, other, side.ring(publishers))
-            side.bring(f"topic {other}", publishers)
-            if self._stands_by(side, other, relay) or (relay is not None and relay.outdated):
+                wanted = True  # the graph is unknown: keep what works
+            wanted = self._debounce("topic", key, wanted, relay is not None)
+            self._refuse("topic", key, other, side.find_circle(publishers))
+            side.add_route(f"topic {other}", publishers)
+            if self._is_standby(side, other, relay) or (relay is not None and relay.outdated):
                 wanted = False
             if not wanted:
                 if relay is not None:
@@ -261,19 +283,19 @@ class Bridge(Handle):
             back = self._relays.get((side.other.number, other))
             relay.follow(1 if back is not None and back.subscribed else 0)
 
-    def _stands_by(self, side: Side, other: str, relay: TopicRelay | None) -> bool:
-        """Return whether another bridge between the two worlds relays a topic already."""
-        beside = side.other.beside(side.other.node.publishers(other))
+    def _is_standby(self, side: Side, other: str, relay: TopicRelay | None) -> bool:
+        """Return whether another bridge between the two graphs relays a topic already."""
+        parallel = side.other.parallel(side.other.node.publishers(other))
         if relay is None:
-            return bool(beside) or not side.other.known
-        return any(end.node < side.other.name for end in beside)
+            return bool(parallel) or not side.other.known
+        return any(end.node < side.other.name for end in parallel)
 
-    def _parts_of_actions(self, side: Side) -> set[str]:
-        """Return the topics of actions that are relayed as such."""
+    def _action_topics(self, side: Side) -> set[str]:
+        """Return the topics of relayed actions in ROS 1."""
         rules = self._offers["action"]
         if not rules or side.node.wire != "ros1":
             return set()
-        # In a world of ROS 1, they have the names that they have in the other.
+        # Relayed from the other graph, they have the names given by the rules.
         names = {name for name in side.offered("action") if rules.other_name(side.number, name)}
         for name in side.other.offered("action"):
             names.add(rules.other_name(side.other.number, name))
@@ -294,22 +316,22 @@ class Bridge(Handle):
             key, offer = (side.number, name), (kind, side.number, name)
             relay = self._callable.get(offer)
             offers = side.servers(kind, name)
-            side.bring(side.other.key(kind, other), offers)
+            side.add_route(side.other.route_key(kind, other), offers)
             servers = side.sources(offers)
             wanted = bool(servers) or (relay is not None and not side.connected)
-            wanted = self._settled(kind, key, wanted, relay is not None)
+            wanted = self._debounce(kind, key, wanted, relay is not None)
             there = side.other.servers(kind, other)
-            if relay is None and (side.other.beside(there) or not side.other.known):
-                # In ROS 1 whoever offers a service last is called: nobody must be pushed aside.
+            if relay is None and (side.other.parallel(there) or not side.other.known):
+                # In ROS 1, the last server of a service replaces the others.
                 wanted = False
-            elif any(end.node < side.other.name for end in side.other.beside(there)):
+            elif any(end.node < side.other.name for end in side.other.parallel(there)):
                 wanted = False
             rivals = side.other.sources(there)
-            told = side.ring(offers)
+            problem = side.find_circle(offers)
             if wanted and rivals:
-                told = f"{rivals[0].node} offers it there already"
+                problem = f"{rivals[0].node} offers it there already"
                 wanted = False
-            self._refuse(kind, key, other, told)
+            self._refuse(kind, key, other, problem)
             if not wanted:
                 if relay is not None:
                     with self._lock:
@@ -324,8 +346,8 @@ class Bridge(Handle):
                     self._callable[offer] = relay
             relay.follow(self._worker.wake)
 
-    def _miss(self, kind: str, rules: Rules, there: Collection[tuple[int, str]]) -> None:
-        """Take note of what was asked for by its name, and is nowhere; and what may be meant."""
+    def _report_missing(self, kind: str, rules: Rules, there: Collection[tuple[int, str]]) -> None:
+        """Report names that exist in neither graph, with similar names."""
         if not all(side.known for side in self._sides):
             return
         for rule in rules.rules:
@@ -341,17 +363,17 @@ class Bridge(Handle):
                     n for side, _ in asked for n in side.offered(kind) if side.servers(kind, n)
                 }
                 guess = similar(asked[0][1], sorted(known))
-            told = f"nobody {'publishes' if kind == 'topic' else 'offers'} it{guess}"
+            problem = f"no {'publisher' if kind == 'topic' else 'server'}{guess}"
             key = asked[0][0].number, asked[0][1]
             if missing:
                 self._missing.add((kind, *key))
-                self._refuse(kind, key, names[1 - key[0]], told)
+                self._refuse(kind, key, names[1 - key[0]], problem)
             elif (kind, *key) in self._missing:
                 self._missing.discard((kind, *key))
                 self._refuse(kind, key, names[1 - key[0]], "")
 
     def _refuse(self, kind: str, key: tuple[int, str], other: str, problem: str) -> None:
-        """Take note of why something is not relayed; no problem: it is."""
+        """Set or clear the reason why something is not relayed."""
         refusal = kind, *key
         if not problem and refusal not in self._refused:
             return
@@ -362,29 +384,146 @@ class Bridge(Handle):
             else:
                 del self._refused[refusal]
 
-    def _settled(self, kind: str, key: tuple[int, str], wanted: bool, there: bool) -> bool:
-        """Return whether something is wanted, or was until just now."""
+    def _debounce(self, kind: str, key: tuple[int, str], wanted: bool, there: bool) -> bool:
+        """Return whether something is wanted, or was a moment ago: its node may be restarting."""
         if wanted or not there:
             self._missed.pop((kind, *key), None)
             return wanted
         since = self._missed.setdefault((kind, *key), time.monotonic())
-        return time.monotonic() - since < _GONE
+        return time.monotonic() - since < _RESTART_TIME_S
 
     def _type_of(self, side: Side, name: str, other: str) -> str:
-        """Return the type that was given for a topic or service."""
+        """Return the type given for a topic, service or action."""
         first, second = (name, other) if side.number == 0 else (other, name)
         return self._types.get(first) or self._types.get(second, "")
 
-    def _tell(self) -> None:
+    def _publish_statistics(self) -> None:
         now = time.monotonic()
-        if now - self._told_at < _TELL:
+        if now - self._published_at < _STATISTICS_INTERVAL_S:
             return
-        self._told_at = now
+        self._published_at = now
         line = self.status().line()
-        for teller in self._tellers:
+        for publisher in self._statistics:
             with suppress(Error):
-                teller.publish(data=line)
+                publisher.publish(data=line)
 
 
 def _absolute(name: str) -> str:
     return name if name.startswith("/") else f"/{name}"
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyEntry:
+    """A topic, service or action that a bridge would relay.
+
+    Attributes:
+        kind: ``topic``, ``service`` or ``action``.
+        name: Name in the source graph, with the publishers or the server.
+        other: Name in the target graph.
+        direction: ``->`` from the first graph to the second, ``<-`` from the second to the first.
+        type: Type in the source graph.
+        other_type: Type in the target graph; empty if it cannot be relayed.
+        notes: What is lost or added in translation.
+        problem: Why it cannot be relayed; empty if it can.
+    """
+
+    kind: str
+    name: str
+    other: str
+    direction: str
+    type: str
+    other_type: str = ""
+    notes: tuple[str, ...] = ()
+    problem: str = ""
+
+
+def survey(
+    node_a: Node,
+    node_b: Node,
+    topics: Iterable[str | Rule] = ("*",),
+    services: Iterable[str | Rule] = ("*",),
+    actions: Iterable[str | Rule] = ("*",),
+    *,
+    exclude: str = "",
+    timeout: float = 3.0,
+) -> list[SurveyEntry]:
+    """Return what a bridge would relay, without relaying it; arguments as for :class:`Bridge`.
+
+    Waits for unknown types up to `timeout` seconds.
+    """
+    sides = Side(node_a, 0), Side(node_b, 1)
+    sides[0].other, sides[1].other = sides[1], sides[0]
+    for side in sides:
+        side.update()
+    rules = {
+        "topic": Rules(topics, exclude),
+        "service": Rules(services, exclude),
+        "action": Rules(actions, exclude),
+    }
+    with ExitStack() as stack:
+        asked: list[tuple[str, Side, str, str, Subscription | ServiceClient | ActionClient]] = []
+        for side in sides:
+            for name in sorted(side.node.topics()):
+                other = rules["topic"].other_name(side.number, name)
+                if other and side.sources(side.node.publishers(name)):
+                    asked.append(("topic", side, name, other, _listen(side, name, stack)))
+            for kind in ("service", "action"):
+                for name in sorted(side.offered(kind) if rules[kind] else ()):
+                    other = rules[kind].other_name(side.number, name)
+                    if other and side.sources(side.servers(kind, name)):
+                        make: Callable[[str], ServiceClient | ActionClient] = (
+                            side.node.create_service_client
+                            if kind == "service"
+                            else side.node.create_action_client
+                        )
+                        client = make(name)
+                        stack.callback(client.close)
+                        asked.append((kind, side, name, other, client))
+        deadline = time.monotonic() + timeout
+        while any(one[4].type is None for one in asked) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        return [_entry(*one) for one in asked]
+
+
+def _listen(side: Side, name: str, stack: ExitStack) -> Subscription:
+    made = side.node.create_subscription(name, raw_callback=lambda _: None)
+    stack.callback(made.close)
+    return made
+
+
+def _entry(
+    kind: str,
+    side: Side,
+    name: str,
+    other: str,
+    end: Subscription | ServiceClient | ActionClient,
+) -> SurveyEntry:
+    sign = "->" if side.number == 0 else "<-"
+    found = end.type
+    if found is None:
+        problem = ""
+        with suppress(Error):
+            problem = end.problem
+        known = side.offered(kind)
+        problem = problem or "its type is unknown, and no node describes it"
+        return SurveyEntry(kind, name, other, sign, ", ".join(known.get(name, [])), problem=problem)
+    if side.node.wire == side.other.node.wire:
+        return SurveyEntry(kind, name, other, sign, found.name, found.name)
+    try:
+        other_type, losses = _translated(found)
+    except Error as error:
+        return SurveyEntry(kind, name, other, sign, found.name, problem=str(error))
+    return SurveyEntry(kind, name, other, sign, found.name, other_type, losses)
+
+
+def _translated(kind: MessageType | ServiceType | ActionType) -> tuple[str, tuple[str, ...]]:
+    if isinstance(kind, OpaqueType):
+        raise UnsupportedError(f"its type {kind.name} cannot be translated: {kind.reason}")
+    if isinstance(kind, MessageType):
+        made = Translation(kind)
+        return made.type.name, topic_notes(made)
+    if isinstance(kind, ActionType):
+        action = ActionTranslation(kind)
+        return action.type.name, service_notes(action, ActionRelay.PARTS)
+    service = ServiceTranslation(kind)
+    return service.type.name, service_notes(service, ServiceRelay.PARTS)

@@ -1,4 +1,4 @@
-"""What to relay: names, patterns, new names and directions."""
+"""The rules of a bridge: names, patterns, new names and directions."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ __all__ = ["Direction", "Rule", "Rules"]
 
 _SIGN = re.compile(r":=|<->|->|<-")
 _WILD = frozenset("*?[")
-#: What is meant by ``*`` only when it is asked for by its own name: every node has these.
-_FURNITURE = re.compile(
+#: The built-in topics and services of nodes, which ``*`` does not match.
+_BUILTIN = re.compile(
     r"/parameter_events|/rosout_agg"
     r"|.*/(get_loggers|set_logger_level|describe_parameters|get_parameter_types|get_parameters"
     r"|list_parameters|set_parameters|set_parameters_atomically|get_type_description"
@@ -27,24 +27,24 @@ _FURNITURE = re.compile(
 
 
 class Direction(Enum):
-    """Which way is relayed."""
+    """The direction of a relay."""
 
     BOTH = "<->"
-    #: From the first world to the second.
+    #: From the first graph to the second.
     THERE = "->"
-    #: From the second world to the first.
+    #: From the second graph to the first.
     BACK = "<-"
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """Topics, or services, that are relayed.
+    """Topics, services or actions to relay.
 
     Attributes:
-        name: Absolute name in the first world, or a pattern: ``*`` stands for any characters,
-            slashes included, ``?`` for one.
-        other: Its name in the second world; for a pattern, the same.
-        direction: Which way. A service goes from where it is offered to where it is called.
+        name: Absolute name in the first graph, or a pattern: ``*`` matches any characters,
+            slashes included, ``?`` matches one.
+        other: Name in the second graph; for a pattern, the same.
+        direction: The direction; that of a service is from its server to its clients.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Rule:
 
     @classmethod
     def parse(cls, text: str) -> Rule:
-        """Read ``/scan``, ``/scan->``, ``/scan<-``, ``/scan:=/other``, ``/a->/b`` or ``/a<-/b``.
+        """Parse ``/scan``, ``/scan->``, ``/scan<-``, ``/scan:=/other``, ``/a->/b`` or ``/a<-/b``.
 
         Raises:
             InvalidNameError: It is none of these.
@@ -81,23 +81,23 @@ class Rule:
 
     @property
     def is_pattern(self) -> bool:
-        """Whether it may stand for several names."""
+        """Whether it can match several names."""
         return _is_pattern(self.name)
 
     def applies(self, side: int) -> bool:
-        """Return whether it relays from the first (0) or the second (1) world."""
+        """Return whether it relays from the first (0) or the second (1) graph."""
         return self.direction is not (Direction.BACK if side == 0 else Direction.THERE)
 
 
 class Rules:
-    """What to relay, and under which name.
+    """The rules for topics, services or actions.
 
     Args:
-        rules: Texts, see :meth:`Rule.parse`, or rules.
-        exclude: Regular expression; what matches as a whole is never relayed.
+        rules: Rules, or texts for :meth:`Rule.parse`.
+        exclude: Regular expression; full names that match are never relayed.
 
     Raises:
-        InvalidNameError: A text makes no sense.
+        InvalidNameError: A text is invalid.
         ArgumentError: `exclude` is no regular expression.
     """
 
@@ -115,7 +115,7 @@ class Rules:
         return bool(self.rules)
 
     def other_name(self, side: int, name: str) -> str:
-        """Return the name in the other world of what is `name` in world `side`; "" for none."""
+        """Return the other graph's name for `name` in graph `side`; empty if it is not relayed."""
         if self._exclude is not None and self._exclude.fullmatch(name):
             return ""
         for rule in self.rules:
@@ -124,17 +124,17 @@ class Rules:
                 if ours == name:
                     return other
         if any(name in (rule.name, rule.other) for rule in self.rules if not rule.is_pattern):
-            return ""  # it was said of this one which way, or what it is called
+            return ""  # a rule of its own excludes this direction
         hidden = any(part.startswith("_") for part in name.split("/"))
         for rule in self.rules:
             if rule.is_pattern and rule.applies(side) and fnmatchcase(name, rule.name):
-                usual = hidden or _FURNITURE.fullmatch(name)
+                usual = hidden or _BUILTIN.fullmatch(name)
                 if not (usual and rule.name.strip("/") in ("*", "**")):
                     return name
         return ""
 
     def named(self, side: int) -> list[str]:
-        """Return the names in world `side` that are relayed from there, patterns left out."""
+        """Return the names in graph `side` that are relayed from there, without patterns."""
         return [
             rule.name if side == 0 else rule.other
             for rule in self.rules

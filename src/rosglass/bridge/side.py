@@ -1,47 +1,52 @@
-"""One of a bridge's two worlds: who is there, leaving out ourselves and bridges beside us."""
+"""One of a bridge's two graphs: its sources, without those of this and of parallel bridges.
+
+So that nothing is relayed in circles, each bridge publishes in both graphs the routes of what it
+relays from other bridges; none relays something to a graph where it has been before.
+"""
 
 from __future__ import annotations
 
+import json
+import logging
 import math
+import threading
 import time
 from typing import TYPE_CHECKING
 
-from rosglass.bridge.routes import TOPIC
-from rosglass.comm import ConnectionState, NodeName
+from rosglass.comm import IMMEDIATE, ConnectionState, EndpointKind, NodeName, QoS
 from rosglass.errors import UnsupportedError
 from rosglass.messages import default_library
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from rosglass.bridge.routes import Routes
-    from rosglass.comm import EndpointInfo, Node
-    from rosglass.messages import ActionTranslation, ServiceTranslation, Translation
+    from rosglass.comm import EndpointInfo, Node, Subscription
+    from rosglass.messages import ActionTranslation, Message, ServiceTranslation, Translation
 
-__all__ = ["BRIDGE_NAME", "Side"]
+__all__ = ["BRIDGE_NAME", "TOPIC", "Routes", "Side", "key_of"]
 
-#: What base names of bridges' nodes begin with.
+
+#: Prefix of the names of bridges' nodes.
 BRIDGE_NAME = "rosglass_bridge"
-#: Seconds within which both nodes of a bridge that starts are seen.
-_GRACE = 3.0
-#: Seconds in which the graph becomes known.
-_DISCOVERY = 1.5
+#: Seconds within which both nodes of a new bridge are discovered.
+_PAIRING_TIME_S = 3.0
+#: Seconds that discovery takes.
+_DISCOVERY_TIME_S = 1.5
 
 
 class Side:
-    """A world, seen from a bridge.
+    """One of a bridge's two graphs.
 
-    Bridges beside this one, between the same two worlds, must not be taken for sources: what they
-    publish comes from where we take it from ourselves. They are known by their nodes, which have
-    the same base name in both worlds. A bridge that goes on to a third world is none of them: what
-    it brings is taken on, unless it has been in our other world already (see :class:`Routes`).
+    Parallel bridges, between the same two graphs, are no sources: they publish what this bridge
+    relays itself. Their nodes have the same base name in both graphs. A bridge to a third graph is
+    a source, unless what it relays has been in the other graph before (see :class:`Routes`).
 
     Args:
-        node: Our node there.
-        number: 0 for the first world, 1 for the second.
+        node: The bridge's node in this graph.
+        number: 0 for the first graph, 1 for the second.
 
     Attributes:
-        other: The other world.
+        other: The other graph.
     """
 
     other: Side
@@ -53,112 +58,114 @@ class Side:
         self._names: set[str] = set()
         self._bridges: set[NodeName] = set()
         self._marked: set[str] = set()
-        self._before: dict[str, frozenset[str]] = {}
-        self._brought: dict[str, frozenset[str]] = {}
+        self._previous_routes: dict[str, frozenset[str]] = {}
+        self._new_routes: dict[str, frozenset[str]] = {}
         self._seen: dict[NodeName, float] = {}
         self._since = math.inf
 
     @property
     def connected(self) -> bool:
-        """Whether what the graph says is what there is."""
+        """Whether the node is connected, so that its graph is up to date."""
         return self.node.status().state is ConnectionState.CONNECTED
 
     @property
     def known(self) -> bool:
-        """Whether the graph was there long enough to tell who is not."""
-        return time.monotonic() - self._since > _DISCOVERY
+        """Whether discovery has had time to complete."""
+        return time.monotonic() - self._since > _DISCOVERY_TIME_S
 
-    def look(self) -> None:
-        """Look who is there."""
+    def update(self) -> None:
+        """Read the nodes and bridges of the graph."""
         nodes = self.node.nodes()
         self._names = {node.name for node in nodes}
         end = f"/{TOPIC}"
         self._marked = {t.removesuffix(end) for t in self.node.topics() if t.endswith(end)}
         now = time.monotonic()
         self._since = min(self._since, now) if self.connected else math.inf
-        self._before, self._brought = self._brought, {}
+        self._previous_routes, self._new_routes = self._new_routes, {}
         self._bridges = {node for node in nodes if self.is_bridge(node)} - {self.name}
         self._seen = {node: self._seen.get(node, now) for node in self._bridges}
 
-    def listen(self) -> None:
-        """Listen to the routes of bridges that go on to other worlds; after both sides' look."""
+    def follow_routes(self) -> None:
+        """Subscribe to the routes of bridges to other graphs; after both sides' :meth:`update`."""
         if self.routes is not None:
-            self.routes.follow(node for node in self._bridges if not self.is_beside(node))
+            self.routes.follow(node for node in self._bridges if not self.is_parallel(node))
 
     def is_bridge(self, node: NodeName) -> bool:
-        """Return whether a node is a bridge's."""
+        """Return whether a node is that of a bridge."""
         return node.name.startswith(BRIDGE_NAME) or node.full in self._marked
 
-    def is_beside(self, node: NodeName) -> bool:
-        """Return whether a node is that of another bridge between our two worlds."""
+    def is_parallel(self, node: NodeName) -> bool:
+        """Return whether a node is that of another bridge between the same two graphs."""
         if node == self.name or not self.is_bridge(node):
             return False
         if node.name in self.other._names:
             return True
-        # Its other node may not have shown up yet.
-        return time.monotonic() - self._seen.get(node, time.monotonic()) < _GRACE
+        # Its other node may not be discovered yet.
+        return time.monotonic() - self._seen.get(node, time.monotonic()) < _PAIRING_TIME_S
 
     def sources(self, endpoints: Iterable[EndpointInfo]) -> list[EndpointInfo]:
-        """Return those that are neither ours, nor of bridges beside us or in a ring with us."""
+        """Return the endpoints to relay: none of this, a parallel, or a circular bridge."""
         return [e for e in endpoints if e.node != self.name and self._is_source(e)]
 
     def _is_source(self, end: EndpointInfo) -> bool:
-        if self.routes is None or not self.is_bridge(end.node) or self.is_beside(end.node):
-            return not self.is_beside(end.node)
+        if self.routes is None or not self.is_bridge(end.node) or self.is_parallel(end.node):
+            return not self.is_parallel(end.node)
         path = self.routes.path(end)
         if path is None or path & self.other._names:
-            self.routes.leave(end)
+            self.routes.reject(end)
             return False
-        return self.routes.take(end)
+        return self.routes.accept(end)
 
     def _path(self, endpoints: Iterable[EndpointInfo]) -> frozenset[str]:
-        """Return by way of which bridges these come, as far as they are, or will be, taken."""
+        """Return the bridges on the way of those endpoints that are, or will be, relayed."""
         found: set[str] = set()
         for end in endpoints:
-            if self.routes is None or end.node not in self._bridges or self.is_beside(end.node):
+            if self.routes is None or end.node not in self._bridges or self.is_parallel(end.node):
                 continue
             path = self.routes.path(end) or frozenset()
             if not path & self.other._names:
                 found |= path
         return frozenset(found)
 
-    def bring(self, key: str, endpoints: Sequence[EndpointInfo]) -> None:
-        """Note by way of which bridges something is brought to the other world; see `tell`."""
-        # What has lost its sources is offered for a while: by the way by which it came.
-        before = frozenset() if self.sources(endpoints) else self._before.get(key, frozenset())
-        self._brought[key] = before | self._path(endpoints)
+    def add_route(self, key: str, endpoints: Sequence[EndpointInfo]) -> None:
+        """Add the route of a relayed topic or service, for :meth:`publish_routes`."""
+        # What has lost its sources is offered for a while, with its last route.
+        before = (
+            frozenset() if self.sources(endpoints) else self._previous_routes.get(key, frozenset())
+        )
+        self._new_routes[key] = before | self._path(endpoints)
 
-    def tell(self) -> None:
-        """Tell the other world's bridges what was noted."""
+    def publish_routes(self) -> None:
+        """Publish the routes of what is relayed from here, in the other graph."""
         if self.other.routes is not None:
-            self.other.routes.tell(self._brought)
+            self.other.routes.publish(self._new_routes)
 
-    def ring(self, endpoints: Iterable[EndpointInfo]) -> str:
-        """Say which of these would go in circles; empty when none would."""
+    def find_circle(self, endpoints: Iterable[EndpointInfo]) -> str:
+        """Return why one of these endpoints would be relayed in a circle; empty if none would."""
         for end in endpoints:
-            if self.routes is None or end.node not in self._bridges or self.is_beside(end.node):
+            if self.routes is None or end.node not in self._bridges or self.is_parallel(end.node):
                 continue
             known = (self.routes.path(end) or frozenset()) & self.other._names
             if known:
                 names = " and ".join(sorted(known))
                 return (
-                    f"these bridges form a ring: {end.node} brings what {names} "
-                    f"{'has' if len(known) == 1 else 'have'} taken from there; it is not relayed, "
-                    "or it would go round for ever: leave one bridge out"
+                    f"these bridges form a ring: {end.node} relays what {names} "
+                    f"{'has' if len(known) == 1 else 'have'} relayed from there; it is not relayed "
+                    "again, or it would go round for ever: leave one bridge out"
                 )
         return ""
 
-    def beside(self, endpoints: Iterable[EndpointInfo]) -> list[EndpointInfo]:
-        """Return those of bridges beside us."""
-        return [e for e in endpoints if self.is_beside(e.node)]
+    def parallel(self, endpoints: Iterable[EndpointInfo]) -> list[EndpointInfo]:
+        """Return the endpoints of parallel bridges."""
+        return [e for e in endpoints if self.is_parallel(e.node)]
 
-    def teach(self, translation: Translation | ServiceTranslation | ActionTranslation) -> None:
-        """Let our node describe a type that was derived to those who ask: nobody else can."""
+    def add_type(self, translation: Translation | ServiceTranslation | ActionTranslation) -> None:
+        """Let the node describe a type that was derived here, and that no other node knows."""
         if translation.derived and self.node.wire == "cdr":
             default_library().add_version(translation.type.definition)
 
     def offered(self, kind: str) -> dict[str, list[str]]:
-        """Return every topic, service or action with its types, as far as they are known."""
+        """Return all topics, services or actions with their known types."""
         if kind == "topic":
             return self.node.topics()
         try:
@@ -167,7 +174,7 @@ class Side:
             return {}
 
     def servers(self, kind: str, name: str) -> list[EndpointInfo]:
-        """Return who publishes a topic, or offers a service or an action, whoever that is."""
+        """Return all publishers of a topic, or servers of a service or action."""
         if kind == "topic":
             return self.node.publishers(name)
         if kind == "service":
@@ -176,9 +183,110 @@ class Side:
             return self.node.publishers(f"{name}/result")
         return self.node.service_servers(f"{name}/_action/send_goal")
 
-    def key(self, kind: str, name: str) -> str:
-        """Return the name under which routes of what servers offer are told."""
+    def route_key(self, kind: str, name: str) -> str:
+        """Return the key of a service or action in published routes."""
         if kind == "action":
             ros1 = self.node.wire == "ros1"
             return f"topic {name}/result" if ros1 else f"service {name}/_action/send_goal"
         return f"service {name}"
+
+
+_log = logging.getLogger("rosglass.bridge")
+#: Private topic on which a bridge publishes its routes as JSON: ``{"topic /scan": ["bridge_1"]}``.
+TOPIC = "bridge_routes"
+_STRING = "std_msgs/msg/String"
+#: Seconds after which a bridge without routes counts as one that does not support them.
+_ROUTES_TIMEOUT_S = 5.0
+#: Seconds between publishing the route of something and relaying it.
+_NOTICE_S = 1.0
+
+
+class Routes:
+    """The routes that bridges publish in one graph.
+
+    Args:
+        node: The bridge's node in that graph.
+        wake: Called when another bridge publishes new routes.
+    """
+
+    def __init__(self, node: Node, wake: Callable[[], None]) -> None:
+        self._node, self._wake = node, wake
+        #: Guards what the subscriptions' threads receive.
+        self._lock = threading.Lock()
+        self._published: dict[str, list[str]] = {}
+        self._known: dict[NodeName, dict[str, frozenset[str]]] = {}
+        self._since: dict[NodeName, float] = {}
+        self._readers: dict[NodeName, Subscription] = {}
+        self._accepted: dict[tuple[NodeName, str], float] = {}
+        self._publisher = node.create_publisher(f"~/{TOPIC}", _STRING, QoS.latched())
+        self._publisher.publish(data="{}")
+
+    def follow(self, bridges: Iterable[NodeName]) -> None:
+        """Subscribe to the routes of these bridges only."""
+        bridges = set(bridges)
+        for node in self._readers.keys() - bridges:
+            self._readers.pop(node).close()
+            with self._lock:
+                self._known.pop(node, None)
+                self._since.pop(node, None)
+            self._accepted = {key: at for key, at in self._accepted.items() if key[0] != node}
+        for node in bridges - self._readers.keys():
+            self._since[node] = time.monotonic()
+            self._readers[node] = self._node.create_subscription(
+                f"{node.full}/{TOPIC}",
+                _STRING,
+                lambda message, node=node: self._on_routes(node, message),  # type: ignore[misc]
+                qos=QoS.latched(),
+                executor=IMMEDIATE,
+            )
+
+    def path(self, end: EndpointInfo) -> frozenset[str] | None:
+        """Return the base names of the bridges on the way of a bridge's endpoint.
+
+        None until that bridge has published its routes.
+        """
+        with self._lock:
+            known = self._known.get(end.node)
+            if known is None:
+                waited = time.monotonic() - self._since.get(end.node, time.monotonic())
+                return frozenset({end.node.name}) if waited > _ROUTES_TIMEOUT_S else None
+        return known.get(key_of(end), frozenset()) | {end.node.name}
+
+    def accept(self, end: EndpointInfo) -> bool:
+        """Return whether a bridge's endpoint may be relayed: all had time to receive the route."""
+        now = time.monotonic()
+        return now - self._accepted.setdefault((end.node, key_of(end)), now) > _NOTICE_S
+
+    def reject(self, end: EndpointInfo) -> None:
+        """Record that a bridge's endpoint is not relayed."""
+        self._accepted.pop((end.node, key_of(end)), None)
+
+    def publish(self, routes: Mapping[str, Iterable[str]]) -> None:
+        """Publish the routes of what is relayed from other bridges."""
+        found = {key: sorted(path) for key, path in sorted(routes.items()) if path}
+        if found != self._published:
+            self._publisher.publish(data=json.dumps(found))
+            self._published = found
+
+    def close(self) -> None:
+        """Stop publishing; safe to call twice."""
+        self.follow(())
+        self._publisher.close()
+
+    def _on_routes(self, node: NodeName, message: Message) -> None:
+        try:
+            known = {
+                str(key): frozenset(map(str, path))
+                for key, path in json.loads(message.data).items()
+            }
+        except (ValueError, TypeError, AttributeError) as error:
+            _log.warning("%s publishes invalid routes: %s", node, error)
+            return
+        with self._lock:
+            self._known[node] = known
+        self._wake()
+
+
+def key_of(end: EndpointInfo) -> str:
+    """Return the key of an endpoint in published routes, e.g. ``topic /scan``."""
+    return f"{'topic' if end.kind is EndpointKind.PUBLISHER else 'service'} {end.name}"

@@ -152,5 +152,5 @@ def test_survey_shows_actions(connect, rospy_peer):
     eventually(lambda: "/seen" in one.actions())
     (found,) = survey(one, two, [], [], ["/seen"])
     assert (found.kind, found.type, found.direction) == ("action", "actionlib/action/Test", "->")
-    assert found.notes == ("ROS 2 has no such type of its own",)
+    assert found.notes == ("ROS 2 has no such type",)
     rospy_peer.call("stop_action_server", name="/seen")

@@ -81,7 +81,7 @@ def test_what_is_nowhere_is_told(master, router, connect, start_program):
     two.create_publisher("/odometry", STRING)
     command = (*COMMAND, master.url, router.url, "--topic", "/odometri")
     process = start_program(*command, env=dict(os.environ))
-    told = "/odometri ->: nobody publishes it; did you mean /odometry?"
+    told = "/odometri ->: no publisher; did you mean /odometry?"
     eventually(lambda: any(told in line for line in process.output))
     two.create_publisher("/odometri", STRING)
     eventually(lambda: any("/odometri ->: well again" in line for line in process.output))
