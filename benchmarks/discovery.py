@@ -113,9 +113,9 @@ def zenoh_robot(plan: dict[str, Any]) -> list[Any]:
 
     import rosglass
     from rosglass.comm import EndpointInfo, EndpointKind, NodeName
-    from rosglass.wires.zenoh.config import session_config
     from rosglass.wires.zenoh.keys import Token
     from rosglass.wires.zenoh.options import ZenohOptions
+    from rosglass.wires.zenoh.session import session_config
 
     config, _ = session_config(ZenohOptions(port=plan["port"]))
     session = zenoh.open(config)
@@ -206,8 +206,8 @@ def bare_dds(plan: dict[str, Any], seen: threading.Event) -> Any:
 def bare_zenoh(plan: dict[str, Any], seen: threading.Event) -> Any:
     import zenoh
 
-    from rosglass.wires.zenoh.config import session_config
     from rosglass.wires.zenoh.options import ZenohOptions
+    from rosglass.wires.zenoh.session import session_config
 
     config, _ = session_config(ZenohOptions(port=plan["port"]))
     session = zenoh.open(config)

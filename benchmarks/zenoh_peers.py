@@ -31,8 +31,8 @@ def session(plan: Plan) -> Any:
     """Open a session with the settings that ours has."""
     import zenoh
 
-    from rosglass.wires.zenoh.config import session_config
     from rosglass.wires.zenoh.options import ZenohOptions
+    from rosglass.wires.zenoh.session import session_config
 
     options = ZenohOptions("127.0.0.1", plan["port"], shared_memory=plan["shm"])
     return zenoh.open(session_config(options)[0])

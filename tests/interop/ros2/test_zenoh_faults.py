@@ -234,7 +234,7 @@ def test_rubbish_is_named_and_disturbs_nothing(router, connect, caplog):
     assert client.call({"a": 1, "b": 2}).sum == 3
     assert server.problem == ""
     told = [record.getMessage() for record in caplog.records]
-    for what in ("graph token that is not understood", "/count", "/add"):
+    for what in ("invalid graph token", "/count", "/add"):
         assert any(what in line for line in told), what
     assert len(told) < 20, told
 

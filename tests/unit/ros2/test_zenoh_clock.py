@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -62,7 +63,9 @@ def test_the_lifespan_of_latched_samples_is_none_of_the_system_clock(monkeypatch
     qos = QoS(durability=Durability.TRANSIENT_LOCAL, lifespan=Duration.from_seconds(600))
     node, clock = NodeName("/", "robot"), time.time_ns
     end = EndpointInfo(EndpointKind.PUBLISHER, "/map", "std_msgs/msg/String", node, qos)
-    writer = ZenohWriter(None, ZenohOptions(), "token", end, None, LocalRegistry())
+    writer = ZenohWriter(
+        SimpleNamespace(options=ZenohOptions()), "token", end, None, LocalRegistry()
+    )
     writer.write(b"\0\1\0\0map")
     monkeypatch.setattr(time, "time_ns", lambda: clock() + jump)
     declare = Session.declare_publisher

@@ -6,8 +6,8 @@ import pytest
 import zenoh
 
 import rosglass
-from rosglass.wires.zenoh.config import reason, router_config, session_config
 from rosglass.wires.zenoh.options import ZenohOptions
+from rosglass.wires.zenoh.session import reason, router_config, session_config
 
 RMW_FILE = """
 // As rmw_zenoh ships it: JSON5 with comments, settings for each mode.

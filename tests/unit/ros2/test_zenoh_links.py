@@ -8,7 +8,7 @@ import pytest
 zenoh = pytest.importorskip("zenoh")
 
 from rosglass.wires.zenoh.endpoints import LocalRegistry  # noqa: E402
-from rosglass.wires.zenoh.links import Pulse, limit_silence  # noqa: E402
+from rosglass.wires.zenoh.session import Heartbeat, limit_silence  # noqa: E402
 
 
 class FakeSession:
@@ -42,53 +42,53 @@ class FakeChannel:
 
 
 def test_a_router_that_answers_is_asked_again():
-    pulse, session = Pulse("key"), FakeSession()
+    heartbeat, session = Heartbeat("key"), FakeSession()
     for now in range(10):
-        pulse.beat(session, float(now))
+        heartbeat.beat(session, float(now))
         session.questions[-1].state = "ended"
-        assert not pulse.silent
+        assert not heartbeat.silent
     assert len(session.questions) == 10
 
 
 def test_a_router_that_owes_an_answer_is_silent_until_it_answers():
-    pulse, session = Pulse("key"), FakeSession()
+    heartbeat, session = Heartbeat("key"), FakeSession()
     silent = []
     for now in range(8):
-        pulse.beat(session, float(now))
-        silent.append(pulse.silent)
+        heartbeat.beat(session, float(now))
+        silent.append(heartbeat.silent)
     assert silent == [False] * 4 + [True] * 4
     assert len(session.questions) == 1, "one question at a time"
     session.questions[0].state = "ended"
-    pulse.beat(session, 8.0)
-    assert pulse.silent, "a link that is given up ends its questions, too"
+    heartbeat.beat(session, 8.0)
+    assert heartbeat.silent, "a link that is given up ends its questions, too"
     assert len(session.questions) == 2
     session.questions[1].state = "ended"
-    pulse.beat(session, 9.0)
-    assert not pulse.silent
+    heartbeat.beat(session, 9.0)
+    assert not heartbeat.silent
 
 
 def test_a_question_whose_time_is_over_is_asked_again_and_the_router_stays_silent():
-    pulse, session = Pulse("key"), FakeSession()
-    pulse.beat(session, 0.0)
-    pulse.beat(session, 5.0)
+    heartbeat, session = Heartbeat("key"), FakeSession()
+    heartbeat.beat(session, 0.0)
+    heartbeat.beat(session, 5.0)
     session.questions[0].state = "error"
-    pulse.beat(session, 10.0)
-    assert pulse.silent
+    heartbeat.beat(session, 10.0)
+    assert heartbeat.silent
     assert len(session.questions) == 2
-    pulse.rest()
-    assert not pulse.silent
+    heartbeat.pause()
+    assert not heartbeat.silent
 
 
 def test_a_router_that_sends_tokens_is_not_silent_though_its_answer_queues():
-    pulse, session = Pulse("key"), FakeSession()
+    heartbeat, session = Heartbeat("key"), FakeSession()
     for now in range(10):
-        pulse.on_news(float(now))
-        pulse.beat(session, float(now))
-        assert not pulse.silent
-    pulse.beat(session, 11.0)
-    assert not pulse.silent
-    pulse.beat(session, 13.0)
-    assert pulse.silent
+        heartbeat.on_received(float(now))
+        heartbeat.beat(session, float(now))
+        assert not heartbeat.silent
+    heartbeat.beat(session, 11.0)
+    assert not heartbeat.silent
+    heartbeat.beat(session, 13.0)
+    assert heartbeat.silent
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="a setting of Linux")

@@ -9,8 +9,9 @@ import pytest
 
 pytest.importorskip("zenoh")
 
-from rosglass.comm import QoS
+from rosglass.comm import EndpointInfo, EndpointKind, NodeName
 from rosglass.wires.zenoh.endpoints import LocalRegistry
+from rosglass.wires.zenoh.options import ZenohOptions
 from rosglass.wires.zenoh.reader import ZenohReader, _Collected
 
 
@@ -85,13 +86,15 @@ def test_a_reader_closed_while_its_samples_change_their_way_ends_each_source_onc
             calls.append("end")
 
     # Any rate is high enough for a thread of their own.
-    monkeypatch.setattr("rosglass.wires.zenoh.reader._WINDOW", 0.0)
-    monkeypatch.setattr("rosglass.wires.zenoh.reader._FAST", -1.0)
+    monkeypatch.setattr("rosglass.wires.zenoh.reader._MIN_RATE_WINDOW_S", 0.0)
+    monkeypatch.setattr("rosglass.wires.zenoh.reader._THREAD_RATE_HZ", -1.0)
     monkeypatch.setattr("rosglass.wires.zenoh.reader._Pumped", Source)
     first = Subscriber()
-    owner = SimpleNamespace(forget=lambda _: None, recycle=lambda _: None)
-    place, qos = ("/topic", "std_msgs/msg/Empty"), QoS()
-    reader = ZenohReader(owner, "token", place, "key", qos, print, None, LocalRegistry(), None)
+    owner = SimpleNamespace(options=ZenohOptions(), forget=lambda _: None, recycle=lambda _: None)
+    endpoint = EndpointInfo(
+        EndpointKind.SUBSCRIPTION, "/topic", "std_msgs/msg/Empty", NodeName("/", "node")
+    )
+    reader = ZenohReader(owner, "token", endpoint, print, None, LocalRegistry())
     reader.declare(Session(first))
     reader.poll()
     assert first.undeclared

@@ -7,8 +7,8 @@ import pytest
 zenoh = pytest.importorskip("zenoh")
 pytest.importorskip("zenoh.shm")
 
-from rosglass.wires.zenoh import shm as zenoh_shm  # noqa: E402
-from rosglass.wires.zenoh.shm import SharedMemory  # noqa: E402
+from rosglass.wires.zenoh import endpoints  # noqa: E402
+from rosglass.wires.zenoh.endpoints import SharedMemory  # noqa: E402
 
 BIG = 100_000
 
@@ -25,16 +25,16 @@ def test_parts_arrive_as_they_are():
 
 
 def test_bigger_payloads_get_a_bigger_pool(monkeypatch):
-    monkeypatch.setattr(zenoh_shm, "_POOL", 4 * BIG)
-    monkeypatch.setattr(zenoh_shm, "_PAYLOADS", 2)
+    monkeypatch.setattr(endpoints, "_MIN_POOL_SIZE", 4 * BIG)
+    monkeypatch.setattr(endpoints, "_MIN_POOL_PAYLOADS", 2)
     shared = SharedMemory()
     kept = [shared.place((bytes([size]) * size * BIG,)) for size in (1, 2, 3, 8)]
     assert [payload.to_bytes()[:1] for payload in kept] == [b"\x01", b"\x02", b"\x03", b"\x08"]
 
 
 def test_a_full_pool_is_no_error(monkeypatch):
-    monkeypatch.setattr(zenoh_shm, "_POOL", 4 * BIG)
-    monkeypatch.setattr(zenoh_shm, "_PAYLOADS", 2)
+    monkeypatch.setattr(endpoints, "_MIN_POOL_SIZE", 4 * BIG)
+    monkeypatch.setattr(endpoints, "_MIN_POOL_PAYLOADS", 2)
     shared = SharedMemory()
     kept = [shared.place((b"x" * BIG,)) for _ in range(8)]
     assert kept[0] is not None
@@ -44,7 +44,7 @@ def test_a_full_pool_is_no_error(monkeypatch):
 
 
 def test_a_machine_without_room_is_told_once(monkeypatch, caplog):
-    monkeypatch.setattr(zenoh_shm, "_free", lambda: 1_000_000)
+    monkeypatch.setattr(endpoints, "_free", lambda: 1_000_000)
     shared = SharedMemory()
     with caplog.at_level(logging.WARNING):
         assert [shared.place((b"x" * BIG,)) for _ in range(3)] == [None, None, None]
@@ -53,7 +53,7 @@ def test_a_machine_without_room_is_told_once(monkeypatch, caplog):
 
 
 def test_a_pool_is_no_bigger_than_what_the_user_may_lock(monkeypatch, caplog):
-    monkeypatch.setattr(zenoh_shm, "lockable_bytes", lambda: 6 * 2**20)
+    monkeypatch.setattr(endpoints, "lockable_bytes", lambda: 6 * 2**20)
     shared = SharedMemory()
     assert shared.place((b"x" * 2**20,)) is not None
     with caplog.at_level(logging.WARNING):
@@ -63,6 +63,6 @@ def test_a_pool_is_no_bigger_than_what_the_user_may_lock(monkeypatch, caplog):
 
 
 def test_users_other_than_root_may_lock_what_their_limit_says(monkeypatch):
-    monkeypatch.setattr(zenoh_shm.os, "geteuid", lambda: 1000)
-    monkeypatch.setattr(zenoh_shm.resource, "getrlimit", lambda _: (8 * 2**20, 8 * 2**20))
-    assert zenoh_shm.lockable_bytes() == 6 * 2**20
+    monkeypatch.setattr(endpoints.os, "geteuid", lambda: 1000)
+    monkeypatch.setattr(endpoints.resource, "getrlimit", lambda _: (8 * 2**20, 8 * 2**20))
+    assert endpoints.lockable_bytes() == 6 * 2**20

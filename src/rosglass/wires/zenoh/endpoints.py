@@ -1,9 +1,10 @@
-"""What a node declares on a Zenoh session: tokens, and the writers of its publishers."""
+"""What a node declares on a Zenoh session: liveliness tokens, and publishers with shared memory."""
 
 from __future__ import annotations
 
 import itertools
 import logging
+import os
 import threading
 import time
 from abc import abstractmethod
@@ -19,13 +20,19 @@ from rosglass.errors import ConnectionLostError, NodeClosedError
 from rosglass.wires.base import Writer
 from rosglass.wires.zenoh.keys import ATTACHMENT_FULL, HUMBLE_HASH, gid_of, topic_key, without_hash
 
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None  # type: ignore[assignment]
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from zenoh import shm
+
     from rosglass.comm import EndpointInfo, Status
+    from rosglass.comm.graph import Graph
     from rosglass.wires.zenoh.options import ZenohOptions
-    from rosglass.wires.zenoh.reader import ZenohReader
-    from rosglass.wires.zenoh.shm import SharedMemory
 
 __all__ = [
     "CHANNEL",
@@ -34,67 +41,72 @@ __all__ = [
     "LocalRegistry",
     "Owner",
     "Pump",
+    "SharedMemory",
     "ZenohWriter",
     "direct",
 ]
 
 _T = TypeVar("_T")
+_log = logging.getLogger("rosglass.ros2")
+#: Seconds between the heartbeats by which subscriptions notice a lost last sample (rmw_zenoh's).
+_HEARTBEAT_INTERVAL_S = 0.5
+#: Part of the names of an action's topics.
+_ACTION = "/_action/"
+#: Seconds that closing waits for another thread's write or query.
+_CLOSE_TIMEOUT_S = 1.0
+#: Seconds between two checks while closing waits.
+_POLL_INTERVAL_S = 0.0005
 
 
 class LocalRegistry(Generic[_T]):
-    """The node's own ends of each topic or service, to which it sends without a detour over Zenoh.
+    """The node's own readers or servers, to which it delivers directly instead of over Zenoh.
 
-    Zenoh would call back in the thread that sends. Where that is the main thread, Ctrl-C is most
-    likely to strike in the callback, and Zenoh swallows whatever that raises: a program would not
-    end.
+    Zenoh would call back in the sending thread. In the main thread, Ctrl-C is likely to strike in
+    that callback, and Zenoh swallows whatever it raises: the program would not end.
     """
 
     def __init__(self) -> None:
+        #: Guards changes; readers take the tuples without it.
         self._lock = threading.Lock()
-        self._there: dict[tuple[str, str], tuple[_T, ...]] = {}
+        self._entries: dict[tuple[str, str], tuple[_T, ...]] = {}
 
-    def add(self, place: tuple[str, str], one: _T) -> None:
-        """Add somebody."""
+    def add(self, place: tuple[str, str], entry: _T) -> None:
+        """Add an entry for a topic or service, given by its name and type."""
         with self._lock:
-            self._there[place] = (*self._there.get(place, ()), one)
+            self._entries[place] = (*self._entries.get(place, ()), entry)
 
-    def remove(self, place: tuple[str, str], one: _T) -> None:
-        """Remove somebody, who may be gone already."""
+    def remove(self, place: tuple[str, str], entry: _T) -> None:
+        """Remove an entry; safe to call twice."""
         with self._lock:
-            left = tuple(other for other in self._there.get(place, ()) if other is not one)
+            left = tuple(other for other in self._entries.pop(place, ()) if other is not entry)
             if left:
-                self._there[place] = left
-            else:
-                self._there.pop(place, None)
+                self._entries[place] = left
 
     def at(self, place: tuple[str, str]) -> tuple[_T, ...]:
-        """Return who is there, in order of appearance."""
-        return self._there.get(place, ())
-
-
-_log = logging.getLogger("rosglass.ros2")
-#: Seconds between the heartbeats that let subscriptions notice a lost last sample (rmw_zenoh's).
-_HEARTBEAT = 0.5
-#: Part of the names of an action's topics.
-_ACTION = "/_action/"
-#: Seconds that closing waits for another thread's write, or question.
-_PATIENCE = 1.0
+        """Return the entries for a topic or service, in order of appearance."""
+        return self._entries.get(place, ())
 
 
 class Owner(Protocol):
-    """Who keeps declarations.
+    """The middleware, as its declarations use it.
 
     Attributes:
-        version: Another number after each change of links or service servers.
+        options: Options of the session.
+        version: Increases with each change of links or service servers.
     """
 
+    options: ZenohOptions
     version: int
 
+    @property
+    def graph(self) -> Graph:
+        """The graph."""
+
     def forget(self, declaration: Declaration) -> None:
-        """Drop a declaration that was closed."""
+        """Remove a declaration that was closed."""
 
     def recycle(self, declaration: Declaration) -> None:
-        """Take back the number of a declaration whose token is gone."""
+        """Reuse the number of a declaration whose token is gone."""
 
     def wake(self) -> None:
         """Have declarations polled soon; from any thread."""
@@ -104,38 +116,44 @@ class Owner(Protocol):
 
 
 class Declaration(Handle):
-    """Something declared on the session, or to be declared when it opens."""
+    """A token and what belongs to it, declared as soon as the session is open.
+
+    Args:
+        owner: The middleware.
+        token: Key of the token.
+    """
 
     def __init__(self, owner: Owner, token: str) -> None:
         self.token = token
         self._owner = owner
+        #: Guards the state of the declaration, and that of subclasses.
         self._lock = threading.Lock()
         self._closed = self._attached = False
         self._handles: list[Any] = []
 
     def attach(self, session: zenoh.Session) -> None:
-        """Declare it on the session that just opened."""
+        """Declare it on the session that was opened."""
         with self._lock:
             if self._closed or self._attached:
                 return
             self._attached = True
-        # Declaring may call back at once, into code that closes this very declaration.
+        # Declaring may call back at once, into code that closes this declaration.
         try:
             handles = self.declare(session)
-            # The token comes last and goes first: who sees it can count on the rest.
+            # The token is declared last and undeclared first: it announces the rest.
             self._keep([session.liveliness().declare_token(self.token), *handles])
         except zenoh.ZError as error:
             raise self._error(error) from error
 
     @abstractmethod
     def declare(self, session: zenoh.Session) -> list[Any]:
-        """Declare what comes with the token, and return what has to be undeclared."""
+        """Declare what belongs to the token, and return the handles to undeclare."""
 
     def poll(self) -> None:
-        """Do what has to be done now and then; called about once a second."""
+        """Do periodic work; called about once a second."""
 
     def close(self) -> None:
-        """Undeclare it."""
+        """Undeclare it; safe to call twice."""
         with self._lock:
             if self._closed:
                 return
@@ -167,26 +185,26 @@ class Declaration(Handle):
 
 
 def _undeclare(handle: Any) -> None:
-    """Withdraw a handle, once no other thread is inside one of its methods."""
-    deadline = time.monotonic() + _PATIENCE
-    while not _undeclared(handle):
+    """Undeclare a handle as soon as no other thread is inside one of its methods."""
+    deadline = time.monotonic() + _CLOSE_TIMEOUT_S
+    while not _try_undeclare(handle):
         if time.monotonic() > deadline:
-            _log.warning("%r is still in use and is left to the end of the session", handle)
+            _log.warning("%r is in use, and stays declared until the session is closed", handle)
             return
-        time.sleep(0.0005)
+        time.sleep(_POLL_INTERVAL_S)
 
 
-def _undeclared(handle: Any) -> bool:
+def _try_undeclare(handle: Any) -> bool:
     try:
-        with suppress(zenoh.ZError):  # the session went first
+        with suppress(zenoh.ZError):  # the session was closed first
             handle.undeclare()
-    except RuntimeError:  # "Already borrowed": another thread asks it who matches
+    except RuntimeError:  # "Already borrowed": another thread reads its matching status
         return False
     return True
 
 
 class Announcement(Declaration):
-    """A token alone: a node."""
+    """The token of a node."""
 
     def declare(self, session: zenoh.Session) -> list[Any]:  # noqa: ARG002 - nothing but the token
         """Declare nothing more."""
@@ -194,82 +212,89 @@ class Announcement(Declaration):
 
 
 class ZenohWriter(Declaration, Writer):
-    """A publisher and its token; one publisher for each key that is listened to.
+    """A publisher and its token, with one Zenoh publisher for each subscribed key.
 
-    Plain subscriptions of the same node are handed the samples here.
+    Args:
+        owner: The middleware.
+        token: The publisher's token.
+        endpoint: The publisher.
+        shared: Shared memory for its payloads; None for none.
+        readers: The node's own readers, which receive the samples directly.
     """
 
     def __init__(
         self,
         owner: Owner,
-        options: ZenohOptions,
         token: str,
         endpoint: EndpointInfo,
         shared: SharedMemory | None,
-        readers: LocalRegistry[ZenohReader],
+        readers: LocalRegistry[Any],
     ) -> None:
         super().__init__(owner, token)
-        self._options, self._topic, self._qos = options, endpoint.name, endpoint.qos
+        self._topic, self._qos = endpoint.name, endpoint.qos
         self._type_name, self._type_hash = endpoint.type, endpoint.type_hash
         self._readers, self._place = readers, (self._topic, self._type_name)
         self.gid = gid_of(token)
         self._numbers = itertools.count(1)
         self._session: zenoh.Session | None = None
-        self._hashes = {HUMBLE_HASH if options.humble else self._type_hash or HUMBLE_HASH}
+        self._hashes = {HUMBLE_HASH if owner.options.humble else self._type_hash or HUMBLE_HASH}
         self._publishers: tuple[Any, ...] = ()
+        #: The threads that are writing, and whether one of them has to release the publishers.
         self._writing: list[int] = []
-        self._abandoned = False
-        self._quiet = threading.Condition(self._lock)
-        # Kept for keys that are declared later: late subscriptions are owed the last samples.
+        self._release_later = False
         self._latched = self._qos.durability is Durability.TRANSIENT_LOCAL
-        #: Payload, attachment, and when it was sent, in nanoseconds of the monotonic clock.
+        #: The last samples, for keys that are declared later: payload, attachment, and time of
+        #: sending in nanoseconds of the monotonic clock.
         self._history: deque[tuple[bytes | bytearray, bytes, int]] = deque(maxlen=self._qos.depth)
-        self._joining, self._joined = threading.Lock(), bytearray()
-        # What is kept for late subscriptions would fill the shared memory for good.
+        #: A buffer to join parts in: fresh memory takes longer than copying.
+        self._buffers: list[bytearray] = []
+        # What is kept for late subscriptions would fill the shared memory.
         self._shared = None if self._latched else shared
 
     def declare(self, session: zenoh.Session) -> list[Any]:
-        """Declare the publishers of the keys known so far."""
+        """Declare a publisher for each known key."""
         with self._lock:
             self._session, hashes = session, set(self._hashes)
         return self._declare_publishers(session, hashes)
 
     def write(self, data: bytes | bytearray) -> None:
-        """Send a payload; while nothing is linked, only a transient local cache keeps it."""
+        """Send a payload; without a link, only a transient-local cache keeps it."""
         now = time.time_ns()
         shared = None if self._shared is None else self._shared.place((data,))
         self._send(data, data if shared is None else shared, now)
 
     def write_parts(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
-        """Send a payload that comes in parts, with one copy less than by joining them."""
+        """Send a payload given in parts, with one copy less than by joining them."""
         now = time.time_ns()
         kept = self._latched or bool(self._readers.at(self._place))
         shared = None if kept or self._shared is None else self._shared.place(parts)
         if shared is not None:
             self._send(b"", shared, now)
-        elif kept or not self._joining.acquire(blocking=False):
+        elif kept:
             joined = b"".join(parts)
             self._send(joined, joined, now)
         else:
-            try:
-                self._send(b"", self._join(parts), now)
-            finally:
-                self._joining.release()
+            buffer = self._join(parts)
+            self._send(b"", buffer, now)
+            self._buffers[:] = [buffer]
 
     def _join(self, parts: Sequence[bytes | bytearray | memoryview]) -> bytearray:
-        """Join parts in memory that is used again: fresh memory takes longer than the copying."""
         size = sum(map(len, parts))
-        if len(self._joined) != size:
-            self._joined = bytearray(size)
+        try:
+            buffer = self._buffers.pop()
+        except IndexError:  # the first message, or another thread is sending
+            buffer = bytearray()
+        if len(buffer) != size:
+            buffer = bytearray(size)
         start = 0
         for part in parts:
-            self._joined[start : start + len(part)] = part
+            buffer[start : start + len(part)] = part
             start += len(part)
-        return self._joined
+        return buffer
 
     def _send(self, data: bytes | bytearray, payload: Any, now: int) -> None:
-        # No lock: it would be held while a subscription of this very session is called back.
-        # Either close() sees the entry in this list, or this sees that it was closed.
+        # No lock, as subscriptions of this session may be called back. Either close() sees the
+        # entry in this list, or this sees that it was closed.
         writing, thread = self._writing, threading.get_ident()
         writing.append(thread)
         try:
@@ -287,22 +312,11 @@ class ZenohWriter(Declaration, Writer):
             raise self._error(error) from error
         finally:
             writing.remove(thread)
-            if self._closed:
-                self._finish()
-
-    def _finish(self) -> None:
-        """Let close() go on; or do its work, if it waits no more."""
-        with self._lock:
-            self._quiet.notify_all()
-            late = self._abandoned and not self._writing
-        if late:
-            self._release()
+            if self._release_later and not writing:
+                self._release()
 
     def match(self, subscriptions: Sequence[EndpointInfo]) -> None:
-        """Send under a further key for subscriptions that name the type's definition otherwise.
-
-        A Humble robot subscribes without hash; the same definition is meant.
-        """
+        """Publish also on the key without type hash if a subscription, as of Humble, uses that."""
         ours = {self._type_hash or HUMBLE_HASH, HUMBLE_HASH}
         wanted = {endpoint.type_hash or HUMBLE_HASH for endpoint in subscriptions}
         with self._lock:
@@ -313,25 +327,24 @@ class ZenohWriter(Declaration, Writer):
             try:
                 self._keep(self._declare_publishers(session, new))
                 if _ACTION in self._topic and HUMBLE_HASH in new:
-                    # dora-rs looks for an action's topics by the hash, too; others do not.
+                    # dora-rs finds an action's topics by the hash; others do not.
                     second = without_hash(self.token, self._type_hash)
                     self._keep([session.liveliness().declare_token(second)])
             except zenoh.ZError as error:
                 raise self._error(error) from error
 
     def _release(self) -> None:
-        # Zenoh refuses to undeclare what is in use; a write ends soon, or does this when it ends.
-        own = threading.get_ident()
-        with self._lock:
-            self._quiet.wait_for(lambda: not set(self._writing) - {own}, _PATIENCE)
-            self._abandoned = bool(self._writing)
-            if self._abandoned:
-                return
-        super()._release()
+        # Zenoh refuses to undeclare what is in use. A write ends soon, or else releases this.
+        own, deadline = threading.get_ident(), time.monotonic() + _CLOSE_TIMEOUT_S
+        while set(self._writing) - {own} and time.monotonic() < deadline:
+            time.sleep(_POLL_INTERVAL_S)
+        self._release_later = True
+        if not self._writing:
+            super()._release()
 
     def _declare_publishers(self, session: zenoh.Session, hashes: set[str]) -> list[Any]:
         publishers = [self._declare_publisher(session, name) for name in sorted(hashes)]
-        # First: whatever is written from here on reaches them; some of it twice, under one number.
+        # First, so that no sample is lost; some are sent twice, with the same number.
         self._publishers += tuple(publishers)
         lifespan, now = self._qos.lifespan, time.monotonic_ns()
         for data, note, sent in tuple(self._history):
@@ -341,14 +354,14 @@ class ZenohWriter(Declaration, Writer):
         return publishers
 
     def _declare_publisher(self, session: zenoh.Session, type_hash: str) -> Any:
-        key = topic_key(self._options.domain, self._topic, self._type_name, type_hash)
+        key = topic_key(self._owner.options.domain, self._topic, self._type_name, type_hash)
         reliable = self._qos.reliability is Reliability.RELIABLE
         keep_all = self._qos.history is History.KEEP_ALL
-        # rmw_zenoh's choice: only who keeps everything waits for a full queue.
+        # As in rmw_zenoh, only keep-all publishers wait for a full queue.
         block = reliable and keep_all
         congestion = zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP
-        # Each priority has its own queue: a stop command must not be thrown away because camera
-        # pictures, sent best effort by the same program, fill theirs while the network is stuck.
+        # Each priority has its own queue: a stop command must not be dropped because best-effort
+        # camera images of the same program fill theirs while the network is stuck.
         priority = zenoh.Priority.INTERACTIVE_LOW if reliable else zenoh.Priority.DATA
         if self._qos.durability is Durability.VOLATILE:
             return session.declare_publisher(key, congestion_control=congestion, priority=priority)
@@ -360,7 +373,7 @@ class ZenohWriter(Declaration, Writer):
             cache=zenoh.ext.CacheConfig(max_samples=self._qos.depth),
             publisher_detection=True,
             sample_miss_detection=zenoh.ext.MissDetectionConfig(
-                heartbeat=None, sporadic_heartbeat=_HEARTBEAT
+                heartbeat=None, sporadic_heartbeat=_HEARTBEAT_INTERVAL_S
             )
             if reliable
             else None,
@@ -368,54 +381,57 @@ class ZenohWriter(Declaration, Writer):
 
 
 def _guarded(callback: Callable[[Any], None]) -> Callable[[Any], None]:
-    """Log what `callback` raises: Zenoh would only print it."""
+    """Log what a callback raises; Zenoh would only print it."""
 
     def guarded(item: Any) -> None:
         try:
             callback(item)
         except Exception:
-            _log.exception("handling something received over Zenoh failed")
+            _log.exception("handling received data failed")
 
     return guarded
 
 
 def direct(callback: Callable[[Any], None]) -> Any:
-    """Run `callback` on the thread that receives; for what comes from other sessions only."""
+    """Run a callback on the receiving thread; only for data of other sessions."""
     return zenoh.handlers.Callback(_guarded(callback), indirect=False)
 
 
 class Pump:
-    """Hands what a Zenoh channel receives to a callback, on a thread of its own.
+    """A thread that hands the items of a Zenoh channel to a callback.
 
     Zenoh's "net" threads must never wait for Python's global lock: undeclaring an advanced
-    publisher holds that lock while it waits for a task of theirs (measured with eclipse-zenoh
-    1.10.2: the whole program stands still for 10 s). Only the samples of plain subscribers come
-    on other threads. Zenoh's own queueing callbacks keep a program from ending.
+    publisher holds that lock while it waits for one of their tasks (measured with eclipse-zenoh
+    1.10.2: the whole program stops for 10 s). Only samples of plain subscribers are received on
+    other threads. Zenoh's own queueing callbacks prevent a program from ending.
 
     Args:
-        source: What was declared with :data:`CHANNEL`; it ends the thread when it is undeclared.
-        callback: Takes each item.
-        name: The thread's name.
+        source: A declaration with :data:`CHANNEL`; undeclaring it ends the thread.
+        callback: Called with each item.
+        name: Name of the thread.
     """
 
     def __init__(self, source: Any, callback: Callable[[Any], None], name: str) -> None:
         self._source, self._callback = source, _guarded(callback)
-        # It cannot be asked for any more once the source is undeclared.
+        # Not available any more once the source is undeclared.
         self._items = source.handler
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._thread.start()
 
-    def undeclare(self, patience: float = _PATIENCE) -> bool:
-        """Undeclare the source, and wait up to so many seconds for the thread, unless this is it.
+    def undeclare(self, timeout: float = _CLOSE_TIMEOUT_S) -> bool:
+        """Undeclare the source, and wait for the thread, unless called on it.
+
+        Args:
+            timeout: Seconds to wait.
 
         Returns:
-            Whether the thread has ended. That of an advanced subscriber goes on while questions to
-            publishers are open; the end of the session ends it.
+            Whether the thread has ended. That of an advanced subscriber continues while it has open
+            queries; closing the session ends it.
         """
-        with suppress(zenoh.ZError):  # undeclared already, or the session went first
+        with suppress(zenoh.ZError):  # undeclared already, or the session was closed first
             self._source.undeclare()
         if self._thread is not threading.current_thread():
-            self._thread.join(patience)
+            self._thread.join(timeout)
         return not self._thread.is_alive()
 
     def _work(self) -> None:
@@ -423,5 +439,110 @@ class Pump:
             self._callback(item)
 
 
-#: Channel for a :class:`Pump`; so long that its end is never met while the pump's thread lives.
+#: The channel of a :class:`Pump`, long enough never to be full while its thread lives.
 CHANNEL = zenoh.handlers.FifoChannel(100_000)
+
+
+#: Size of payloads in bytes from which shared memory is used; Zenoh itself uses it from 3 kB.
+_MIN_SHARED_SIZE = 64 * 1024
+#: Smallest pool size in bytes and in payloads; only used parts take up memory.
+_MIN_POOL_SIZE = 64 * 1024 * 1024
+_MIN_POOL_PAYLOADS = 10
+#: Bytes of a view to copy at a time; from 128 kB on, malloc would get fresh memory each time.
+_PIECE = 96 * 1024
+#: The folder of shared memory on Linux.
+_SHM_FOLDER = "/dev/shm"
+
+
+class SharedMemory:
+    """The shared memory for the payloads of a session.
+
+    Writing a payload there saves one copy by Zenoh. Where there is no room, because receivers are
+    slow or the machine's memory is full, payloads are sent as usual.
+    """
+
+    def __init__(self) -> None:
+        from zenoh import shm  # noqa: PLC0415 - not in every build of Zenoh
+
+        self._shm = shm
+        #: Guards the pool, which is replaced by a larger one when needed.
+        self._lock = threading.Lock()
+        self._provider: shm.ShmProvider | None = None
+        self._size = self._refused = 0
+
+    def place(self, parts: Sequence[bytes | bytearray | memoryview]) -> zenoh.ZBytes | None:
+        """Return a payload in shared memory; None if it is too small or there is no room."""
+        size = sum(map(len, parts))
+        if size < _MIN_SHARED_SIZE:
+            return None
+        provider = self._provide(size)
+        if provider is None:
+            return None
+        try:
+            buffer = provider.alloc(size, policy=self._shm.GarbageCollect())
+        except zenoh.ZError:
+            return None
+        start = 0
+        for part in parts:
+            _copy(part, buffer, start)
+            start += len(part)
+        payload: zenoh.ZBytes = zenoh.ZBytes(buffer)
+        return payload
+
+    def _provide(self, size: int) -> shm.ShmProvider | None:
+        with self._lock:
+            if size * 2 <= self._size:
+                return self._provider
+            wanted = min(max(_MIN_POOL_SIZE, size * _MIN_POOL_PAYLOADS), lockable_bytes())
+            if self._refused and wanted >= self._refused:
+                return self._provider if size <= self._size else None
+            try:
+                if wanted < size * 2:
+                    raise MemoryError(
+                        f"Zenoh locks it, and this user may lock {wanted / 2**20:.0f} MB; "
+                        f"{size * 2 / 2**20:.0f} MB are needed at least: raise the limit "
+                        "(ulimit -l, memlock in /etc/security/limits.conf, LimitMEMLOCK in systemd)"
+                    )
+                if wanted > _free() // 2:
+                    raise MemoryError(f"{_SHM_FOLDER} has less than {2 * wanted // 2**20} MB left")
+                # Payloads in the old pool keep it until they are received.
+                self._provider = self._shm.ShmProvider.default_backend(wanted)
+                self._size = wanted
+            except (zenoh.ZError, MemoryError) as error:
+                self._refused = wanted
+                _log.warning(
+                    "no shared memory for messages of %d bytes, they are copied once more: %s",
+                    size,
+                    error,
+                )
+            return self._provider if size <= self._size else None
+
+
+def _copy(part: bytes | bytearray | memoryview, buffer: shm.ZShmMut, start: int) -> None:
+    if not isinstance(part, memoryview):
+        buffer[start : start + len(part)] = part
+        return
+    for offset in range(0, len(part), _PIECE):
+        piece = bytes(part[offset : offset + _PIECE])
+        buffer[start + offset : start + offset + len(piece)] = piece
+
+
+def lockable_bytes() -> int:
+    """Return the largest pool in bytes that this user may lock.
+
+    Zenoh locks its pools in memory; Debian allows 8 MB to users other than root.
+    """
+    if resource is None or os.geteuid() == 0:
+        return 1 << 62
+    limit = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
+    # Leave room for Zenoh's own pages and for rounding.
+    return 1 << 62 if limit == resource.RLIM_INFINITY else limit * 3 // 4
+
+
+def _free() -> int:
+    """Return the free shared memory in bytes; writing beyond it kills a program."""
+    try:
+        state = os.statvfs(_SHM_FOLDER)
+    except (AttributeError, OSError):  # another system than Linux
+        return 1 << 62
+    return state.f_bavail * state.f_frsize

@@ -1,7 +1,7 @@
-"""rmw_zenoh's key expressions: where data flows, and the tokens that make up the graph.
+"""rmw_zenoh's key expressions, liveliness tokens and attachments.
 
 Formats: ``docs/design.md`` of rmw_zenoh (https://github.com/ros2/rmw_zenoh) and its released
-behaviour. Everything here is text in, text out; no session is needed.
+behaviour. Nothing here needs a session.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ __all__ = [
     "without_hash",
 ]
 
-#: What Humble, which has no type hashes, writes in their place.
+#: What Humble, which has no type hashes, writes instead.
 HUMBLE_HASH = "TypeHashNotSupported"
 
 _SPACE = "@ros2_lv"
@@ -69,34 +69,34 @@ _DEFAULTS = (
     History.KEEP_LAST,
     Liveliness.AUTOMATIC,
 )
-#: Depth that an empty field stands for (RMW_ZENOH_DEFAULT_HISTORY_DEPTH).
+#: Depth for an empty field (RMW_ZENOH_DEFAULT_HISTORY_DEPTH).
 _DEFAULT_DEPTH = 42
 _NS = 1_000_000_000
-#: Spans of a century and more mean "infinite": rmw writes INT64_MAX or UINT64_MAX nanoseconds.
+#: Durations from this one on mean "infinite": rmw writes INT64_MAX or UINT64_MAX nanoseconds.
 _INFINITE = 100 * 365 * 86400 * _NS
 
 
 def topic_key(domain: int, topic: str, type_name: str, type_hash: str) -> str:
-    """Return the key that a topic's data is sent on; `type_hash` may be the wildcard ``*``."""
+    """Return the key of a topic's data; `type_hash` may be the wildcard ``*``."""
     return f"{domain}/{topic.strip('/')}/{mangle_type(type_name)}/{type_hash}"
 
 
 def graph_key(domain: int) -> str:
-    """Return the key expression that all tokens of a domain match."""
+    """Return the key expression that matches all tokens of a domain."""
     return f"{_SPACE}/{domain}/**"
 
 
 @dataclass(frozen=True)
 class Token:
-    """A liveliness token: one node, or one endpoint of it.
+    """The liveliness token of a node or endpoint.
 
     Attributes:
         domain: ROS domain.
         session: The session's Zenoh id, hexadecimal.
-        node_id: The node's running number in its session; text, as some peers write a name.
-        entity_id: The entity's running number in its session.
+        node_id: The node's number in its session; a text, as some peers use names.
+        entity_id: The entity's number in its session.
         node: Name of the node.
-        endpoint: The endpoint; None when the token stands for the node itself.
+        endpoint: The endpoint; None for the token of a node.
     """
 
     domain: int
@@ -131,9 +131,9 @@ class Token:
 
     @classmethod
     def parse(cls, key: str) -> Token:
-        """Return the token that `key` stands for; raises ValueError with the reason.
+        """Parse a token's key; raises ValueError with the reason.
 
-        Parts beyond those known are ignored, as newer versions append some.
+        Additional parts at the end, of newer versions, are ignored.
         """
         parts = key.split("/")
         if len(parts) < 9 or parts[0] != _SPACE:
@@ -149,7 +149,7 @@ class Token:
         name, dds_type, type_hash, qos = parts[9:13]
         endpoint = EndpointInfo(
             _KINDS[parts[5]],
-            # Some peers leave out the leading slash.
+            # Some peers omit the leading slash.
             "/" + _demangle(name).lstrip("/"),
             demangle_type(_demangle(dds_type)),
             node,
@@ -161,22 +161,22 @@ class Token:
 
 
 def gid_of(key: str) -> bytes:
-    """Return the 16-byte identity of the endpoint whose token is `key` (XXH3-128, low half first).
+    """Return the 16-byte identity of the endpoint with token `key` (XXH3-128, low half first).
 
-    Peers other than rmw_zenoh may send another identity with their samples.
+    Peers other than rmw_zenoh may attach another identity to their samples.
     """
     return xxhash.xxh3_128_intdigest(key.encode()).to_bytes(16, "little")
 
 
 def without_hash(key: str, type_hash: str) -> str:
-    """Return the key of a token as Humble, which has no type hashes, writes it."""
+    """Return the key of a token as in Humble, which has no type hashes."""
     return key.replace(f"/{type_hash}/", f"/{HUMBLE_HASH}/")
 
 
 def encode_qos(qos: QoS) -> str:
-    """Return the part of a token that says the quality of service, as released rmw_zenoh does.
+    """Return the QoS part of a token as in released rmw_zenoh.
 
-    What is the default is left out: dora-rs finds services and actions by the whole token.
+    Defaults are left out: dora-rs finds services and actions by the whole token.
     """
 
     def number(policy: object) -> str:
@@ -195,9 +195,9 @@ def encode_qos(qos: QoS) -> str:
 
 
 def decode_qos(text: str) -> QoS:
-    """Return the profile that a token's last part says; raises ValueError.
+    """Parse the QoS part of a token; raises ValueError.
 
-    Values without a counterpart here (system default, best available) count as the default.
+    Values without a counterpart here (system default, best available) become the default.
     """
     fields = text.split(":")
     if len(fields) < 6:
@@ -218,12 +218,12 @@ def decode_qos(text: str) -> QoS:
 
 
 class Attachment(NamedTuple):
-    """What travels beside each sample.
+    """The attachment of a sample.
 
     Attributes:
-        sequence: The publisher's running number, -1 when unknown.
-        sent: Nanoseconds since the Unix epoch at which it was published, None when unknown.
-        gid: Identity of the publisher, empty when unknown.
+        sequence: Sequence number of the publisher, -1 if unknown.
+        sent: Time of publication in nanoseconds since the Unix epoch, None if unknown.
+        gid: Identity of the publisher, empty if unknown.
     """
 
     sequence: int
@@ -231,20 +231,20 @@ class Attachment(NamedTuple):
     gid: bytes
 
     def encode(self) -> bytes:
-        """Return the 33 bytes rmw_zenoh attaches: two integers, the identity with its length."""
+        """Return rmw_zenoh's 33 bytes: two integers, and the identity with its length."""
         return ATTACHMENT_FULL.pack(self.sequence, self.sent or 0, len(self.gid), self.gid)
 
     @classmethod
     def decode(cls, data: bytes) -> Attachment:
-        """Return what `data` says; other programs' attachments give :data:`NO_ATTACHMENT`."""
+        """Parse an attachment; those of other programs become :data:`NO_ATTACHMENT`."""
         if len(data) != ATTACHMENT.size or data[16] != 16:
             return NO_ATTACHMENT
         return cls(*ATTACHMENT.unpack(data))
 
 
-#: What :class:`Attachment` reads, for those who have no time for classes; byte 16 must be 16.
+#: The layout that :meth:`Attachment.decode` reads, for hot paths; byte 16 must be 16.
 ATTACHMENT = struct.Struct("<qqx16s")
-#: What :meth:`Attachment.encode` writes: number, time of sending, 16, identity.
+#: The layout that :meth:`Attachment.encode` writes: number, time of sending, 16, identity.
 ATTACHMENT_FULL = struct.Struct("<qqB16s")
 NO_ATTACHMENT = Attachment(-1, None, b"")
 

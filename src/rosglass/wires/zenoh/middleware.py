@@ -1,4 +1,4 @@
-"""ROS 2 over Zenoh, speaking rmw_zenoh's protocol (Jazzy and newer; Humble by its hash marker)."""
+"""ROS 2 over Zenoh with rmw_zenoh's protocol (Jazzy and newer, and Humble)."""
 
 from __future__ import annotations
 
@@ -33,13 +33,6 @@ from rosglass.wires.base import (
     Requester,
     Writer,
 )
-from rosglass.wires.zenoh.config import (
-    check_process,
-    close_session,
-    open_session,
-    reason,
-    session_config,
-)
 from rosglass.wires.zenoh.endpoints import (
     CHANNEL,
     Announcement,
@@ -48,52 +41,61 @@ from rosglass.wires.zenoh.endpoints import (
     Pump,
     ZenohWriter,
 )
-from rosglass.wires.zenoh.keys import Token, gid_of, graph_key, topic_key
-from rosglass.wires.zenoh.links import Pulse, limit_silence
+from rosglass.wires.zenoh.keys import Token, gid_of, graph_key
 from rosglass.wires.zenoh.reader import Drain, ZenohReader
-from rosglass.wires.zenoh.services import Service, ZenohReplier, ZenohRequester
+from rosglass.wires.zenoh.services import ZenohReplier, ZenohRequester
+from rosglass.wires.zenoh.session import (
+    Heartbeat,
+    check_process,
+    close_session,
+    limit_silence,
+    open_session,
+    reason,
+    session_config,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm.graph import Graph
+    from rosglass.wires.zenoh.endpoints import SharedMemory
     from rosglass.wires.zenoh.options import ZenohOptions
-    from rosglass.wires.zenoh.shm import SharedMemory
 
 __all__ = ["ZenohMiddleware"]
 
 _Kind = TypeVar("_Kind", bound=Declaration)
 
 _log = logging.getLogger("rosglass.ros2")
-#: Numbers of closed endpoints that rest before the oldest of them is used again.
-_RESERVE = 8
-#: Seconds between questions whether the router is there.
-_BEAT = 0.9
-#: Seconds that a router has to send the tokens that there are: for 10,000, Zenoh needs 4 to 13.
-_HISTORY_S = 20.0
-#: Tokens that are not understood are logged up to so many.
-_MAX_STRANGE = 100
-#: Seconds without a new link before a peer's session is closed: a link that another peer, or this
-#: one, opens at that moment is never closed (eclipse-zenoh 1.10.2), nor are its sockets.
-_SETTLING = 0.2
+#: Number of closed endpoints before the number of the oldest is used again.
+_MIN_UNUSED_NUMBERS = 8
+#: Seconds between two heartbeats to the router.
+_HEARTBEAT_INTERVAL_S = 0.9
+#: Seconds that a router has to send all tokens: for 10,000, Zenoh needs 4 to 13.
+_HISTORY_TIMEOUT_S = 20.0
+#: Number of invalid tokens to log.
+_MAX_LOGGED = 100
+#: Seconds without a new link before a peer's session is closed: a link that is opened at that
+#: moment is never closed (eclipse-zenoh 1.10.2), nor are its sockets.
+_SETTLING_TIME_S = 0.2
 
 
 class ZenohMiddleware(Middleware):
-    """One Zenoh session.
+    """A Zenoh session.
 
-    What is declared before the session is open (a client opens only when its router answers) is
-    kept and declared then.
+    What is created before the session is open (that of a client opens when its router answers) is
+    declared then.
     """
 
     matches_qos = False
 
     def __init__(self, options: ZenohOptions) -> None:
-        self._options = options
+        self.options = options
         self._config, self._address = session_config(options)
         self._session: zenoh.Session | None = None
         self._id = json.loads(self._config.get_json("id"))
         self._numbers = itertools.count(1)
         self._used_numbers: deque[str] = deque()
+        #: Guards what several threads change: declarations, links, the session.
         self._lock = threading.Lock()
         self._declared: dict[int, Declaration] = {}
         self._links: dict[str, bool] = {}
@@ -102,16 +104,16 @@ class ZenohMiddleware(Middleware):
         self._is_peer = json.loads(self._config.get_json("mode")) != "client"
         self._settled = 0.0
         self._was_connected = self._closed = False
-        self._refused = self._linked = False
-        self._nothing = f"@ros2_lv/{options.domain}/{self._id}/pulse"
-        self._pulse = Pulse(self._nothing)
-        #: Ends after the tokens that were there when the router was linked.
+        self._retries_open = self._linked = False
+        self._no_token = f"@ros2_lv/{options.domain}/{self._id}/pulse"
+        self._heartbeat = Heartbeat(self._no_token)
+        #: A query that ends after the tokens that the router had when it was linked.
         self._history: Any = None
         self._next_beat = 0.0
         self._pumps: list[Pump] = []
         self._shared: SharedMemory | None = None
         if json.loads(self._config.get_json("transport/shared_memory/enabled")):
-            from rosglass.wires.zenoh.shm import SharedMemory  # noqa: PLC0415 - not everywhere
+            from rosglass.wires.zenoh.endpoints import SharedMemory  # noqa: PLC0415 - not everywhere
 
             self._shared = SharedMemory()
         self._readers: LocalRegistry[ZenohReader] = LocalRegistry()
@@ -119,33 +121,40 @@ class ZenohMiddleware(Middleware):
         self._drain = Drain(f"{self._address} unread")
         self._changed: Callable[[], None] = lambda: None
         self._graph: Graph | None = None
-        self._strange: set[str] = set()
+        self._logged_tokens: set[str] = set()
 
     def open(self, graph: Graph, changed: Callable[[], None]) -> None:
-        """Open the session; a peer's opens at once, a client's when its router answers."""
+        """Open the session of a peer; that of a client opens when its router answers."""
         check_process()
         self._graph, self._changed = graph, changed
         if not self._is_peer:
-            self._refused = True  # it would wait for the router: poll() does
+            self._retries_open = True  # poll() opens it, as it would wait for the router
             changed()
         else:
             self._open()
 
+    @property
+    def graph(self) -> Graph:
+        """The graph."""
+        if self._graph is None:
+            raise NodeClosedError("the node is not open yet")
+        return self._graph
+
     def status(self) -> Status:
-        """Return whether a router or at least a peer is linked."""
+        """Return the state: connected if a router, or at least a peer, is linked."""
         with self._lock:
             links, was_connected = dict(self._links), self._was_connected
-        again = "trying again every second"
+        retry = "trying again every second"
         if self._closed:
             return Status(ConnectionState.CLOSED, "closed")
-        routers, silent = sum(links.values()), self._pulse.silent
+        routers, silent = sum(links.values()), self._heartbeat.silent
         if routers and not silent:
             return Status(ConnectionState.CONNECTED, f"router at {self._address}")
         if len(links) > routers:
             missing = (
                 f"the router at {self._address} is silent"
                 if routers
-                else (f"no router at {self._address}, {again}")
+                else (f"no router at {self._address}, {retry}")
             )
             detail = f"linked with other nodes, but {missing}"
             return Status(ConnectionState.CONNECTED, detail)
@@ -153,16 +162,16 @@ class ZenohMiddleware(Middleware):
             detail = f"connected to {self._address}, which is silent, waiting for it"
             return Status(ConnectionState.LOST, detail)
         if was_connected:
-            detail = f"connection to {self._address} lost, {again}"
+            detail = f"connection to {self._address} lost, {retry}"
             return Status(ConnectionState.LOST, detail)
-        return Status(ConnectionState.CONNECTING, f"no answer from {self._address}, {again}")
+        return Status(ConnectionState.CONNECTING, f"no answer from {self._address}, {retry}")
 
     def unnamed(self) -> int:
-        """Return 1 while the router has not sent all tokens that there are, else 0."""
+        """Return 1 until the router has sent all its tokens, then 0."""
         with self._lock:
             if self._history is not None:
                 try:
-                    over = self._history.try_recv() is not None  # an error: not in time
+                    over = self._history.try_recv() is not None  # an error: the timeout
                 except zenoh.ZError:  # the end of the answer
                     over = True
                 if over:
@@ -171,56 +180,41 @@ class ZenohMiddleware(Middleware):
 
     def announce(self, node: NodeName) -> Handle:
         """Declare the node's token."""
-        key = Token(self._options.domain, self._id, "0", "0", node).key()
+        key = Token(self.options.domain, self._id, "0", "0", node).key()
         return self._add(Announcement(self, key))
 
     def create_writer(self, endpoint: EndpointInfo) -> Writer:
         """Declare a publisher and its token."""
-        writer = ZenohWriter(
-            self, self._options, self._token(endpoint), endpoint, self._shared, self._readers
-        )
-        self._add(writer)
-        return writer
+        token = self._token(endpoint)
+        return self._add(ZenohWriter(self, token, endpoint, self._shared, self._readers))
 
     def create_reader(self, endpoint: EndpointInfo, on_sample: OnSample) -> Reader:
-        """Declare a subscriber to every definition of the type, and its token."""
-        token, graph = self._token(endpoint), self._opened_graph()
-        key = topic_key(self._options.domain, endpoint.name, endpoint.type, "*")
-        place = endpoint.name, endpoint.type
-        reader = ZenohReader(
-            self, token, place, key, endpoint.qos, on_sample, self._drain, self._readers, graph
-        )
-        self._add(reader)
-        return reader
+        """Declare a subscriber to all definitions of the type, and its token."""
+        token = self._token(endpoint)
+        return self._add(ZenohReader(self, token, endpoint, on_sample, self._drain, self._readers))
 
     def create_requester(self, endpoint: EndpointInfo, on_reply: OnReply) -> Requester:
-        """Declare a client's token, and queriers that follow its servers."""
-        token, graph = self._token(endpoint), self._opened_graph()
-        wanted = Service(self._options, endpoint)
-        requester = ZenohRequester(self, token, wanted, graph, on_reply, self._servers)
-        self._add(requester)
-        return requester
+        """Declare a client's queriers and its token."""
+        token = self._token(endpoint)
+        return self._add(ZenohRequester(self, token, endpoint, on_reply, self._servers))
 
     def create_replier(self, endpoint: EndpointInfo, on_request: OnRequest) -> Replier:
-        """Declare a server's queryables, and its token."""
-        token, graph = self._token(endpoint), self._opened_graph()
-        offered = Service(self._options, endpoint)
-        replier = ZenohReplier(self, token, offered, graph, on_request, self._servers)
-        self._add(replier)
-        return replier
+        """Declare a server's queryables and its token."""
+        token = self._token(endpoint)
+        return self._add(ZenohReplier(self, token, endpoint, on_request, self._servers))
 
     def poll(self) -> None:
-        """Try again to open a client's session; let what is declared see to itself."""
+        """Open a client's session if its router answers; poll all declarations."""
         if self._closed:
             return
-        if self._refused:
+        if self._retries_open:
             self._open()
         self._watch_links()
         for declaration in self._of(Declaration):  # type: ignore[type-abstract]
             declaration.poll()
 
     def close(self) -> None:
-        """Close the session; everything declared on it goes with it."""
+        """Close the session, with everything declared on it."""
         with self._lock:
             if self._closed:
                 return
@@ -229,7 +223,7 @@ class ZenohMiddleware(Middleware):
             pause = max(0.0, self._settled - time.monotonic()) if self._is_peer else 0.0
             self._declared.clear()
             self._links.clear()
-        self._renew()
+        self._increase_version()
         for pump in self._pumps:
             pump.undeclare()
         if session is not None:
@@ -238,31 +232,31 @@ class ZenohMiddleware(Middleware):
         self._changed()
 
     def forget(self, declaration: Declaration) -> None:
-        """Drop a declaration that was closed; for declarations."""
+        """Remove a declaration that was closed."""
         with self._lock:
             self._declared.pop(id(declaration), None)
         self._hide(declaration.token)
 
     def recycle(self, declaration: Declaration) -> None:
-        """Use the number of a declaration again; for declarations.
+        """Reuse the number of a declaration whose token is gone.
 
-        Every program in the graph, and the router, remembers each token's key for ever.
+        Every program in the graph, and the router, stores each token's key for ever.
         """
         self._used_numbers.append(Token.parse(declaration.token).entity_id)
 
     def wake(self) -> None:
-        """Have declarations polled soon; for declarations."""
+        """Have declarations polled soon."""
         self._changed()
 
     def _token(self, endpoint: EndpointInfo) -> str:
         with self._lock:
-            again = len(self._used_numbers) > _RESERVE
+            again = len(self._used_numbers) > _MIN_UNUSED_NUMBERS
             number = self._used_numbers.popleft() if again else str(next(self._numbers))
-        if self._options.humble:
+        if self.options.humble:
             endpoint = replace(endpoint, type_hash="")
-        return Token(self._options.domain, self._id, "0", number, endpoint.node, endpoint).key()
+        return Token(self.options.domain, self._id, "0", number, endpoint.node, endpoint).key()
 
-    def _add(self, declaration: Declaration) -> Declaration:
+    def _add(self, declaration: _Kind) -> _Kind:
         with self._lock:
             if self._closed:
                 raise NodeClosedError("the node is closed; connect again")
@@ -270,7 +264,7 @@ class ZenohMiddleware(Middleware):
             session = self._session
         if session is not None:
             declaration.attach(session)
-        # Last: who counts it, and publishes, counts on its being there.
+        # Last, as it must be able to receive once it is in the graph.
         self._show(declaration.token)
         with self._lock:
             gone = id(declaration) not in self._declared
@@ -283,22 +277,22 @@ class ZenohMiddleware(Middleware):
             session = open_session(self._config)
         except zenoh.ZError as error:
             if "Unable to connect" in str(error):
-                self._refused = True  # a client without router; poll() tries again
+                self._retries_open = True  # a client without router; poll() tries again
                 return
             raise ConnectionLostError(f"cannot open a Zenoh session: {reason(error)}") from error
-        self._refused = False
-        self._settled = time.monotonic() + _SETTLING
+        self._retries_open = False
+        self._settled = time.monotonic() + _SETTLING_TIME_S
         try:
             events = session.info.declare_transport_events_listener(CHANNEL, history=True)
             tokens = session.liveliness().declare_subscriber(
-                graph_key(self._options.domain), CHANNEL, history=True
+                graph_key(self.options.domain), CHANNEL, history=True
             )
             self._pumps = [
                 Pump(events, self._on_transport, f"{self._address} links"),
                 Pump(tokens, self._on_token, f"{self._address} tokens"),
             ]
         except BaseException:  # Ctrl-C
-            # A pump that waits in Zenoh while the interpreter ends would abort the program.
+            # A pump that waits in Zenoh while the interpreter shuts down would abort the program.
             close_session(session)
             raise
         if not self._is_peer:
@@ -308,12 +302,12 @@ class ZenohMiddleware(Middleware):
                 self._session = session
             waiting = list(self._declared.values())
         if self._closed:
-            close_session(session, _SETTLING)
+            close_session(session, _SETTLING_TIME_S)
         for declaration in waiting:
             declaration.attach(session)
 
     def _watch_links(self) -> None:
-        """Notice links that are dead but not closed."""
+        """Detect links that are dead but not closed."""
         with self._lock:
             session, routers = self._session, any(self._links.values())
             fresh, self._linked = self._linked, False
@@ -323,47 +317,47 @@ class ZenohMiddleware(Middleware):
             limit_silence(session)
             if routers:
                 self._await_history(session)
-        # Answers queue behind the tokens that there are.
+        # Answers queue behind the tokens.
         if not routers or self.unnamed():
-            self._pulse.rest()
+            self._heartbeat.pause()
         elif (now := time.monotonic()) >= self._next_beat:
-            self._next_beat = now + _BEAT
-            self._pulse.beat(session, now)
-            if self._pulse.silent:
-                self._renew()
+            self._next_beat = now + _HEARTBEAT_INTERVAL_S
+            self._heartbeat.beat(session, now)
+            if self._heartbeat.silent:
+                self._increase_version()
 
     def _await_history(self, session: zenoh.Session) -> None:
-        """Ask a router what has no answer: the question ends when all before it has been sent."""
+        """Send a query without result to a router, which ends after all tokens before it."""
         with suppress(zenoh.ZError):  # the session is closed
             channel = zenoh.handlers.FifoChannel(4)
-            history = session.liveliness().get(self._nothing, channel, timeout=_HISTORY_S)
+            history = session.liveliness().get(self._no_token, channel, timeout=_HISTORY_TIMEOUT_S)
             with self._lock:
                 self._history = history
 
-    def _renew(self) -> None:
-        # A number never used before, whichever thread comes last.
+    def _increase_version(self) -> None:
+        # A new number on whichever thread.
         self.version = next(self._versions)
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         zid = str(event.transport.zid)
         with self._lock:
             if event.kind == zenoh.SampleKind.PUT:
-                self._settled = time.monotonic() + _SETTLING
+                self._settled = time.monotonic() + _SETTLING_TIME_S
                 self._links[zid] = event.transport.whatami == zenoh.WhatAmI.ROUTER
                 self._was_connected = self._linked = True
             else:
                 self._links.pop(zid, None)
-        self._renew()
+        self._increase_version()
         self._changed()
 
     def _on_token(self, sample: zenoh.Sample) -> None:
         key = str(sample.key_expr)
         if f"/{self._id}/" in key or self._closed:
-            return  # our own show as long as they are declared, whatever happens to links
+            return  # our own stay in the graph while they are declared, regardless of links
         if sample.kind == zenoh.SampleKind.DELETE:
             self._hide(key)
         else:
-            self._pulse.on_news(time.monotonic())
+            self._heartbeat.on_received(time.monotonic())
             self._show(key)
 
     def _show(self, key: str) -> None:
@@ -372,9 +366,9 @@ class ZenohMiddleware(Middleware):
         try:
             token = Token.parse(key)
         except ValueError as error:
-            if key not in self._strange and len(self._strange) < _MAX_STRANGE:
-                self._strange.add(key)
-                _log.warning("ignoring a graph token that is not understood: %s: %s", key, error)
+            if key not in self._logged_tokens and len(self._logged_tokens) < _MAX_LOGGED:
+                self._logged_tokens.add(key)
+                _log.warning("ignoring an invalid graph token: %s: %s", key, error)
             return
         endpoint = token.endpoint
         if endpoint is None:
@@ -382,26 +376,21 @@ class ZenohMiddleware(Middleware):
             return
         self._graph.put_endpoint(key, endpoint)
         if endpoint.kind is EndpointKind.SERVICE_SERVER:
-            self._renew()
+            self._increase_version()
         if endpoint.kind is EndpointKind.SERVICE_CLIENT and not endpoint.type_hash:
             for replier in self._of(ZenohReplier):
-                replier.client_came(endpoint)
+                replier.on_client(endpoint)
 
     def _hide(self, key: str) -> None:
         if self._graph is None:
             return
         self._graph.remove(key)
         if key.split("/", 6)[5:6] == ["SS"]:
-            self._renew()
+            self._increase_version()
             for requester in self._of(ZenohRequester):
-                requester.server_left(gid_of(key))
+                requester.on_server_left(gid_of(key))
 
     def _of(self, kind: type[_Kind]) -> list[_Kind]:
         with self._lock:
             declared = list(self._declared.values())
         return [one for one in declared if isinstance(one, kind)]
-
-    def _opened_graph(self) -> Graph:
-        if self._graph is None:
-            raise NodeClosedError("the node is not open yet")
-        return self._graph

@@ -1,4 +1,4 @@
-"""What a ``zenoh://`` URL says; needs no Zenoh."""
+"""The options of a ``zenoh://`` URL; does not import Zenoh."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 __all__ = ["DEFAULT_PORT", "ZenohOptions", "locator"]
 
-#: Where routers of rmw_zenoh listen.
+#: The port of rmw_zenoh's routers.
 DEFAULT_PORT = 7447
-#: ROS leaves the limit to the middleware; Zenoh's keys take any number, rcl stores 32 bits.
+#: Zenoh's keys allow any number; rcl stores 32 bits.
 _MAX_DOMAIN = 2**32 - 2
 _HOST = re.compile(r"[A-Za-z0-9_.:%-]+\Z")
 _CHOICES: dict[str, dict[str, str | bool]] = {
@@ -34,14 +34,14 @@ class ZenohOptions:
     """How to join a domain over Zenoh.
 
     Attributes:
-        host: Router's host name or address; None takes what `config_file` says, or this machine.
+        host: Router's host name or address; None for that of `config_file`, or this machine.
         port: Router's TCP port.
         domain: ROS domain.
-        mode: ``peer`` links directly with peers it hears of, ``client`` only with the router; None
-            takes what `config_file` says, or ``peer`` on one machine, ``client`` to another.
+        mode: ``peer`` links directly with discovered peers, ``client`` only with the router; None
+            for that of `config_file`, or ``peer`` on one machine and ``client`` to another.
         humble: Whether to announce types without hash, as ROS 2 Humble does.
-        shared_memory: Whether messages from 3 kB pass through shared memory between programs of
-            one machine that both allow it; None takes what `config_file` says, or not.
+        shared_memory: Whether messages from 3 kB on use shared memory between programs of one
+            machine that both allow it; None for that of `config_file`, or false.
         config_file: Zenoh configuration to start from, as in ``ZENOH_SESSION_CONFIG_URI``.
     """
 
@@ -55,10 +55,10 @@ class ZenohOptions:
 
     @classmethod
     def parse(cls, url: str, env: Mapping[str, str]) -> ZenohOptions:
-        """Return what `url` says, completed by the environment `env`.
+        """Parse `url`, with defaults from the environment `env`.
 
         Raises:
-            ArgumentError: A part of the URL, or ROS_DOMAIN_ID, is not valid; it says which.
+            ArgumentError: A part of the URL, or ROS_DOMAIN_ID, is not valid.
         """
         example = "as in zenoh://127.0.0.1:7447?domain=0"
         try:
@@ -85,33 +85,35 @@ class ZenohOptions:
             if options[key] != value:
                 raise ArgumentError(key, value, f"to be given once, not also {options[key]}", url)
         if "domain" in options:
-            domain = _domain(options["domain"], "domain", url)
+            domain = _parse_domain(options["domain"], "domain", url)
         else:
-            domain = _domain(env.get("ROS_DOMAIN_ID") or "0", "ROS_DOMAIN_ID", "environment")
-        mode = _choice(options, "mode", url)
+            domain = _parse_domain(env.get("ROS_DOMAIN_ID") or "0", "ROS_DOMAIN_ID", "environment")
+        mode = _parse_choice(options, "mode", url)
         return cls(
             host=host,
             port=port,
             domain=domain,
             mode=None if mode is None else str(mode),
-            humble=bool(_choice(options, "distro", url)),
-            shared_memory=None if "shm" not in options else bool(_choice(options, "shm", url)),
+            humble=bool(_parse_choice(options, "distro", url)),
+            shared_memory=None
+            if "shm" not in options
+            else bool(_parse_choice(options, "shm", url)),
             config_file=env.get("ZENOH_SESSION_CONFIG_URI") or None,
         )
 
 
 def locator(host: str, port: int) -> str:
-    """Return Zenoh's spelling of a TCP address; IPv6 addresses get their brackets."""
+    """Return the Zenoh locator of a TCP address, with brackets around IPv6 addresses."""
     return f"tcp/[{host}]:{port}" if ":" in host else f"tcp/{host}:{port}"
 
 
-def _domain(text: str, what: str, where: str) -> int:
+def _parse_domain(text: str, what: str, where: str) -> int:
     if not (text.isascii() and text.isdigit() and int(text[:12]) <= _MAX_DOMAIN):
         raise ArgumentError(what, text, "a ROS domain: a whole number, 0 or more", where)
     return int(text)
 
 
-def _choice(options: Mapping[str, str], key: str, url: str) -> str | bool | None:
+def _parse_choice(options: Mapping[str, str], key: str, url: str) -> str | bool | None:
     if key not in options:
         return None
     choices = _CHOICES[key]

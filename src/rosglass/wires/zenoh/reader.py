@@ -1,9 +1,8 @@
-"""Receiving samples over Zenoh, in the way that costs least for how they come and who waits.
+"""Receiving samples over Zenoh, in the cheapest of three ways.
 
-Usually each sample comes on the thread that receives it, which is the fastest. Where thousands come
-in a second, a thread of Python's own takes them from a native channel, as entering Python from
-outside costs more than everything else. Where nobody waits for them, they are taken from a channel
-some ten times a second.
+Usually each sample is handled on Zenoh's receiving thread, which is the fastest. At thousands per
+second, a Python thread takes them from a native channel, as entering Python from outside costs more
+than everything else. If no consumer waits, they are taken from a channel ten times a second.
 """
 
 from __future__ import annotations
@@ -23,65 +22,63 @@ from rosglass.comm import Durability, EndpointKind, Reliability
 from rosglass.comm.statistics import LatencyEstimator
 from rosglass.wires.base import OnSample, Reader
 from rosglass.wires.zenoh.endpoints import Declaration, Owner, Pump
-from rosglass.wires.zenoh.keys import ATTACHMENT, HUMBLE_HASH, NO_ATTACHMENT
+from rosglass.wires.zenoh.keys import ATTACHMENT, HUMBLE_HASH, NO_ATTACHMENT, topic_key
 
 if TYPE_CHECKING:
-    from rosglass.comm import QoS
-    from rosglass.comm.graph import Graph
+    from rosglass.comm import EndpointInfo
     from rosglass.wires.zenoh.endpoints import LocalRegistry
 
 __all__ = ["Drain", "ZenohReader"]
 
 _log = logging.getLogger("rosglass.ros2")
-#: Seconds between two looks at what nobody waits for.
-_INTERVAL = 0.1
-_INTERVAL_NS = 100_000_000
-#: Seconds, at least, over which samples are counted to know their rate.
-_WINDOW = 0.2
-#: Every 512th sample is a moment to see whether they come too fast.
-_HURRY = 511
-#: Samples per second from which collecting what nobody waits for is worth while.
-_OFTEN = 30.0
-#: Samples per second from which a thread of their own is worth while.
-_FAST = 2000.0
-#: Most samples that wait in a channel, and most bytes, going by the largest sample seen.
+#: Seconds between two collections of the samples that no consumer waits for.
+_COLLECT_INTERVAL_S = 0.1
+_COLLECT_INTERVAL_NS = 100_000_000
+#: Shortest time in seconds over which the rate is measured.
+_MIN_RATE_WINDOW_S = 0.2
+#: The rate is checked at every 512th sample (a bit mask).
+_RATE_CHECK_MASK = 511
+#: Rate in Hz from which collecting is cheaper, if no consumer waits.
+_COLLECT_RATE_HZ = 30.0
+#: Rate in Hz from which a thread is cheaper.
+_THREAD_RATE_HZ = 2000.0
+#: Capacity of a channel in samples, and in bytes by the largest sample so far.
 _MAX_WAITING = 4096
 _MAX_BYTES = 32 * 1024 * 1024
-#: Most samples that wait for a thread of their own: what waits gets its time stamp late.
-_MAX_BUSY = 512
-#: Largest sample, in bytes, whose copying does not outweigh what a channel saves.
-_SMALL = 65_536
-#: Seconds that closing waits for a thread.
-_PATIENCE = 1.0
-#: Seconds for the thread of a transient local subscription, which may last longer.
-_SHORTLY = 0.02
-#: The node's own publishers hand on their samples themselves.
-_OTHERS = zenoh.Locality.REMOTE
-#: Publishers that are remembered, for a second.
+#: Capacity of a thread's channel in samples: those that wait get their timestamp late.
+_MAX_THREAD_WAITING = 512
+#: Largest sample in bytes for which a channel is cheaper, despite copying.
+_MAX_THREAD_SIZE = 65_536
+#: Seconds that closing waits for a thread, and for that of a transient-local subscription, which
+#: may take longer to end.
+_CLOSE_TIMEOUT_S, _LATCHED_CLOSE_TIMEOUT_S = 1.0, 0.02
+#: The node's own publishers deliver their samples directly.
+_REMOTE = zenoh.Locality.REMOTE
+#: Number of publishers to cache, for a second.
 _MAX_PUBLISHERS = 256
 _NOTE_SIZE, _read_note = ATTACHMENT.size, ATTACHMENT.unpack
 
 
-class _Take(Protocol):
-    """Takes samples."""
+class _OnSample(Protocol):
+    """Handles a sample."""
 
     def __call__(self, sample: zenoh.Sample, received: int = 0, /) -> None:
-        """Take a sample and the time at which it was received, 0 for now."""
+        """Handle a sample and its time of reception, 0 for now."""
 
 
 class Drain:
-    """The thread that takes what nobody waits for, for all readers of a session."""
+    """The thread that collects the samples of all readers without a waiting consumer."""
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._lock = threading.Lock()
+        #: Guards the state below; notified when the thread has to end.
+        self._lock = threading.Condition()
         self._collected: dict[_Collected, None] = {}
-        self._wake = threading.Event()
-        self._leaving: list[Pump] = []
+        self._ending: list[Pump] = []
         self._thread: threading.Thread | None = None
 
     def add(self, collected: _Collected) -> None:
-        """Take what comes there from now on."""
+        """Collect the samples of a source from now on."""
         with self._lock:
             self._collected[collected] = None
             if self._thread is None:
@@ -89,61 +86,60 @@ class Drain:
                 self._thread.start()
 
     def remove(self, collected: _Collected) -> None:
-        """Take no more from there; without anything to do, the thread ends."""
+        """Stop collecting from a source; the thread ends with the last one."""
         with self._lock:
             self._collected.pop(collected, None)
-            if not self._collected:
-                self._wake.set()
+            self._lock.notify_all()
 
-    def see_off(self, pump: Pump) -> None:
-        """Wait for the end of a pump's thread, but not before the session is closed."""
+    def join_later(self, pump: Pump) -> None:
+        """Wait for the end of a pump's thread when the session is closed."""
         with self._lock:
-            self._leaving = [one for one in self._leaving if not one.undeclare(0)]
-            self._leaving.append(pump)
+            self._ending = [one for one in self._ending if not one.undeclare(0)]
+            self._ending.append(pump)
 
     def close(self) -> None:
-        """Take nothing more, and wait for the end of the threads; the session is closed."""
+        """Wait for the end of all threads; the session is closed."""
         with self._lock:
             self._collected.clear()
-            leaving, thread = self._leaving, self._thread
-        self._wake.set()
-        for pump in leaving:
-            pump.undeclare(_PATIENCE)
+            ending, thread = self._ending, self._thread
+            self._lock.notify_all()
+        for pump in ending:
+            pump.undeclare(_CLOSE_TIMEOUT_S)
         if thread is not None and thread is not threading.current_thread():
-            thread.join(_PATIENCE)
+            thread.join(_CLOSE_TIMEOUT_S)
 
     def _work(self) -> None:
         while True:
             with self._lock:
                 collected = list(self._collected)
-                if not collected:
+            for source in collected:
+                source.flush()
+            with self._lock:
+                if self._lock.wait_for(lambda: not self._collected, _COLLECT_INTERVAL_S):
                     self._thread = None
                     return
-            for one in collected:
-                one.flush()
-            if self._wake.wait(_INTERVAL):
-                self._wake.clear()
 
 
 class _Source(Protocol):
-    """Where a reader's samples come from."""
+    """The source of a reader's samples."""
 
     def begin(self) -> None:
-        """Hand on what has come since it was made, and what comes."""
+        """Start to hand on samples, from those received since it was created."""
 
     def end(self) -> None:
-        """Receive no more; hand on what came before that."""
+        """Stop receiving, and hand on what was received before."""
 
 
 class _Direct:
-    """Hands on samples in the thread that receives them; held ones only from the beginning on."""
+    """Hands on samples on the receiving thread; `held` ones are kept until :meth:`begin`."""
 
-    def __init__(self, session: zenoh.Session, key: str, take: _Take, *, held: bool) -> None:
+    def __init__(self, session: zenoh.Session, key: str, take: _OnSample, *, held: bool) -> None:
         self._take = take
+        #: Guards the held samples, so that they are handed on in order.
         self._lock = threading.Lock()
         self._held: deque[tuple[zenoh.Sample, int]] | None = deque() if held else None
         callback = zenoh.handlers.Callback(self._receive if held else take, indirect=False)
-        self._subscriber: Any = session.declare_subscriber(key, callback, allowed_origin=_OTHERS)
+        self._subscriber: Any = session.declare_subscriber(key, callback, allowed_origin=_REMOTE)
 
     def begin(self) -> None:
         held = self._held
@@ -156,7 +152,7 @@ class _Direct:
             self._take(*item)
 
     def end(self) -> None:
-        with suppress(zenoh.ZError):  # the session went first
+        with suppress(zenoh.ZError):  # the session was closed first
             self._subscriber.undeclare()
 
     def _receive(self, sample: zenoh.Sample) -> None:
@@ -170,13 +166,13 @@ class _Direct:
 
 
 class _Pumped:
-    """Hands on samples in a thread of their own."""
+    """Hands on samples on a thread."""
 
     def __init__(
-        self, subscriber: Any, take: _Take, name: str, patience: float, drain: Drain
+        self, subscriber: Any, take: _OnSample, name: str, timeout: float, drain: Drain
     ) -> None:
         self._subscriber, self._take, self._name = subscriber, take, name
-        self._patience, self._drain = patience, drain
+        self._timeout, self._drain = timeout, drain
         self._pump: Pump | None = None
 
     def begin(self) -> None:
@@ -186,25 +182,25 @@ class _Pumped:
         if self._pump is None:
             self.begin()
         assert self._pump is not None
-        if not self._pump.undeclare(self._patience):
-            self._drain.see_off(self._pump)
+        if not self._pump.undeclare(self._timeout):
+            self._drain.join_later(self._pump)
 
     def _receive(self, sample: zenoh.Sample) -> None:
         self._take(sample, time.time_ns())
 
 
 class _Collected:
-    """Hands on samples now and then."""
+    """Hands on samples when they are collected."""
 
     def __init__(
-        self, session: zenoh.Session, key: str, room: int, take: _Take, drain: Drain
+        self, session: zenoh.Session, key: str, room: int, take: _OnSample, drain: Drain
     ) -> None:
         self._take, self._drain = take, drain
-        # Reentrant: what listens to events of a subscription may ask for its samples.
+        #: Guards reading from the channel; reentrant, as callbacks may take samples.
         self._lock = threading.RLock()
-        self._looked = time.monotonic_ns()
+        self._flushed_at = time.monotonic_ns()
         self._subscriber: Any = session.declare_subscriber(
-            key, zenoh.handlers.FifoChannel(room), allowed_origin=_OTHERS
+            key, zenoh.handlers.FifoChannel(room), allowed_origin=_REMOTE
         )
         self._next = self._subscriber.handler.try_recv
 
@@ -213,83 +209,79 @@ class _Collected:
 
     def end(self) -> None:
         self._drain.remove(self)
-        # Not while its handler is read: undeclaring it then raises "Already borrowed".
-        with self._lock, suppress(zenoh.ZError):  # the session went first
+        # Undeclaring a handler that is being read raises "Already borrowed".
+        with self._lock, suppress(zenoh.ZError):  # the session was closed first
             self._subscriber.undeclare()
         self.flush()
 
     def flush(self) -> None:
-        """Hand on what waits, in the calling thread."""
+        """Hand on the waiting samples, in the calling thread."""
         with self._lock, suppress(zenoh.ZError):  # undeclared, and empty
             now = time.monotonic_ns()
-            # What waited longer than it should must not look new: the program was held up.
-            received = time.time_ns() - max(0, now - self._looked - _INTERVAL_NS)
+            # Samples that waited longer, because the program was stalled, must not look new.
+            received = time.time_ns() - max(0, now - self._flushed_at - _COLLECT_INTERVAL_NS)
             for _ in range(_MAX_WAITING):
                 sample = self._next()
                 if sample is None:
                     break
                 self._take(sample, received)
-            self._looked = now
+            self._flushed_at = now
 
 
-class _Way(Enum):
-    """How a reader's samples come."""
+class _Mode(Enum):
+    """How a reader's samples are received."""
 
-    DIRECT = "one by one"
-    PUMPED = "through a thread of their own"
-    COLLECTED = "together, now and then"
+    DIRECT = "on the receiving thread"
+    PUMPED = "on a thread"
+    COLLECTED = "in batches"
 
 
 class ZenohReader(Declaration, Reader):
-    """A subscriber and its token.
+    """A subscription and its token.
 
     Args:
-        owner: Keeps the declaration.
+        owner: The middleware.
         token: The subscription's token.
-        place: The topic and its type.
-        key: Key expression of the topic's samples, whatever their definition.
-        qos: The subscription's profile.
-        on_sample: Takes the samples.
-        drain: Takes what nobody waits for.
-        readers: Where the node's own publishers find it.
-        graph: Where publishers' profiles are looked up.
+        endpoint: The subscription.
+        on_sample: Handles the samples.
+        drain: Collects the samples while no consumer waits.
+        readers: The readers of the node, to which its own publishers deliver directly.
     """
 
     def __init__(
         self,
         owner: Owner,
         token: str,
-        place: tuple[str, str],
-        key: str,
-        qos: QoS,
+        endpoint: EndpointInfo,
         on_sample: OnSample,
         drain: Drain,
         readers: LocalRegistry[ZenohReader],
-        graph: Graph,
     ) -> None:
         super().__init__(owner, token)
-        self._place, self._readers, self._graph = place, readers, graph
-        # Transient local ones get everything over Zenoh, and never in the thread that sends.
-        if qos.durability is not Durability.TRANSIENT_LOCAL:
-            readers.add(place, self)
-        self._key, self._qos, self._on_sample, self._drain = key, qos, on_sample, drain
+        self._place, self._qos = (endpoint.name, endpoint.type), endpoint.qos
+        # All definitions of the type.
+        self._key = topic_key(owner.options.domain, *self._place, "*")
+        self._on_sample, self._drain, self._readers = on_sample, drain, readers
+        # Transient-local ones receive everything over Zenoh, never in the sending thread.
+        if self._qos.durability is not Durability.TRANSIENT_LOCAL:
+            readers.add(self._place, self)
         self._session: zenoh.Session | None = None
         self._source: _Source | None = None
-        self._way = _Way.DIRECT
-        self._eager, self._moving = True, False
+        self._mode = _Mode.DIRECT
+        self._eager, self._switching = True, False
         self._known: dict[bytes, tuple[str, int]] = {}
-        self._lateness = LatencyEstimator()
+        self._latency = LatencyEstimator()
         self._warned = self._anonymous = False
         self._count = self._largest = self._marked = 0
         self._marked_at, self._rate = time.monotonic(), 0.0
 
     def declare(self, session: zenoh.Session) -> list[Any]:
-        """Declare the subscriber; a transient local one asks publishers for their last samples."""
+        """Declare the subscriber; a transient-local one queries the publishers' last samples."""
         source: _Source
         if self._qos.durability is Durability.TRANSIENT_LOCAL:
             name = f"{self._key} samples"
             advanced = self._declare_advanced(session)
-            source = _Pumped(advanced, self._take, name, _SHORTLY, self._drain)
+            source = _Pumped(advanced, self._take, name, _LATCHED_CLOSE_TIMEOUT_S, self._drain)
         else:
             self._session = session
             source = _Direct(session, self._key, self._take, held=False)
@@ -299,29 +291,29 @@ class ZenohReader(Declaration, Reader):
         return []
 
     def set_eager(self, eager: bool) -> None:
-        """Say whether anybody waits for the samples."""
+        """Set whether a consumer waits for the samples."""
         self._eager = eager
-        if eager and self._way is _Way.COLLECTED:
-            self._move()
+        if eager and self._mode is _Mode.COLLECTED:
+            self._switch()
 
     def flush(self) -> None:
-        """Hand on what waits for its turn."""
+        """Hand on the waiting samples."""
         source = self._source
         if isinstance(source, _Collected):
             source.flush()
 
     def poll(self) -> None:
-        """Choose how samples come from now on; called about once a second."""
+        """Choose the cheapest mode; called about once a second."""
         now, count = time.monotonic(), self._count
-        if now - self._marked_at < _WINDOW:
+        if now - self._marked_at < _MIN_RATE_WINDOW_S:
             return
-        self._known.clear()  # other publishers may have appeared, or these tell more
+        self._known.clear()  # read the publishers' profiles again
         self._rate = (count - self._marked) / (now - self._marked_at)
         self._marked, self._marked_at = count, now
-        self._move()
+        self._switch()
 
     def take_own(self, data: bytes, sent: int, gid: bytes, sequence: int, type_hash: str) -> None:
-        """Take a sample of the same node, in the thread that sends it."""
+        """Handle a sample of the same node, in the sending thread."""
         if not self._closed:
             self._count += 1
             try:
@@ -352,37 +344,37 @@ class ZenohReader(Declaration, Reader):
             subscriber_detection=True,
         )
 
-    def _wanted(self) -> _Way:
-        """Return how samples should come, going by their rate, their size and who waits."""
-        # Once chosen, a way is kept until the rate is half of what it was chosen for.
-        often = _OFTEN / 2 if self._way is _Way.COLLECTED else _OFTEN
-        fast = _FAST / 2 if self._way is _Way.PUMPED else _FAST
+    def _choose_mode(self) -> _Mode:
+        """Return the cheapest mode for the rate, the size, and whether a consumer waits."""
+        # Hysteresis: a mode is kept until the rate is half of what it was chosen for.
+        often = _COLLECT_RATE_HZ / 2 if self._mode is _Mode.COLLECTED else _COLLECT_RATE_HZ
+        fast = _THREAD_RATE_HZ / 2 if self._mode is _Mode.PUMPED else _THREAD_RATE_HZ
         room = min(_MAX_WAITING, self._room())
-        if not self._eager and self._rate > often and self._rate * 4 * _INTERVAL < room:
-            return _Way.COLLECTED
-        if self._rate > fast and self._largest <= _SMALL:
-            return _Way.PUMPED
-        return _Way.DIRECT
+        if not self._eager and self._rate > often and self._rate * 4 * _COLLECT_INTERVAL_S < room:
+            return _Mode.COLLECTED
+        if self._rate > fast and self._largest <= _MAX_THREAD_SIZE:
+            return _Mode.PUMPED
+        return _Mode.DIRECT
 
     def _room(self) -> int:
         return max(1, _MAX_BYTES // max(1, self._largest))
 
-    def _move(self) -> None:
-        """Let samples come in another way: all of them, and in order.
+    def _switch(self) -> None:
+        """Switch to the cheapest mode without losing or reordering samples.
 
-        The new subscriber is there before the old one goes. What both receive is handed on twice,
-        under one number, and recognised by who takes it.
+        The new subscriber is declared before the old one is undeclared. Samples that both receive
+        are handed on twice with the same number, by which the subscription recognizes them.
         """
-        wanted, session = self._wanted(), self._session
+        wanted, session = self._choose_mode(), self._session
         with self._lock:
-            staying = self._moving or self._anonymous or wanted is self._way
+            staying = self._switching or self._anonymous or wanted is self._mode
             if staying or session is None or self._source is None:
                 return
-            self._moving = True
+            self._switching = True
         try:
-            new = self._make(session, wanted)
+            new = self._create_source(session, wanted)
             with self._lock:
-                # Until the new one has begun, both are this thread's to end, not close()'s.
+                # Until the new one has begun, this thread ends both, not close().
                 old, self._source = self._source, None
             if old is not None:
                 old.end()
@@ -390,27 +382,27 @@ class ZenohReader(Declaration, Reader):
             with self._lock:
                 closed = self._closed
                 if not closed:
-                    self._source, self._way = new, wanted
+                    self._source, self._mode = new, wanted
             if closed:
                 new.end()
         except zenoh.ZError as error:
-            _log.debug("%s: keeps receiving as before: %s", self._key, error)
+            _log.debug("%s: the mode of receiving is unchanged: %s", self._key, error)
         finally:
-            self._moving = False
+            self._switching = False
 
-    def _make(self, session: zenoh.Session, way: _Way) -> _Source:
-        if way is _Way.DIRECT:
+    def _create_source(self, session: zenoh.Session, mode: _Mode) -> _Source:
+        if mode is _Mode.DIRECT:
             return _Direct(session, self._key, self._take, held=True)
-        if way is _Way.COLLECTED:
+        if mode is _Mode.COLLECTED:
             room = min(_MAX_WAITING, self._room())
             return _Collected(session, self._key, room, self._take, self._drain)
-        channel = zenoh.handlers.FifoChannel(min(_MAX_BUSY, self._room()))
-        subscriber = session.declare_subscriber(self._key, channel, allowed_origin=_OTHERS)
+        channel = zenoh.handlers.FifoChannel(min(_MAX_THREAD_WAITING, self._room()))
+        subscriber = session.declare_subscriber(self._key, channel, allowed_origin=_REMOTE)
         name = f"{self._key} samples"
-        return _Pumped(subscriber, self._take, name, _PATIENCE, self._drain)
+        return _Pumped(subscriber, self._take, name, _CLOSE_TIMEOUT_S, self._drain)
 
     def _take(self, sample: zenoh.Sample, received: int = 0, /) -> None:
-        """Hand a sample on; every line here is paid for by each sample."""
+        """Hand on a sample; hot: runs once per sample."""
         try:
             if self._closed:
                 return
@@ -425,35 +417,35 @@ class ZenohReader(Declaration, Reader):
             else:
                 sequence, sent, gid = NO_ATTACHMENT
             if known is None:
-                known = self._look_at(sample, data, note, gid)
+                known = self._inspect(sample, data, note, gid)
                 if known is None:
                     return
             self._count = count = self._count + 1
-            if not count & _HURRY:
-                self._hurry()
+            if not count & _RATE_CHECK_MASK:
+                self._check_rate()
             type_hash, lifespan = known
-            # Not by the difference of two clocks, but by how long others of its kind took.
-            if lifespan and gid and self._lateness.add(gid, received, sent) > lifespan:
+            # Compare with the fastest sample, not across clocks.
+            if lifespan and gid and self._latency.add(gid, received, sent) > lifespan:
                 return
             self._on_sample(data, received, sent, gid, sequence, type_hash)
         except Exception:
             self._log_failure()
 
-    def _hurry(self) -> None:
-        """Have the way of receiving chosen anew, if this one is too slow for what comes."""
+    def _check_rate(self) -> None:
+        """Have the mode chosen again if the rate is too high for it."""
         span = time.monotonic() - self._marked_at
-        fast = self._count - self._marked > _FAST * span
-        if fast and span > _WINDOW and self._way is _Way.DIRECT:
+        fast = self._count - self._marked > _THREAD_RATE_HZ * span
+        if fast and span > _MIN_RATE_WINDOW_S and self._mode is _Mode.DIRECT:
             self._owner.wake()
 
-    def _look_at(
+    def _inspect(
         self, sample: zenoh.Sample, data: bytes, note: bytes, gid: bytes
     ) -> tuple[str, int] | None:
-        """Take a closer look at a publisher's sample, about once a second.
+        """Inspect a publisher's sample, about once a second.
 
         Returns:
-            The publisher's type hash, and the nanoseconds after which its samples are worthless, 0
-            for never. None when there is no sample.
+            The publisher's type hash, and its lifespan in nanoseconds, 0 for none. None if there
+            is no sample.
         """
         if len(data) < 4 and sample.kind == zenoh.SampleKind.DELETE:
             return None
@@ -463,7 +455,7 @@ class ZenohReader(Declaration, Reader):
             type_hash = ""
         known = type_hash, self._lifespan_of(gid)
         if not gid:
-            self._doubt(note)
+            self._on_anonymous(note)
         elif len(self._known) < _MAX_PUBLISHERS:
             self._known[gid] = known
         return known
@@ -471,20 +463,20 @@ class ZenohReader(Declaration, Reader):
     def _log_failure(self) -> None:
         _log.exception("%s: handling a sample failed", self._key)
 
-    def _doubt(self, note: bytes) -> None:
-        """Take note of a publisher that does not say who it is."""
-        self._anonymous = True  # its samples cannot be told apart when they come twice
+    def _on_anonymous(self, note: bytes) -> None:
+        """Handle a publisher without identity."""
+        self._anonymous = True  # duplicates of its samples cannot be recognized
         if note and not self._warned:
             self._warned = True
             _log.warning(
-                "%s: samples come with %d bytes attached that are not what ROS 2 attaches: their "
-                "publisher, number and time of sending stay unknown",
+                "%s: samples have attachments of %d bytes that are not those of ROS 2: their "
+                "publisher, number and time of sending are unknown",
                 self._key,
                 len(note),
             )
 
     def _lifespan_of(self, gid: bytes) -> int:
-        publishers = self._graph.endpoints(EndpointKind.PUBLISHER, self._place[0])
+        publishers = self._owner.graph.endpoints(EndpointKind.PUBLISHER, self._place[0])
         profiles = [self._qos, *(one.qos for one in publishers if gid and one.gid == gid)]
         spans = [profile.lifespan.nanoseconds for profile in profiles if profile.lifespan]
         return min(spans, default=0)

@@ -1,4 +1,4 @@
-"""A Zenoh router: the place where the nodes of a ROS 2 graph over rmw_zenoh find each other."""
+"""A Zenoh router, through which the nodes of a ROS 2 graph over rmw_zenoh discover each other."""
 
 from __future__ import annotations
 
@@ -6,27 +6,26 @@ import atexit
 import os
 import re
 import socket
-import threading
 import time
 
 import zenoh
 
 from rosglass.comm import Handle
 from rosglass.errors import ArgumentError, ConnectionLostError
-from rosglass.wires.zenoh.config import (
+from rosglass.wires.zenoh.endpoints import CHANNEL, Pump
+from rosglass.wires.zenoh.options import DEFAULT_PORT, ZenohOptions, locator
+from rosglass.wires.zenoh.session import (
     close_session,
+    limit_silence,
     open_session,
     reason,
     router_config,
     session_config,
 )
-from rosglass.wires.zenoh.endpoints import CHANNEL, Pump
-from rosglass.wires.zenoh.links import limit_silence
-from rosglass.wires.zenoh.options import DEFAULT_PORT, ZenohOptions, locator
 
 __all__ = ["DEFAULT_LISTEN", "Router", "is_router_reachable"]
 
-#: Where a router listens unless told otherwise: this machine only.
+#: The default address to listen on: this machine only.
 DEFAULT_LISTEN = f"tcp/127.0.0.1:{DEFAULT_PORT}"
 
 _LOCATOR = re.compile(
@@ -39,16 +38,16 @@ class Router(Handle):
     """A router in this process, running from creation to :meth:`close`.
 
     Args:
-        listen: Where to listen, ``tcp/HOST:PORT``; port 0 takes a free one.
+        listen: Address to listen on, ``tcp/HOST:PORT``; port 0 chooses a free one.
 
     Attributes:
-        listen: Where it listens, with the real port.
-        url: URL to pass to :func:`rosglass.connect`.
-        is_local: Whether only programs on this machine can reach it.
+        listen: The address, with the actual port.
+        url: URL for :func:`rosglass.connect`.
+        is_local: Whether only programs on this machine can connect.
 
     Raises:
         ArgumentError: `listen` is not an address.
-        ConnectionLostError: The address is taken, or not one of this machine's.
+        ConnectionLostError: The address is in use, or none of this machine.
     """
 
     def __init__(self, listen: str = DEFAULT_LISTEN) -> None:
@@ -58,20 +57,18 @@ class Router(Handle):
         reachable = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
         self.url = "zenoh://" + locator(reachable, port).removeprefix("tcp/")
         self.is_local = _LOOPBACK.fullmatch(host) is not None
-        self._lock = threading.Lock()
         self._session: zenoh.Session | None = None
         try:
             self._session = open_session(router_config(self.listen))
         except zenoh.ZError as error:
-            raise ConnectionLostError(self._why(error)) from error
+            raise ConnectionLostError(self._explain(error)) from error
         self._pump = None if self.is_local else self._watch(self._session)
-        # A thread inside Zenoh must not meet an interpreter that is being taken down.
+        # No Zenoh thread may call into an interpreter that is shutting down.
         atexit.register(self.close)
 
     def close(self) -> None:
         """Stop the router; safe to call twice."""
-        with self._lock:
-            session, self._session = self._session, None
+        session, self._session = self._session, None
         if session is None:
             return
         atexit.unregister(self.close)
@@ -80,18 +77,18 @@ class Router(Handle):
         close_session(session)
 
     def _watch(self, session: zenoh.Session) -> Pump:
-        """Let go of programs whose network is gone, so that they can come back at once."""
+        """Disconnect programs whose network is lost, so that they can reconnect at once."""
         events = session.info.declare_transport_events_listener(CHANNEL, history=True)
         return Pump(events, lambda _: limit_silence(session), f"{self.listen} links")
 
-    def _why(self, error: zenoh.ZError) -> str:
-        what = f"cannot run a router at {self.listen}"
+    def _explain(self, error: zenoh.ZError) -> str:
+        problem = f"cannot run a router at {self.listen}"
         other = "choose another port with --listen tcp/127.0.0.1:PORT"
         if "in use" not in str(error):
-            return f"{what}: {reason(error)}; name an address of this machine"
+            return f"{problem}: {reason(error)}; name an address of this machine"
         if is_router_reachable(self.url):
-            return f"{what}: a Zenoh router runs there already; use that one, or {other}"
-        return f"{what}: another program uses the port; {other}"
+            return f"{problem}: a Zenoh router runs there already; use that one, or {other}"
+        return f"{problem}: another program uses the port; {other}"
 
 
 def is_router_reachable(url: str, timeout: float = 0.5) -> bool:
@@ -99,7 +96,7 @@ def is_router_reachable(url: str, timeout: float = 0.5) -> bool:
 
     Args:
         url: As for :func:`rosglass.connect`.
-        timeout: How long to wait for an answer, in seconds.
+        timeout: Seconds to wait for an answer.
 
     Raises:
         ArgumentError: The URL is not valid.
@@ -108,7 +105,7 @@ def is_router_reachable(url: str, timeout: float = 0.5) -> bool:
     host = options.host or "127.0.0.1"
     deadline = time.monotonic() + timeout
     try:
-        # Quicker to give up than Zenoh when nobody listens.
+        # Fails faster than Zenoh where nothing listens.
         socket.create_connection((host, options.port), timeout).close()
     except OSError:
         return False
