@@ -15,7 +15,7 @@ import time
 import rosglass
 from rosglass.comm import Sample
 from rosglass.tf import TransformBuffer
-from rosglass.tf.listener import transforms_in
+from rosglass.tf.topics import transforms_in
 
 COUNT, MESSAGES, LOOKUPS, TURNS = 50, 500, 2000, 3
 PEER = f"""

@@ -1,9 +1,13 @@
-"""Where every frame of a robot is, and was: buffer, listener and broadcasters for both worlds."""
+"""Frames and transforms: buffer, listener and broadcasters for ROS 1 and ROS 2."""
 
-from rosglass.tf.broadcaster import StaticTransformBroadcaster, TransformBroadcaster
 from rosglass.tf.buffer import Transformable, TransformBuffer
 from rosglass.tf.frames import FrameInfo, FrameTree
-from rosglass.tf.listener import UNKNOWN_PUBLISHER, TransformListener
+from rosglass.tf.topics import (
+    UNKNOWN_PUBLISHER,
+    StaticTransformBroadcaster,
+    TransformBroadcaster,
+    TransformListener,
+)
 from rosglass.tf.transform import Transform
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""The transform buffer: remembers the last seconds of every frame and answers where it was.
+"""The transform buffer, which stores the last seconds of all frames for lookups.
 
 Behaviour: tf2's ``BufferCore`` and tf2_ros's ``Buffer``.
 """
@@ -28,22 +28,20 @@ from rosglass.errors import (
     TimeoutException,
     TransformException,
 )
-from rosglass.tf.frames import FrameInfo, FrameTree
-from rosglass.tf.store import FrameStore
+from rosglass.tf.frames import FrameInfo, FrameStore, FrameTree, common_time, links_between, look_up
 from rosglass.tf.transform import Transform
-from rosglass.tf.walk import common_time, links_between, look_up
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from collections.abc import Set as AbstractSet
 
-    from rosglass.tf.cache import Entry
+    from rosglass.tf.frames import Entry
 
 __all__ = ["TransformBuffer", "Transformable"]
 
 
 def check_name(name: object, what: str) -> None:
-    """Raise InvalidArgumentException unless `name` can be that of a frame."""
+    """Raise InvalidArgumentException if `name` is no valid name of a frame."""
     if not isinstance(name, str) or not name:
         raise InvalidArgumentException(f"{what}: expected the name of a frame, got {name!r}")
     if name[0] == "/":
@@ -54,7 +52,7 @@ def check_name(name: object, what: str) -> None:
 
 
 def nanoseconds_of(time: Time | None, what: str) -> int:
-    """Return a time, 0 for the newest; raises InvalidArgumentException."""
+    """Return a time in nanoseconds, 0 for the newest; raises InvalidArgumentException."""
     if time is None:
         return 0
     if not isinstance(time, Time):
@@ -64,48 +62,50 @@ def nanoseconds_of(time: Time | None, what: str) -> int:
     return time.nanoseconds
 
 
-class Changes:
-    """Who wants to know of a buffer's changes.
+class ChangeListeners:
+    """The listeners for changes of a buffer.
 
     Args:
-        links: Returns the frames whose transforms connect a target and a source; None when
-            nothing does.
+        lock: The buffer's lock, which guards the list.
+        links: Returns the frames whose transforms connect a target and a source; None if they
+            are not connected.
     """
 
-    def __init__(self, links: Callable[[str, str], frozenset[str] | None]) -> None:
-        self._links = links
-        self._lock = threading.Lock()
+    def __init__(
+        self, lock: threading.Lock, links: Callable[[str, str], frozenset[str] | None]
+    ) -> None:
+        self._lock, self._links = lock, links
         self._pairs: list[_Pair] = []
         self._any: Listeners[None] = Listeners(merge=True, where="transforms")
         self._tree: Listeners[None] = Listeners(merge=True, where="the tree of frames")
 
     def on_any(self, callback: Callable[[], None], executor: Executor) -> Handle:
-        """Call back after any transform came."""
+        """Call back after any new transform."""
         return self._any.add(_ignoring(callback), executor)
 
     def on_tree(self, callback: Callable[[], None], executor: Executor) -> Handle:
-        """Call back after the tree changed."""
+        """Call back after changes of the tree."""
         return self._tree.add(_ignoring(callback), executor)
 
     def on_pair(
         self, target: str, source: str, callback: Callable[[], None], executor: Executor
     ) -> Handle:
-        """Call back after a transform came that lies between two frames."""
+        """Call back after a new transform between two frames."""
         pair = _Pair(self, target, source)
         pair.listeners.add(_ignoring(callback), executor)
         pair.links = self._links(target, source)
         with self._lock:
             self._pairs.append(pair)
-        # What connected them meanwhile was not told.
+        # Again, as changes between the first time and the registration were not notified.
         pair.links = self._links(target, source)
         return pair
 
-    def tell(self, changed: AbstractSet[str], tree: bool) -> None:
-        """Tell everybody; from any thread, without a lock held.
+    def notify(self, changed: AbstractSet[str], tree: bool) -> None:
+        """Notify the listeners; from any thread, without the lock held.
 
         Args:
-            changed: The frames that a transform came for.
-            tree: Whether frames came, went, or have another parent.
+            changed: The frames with new transforms.
+            tree: Whether frames appeared, disappeared, or changed their parent.
         """
         self._any.notify(None)
         if tree:
@@ -121,22 +121,22 @@ class Changes:
             if before != pair.links or (before is not None and not changed.isdisjoint(before)):
                 pair.listeners.notify(None)
 
-    def forget(self, pair: _Pair) -> None:
-        """Let go of who wants to know no more."""
+    def remove(self, pair: _Pair) -> None:
+        """Remove a listener."""
         with self._lock:
             if pair in self._pairs:
                 self._pairs.remove(pair)
 
 
 class _Pair(Handle):
-    def __init__(self, owner: Changes, target: str, source: str) -> None:
+    def __init__(self, owner: ChangeListeners, target: str, source: str) -> None:
         self._owner = owner
         self.target, self.source = target, source
         self.listeners: Listeners[None] = Listeners(merge=True, where=f"{target} <- {source}")
         self.links: frozenset[str] | None = None
 
     def close(self) -> None:
-        self._owner.forget(self)
+        self._owner.remove(self)
         self.listeners.clear()
 
 
@@ -145,11 +145,15 @@ def _ignoring(callback: Callable[[], None]) -> Callable[[None], None]:
     return lambda _: callback()
 
 
-class Waiting:
-    """The lookups of a buffer that wait."""
+class PendingLookups:
+    """The lookups of a buffer that wait for transforms.
 
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
+    Args:
+        lock: The buffer's lock, which guards the list.
+    """
+
+    def __init__(self, lock: threading.Lock) -> None:
+        self._lock = lock
         self._requests: list[_Request] = []
         self._timers: Timers | None = None
         self._closed = False
@@ -160,16 +164,16 @@ class Waiting:
     def add(
         self, what: str, query: Callable[[], Transform], timeout: float | None
     ) -> Promise[Transform]:
-        """Return the promise of what `query` returns, as soon as it does not fail any more.
+        """Return the promise of a lookup, completed as soon as it succeeds.
 
         Args:
-            what: What is looked up.
-            query: Looks it up.
-            timeout: Seconds; None for ever.
+            what: Description of the lookup.
+            query: Performs the lookup.
+            timeout: Seconds; None for no limit.
 
         Raises:
             ConversionError: The timeout is no number of seconds.
-            InvalidArgumentException: Waiting cannot help.
+            InvalidArgumentException: The arguments are invalid.
             NodeClosedError: The buffer is closed.
         """
         timeout = check_timeout(timeout, what)
@@ -195,15 +199,15 @@ class Waiting:
                 request.timer.close()
         return request.promise
 
-    def test(self) -> None:
-        """Try all again: something came. Without a lock held."""
+    def retry(self) -> None:
+        """Try all lookups again; without the lock held."""
         with self._lock:
             requests = list(self._requests)
         for request in requests:
             request.attempt()
 
     def close(self) -> None:
-        """Fail all that wait; safe to call twice."""
+        """Fail all lookups; safe to call twice."""
         with self._lock:
             self._closed = True
             requests, self._requests = self._requests, []
@@ -212,7 +216,7 @@ class Waiting:
             timers.close()
         for request in requests:
             request.promise.set_exception(
-                NodeClosedError(f"{request.what}: the transform buffer was closed meanwhile")
+                NodeClosedError(f"{request.what}: the transform buffer was closed")
             )
 
     def _forget(self, request: _Request) -> None:
@@ -231,7 +235,7 @@ class _Request:
         self._reason: TransformException | None = None
 
     def attempt(self) -> bool:
-        """Look it up; returns whether it was there, or never will be."""
+        """Try the lookup; return whether it succeeded or can never succeed."""
         try:
             found = self._query()
         except InvalidArgumentException as error:
@@ -244,7 +248,7 @@ class _Request:
         return True
 
     def expire(self, timeout: float) -> None:
-        """Give up."""
+        """Fail with the reason of the last attempt."""
         error = TimeoutException(
             f"{self.what} is not available within {timeout:g} s: {self._reason}"
         )
@@ -253,14 +257,11 @@ class _Request:
 
 
 def check_may_wait_for(promise: Promise[Transform], what: str) -> None:
-    """Cancel a promise that the calling thread must not wait for.
+    """Cancel a promise, and raise UnsupportedError, if this thread receives transforms.
 
     Args:
-        promise: Of a transform.
-        what: What is looked up.
-
-    Raises:
-        UnsupportedError: This is a thread that receives transforms.
+        promise: Promise of a transform.
+        what: Description of the lookup.
     """
     try:
         check_may_wait(what)
@@ -274,10 +275,10 @@ _log = logging.getLogger("rosglass.tf")
 
 @dataclass(frozen=True, slots=True)
 class Transformable:
-    """Whether a transform is available; true if so.
+    """Whether a transform is available; true if it is.
 
     Attributes:
-        error: Why not; None when it is.
+        error: Why it is not; None if it is.
     """
 
     error: TransformException | None = None
@@ -287,27 +288,27 @@ class Transformable:
 
     @property
     def reason(self) -> str:
-        """Why not, in words; empty when it is available."""
+        """Why it is not available, as a text; empty if it is."""
         return "" if self.error is None else str(self.error)
 
 
 class TransformBuffer(Handle):
-    """Remembers transforms for some seconds and looks them up, at any time in between.
+    """Stores transforms for some seconds, and looks them up at any time in between.
 
-    Times are :class:`rosglass.Time`; None and zero mean the newest time at which every link between
-    the two frames is known. Safe to use from any thread.
+    Times are :class:`rosglass.Time`; None and zero mean the newest time at which all links between
+    the two frames are known. Thread-safe.
 
     Args:
-        cache_time: How long transforms are kept, seconds or a Duration; measured back from the
-            newest of each frame, by the stamps.
+        cache_time: Time to keep transforms, in seconds or as a Duration, before the newest stamp of
+            each frame.
 
     Attributes:
-        ignored: How many transforms were not taken, by reason: ``old`` (older than what is kept),
+        ignored: Number of refused transforms by reason: ``old`` (beyond the cache time),
             ``repeated`` (same frame and stamp), ``self``, ``no name``, ``not finite``,
             ``not normalised``, ``loop``.
 
     Raises:
-        ArgumentError: The time is not above zero.
+        ArgumentError: The cache time is not above zero.
     """
 
     def __init__(self, cache_time: float | Duration = 10.0) -> None:
@@ -318,11 +319,12 @@ class TransformBuffer(Handle):
             raise ArgumentError("cache_time", cache_time, "seconds above zero, or a Duration")
         self.cache_time = kept
         self.ignored: Counter[str] = Counter()
+        #: Guards the frames, the listeners and the pending lookups.
         self._lock = threading.Lock()
         self._store = FrameStore(kept.nanoseconds)
         self._log_once = LogOnce(1000)
-        self._changes = Changes(self._links)
-        self._waiting = Waiting()
+        self._changes = ChangeListeners(self._lock, self._links)
+        self._pending = PendingLookups(self._lock)
 
     def __repr__(self) -> str:
         return f"<TransformBuffer of {len(self._store.names)} frames>"
@@ -332,47 +334,47 @@ class TransformBuffer(Handle):
     def set_transform(
         self, transform: Transform, authority: str = "", *, static: bool = False
     ) -> bool:
-        """Remember a transform.
+        """Store a transform.
 
         Args:
-            transform: A slash before its frames' names is left out, as in tf2.
-            authority: Who says so.
-            static: Whether it holds for ever. Of a frame that is published as static and as moving,
-                what comes last counts, and the log says who disagrees.
+            transform: The transform; leading slashes of its frames are removed, as in tf2.
+            authority: Publisher of the transform.
+            static: Whether it is static. If a frame is published as static and as dynamic, the last
+                transform counts, and a warning is logged.
 
         Returns:
-            Whether it was taken; not so when it is older than what is kept, or known already.
+            Whether it was stored; false if it is beyond the cache time, or known already.
 
         Raises:
-            InvalidArgumentException: A frame in itself or without a name, a quaternion that is not
-                normalised, a parent that is itself placed in the child.
+            InvalidArgumentException: A frame is its own parent or has no name, the quaternion is
+                not normalised, or the frames would form a loop.
         """
         if not isinstance(transform, Transform):
             raise InvalidArgumentException(
                 f"expected a rosglass.tf.Transform, got {transform!r}; Transform.from_message() "
-                "makes one of a message"
+                "creates one from a message"
             )
         entry = (transform.frame_id, *transform.translation, *transform.rotation)
         item = (transform.child_frame_id, transform.stamp.nanoseconds, entry)
         refused = self.set_many([item], authority, static)
-        for kind, told in refused:
+        for kind, reason in refused:
             if kind not in ("old", "repeated"):
-                raise InvalidArgumentException(told)
+                raise InvalidArgumentException(reason)
         return not refused
 
     def set_many(
         self, items: Iterable[tuple[str, int, Entry]], authority: object = "", static: bool = False
     ) -> list[tuple[str, str]]:
-        """Remember many transforms at once; for listeners.
+        """Store several transforms; for listeners.
 
         Args:
-            items: Each the child's name, the stamp in nanoseconds, and where it is.
-            authority: Who says so; its text is taken when somebody asks.
-            static: Whether they hold for ever.
+            items: For each the child frame, the stamp in nanoseconds, and the transform.
+            authority: Publisher of the transforms; converted to a string when needed.
+            static: Whether they are static.
 
         Returns:
-            What was refused: a key of :attr:`ignored` and the reason in words. What may be a fault
-            of others is logged, once for each frame and authority.
+            The refused ones: a key of :attr:`ignored`, and the reason. Each reason is logged once
+            for each frame and authority.
         """
         refused: list[tuple[str, str, str]] = []
         changed = set()
@@ -382,7 +384,7 @@ class TransformBuffer(Handle):
             for child, stamp, entry in items:
                 kind, name = store.put(child, stamp, entry, static, authority)
                 if kind:
-                    refused.append((kind, name, store.told(kind, name, stamp, entry)))
+                    refused.append((kind, name, store.describe(kind, name, stamp, entry)))
                 else:
                     changed.add(name)
             store.arrivals.update(dict.fromkeys(changed, monotonic()))
@@ -390,68 +392,68 @@ class TransformBuffer(Handle):
             moved = store.version != tree
             disagreements, store.disagreements = store.disagreements, []
             jumps, store.jumps = store.jumps, []
-        # What is logged may go round the world, and may ask the graph who it was.
+        # Without the lock: log handlers may do anything, and names are looked up in the graph.
         for frame, first, second in disagreements:
             if self._log_once.is_first(("kind", frame)):
                 _log.warning(
-                    "frame '%s' is published as static and as moving, by %s and %s: what comes "
-                    "last counts; let one of them publish it",
+                    "frame '%s' is published as static and as dynamic, by %s and %s: the last "
+                    "transform counts; let only one of them publish it",
                     frame,
                     first,
                     second,
                 )
         if jumps:
-            told = ", ".join(f"'{frame}' by {back / 1e9:.3f} s" for frame, back, _ in jumps)
+            frames = ", ".join(f"'{frame}' by {back / 1e9:.3f} s" for frame, back, _ in jumps)
             _log.warning(
-                "time jumped back for %s (from %s): where they were before is forgotten; was a "
-                "clock set, or the robot started again?",
-                told,
+                "time jumped back for %s (from %s): earlier transforms are removed; was a clock "
+                "set, or the robot restarted?",
+                frames,
                 str(jumps[-1][2]) or "an unnamed authority",
             )
-        for kind, child, told in refused:
+        for kind, child, reason in refused:
             if self._log_once.is_first((kind, child, authority)):
                 level = logging.DEBUG if kind == "repeated" else logging.WARNING
-                _log.log(level, "%s (from %s)", told, str(authority) or "an unnamed authority")
+                _log.log(level, "%s (from %s)", reason, str(authority) or "an unnamed authority")
         if changed:
-            if self._waiting:
-                self._waiting.test()
-            self._changes.tell(changed, moved)
-        return [(kind, told) for kind, _, told in refused]
+            if self._pending:
+                self._pending.retry()
+            self._changes.notify(changed, moved)
+        return [(kind, reason) for kind, _, reason in refused]
 
     def clear(self, *, static: bool = False) -> None:
-        """Forget all transforms, static ones only if told to; frames without any are gone then."""
+        """Remove all dynamic transforms, and the static ones if `static`."""
         with self._lock:
             gone = self._store.clear(static)
-        self._changes.tell(gone, True)
+        self._changes.notify(gone, True)
 
     def close(self) -> None:
-        """Fail all lookups that wait; safe to call twice. Everything else goes on working."""
-        self._waiting.close()
+        """Fail pending lookups; safe to call twice. Everything else continues to work."""
+        self._pending.close()
 
     # -- looking up ------------------------------------------------------------------------------
 
     def lookup_transform(
         self, target: str, source: str, time: Time | None = None, *, timeout: float = 0.0
     ) -> Transform:
-        """Return where the frame `source` is, seen from `target`.
+        """Return the pose of the frame `source` in the frame `target`.
 
-        Applied to a point in `source`, the result tells the point in `target`.
+        The result transforms points from `source` to `target`.
 
         Args:
-            target: Frame to express it in.
-            source: Frame to express.
-            time: When; None for the newest.
+            target: Parent frame of the result.
+            source: Child frame of the result.
+            time: Time of the transform; None for the newest.
             timeout: Seconds to wait for it to become available. Blocks: not for GUI threads.
 
         Raises:
             LookupException: A frame does not exist.
-            ConnectivityException: Nothing connects the two.
-            ExtrapolationException: A link between them is not known at that time.
-            InvalidArgumentException: A frame's name starts with a slash or is empty, or the time
-                is none.
+            ConnectivityException: The frames are not connected.
+            ExtrapolationException: A link between them is unknown at that time.
+            InvalidArgumentException: A frame's name is empty or starts with a slash, or the time
+                is invalid.
             UnsupportedError: A thread that receives transforms cannot wait for them.
         """
-        return self._now_or_within(
+        return self._look_up_within(
             timeout,
             f"{target} <- {source}",
             lambda: self._look_up(target, source, nanoseconds_of(time, "time")),
@@ -467,17 +469,17 @@ class TransformBuffer(Handle):
         *,
         timeout: float = 0.0,
     ) -> Transform:
-        """Return where `source` was at one time, seen from where `target` is at another.
+        """Return the pose of `source` at one time in `target` at another.
 
         Args:
-            target: Frame to express it in, as it is
-            target_time: at this time; None for the newest.
-            source: Frame to express, as it is
-            source_time: at this time; None for the newest.
-            fixed_frame: Frame that does not move in between, e.g. ``odom``.
-            timeout: Seconds to wait, as for :meth:`lookup_transform`, whose errors it has.
+            target: Parent frame of the result.
+            target_time: Time of the parent frame; None for the newest.
+            source: Child frame of the result.
+            source_time: Time of the child frame; None for the newest.
+            fixed_frame: Frame that does not move between these times, e.g. ``odom``.
+            timeout: Seconds to wait; as for :meth:`lookup_transform`, as are errors.
         """
-        return self._now_or_within(
+        return self._look_up_within(
             timeout,
             f"{target} <- {source}",
             lambda: self._look_up_full(target, target_time, source, source_time, fixed_frame),
@@ -491,24 +493,24 @@ class TransformBuffer(Handle):
         *,
         timeout: float | None = None,
     ) -> Promise[Transform]:
-        """Return the promise of a transform, kept as soon as it is available.
+        """Return the promise of a transform, completed as soon as it is available.
 
-        It can be waited for, awaited in asyncio, call back (in the thread that receives, unless
-        ``on_done`` is given an executor), and be cancelled.
+        A promise can be waited for, awaited in asyncio, and cancelled; its ``on_done`` calls back,
+        on the receiving thread or an executor.
 
         Args:
             target: As for :meth:`lookup_transform`.
             source: As above.
-            time: As above; a time to come is fine.
+            time: As above; may be in the future.
             timeout: Seconds until the promise fails with a TimeoutException that has the reason;
-                None to wait for ever.
+                None for no limit.
 
         Raises:
-            InvalidArgumentException: A name or the time is not valid.
+            InvalidArgumentException: A name or the time is invalid.
             NodeClosedError: The buffer is closed.
         """
         when = nanoseconds_of(time, "time")
-        return self._waiting.add(
+        return self._pending.add(
             f"{target} <- {source}", lambda: self._look_up(target, source, when), timeout
         )
 
@@ -523,7 +525,7 @@ class TransformBuffer(Handle):
         timeout: float | None = None,
     ) -> Promise[Transform]:
         """Promise :meth:`lookup_transform_full`; see :meth:`lookup_transform_async`."""
-        return self._waiting.add(
+        return self._pending.add(
             f"{target} <- {source}",
             lambda: self._look_up_full(target, target_time, source, source_time, fixed_frame),
             timeout,
@@ -542,13 +544,13 @@ class TransformBuffer(Handle):
             target: As for :meth:`lookup_transform`.
             source: As above.
             time: As above.
-            timeout: Seconds to wait, None for ever.
+            timeout: Seconds to wait; None for no limit.
 
         Raises:
-            TimeoutException: It did not become available; says why.
-            InvalidArgumentException: A name or the time is not valid.
+            TimeoutException: It did not become available; has the reason.
+            InvalidArgumentException: A name or the time is invalid.
             UnsupportedError: A thread that receives transforms cannot wait for them.
-            NodeClosedError: The buffer is closed, or gets closed meanwhile.
+            NodeClosedError: The buffer is closed.
         """
         promise = self.lookup_transform_async(target, source, time, timeout=timeout)
         if not promise.done():
@@ -558,7 +560,7 @@ class TransformBuffer(Handle):
     def can_transform(
         self, target: str, source: str, time: Time | None = None, *, timeout: float = 0.0
     ) -> Transformable:
-        """Return whether :meth:`lookup_transform` would succeed, and if not, why."""
+        """Return whether :meth:`lookup_transform` would succeed, and why not."""
         return _tried(lambda: self.lookup_transform(target, source, time, timeout=timeout))
 
     def can_transform_full(
@@ -571,7 +573,7 @@ class TransformBuffer(Handle):
         *,
         timeout: float = 0.0,
     ) -> Transformable:
-        """Return whether :meth:`lookup_transform_full` would succeed, and if not, why."""
+        """Return whether :meth:`lookup_transform_full` would succeed, and why not."""
         return _tried(
             lambda: self.lookup_transform_full(
                 target, target_time, source, source_time, fixed_frame, timeout=timeout
@@ -579,9 +581,9 @@ class TransformBuffer(Handle):
         )
 
     def latest_common_time(self, target: str, source: str) -> Time:
-        """Return the newest time at which every link between two frames is known.
+        """Return the newest time at which all links between two frames are known.
 
-        Zero when all are static. Errors as for :meth:`lookup_transform`.
+        Zero if all are static. Errors as for :meth:`lookup_transform`.
         """
         with self._lock:
             self._check_name(target, "target")
@@ -598,11 +600,11 @@ class TransformBuffer(Handle):
         return isinstance(name, str) and name in self._store.names
 
     def frame(self, name: str) -> FrameInfo | None:
-        """Return what is known of a frame; None when it does not exist."""
+        """Return the state of a frame; None if it does not exist."""
         return self._infos([name])[0] if self.has_frame(name) else None
 
     def tree(self) -> FrameTree:
-        """Return all frames as they are now."""
+        """Return a snapshot of all frames."""
         return FrameTree(self._infos(None))
 
     # -- changes ---------------------------------------------------------------------------------
@@ -610,19 +612,19 @@ class TransformBuffer(Handle):
     def on_change(
         self, target: str, source: str, callback: Callable[[], None], executor: Executor = IMMEDIATE
     ) -> Handle:
-        """Call `callback` when a transform came that lies between two frames.
+        """Call `callback` after a new transform between two frames.
 
-        Also when they become connected, or are no longer. Changes of a burst are merged.
+        Also when they become connected or disconnected. Changes in a burst are merged.
 
         Args:
             target: A frame; need not exist yet.
             source: Another one.
-            callback: What to call.
-            executor: Where it runs; by default in the thread that fills the buffer, where it must
-                not wait for anything.
+            callback: Function without arguments.
+            executor: Executor that runs it; by default the thread that fills the buffer, where it
+                must not block.
 
         Raises:
-            ArgumentError: `callback` or `executor` is not what it should be.
+            ArgumentError: `callback` or `executor` is invalid.
             InvalidArgumentException: A name is empty or starts with a slash.
         """
         for frame, what in ((target, "target"), (source, "source")):
@@ -632,14 +634,14 @@ class TransformBuffer(Handle):
     def on_tree_change(
         self, callback: Callable[[], None], executor: Executor = IMMEDIATE
     ) -> Handle:
-        """Call `callback` when frames came, went, or have another parent; see :meth:`on_change`."""
+        """Call `callback` after changes of frames or their parents; see :meth:`on_change`."""
         return self._changes.on_tree(callback, executor)
 
     def on_update(self, callback: Callable[[], None], executor: Executor = IMMEDIATE) -> Handle:
-        """Call `callback` when any transform came; see :meth:`on_change`."""
+        """Call `callback` after any new transform; see :meth:`on_change`."""
         return self._changes.on_any(callback, executor)
 
-    # -- inside ----------------------------------------------------------------------------------
+    # -- internals -------------------------------------------------------------------------------
 
     def _look_up(self, target: str, source: str, time: int) -> Transform:
         with self._lock:
@@ -677,20 +679,20 @@ class TransformBuffer(Handle):
         before = self._look_up(fixed_frame, source, times[1])
         return self._look_up(target, fixed_frame, times[0]).compose(before)
 
-    def _now_or_within(
+    def _look_up_within(
         self, timeout: float, what: str, query: Callable[[], Transform]
     ) -> Transform:
-        # "now" is by far the commonest, and then nothing is made to wait with.
-        patience = check_timeout(timeout, what)
-        if patience == 0:
+        # Most lookups do not wait, and need no promise.
+        limit = check_timeout(timeout, what)
+        if limit == 0:
             return query()
-        promise = self._waiting.add(what, query, patience)
+        promise = self._pending.add(what, query, limit)
         if not promise.done():
             check_may_wait_for(promise, what)
         try:
             return promise.result()
         except TimeoutException as late:
-            # As in tf2: what stands in the way, not that it was waited for.
+            # As in tf2: the reason, not the timeout.
             raise (late.__cause__ or late) from None
 
     def _check_name(self, name: str, what: str) -> None:
@@ -706,7 +708,7 @@ class TransformBuffer(Handle):
         with self._lock:
             wanted = [name for name in names or store.names if name in store.names]
             found = [(store.info(name), store.authorities.get(name, "")) for name in wanted]
-        # Outside the lock: to name the publisher, a listener may have to ask the graph.
+        # Without the lock: names of publishers are looked up in the graph.
         return [replace(info, authority=str(authority)) for info, authority in found]
 
     def _links(self, target: str, source: str) -> frozenset[str] | None:

@@ -1,39 +1,63 @@
-"""The tree of frames at one moment: who is whose parent, who says so, how often."""
+"""The frames of a transform buffer: their caches, the tree, and lookups through it.
+
+Behaviour: tf2's ``BufferCore``, ``TimeCache`` and ``StaticCache``; values and exceptions are equal.
+But loops are refused when they would be closed, a frame can change between static and dynamic, and
+a frame whose time jumped back is accepted again after a while.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 import re
+from bisect import bisect_right
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from time import monotonic
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from rosglass.comm.statistics import fading_rate
-from rosglass.errors import ConnectivityException, LookupException
+from rosglass.comm.time import Time
+from rosglass.errors import ConnectivityException, ExtrapolationException, LookupException
+from rosglass.tf.transform import conjugate, multiply, rotate, slerp
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Mapping
 
-    from rosglass.comm.time import Duration, Time
+    from rosglass.comm.time import Duration
+    from rosglass.errors import TransformException
+    from rosglass.tf.transform import Quaternion, Vector
 
-__all__ = ["FrameInfo", "FrameTree"]
+__all__ = [
+    "DynamicCache",
+    "Entry",
+    "FrameInfo",
+    "FrameStore",
+    "FrameTree",
+    "StaticCache",
+    "clock_text",
+    "common_time",
+    "links_between",
+    "look_up",
+    "root_of",
+]
+
 
 _PLAIN = re.compile(r"[A-Za-z_][\w./-]*")
 
 
 @dataclass(frozen=True, slots=True)
 class FrameInfo:
-    """What is known of a frame.
+    """The state of a frame.
 
     Attributes:
         name: Its name.
-        parent: The frame it is placed in; empty for the top of a tree.
-        authority: Who said so last, a node's full name as a rule; empty when nobody did.
-        static: Whether it never moves.
-        latest: Time of the newest transform; of a static one, when it was published. None without
-            a parent.
-        oldest: Time of the oldest transform kept.
-        count: How many transforms are kept.
-        silence: Seconds since the last one came, by this machine's clock.
+        parent: Parent frame; empty for the root of a tree.
+        authority: Publisher of the last transform, usually a node's full name; empty if unknown.
+        static: Whether it is static.
+        latest: Time of the newest transform; of a static one, its stamp. None without a parent.
+        oldest: Time of the oldest transform in the buffer.
+        count: Number of transforms in the buffer.
+        silence: Seconds since the last transform was received, by this machine's clock.
     """
 
     name: str
@@ -47,22 +71,22 @@ class FrameInfo:
 
     @property
     def rate(self) -> float:
-        """Transforms a second, by their stamps; 0 for static frames, and once none come."""
+        """Rate of transforms in Hz, by their stamps; 0 for static frames and without new ones."""
         if self.static or self.latest is None or self.oldest is None or self.count < 2:
             return 0.0
         period = (self.latest - self.oldest).seconds / (self.count - 1)
         return fading_rate(period, self.silence)
 
     def age(self, now: Time) -> Duration | None:
-        """Return how old the newest transform is at a time; None without a parent."""
+        """Return the age of the newest transform at a time; None without a parent."""
         return None if self.latest is None else now - self.latest
 
 
 class FrameTree:
-    """All frames of a buffer at one moment; iterates over their names.
+    """A snapshot of all frames of a buffer; iterates over their names.
 
     Args:
-        frames: The frames, each parent among them.
+        frames: The frames, including all parents.
     """
 
     def __init__(self, frames: Iterable[FrameInfo]) -> None:
@@ -84,16 +108,16 @@ class FrameTree:
             raise LookupException(f"frame '{name}' does not exist") from None
 
     def roots(self) -> list[str]:
-        """Return the frames without a parent; several where trees are not connected."""
+        """Return the frames without a parent; several if there are unconnected trees."""
         return [name for name, frame in self._frames.items() if not frame.parent]
 
     def children(self, name: str) -> list[str]:
-        """Return the frames that are placed in one; raises LookupException."""
+        """Return the children of a frame; raises LookupException."""
         parent = self[name].name
         return [other for other, frame in self._frames.items() if frame.parent == parent]
 
     def ancestors(self, name: str) -> list[str]:
-        """Return a frame's parent, its parent's parent, and so on; raises LookupException."""
+        """Return a frame's parent, its parent, and so on; raises LookupException."""
         found: list[str] = []
         frame = self[name]
         while frame.parent and frame.parent not in found:
@@ -102,11 +126,11 @@ class FrameTree:
         return found
 
     def chain(self, target: str, source: str) -> list[str]:
-        """Return the frames on the way from `source` to `target`, both included.
+        """Return the frames from `source` to `target`, both included.
 
         Raises:
             LookupException: One of them does not exist.
-            ConnectivityException: Nothing connects them.
+            ConnectivityException: They are not connected.
         """
         up, down = [source, *self.ancestors(source)], [target, *self.ancestors(target)]
         for place, frame in enumerate(down):
@@ -118,16 +142,16 @@ class FrameTree:
         )
 
     def to_yaml(self, now: Time | None = None) -> str:
-        """Return all frames that have a parent as tf2's ``all_frames_as_yaml()`` does.
+        """Return all frames with a parent in the format of tf2's ``all_frames_as_yaml()``.
 
         Args:
-            now: Time to tell each frame's delay by; None to leave it out.
+            now: Current time, for the delay of each frame; None to leave it out.
         """
         lines = []
         for frame in self._frames.values():
             if frame.latest is None or frame.oldest is None:
                 continue
-            # tf2 knows no time of static transforms, and counts 10,000 of them a second.
+            # tf2 has no time for static transforms, and counts 10,000 Hz.
             static = frame.static
             latest = 0.0 if static else frame.latest.seconds
             oldest = 0.0 if static else frame.oldest.seconds
@@ -152,3 +176,506 @@ def _key(name: str) -> str:
 
 def _quoted(text: str) -> str:
     return f"'{text}'" if text.isprintable() and "'" not in text else json.dumps(text)
+
+
+#: The parent's name, the translation (x, y, z) and the rotation (x, y, z, w).
+Entry: TypeAlias = tuple[str, float, float, float, float, float, float, float]
+#: Number of outdated entries to delete at once.
+_PRUNE_SIZE = 256
+
+
+def clock_text(nanoseconds: int) -> str:
+    """Format a time as in tf2's error messages."""
+    return f"{nanoseconds // 1_000_000_000}.{nanoseconds % 1_000_000_000:09d}"
+
+
+class StaticCache:
+    """The transform of a static frame.
+
+    Args:
+        stamp: Its stamp in nanoseconds.
+        entry: The transform.
+    """
+
+    __slots__ = ("entry", "stamp")
+    static = True
+    #: Number and times of the transforms, as tf2 counts static ones.
+    count, latest, oldest = 1, 0, 0
+
+    def __init__(self, stamp: int, entry: Entry) -> None:
+        self.stamp, self.entry = stamp, entry
+
+    @property
+    def parent(self) -> str:
+        """Parent frame."""
+        return self.entry[0]
+
+    def insert(self, stamp: int, entry: Entry) -> str:
+        """Replace the transform."""
+        self.stamp, self.entry = stamp, entry
+        return ""
+
+    def at(self, time: int) -> Entry | None:  # noqa: ARG002 - the same at all times
+        """Return the transform."""
+        return self.entry
+
+    def gap(self, time: int) -> str:  # noqa: ARG002 - as above
+        """Return an empty text: a static transform is valid at all times."""
+        return ""
+
+
+class DynamicCache:
+    """The transforms of a dynamic frame.
+
+    Args:
+        keep: Time before the newest transform to keep, in nanoseconds.
+    """
+
+    __slots__ = ("_entries", "_first", "_keep", "_stamps")
+    static = False
+
+    def __init__(self, keep: int) -> None:
+        self._keep = keep
+        #: Sorted by time; those before `_first` are outdated.
+        self._stamps: list[int] = []
+        self._entries: list[Entry] = []
+        self._first = 0
+
+    @property
+    def count(self) -> int:
+        """Number of transforms."""
+        return len(self._stamps) - self._first
+
+    @property
+    def latest(self) -> int:
+        """Time of the newest transform in nanoseconds."""
+        return self._stamps[-1]
+
+    @property
+    def stamp(self) -> int:
+        """The same as :attr:`latest`."""
+        return self._stamps[-1]
+
+    @property
+    def oldest(self) -> int:
+        """Time of the oldest transform in nanoseconds."""
+        return self._stamps[self._first]
+
+    @property
+    def parent(self) -> str:
+        """Parent frame of the newest transform."""
+        return self._entries[-1][0]
+
+    def insert(self, stamp: int, entry: Entry) -> str:
+        """Insert a transform; return why it is refused, ``old`` or ``repeated``, or empty."""
+        stamps = self._stamps
+        if not stamps or stamp > stamps[-1]:
+            stamps.append(stamp)
+            self._entries.append(entry)
+            limit = stamp - self._keep
+            if stamps[self._first] < limit:
+                self._prune(limit)
+            return ""
+        if stamp < stamps[-1] - self._keep:
+            return "old"
+        place = bisect_right(stamps, stamp, self._first)
+        if place > self._first and stamps[place - 1] == stamp:
+            return "repeated"
+        stamps.insert(place, stamp)
+        self._entries.insert(place, entry)
+        return ""
+
+    def at(self, time: int) -> Entry | None:
+        """Return the interpolated transform at a time; None if there is none, see :meth:`gap`.
+
+        Args:
+            time: Time in nanoseconds, 0 for the newest.
+        """
+        stamps = self._stamps
+        if not time or time == stamps[-1]:
+            return self._entries[-1]
+        if not stamps[self._first] <= time < stamps[-1]:
+            return None
+        place = bisect_right(stamps, time, self._first)
+        then, entry = stamps[place - 1], self._entries[place - 1]
+        other = self._entries[place]
+        # Between two parents, the older one is valid, as in tf2.
+        if then == time or entry[0] != other[0]:
+            return entry
+        ratio = (time - then) / (stamps[place] - then)
+        rest = 1.0 - ratio
+        return (
+            entry[0],
+            rest * entry[1] + ratio * other[1],
+            rest * entry[2] + ratio * other[2],
+            rest * entry[3] + ratio * other[3],
+            *slerp(entry[4:], other[4:], ratio),
+        )
+
+    def gap(self, time: int) -> str:
+        """Return why there is no transform at a time, as in tf2."""
+        if self.count == 1:
+            return (
+                f"Lookup would require extrapolation at time {clock_text(time)}, but only time "
+                f"{clock_text(self.latest)} is in the buffer"
+            )
+        if time > self.latest:
+            return (
+                "Lookup would require extrapolation into the future.  Requested time "
+                f"{clock_text(time)} but the latest data is at time {clock_text(self.latest)}"
+            )
+        return (
+            "Lookup would require extrapolation into the past.  Requested time "
+            f"{clock_text(time)} but the earliest data is at time {clock_text(self.oldest)}"
+        )
+
+    def _prune(self, limit: int) -> None:
+        stamps, first = self._stamps, self._first
+        while stamps[first] < limit:
+            first += 1
+        if first > _PRUNE_SIZE:
+            del stamps[:first]
+            del self._entries[:first]
+            first = 0
+        self._first = first
+
+
+#: How far the squared length of a quaternion may be from 1, as in tf2.
+_TOLERANCE = 10e-3
+#: Seconds of old stamps only after which the time of a frame counts as jumped back.
+_JUMP_TIME_S = 3.0
+_PREFIX = {
+    "repeated": "TF_REPEATED_DATA ",
+    "self": "TF_SELF_TRANSFORM ",
+    "no name": "TF_NO_FRAME_ID ",
+    "not finite": "TF_NAN_INPUT ",
+    "not normalised": "TF_DENORMALIZED_QUATERNION ",
+    "loop": "TF_LOOP ",
+}
+_REASON = {
+    "repeated": "there is one of the same time already",
+    "self": "the two are the same",
+    "no name": "both frames need a name",
+    "not finite": "a number in it is not finite",
+    "not normalised": "its rotation is no quaternion of length 1; an empty one has w = 1",
+    "loop": "the parent is itself placed in the child; find out which of the two is wrong",
+}
+
+
+class _Behind(NamedTuple):
+    """The start of a series of old transforms: monotonic time in seconds, and first stamp."""
+
+    since: float
+    first: int
+
+
+class FrameStore:
+    """The frames of a buffer; guarded by the buffer's lock.
+
+    Args:
+        keep: Time to keep transforms in nanoseconds.
+
+    Attributes:
+        caches: The transforms of each frame with a parent.
+        names: All frames, including parents, in order of appearance.
+        authorities: Publisher of the last transform of each frame.
+        arrivals: Time of the last transform of each frame, by :func:`time.monotonic`.
+        version: Changes when frames appear, disappear, or change their parent.
+        disagreements: Frames that changed between static and dynamic, with their publishers before
+            and now; for the buffer to log.
+        jumps: Frames whose time jumped back, by how many nanoseconds, and their publishers; for the
+            buffer to log.
+    """
+
+    def __init__(self, keep: int) -> None:
+        self._keep = keep
+        self.caches: dict[str, DynamicCache | StaticCache] = {}
+        self.names: dict[str, None] = {}
+        self.authorities: dict[str, object] = {}
+        self.arrivals: dict[str, float] = {}
+        self.version = 0
+        self.disagreements: list[tuple[str, object, object]] = []
+        self.jumps: list[tuple[str, int, object]] = []
+        self._behind: dict[str, _Behind] = {}
+
+    def put(
+        self, child: str, stamp: int, entry: Entry, static: bool, authority: object
+    ) -> tuple[str, str]:
+        """Insert a transform.
+
+        Returns:
+            Why it is refused, a key of :attr:`TransformBuffer.ignored`, or empty; and the frame's
+            name without leading slash.
+        """
+        cache = self.caches.get(child)
+        # The common case is fast: a known frame with an unchanged parent.
+        if cache is not None and cache.parent == entry[0] and cache.static is static:
+            kind = _bad_numbers(entry) or cache.insert(stamp, entry)
+        else:
+            child = child.removeprefix("/")
+            kind = self._place(
+                child, stamp, (entry[0].removeprefix("/"), *entry[1:]), static, authority
+            )
+        if kind == "old" and self._has_jumped(child, stamp):
+            self.jumps.append((child, self.caches[child].latest - stamp, authority))
+            self._remove(child)
+            entry = (entry[0].removeprefix("/"), *entry[1:])
+            kind = self._place(child, stamp, entry, static, authority)
+        elif self._behind and kind != "old":
+            # Transforms with current stamps continue: old ones are just old.
+            self._behind.pop(child, None)
+        if not kind:
+            self.authorities[child] = authority
+        return kind, child
+
+    def _has_jumped(self, child: str, stamp: int) -> bool:
+        """Return whether a frame has had only old stamps for a while."""
+        now, behind = monotonic(), self._behind.get(child)
+        if behind is None or stamp < behind.first:
+            self._behind[child] = _Behind(now, stamp)
+            return False
+        if now - behind.since < _JUMP_TIME_S or stamp == behind.first:
+            return False
+        del self._behind[child]
+        return True
+
+    def describe(self, kind: str, child: str, stamp: int, entry: Entry) -> str:
+        """Describe why a transform was refused."""
+        what = f"ignoring the transform of '{child}' in '{entry[0]}' at {clock_text(stamp)}: "
+        if kind == "old":
+            cache = self.caches[child]
+            return (
+                f"TF_OLD_DATA {what}it is more than {self._keep / 1e9:g} s older than the "
+                f"newest one, of {clock_text(cache.latest)}; are the clocks in step?"
+            )
+        return _PREFIX[kind] + what + _REASON[kind]
+
+    def clear(self, static: bool) -> set[str]:
+        """Remove dynamic frames, and static ones if `static`; return their names."""
+        self._behind.clear()
+        gone = {name for name, cache in self.caches.items() if static or not cache.static}
+        for name in gone:
+            self._remove(name)
+        self.names = {}
+        for name, cache in self.caches.items():
+            self.names[cache.parent] = self.names[name] = None
+        return gone
+
+    def info(self, name: str) -> FrameInfo:
+        """Return the state of a frame, without its authority."""
+        cache = self.caches.get(name)
+        if cache is None:
+            return FrameInfo(name)
+        latest = Time(cache.stamp)
+        oldest = latest if cache.static else Time(cache.oldest)
+        silence = monotonic() - self.arrivals.get(name, -math.inf)
+        return FrameInfo(name, cache.parent, "", cache.static, latest, oldest, cache.count, silence)
+
+    def _place(self, child: str, stamp: int, entry: Entry, static: bool, authority: object) -> str:
+        """Insert a transform of a new frame or parent; return why it is refused."""
+        parent = entry[0]
+        if not child or not parent:
+            return "no name"
+        if child == parent:
+            return "self"
+        wrong = _bad_numbers(entry)
+        if wrong:
+            return wrong
+        cache = self.caches.get(child)
+        before = None if cache is None else (cache.parent, cache.static)
+        if (cache is None or cache.parent != parent) and self._closes_loop(
+            child, parent, None if static else stamp
+        ):
+            return "loop"
+        if cache is None or cache.static is not static:
+            if cache is not None:
+                self.disagreements.append((child, self.authorities.get(child), authority))
+            cache = StaticCache(stamp, entry) if static else DynamicCache(self._keep)
+            self.caches[child] = cache
+        kind = cache.insert(stamp, entry)
+        if not kind:
+            self.names[child] = self.names[parent] = None
+            self.version += before != (cache.parent, static)
+        return kind
+
+    def _closes_loop(self, child: str, parent: str, stamp: int | None) -> bool:
+        """Return whether a link would close a loop; outdated links are removed for it."""
+        path: list[str] = []
+        frame = parent
+        while frame != child:
+            cache = self.caches.get(frame)
+            if cache is None or len(path) > len(self.caches):
+                return False
+            path.append(frame)
+            frame = cache.parent
+        # Otherwise a robot that reversed its tree would be ignored until it is restarted.
+        limit = -math.inf if stamp is None else stamp - self._keep
+        old = [name for name in path if not (c := self.caches[name]).static and c.latest < limit]
+        for name in old:
+            self._remove(name)
+        return not old
+
+    def _remove(self, name: str) -> None:
+        del self.caches[name]
+        self.authorities.pop(name, None)
+        self.arrivals.pop(name, None)
+        self.version += 1
+
+
+def _bad_numbers(entry: Entry) -> str:
+    _, a, b, c, x, y, z, w = entry
+    length = x * x + y * y + z * z + w * w
+    # Only finite numbers give zero.
+    if (a + b + c) * 0.0 != 0.0 or length * 0.0 != 0.0:
+        return "not finite"
+    return "" if abs(length - 1.0) < _TOLERANCE else "not normalised"
+
+
+_ORIGIN: Vector = (0.0, 0.0, 0.0)
+_UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+
+def root_of(caches: Mapping[str, DynamicCache | StaticCache], frame: str) -> str:
+    """Return the root of a frame's tree."""
+    for _ in range(len(caches) + 1):
+        cache = caches.get(frame)
+        if cache is None:
+            break
+        frame = cache.parent
+    return frame
+
+
+def links_between(
+    caches: Mapping[str, DynamicCache | StaticCache], target: str, source: str
+) -> tuple[list[str], list[str]] | None:
+    """Return the frames below the common ancestor of two frames, on the side of each.
+
+    Returns:
+        Those from the source up, and those from the target up; None without a common ancestor.
+    """
+    up = [source]
+    while up[-1] in caches and len(up) <= len(caches) + 1:
+        up.append(caches[up[-1]].parent)
+    places = {frame: place for place, frame in reversed(list(enumerate(up)))}
+    down: list[str] = []
+    frame = target
+    while frame not in places:
+        cache = caches.get(frame)
+        if cache is None or len(down) > len(caches):
+            return None
+        down.append(frame)
+        frame = cache.parent
+    return up[: places[frame]], down
+
+
+def common_time(caches: Mapping[str, DynamicCache | StaticCache], target: str, source: str) -> int:
+    """Return the newest time, in nanoseconds, at which all links between two frames are known.
+
+    Zero if all links are static.
+
+    Raises:
+        ConnectivityException: They are not connected.
+        LookupException: The frames form a loop.
+    """
+    found = links_between(caches, target, source)
+    if found is None:
+        for frame in (source, target):
+            _check_loop(caches, frame)
+        raise _unconnected(caches, target, source)
+    up, down = found
+    stamps = [caches[frame].latest for frame in (*up, *down)]
+    return min((stamp for stamp in stamps if stamp), default=0)
+
+
+def look_up(
+    caches: Mapping[str, DynamicCache | StaticCache], target: str, source: str, time: int
+) -> tuple[Vector, Quaternion]:
+    """Return the pose of `source` in `target` at a time.
+
+    Args:
+        caches: The transforms of all frames.
+        target: The parent frame of the result.
+        source: The child frame of the result.
+        time: Time in nanoseconds, 0 for the newest of each link.
+
+    Raises:
+        ConnectivityException: They are not connected.
+        ExtrapolationException: A link is unknown at that time.
+        LookupException: The frames form a loop.
+    """
+    most = len(caches) + 1
+    # From the source up to the target, or to where the data ends.
+    frame, depth = source, 0
+    moved, turned = _ORIGIN, _UPRIGHT
+    gap = ""
+    while True:
+        cache = caches.get(frame)
+        if cache is None:
+            break
+        entry = cache.at(time)
+        if entry is None:
+            # The way up from the target may meet this one below.
+            gap = _gap(frame, cache.gap(time), target, source)
+            break
+        if frame == target:
+            return moved, turned
+        x, y, z = rotate(entry[4:], moved)
+        moved = (x + entry[1], y + entry[2], z + entry[3])
+        turned = multiply(entry[4:], turned)
+        frame = entry[0]
+        depth += 1
+        if depth > most:
+            raise _loop(frame)
+    top = frame
+    # From the target up.
+    frame, depth = target, 0
+    offset, tilt = _ORIGIN, _UPRIGHT
+    while frame != top:
+        cache = caches.get(frame)
+        if cache is None:
+            break
+        entry = cache.at(time)
+        if entry is None:
+            raise ExtrapolationException(_gap(frame, cache.gap(time), target, source))
+        if frame == source:
+            back = conjugate(tilt)
+            return rotate(back, (-offset[0], -offset[1], -offset[2])), back
+        x, y, z = rotate(entry[4:], offset)
+        offset = (x + entry[1], y + entry[2], z + entry[3])
+        tilt = multiply(entry[4:], tilt)
+        frame = entry[0]
+        depth += 1
+        if depth > most:
+            raise _loop(frame)
+    if frame != top:
+        raise ExtrapolationException(gap) if gap else _unconnected(caches, target, source)
+    back = conjugate(tilt)
+    between = (moved[0] - offset[0], moved[1] - offset[1], moved[2] - offset[2])
+    return rotate(back, between), multiply(back, turned)
+
+
+def _gap(frame: str, gap: str, target: str, source: str) -> str:
+    return f"{gap} for '{frame}', when looking up transform from frame [{source}] to [{target}]"
+
+
+def _unconnected(
+    caches: Mapping[str, DynamicCache | StaticCache], target: str, source: str
+) -> TransformException:
+    return ConnectivityException(
+        f"Could not find a connection between '{target}' and '{source}' because they are not part "
+        f"of the same tree. Tf has two or more unconnected trees: '{target}' belongs to "
+        f"'{root_of(caches, target)}', '{source}' to '{root_of(caches, source)}'; "
+        "publish what connects them"
+    )
+
+
+def _loop(frame: str) -> TransformException:
+    return LookupException(
+        f"The tf tree is invalid because it contains a loop, with '{frame}' in it: find out which "
+        "of its publishers is wrong"
+    )
+
+
+def _check_loop(caches: Mapping[str, DynamicCache | StaticCache], frame: str) -> None:
+    if root_of(caches, frame) in caches:
+        raise _loop(frame)

@@ -1,39 +1,97 @@
-"""A transform: where one frame is in another, at a time."""
+"""Transforms and rotations, as unit quaternions (x, y, z, w).
+
+Plain tuples: a robot has some ten links, and numpy takes longer for one than Python for all.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rosglass.comm.time import Time
 from rosglass.errors import InvalidArgumentException
-from rosglass.tf.rotation import Quaternion, Vector, conjugate, multiply, rotate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rosglass.messages import Message
 
-__all__ = ["Transform"]
+__all__ = ["Quaternion", "Transform", "Vector", "conjugate", "multiply", "rotate", "slerp"]
+
+
+#: x, y, z in metres.
+Vector: TypeAlias = tuple[float, float, float]
+#: x, y, z, w.
+Quaternion: TypeAlias = tuple[float, float, float, float]
+
+
+def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
+    """Return the rotation by `b` and then by `a`."""
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by + ay * bw + az * bx - ax * bz,
+        aw * bz + az * bw + ax * by - ay * bx,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+def conjugate(q: Quaternion) -> Quaternion:
+    """Return the inverse rotation."""
+    return (-q[0], -q[1], -q[2], q[3])
+
+
+def rotate(q: Quaternion, v: Vector) -> Vector:
+    """Rotate a vector; as in tf2, a quaternion that is not exactly of length 1 scales it."""
+    x, y, z, w = q
+    a, b, c = v
+    keep = w * w - x * x - y * y - z * z
+    along = 2.0 * (x * a + y * b + z * c)
+    turn = 2.0 * w
+    return (
+        keep * a + along * x + turn * (y * c - z * b),
+        keep * b + along * y + turn * (z * a - x * c),
+        keep * c + along * z + turn * (x * b - y * a),
+    )
+
+
+def slerp(a: Quaternion, b: Quaternion, ratio: float) -> Quaternion:
+    """Interpolate on the shorter way from `a` (ratio 0) to `b` (ratio 1)."""
+    dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+    sign = -1.0 if dot < 0 else 1.0
+    lengths = math.sqrt(sum(x * x for x in a) * sum(x * x for x in b))
+    angle = math.acos(max(-1.0, min(1.0, sign * dot / lengths)))
+    if angle == 0.0:
+        return a
+    whole = math.sin(angle)
+    s = math.sin((1.0 - ratio) * angle) / whole
+    t = sign * math.sin(ratio * angle) / whole
+    return (
+        a[0] * s + b[0] * t,
+        a[1] * s + b[1] * t,
+        a[2] * s + b[2] * t,
+        a[3] * s + b[3] * t,
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class Transform:
-    """Where the frame `child_frame_id` is, seen from the frame `frame_id`.
+    """The pose of the frame `child_frame_id` in the frame `frame_id`.
 
-    Applied to a point given in the child frame, it tells the point in the other one: what a lookup
-    from a source to a target returns has the target as `frame_id` and the source as child.
+    It transforms points from the child frame to the other one: a lookup from a source to a target
+    returns the target as `frame_id` and the source as `child_frame_id`.
 
     Attributes:
         translation: Origin of the child frame, x, y, z in metres.
         rotation: Orientation of the child frame, a quaternion x, y, z, w.
-        stamp: Time at which it holds; zero for one that always does.
-        frame_id: The frame it is seen from.
-        child_frame_id: The frame that is placed.
+        stamp: Time at which it is valid; zero if it always is.
+        frame_id: The parent frame.
+        child_frame_id: The child frame.
 
     Raises:
-        InvalidArgumentException: A number is missing or not finite, or a name is no text.
+        InvalidArgumentException: A number is missing or not finite, or a name is not a string.
     """
 
     translation: Vector = (0.0, 0.0, 0.0)
@@ -57,10 +115,10 @@ class Transform:
 
     @classmethod
     def from_message(cls, message: Message | dict[str, Any]) -> Transform:
-        """Return the transform in a ``geometry_msgs/TransformStamped`` of ROS 1 or ROS 2.
+        """Create a transform from a ``geometry_msgs/TransformStamped`` of ROS 1 or ROS 2.
 
         Args:
-            message: A message, or a dict with all of its fields.
+            message: A message, or a dict with all its fields.
 
         Raises:
             InvalidArgumentException: It is something else, or its numbers are not finite.
@@ -87,7 +145,7 @@ class Transform:
         """Return the fields of a ``geometry_msgs/TransformStamped``.
 
         Args:
-            ros: 2, or 1 for ROS 1, whose stamps have other field names.
+            ros: ROS version, 1 or 2; the field names of stamps differ.
         """
         sec, nanosec = ("secs", "nsecs") if ros == 1 else ("sec", "nanosec")
         stamp = {sec: self.stamp.sec, nanosec: self.stamp.nanosec}
@@ -101,21 +159,21 @@ class Transform:
         }
 
     def inverse(self) -> Transform:
-        """Return where the other frame is, seen from the child."""
+        """Return the pose of the parent frame in the child frame."""
         back = conjugate(self.rotation)
         x, y, z = self.translation
         moved = rotate(back, (-x, -y, -z))
         return Transform(moved, back, self.stamp, self.child_frame_id, self.frame_id)
 
     def compose(self, other: Transform) -> Transform:
-        """Return where the child of `other` is in this one's frame; ``a @ b`` does the same.
+        """Return the pose of the child of `other` in this parent frame; same as ``a @ b``.
 
         Args:
-            other: Its `frame_id` is this one's child. Its stamp, the newer link's as a rule, is
-                not looked at: the result has this one's.
+            other: A transform whose `frame_id` is this one's child. The result has this one's
+                stamp.
 
         Raises:
-            InvalidArgumentException: The frames do not meet.
+            InvalidArgumentException: The frames do not match.
         """
         if not isinstance(other, Transform):
             raise InvalidArgumentException(f"expected a rosglass.tf.Transform, got {other!r}")
@@ -136,20 +194,20 @@ class Transform:
         return self.compose(other)
 
     def apply_point(self, point: Sequence[float]) -> Vector:
-        """Return a point of the child frame, seen from the other one; metres."""
+        """Transform a point from the child frame to the parent frame, in metres."""
         x, y, z = self.apply_vector(point)
         a, b, c = self.translation
         return (x + a, y + b, z + c)
 
     def apply_vector(self, vector: Sequence[float]) -> Vector:
-        """Return a direction, a velocity or the like of the child frame, seen from the other."""
+        """Transform a direction or velocity from the child frame to the parent frame."""
         x, y, z = _numbers("vector", vector, 3)
         return rotate(self.rotation, (x, y, z))
 
     def apply_pose(
         self, position: Sequence[float], orientation: Sequence[float]
     ) -> tuple[Vector, Quaternion]:
-        """Return a pose given in the child frame as position and orientation in the other one."""
+        """Transform a position and orientation from the child frame to the parent frame."""
         x, y, z, w = _numbers("orientation", orientation, 4)
         return self.apply_point(position), multiply(self.rotation, (x, y, z, w))
 

@@ -133,6 +133,8 @@ def test_samples_that_do_not_say_who_sent_them(router, connect, caplog):
             return len(received.numbers) > 10
 
         eventually(arrived)
-    told = [record.message for record in caplog.records if "attachments of 8 bytes" in record.message]
+    told = [
+        record.message for record in caplog.records if "attachments of 8 bytes" in record.message
+    ]
     assert len(told) == 1
     assert "/count" in told[0]

@@ -301,7 +301,7 @@ def test_many_threads_at_once() -> None:
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The seconds that have gone by, to be set."""
     now = [1000.0]
-    monkeypatch.setattr("rosglass.tf.store.monotonic", lambda: now[0])
+    monkeypatch.setattr("rosglass.tf.frames.monotonic", lambda: now[0])
     return now
 
 

@@ -45,7 +45,7 @@ def test_a_frame(buffer: TransformBuffer) -> None:
 
 def test_the_rate_falls_to_zero_when_nothing_comes(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [100.0]
-    for module in ("buffer", "store"):
+    for module in ("buffer", "frames"):
         monkeypatch.setattr(f"rosglass.tf.{module}.monotonic", lambda: clock[0])
     buffer = TransformBuffer()
     for n in range(50):
