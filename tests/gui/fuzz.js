@@ -52,7 +52,7 @@ function members(object) {
 function calls(value) {
     const within = value()
     const fields = { data: within, ranges: within, header: within, order: within, sec: within, reliability: within }
-    return [[], [value()], [fields], ["/fuzz", value()], ["/fuzz", "std_srvs/srv/SetBool", value()],
+    return [[value()], [fields], ["/fuzz", value()], ["/fuzz", "std_srvs/srv/SetBool", value()],
             ["std_msgs/String", "/fuzz", value(), value()], [value(), value(), value(), value(), value(), value()]]
 }
 
@@ -64,6 +64,10 @@ function drive(host, object, other, how) {
     for (const member of told || members(object)) {
         let kind = ""
         try { kind = typeof object[member] } catch (e) { }
+        if (kind === "function") {
+            host.note(name + "." + member + "()")
+            try { object[member]() } catch (e) { }
+        }
         for (const key in VALUES) {
             if (name.startsWith("Image") && WEBS.indexOf(key) >= 0) continue
             const value = VALUES[key]
