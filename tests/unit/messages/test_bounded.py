@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import subprocess
 import sys
@@ -93,12 +94,13 @@ def bounded() -> Iterator[Callable[[str, int, list[Any]], tuple[str, float, int]
     assert program.wait(timeout=30) == 0
 
 
+@pytest.mark.parametrize(("bomb", "number"), zip(BOMBS, itertools.count()), ids=list(BOMBS))
 @pytest.mark.parametrize("use", USES)
-@pytest.mark.parametrize("bomb", BOMBS)
-def test_bombs_are_used_or_refused(bounded: Any, bomb: str, use: str) -> None:
-    for ros in ROS[use in {"connection header", "idl", "description", "TypeLookup"} :]:
-        told, _, _ = bounded(use, ros, BOMBS[bomb])
-        assert told == "used" or ("b/msg/T" in told and "more than" in told) or "64 levels" in told
+def test_bombs_are_used_or_refused(bounded: Any, bomb: str, number: int, use: str) -> None:
+    # Every bomb in both ROS versions and every use as well, but not each with each.
+    ros = ROS[(number + list(USES).index(use)) % 2]
+    told, _, _ = bounded(use, ros, BOMBS[bomb])
+    assert told == "used" or ("b/msg/T" in told and "more than" in told) or "64 levels" in told
 
 
 def fields(draw: Any, number: int, count: int) -> list[Any]:
@@ -122,7 +124,7 @@ def definitions(draw: Any) -> list[Any]:
 
 
 @settings(
-    max_examples=60, deadline=None, derandomize=True,
+    max_examples=30, deadline=None, derandomize=True,
     suppress_health_check=list(HealthCheck),
 )  # fmt: skip
 @given(types=definitions(), use=st.sampled_from(sorted(USES)), ros=st.sampled_from(ROS))
