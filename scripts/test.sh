@@ -7,10 +7,11 @@ export QT_LOGGING_RULES=${QT_LOGGING_RULES:-qt.multimedia.*=false}
 # Hundreds of processes load the same modules: what one has compiled need not be by all others.
 unset PYTHONDONTWRITEBYTECODE
 
-# Types take longest, on one core: everything else that needs no test runs beside them.
+# Types take longest, on one core: they are checked beside everything else up to the unit tests, in
+# the time that those leave, and must not slow them down.
 types=$(mktemp)
 trap 'kill $(jobs -p) 2>/dev/null || true; rm -f "$types"' EXIT
-.venv/bin/mypy >"$types" 2>&1 &
+nice -n 19 .venv/bin/mypy >"$types" 2>&1 &
 checked=$!
 say "lint and format (ruff)"
 .venv/bin/ruff check .
@@ -25,16 +26,11 @@ if [[ -e /usr/include/ros/ros.h ]]; then
   say "a node of roscpp to test against"
   .venv/bin/python tests/interop/ros1/peers/build_roscpp.py .pytest_cache/d/roscpp
 fi
-say "types (mypy --strict)"
-failed=0
-wait "$checked" || failed=$?
-cat "$types"
-((failed == 0)) || exit "$failed"
 # Most tests wait for others most of the time: six side by side, each file in one process.
 # RViz and Qt 5 draw on the processor: four of them keep two cores busy.
 # A process that crashes fails its test and is not replaced: the others would wait for it for ever.
-# Files in the order of their folders: by default, those of few tests come last, which here are
-# those that wait longest for others, and the end would be spent on waiting for one of them.
+# Files in the order of their folders, first those that wait for others: by default, those of few
+# tests come last, which are the same here, and the end would be spent on waiting for one of them.
 run() { # ENVIRONMENT PROCESSES ARGUMENT...
   local environment=$1 processes=$2
   shift 2
@@ -44,18 +40,25 @@ run() { # ENVIRONMENT PROCESSES ARGUMENT...
 # Once more what failed, with windows and other programs: those can fail on machines under load.
 # Each is listed at the end.
 once_more=(--reruns 1 --rerun-show-tracebacks)
+units=(tests/unit/ros[12] tests/contract tests/unit/[!r_]*/ tests/unit/test_*.py)
 version() { "$1/bin/python" -c 'import sys; print("%d.%d" % sys.version_info[:2])'; }
 # Unit tests need no Qt: once for each Python is enough. Debian's has genpy to compare with.
+# The same holds for tests of interfaces that are marked `one_qt`: they run in Qt 6 only.
 say "unit tests, and what holds on every wire ($(.venv-system/bin/python -V), Debian's own)"
-run .venv-system 6 tests/unit tests/contract "$@"
+run .venv-system 6 "${units[@]}" "$@"
+say "types (mypy --strict)"
+failed=0
+wait "$checked" || failed=$?
+cat "$types"
+((failed == 0)) || exit "$failed"
 say "tests of interfaces in Qt 5 ($(.venv-system/bin/python -V), PySide2)"
-run .venv-system 4 "${once_more[@]}" tests/gui "$@"
+run .venv-system 4 "${once_more[@]}" -m "not one_qt" tests/gui "$@"
 say "tests in RViz ($(.venv-system/bin/python -V))"
 # Apart from tests/gui: a process has one Qt application, and RViz needs one of its own kind.
 run .venv-system 4 "${once_more[@]}" tests/rviz "$@"
 if [[ "$(version .venv)" != "$(version .venv-system)" ]]; then
   say "unit tests, and what holds on every wire ($(.venv/bin/python -V))"
-  run .venv 6 -m "not exhaustive" tests/unit tests/contract "$@"
+  run .venv 6 -m "not exhaustive" "${units[@]}" "$@"
 fi
 say "tests of interfaces in Qt 6, and with other programs ($(.venv/bin/python -V), PySide6)"
 run .venv 6 "${once_more[@]}" -m "not exhaustive" tests/gui tests/interop "$@"
