@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import uuid
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 from urllib.parse import parse_qsl, quote, unquote
 
 from rosglass.bags.bag import open_bag
@@ -14,7 +14,6 @@ from rosglass.comm import (
     IMMEDIATE,
     ConnectionState,
     Durability,
-    Node,
     Publisher,
     QoS,
     Status,
@@ -47,6 +46,17 @@ _DELAY_S = 0.5
 #: Seconds before the target of a seek whose newest messages are sent.
 _CONTEXT_S = 3.0
 _OPTIONS = "rate=2, loop=true, paused=true"
+
+
+def _refusal(what: str) -> Any:
+    """Return a method that raises UnsupportedError, as a recording answers no requests."""
+
+    def refuse(self: ReplayNode, *_: Any, **__: Any) -> NoReturn:
+        raise UnsupportedError(
+            f"{what}: {self.playback.path} is a recording, which answers no requests"
+        )
+
+    return refuse
 
 
 class ReplayNode(Ros2Node):
@@ -201,20 +211,14 @@ class ReplayNode(Ros2Node):
         self._recording_node.close()
         super().close()
 
-    # A recording answers no requests.
-    create_service_client = Node.create_service_client
-    create_service_server = Node.create_service_server
-    create_action_client = Node.create_action_client
-    create_action_server = Node.create_action_server
-    create_parameter_client = Node.create_parameter_client
-    create_lifecycle_client = Node.create_lifecycle_client
-    fetch_type_async = Node.fetch_type_async
-    parameters = Node.parameters  # type: ignore[assignment]
-
-    def _unsupported(self, what: str) -> UnsupportedError:
-        return UnsupportedError(
-            f"{what}: {self.playback.path} is a recording, which answers no requests"
-        )
+    create_service_client = _refusal("service clients")
+    create_service_server = _refusal("service servers")
+    create_action_client = _refusal("action clients")
+    create_action_server = _refusal("action servers")
+    create_parameter_client = _refusal("parameters")
+    create_lifecycle_client = _refusal("lifecycle nodes")
+    fetch_type_async = _refusal("types")
+    parameters = property(_refusal("parameters"))
 
     def _on_clock(self, sample: Sample) -> None:
         self._core.clock.advance(Time(sample.message().clock.nanoseconds))
