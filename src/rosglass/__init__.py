@@ -1,12 +1,12 @@
-"""rosglass: a glass cockpit for robots.
+"""Operator screens for ROS robots, in QML and Python.
 
-Talk to any topic of any ROS robot without ROS installed, and build the screen it is steered from
-in QML. Start with :func:`connect` and :func:`load`, or with ``rosglass --help``.
+Connects to ROS 1 and ROS 2 without ROS installed, with any message type. Start with
+:func:`connect` and :func:`load`, or with ``rosglass --help``.
 """
 
 from __future__ import annotations
 
-# Nothing is imported before the command can answer Ctrl-C; type checkers know this name.
+# No imports before the command can handle Ctrl-C; type checkers know this name.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rosglass.comm import Duration, Node, QoS, Time
@@ -102,7 +102,7 @@ _HOMES = {
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 
-#: Reached as attributes, too: `rosglass.comm.IMMEDIATE`.
+#: Also available as attributes: `rosglass.comm.IMMEDIATE`.
 _PACKAGES = (
     "bags",
     "bridge",
@@ -124,7 +124,7 @@ _PACKAGES = (
 
 
 def __getattr__(name: str) -> object:
-    # Imported on first use, so that `import rosglass` and `rosglass --help` stay quick.
+    # Imported on first use, so that `import rosglass` and `rosglass --help` stay fast.
     from importlib import import_module  # noqa: PLC0415
 
     if name in _PACKAGES:

@@ -1,6 +1,39 @@
-"""Every error rosglass raises, so that one ``except rosglass.Error`` catches them all.
+"""The exceptions of rosglass; all derive from :class:`Error`.
 
-Messages follow one pattern: what happened, where (topic, field path, file and line), what to do.
+Messages say what happened, where (topic, field path, file and line), and what to do.
+
+```
+Error
+├── DefinitionError             an interface definition cannot be parsed
+│   └── CyclicTypeError
+├── TypeNotFoundError           no definition of a type
+├── DefinitionConflictError     two definitions of a type
+├── FieldPathError
+├── ConversionError             a value does not fit a message
+│   └── ArgumentError           an invalid argument; also a TypeError and a ValueError
+├── DecodeError                 invalid bytes
+├── InvalidNameError            also a ValueError
+├── UnsupportedError
+├── NodeClosedError
+├── ConnectionLostError
+├── TimeoutError                also Python's TimeoutError
+├── ServiceError
+│   └── ServiceUnavailableError
+├── GoalRejectedError
+├── ParameterError
+├── TransitionError             of lifecycle nodes
+├── MasterError                 of ROS 1
+├── RosArgumentError            also a ValueError
+├── BagError
+├── NoPictureError
+├── QmlError
+└── TransformException          the exceptions of tf2
+    ├── LookupException
+    ├── ConnectivityException
+    ├── ExtrapolationException
+    ├── InvalidArgumentException
+    └── TimeoutException        also a TimeoutError
+```
 """
 
 from __future__ import annotations
@@ -42,29 +75,28 @@ __all__ = [
 ]
 
 
-#: Characters of one word, and of one line, that a message shows: it is read by people, and may be
-#: about a value of any size.
+#: Longest word and line, in characters, that a message shows in full: values have any size.
 _MOST_IN_WORD, _MOST_IN_LINE = 300, 4000
 _LONG_WORD = re.compile(rf"\S{{{_MOST_IN_WORD + 1},}}")
 _LONG_LINE = re.compile(rf".{{{_MOST_IN_LINE + 1},}}")
 
 
-#: What moves a terminal's cursor, changes its state or reorders its text: C0 but tab and line feed,
-#: DEL, C1, line and paragraph separators, directional controls of Unicode.
+#: Characters that control a terminal or reorder its text: C0 except tab and line feed, DEL, C1,
+#: line and paragraph separators, directional controls of Unicode.
 _CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 
 
 def escape_controls(text: str) -> str:
     r"""Return a text with its control characters as ``\uXXXX``, tabs and line feeds kept.
 
-    Names and texts of other nodes go through this on their way to terminals and logs. The escapes
-    are those of JSON, so that JSON stays JSON.
+    For names and texts of other nodes in terminals and logs. The escapes are those of JSON, so JSON
+    stays valid.
     """
     return _CONTROLS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 def shown(value: object) -> str:
-    """Return a value as error messages show it, cut if it is long."""
+    """Return the repr of a value for an error message, shortened if it is long."""
     try:
         text = repr(value)
     except Exception as error:  # an integer of 5,000 digits, or a class of the user's
@@ -73,7 +105,7 @@ def shown(value: object) -> str:
 
 
 def _shortened(text: str) -> str:
-    """Return a message with the beginnings only of words and lines that are very long."""
+    """Return a message with very long words and lines cut."""
     if len(text) <= _MOST_IN_WORD:
         return text
     text = _LONG_WORD.sub(lambda found: _cut(found[0], 200), text)
@@ -88,8 +120,8 @@ class Error(Exception):
     """Base of every error raised by rosglass.
 
     Args:
-        args: The message; control characters are escaped, and of words and lines that no person
-            would read, it keeps the beginning and tells the length.
+        args: The message. Control characters are escaped; very long words and lines are cut, with
+            their length.
     """
 
     def __init__(self, *args: object) -> None:
@@ -102,7 +134,7 @@ class DefinitionError(Error):
     """An interface definition cannot be parsed.
 
     Attributes:
-        file: Where the text came from: a path, or a label such as ``<std_msgs/msg/String>``.
+        file: Source of the text: a path, or a label such as ``<std_msgs/msg/String>``.
         line: 1-based line number, 0 when the error concerns the whole text.
         column: 1-based column, 0 when the error concerns the whole line.
     """
@@ -129,12 +161,12 @@ class FieldPathError(Error):
 
 
 class ConversionError(Error):
-    """A value does not fit the field it was given for.
+    """A value does not fit its field.
 
     Attributes:
         path: Field path from the message's root, e.g. ``poses[3].position.x``; empty for the root.
-        value: The offending value.
-        expected: What would have been accepted, in words.
+        value: The rejected value.
+        expected: Description of the accepted values.
     """
 
     def __init__(self, path: str, value: object, expected: str, type_name: str = "") -> None:
@@ -144,15 +176,15 @@ class ConversionError(Error):
 
 
 class ArgumentError(ConversionError, TypeError, ValueError):
-    """An argument, an option of a URL or a setting is not what it may be.
+    """An argument, a URL option or a setting is invalid.
 
-    It is a :class:`ConversionError` as well until 0.3; from then on, that is for values that do not
-    fit a message.
+    It is also a :class:`ConversionError` until version 0.3; from then on, that is only for values
+    that do not fit a message.
 
     Attributes:
         path: Name of the argument, option or setting.
-        value: What was given.
-        expected: What would have been accepted, in words.
+        value: The given value.
+        expected: Description of the accepted values.
     """
 
 
@@ -166,9 +198,9 @@ class DecodeError(Error):
     """
 
     def __init__(self, type_name: str, message: str, path: str = "", offset: int = -1) -> None:
-        place = f".{path}" if path else ""
+        field = f".{path}" if path else ""
         at = f" at byte {offset}" if offset >= 0 else ""
-        super().__init__(f"{type_name}{place}{at}: {message}")
+        super().__init__(f"{type_name}{field}{at}: {message}")
         self.type_name, self.path, self.offset = type_name, path, offset
 
 
@@ -177,11 +209,11 @@ class InvalidNameError(Error, ValueError):
 
 
 class UnsupportedError(Error):
-    """This world or middleware cannot do what was asked; the message says why."""
+    """The protocol, middleware or platform does not support this; the message says why."""
 
 
 class NoPictureError(Error):
-    """A video stream cannot be shown yet; the message says what it is waiting for."""
+    """A video stream has no image yet; the message says what is missing."""
 
 
 class NodeClosedError(Error):
@@ -189,15 +221,15 @@ class NodeClosedError(Error):
 
 
 class ConnectionLostError(Error):
-    """The middleware could not be reached, or the connection to it was lost."""
+    """The robot could not be reached, or the connection to it was lost."""
 
 
-class TimeoutError(Error, builtins.TimeoutError):  # noqa: A001 - the field's own word
-    """What was waited for did not come within the given time."""
+class TimeoutError(Error, builtins.TimeoutError):  # noqa: A001 - the name in ROS and Python
+    """An operation did not complete within the given time."""
 
 
 class ServiceError(Error):
-    """A service was called, and its server says that it failed, or its reply makes no sense."""
+    """The server of a service reported a failure, or its response is invalid."""
 
 
 class ServiceUnavailableError(ServiceError):
@@ -205,7 +237,7 @@ class ServiceUnavailableError(ServiceError):
 
 
 class GoalRejectedError(Error):
-    """An action server did not accept a goal."""
+    """An action server rejected a goal."""
 
 
 class ParameterError(Error):
@@ -213,15 +245,15 @@ class ParameterError(Error):
 
 
 class MasterError(Error):
-    """A ROS 1 master or node answers a question with a refusal, e.g. that it knows no such name."""
+    """A ROS 1 master or node refused a request, e.g. because of an unknown name."""
 
 
 class TransitionError(Error):
-    """A lifecycle node cannot take a transition, or failed to."""
+    """A lifecycle transition is not possible, or failed."""
 
 
 class RosArgumentError(Error, ValueError):
-    """What a program was told on its command line, for ROS, is not valid."""
+    """A ROS argument on the command line is invalid."""
 
 
 class BagError(Error):
@@ -233,7 +265,7 @@ class QmlError(Error):
 
 
 class TransformException(Error):  # noqa: N818 - tf2's name
-    """A transform cannot be had, or is not valid; one class below says which. Names as in tf2."""
+    """A transform is not available or not valid; the subclasses have the names of tf2."""
 
 
 class LookupException(TransformException):
@@ -241,11 +273,11 @@ class LookupException(TransformException):
 
 
 class ConnectivityException(TransformException):
-    """Both frames exist, but nothing connects them."""
+    """Both frames exist, but are not connected."""
 
 
 class ExtrapolationException(TransformException):
-    """There is no data for the time asked for: it is too old, too new, or the only one."""
+    """There is no data for the requested time."""
 
 
 class InvalidArgumentException(TransformException):
@@ -253,4 +285,4 @@ class InvalidArgumentException(TransformException):
 
 
 class TimeoutException(TransformException, TimeoutError):  # noqa: N818 - tf2's name
-    """A transform that was waited for did not become available within the time."""
+    """A transform did not become available in time."""

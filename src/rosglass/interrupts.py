@@ -1,8 +1,8 @@
-"""Ctrl-C while Qt's bindings are imported, which swallow it or abort the process."""
+"""Defers Ctrl-C while Qt's bindings are imported, which swallow it or abort the process."""
 
 from __future__ import annotations
 
-# Python has it from its start; `signal` takes milliseconds in which Ctrl-C would be lost already.
+# Built in: importing `signal` takes milliseconds, in which Ctrl-C would be lost.
 import _signal as signal  # type: ignore[import-not-found]
 import sys
 
@@ -15,13 +15,13 @@ __all__ = ["InterruptsDeferred"]
 
 
 class InterruptsDeferred:
-    """Context in which Ctrl-C waits for the end, and then ends the program; for imports.
+    """Context manager that defers Ctrl-C to its end, and then exits the program; for imports.
 
-    Only in the main thread of programs without a handler of their own, which have Python's again
-    afterwards. Pressed twice, it is raised at once.
+    Works in the main thread of programs that have Python's own handler, which is restored
+    afterwards. A second Ctrl-C is raised at once.
 
     Raises:
-        SystemExit: It was pressed (130); KeyboardInterrupt in an interactive session.
+        SystemExit: Ctrl-C was pressed (code 130); KeyboardInterrupt in an interactive session.
     """
 
     def __init__(self) -> None:
@@ -32,7 +32,7 @@ class InterruptsDeferred:
             try:
                 signal.signal(signal.SIGINT, self._on_interrupt)
             except ValueError:
-                # In another thread than the main one, where nothing is raised.
+                # Not the main thread: signals raise nothing here.
                 return
 
     def __exit__(
