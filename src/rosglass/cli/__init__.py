@@ -56,7 +56,7 @@ def _is_main_thread() -> bool:
 
 
 def is_interrupt(error: "BaseException | None") -> bool:
-    """Return whether Ctrl-C is behind an error: modules in C tell it as an ImportError."""
+    """Return whether Ctrl-C is behind an error: C extensions report it as an ImportError."""
     while error is not None:
         if isinstance(error, KeyboardInterrupt):
             return True

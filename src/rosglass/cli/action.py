@@ -47,10 +47,10 @@ _PATIENCE = 5.0
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare what can be done with actions."""
     add = Subcommands(parser).add
-    sub = add("list", "list the actions there are", _list)
-    sub.add_argument("-t", "--types", "--show-types", action="store_true", help="show their types")
+    sub = add("list", "list actions", _list)
+    sub.add_argument("-t", "--types", "--show-types", action="store_true", help="show types")
     _finish(sub)
-    sub = add("info", "show who offers and uses an action", _info)
+    sub = add("info", "show the servers and clients of an action", _info)
     complete(sub.add_argument("action"), "actions")
     _finish(sub)
     summary = "send a goal and wait for its end; Ctrl-C cancels it"
@@ -110,7 +110,7 @@ def _info(args: argparse.Namespace) -> int:
         types = known.get(name, [])
     if not servers and not clients:
         hint = similar(name, known) or "; rosglass action list shows what there is"
-        note(f"nobody offers or uses {name}{hint}")
+        note(f"no node offers or uses {name}{hint}")
         return 1
     if args.json:
         print_json(
@@ -153,7 +153,7 @@ def _send(args: argparse.Namespace) -> int:
             with telling(lambda: client.problem):
                 wait(node, lambda: client.type is not None, args.timeout)
             if client.type is None:
-                raise ServiceUnavailableError(client.problem or f"nobody offers {name}")
+                raise ServiceUnavailableError(client.problem or f"no node offers {name}")
             kind = client.type.goal
             goal = client.send_goal(
                 parse_fields(text, kind.name, template(kind)),
@@ -161,12 +161,12 @@ def _send(args: argparse.Namespace) -> int:
                 executor=IMMEDIATE,
                 timeout=args.timeout,
             )
-            told, end = GoalStatus.PENDING, End()
+            printed, end = GoalStatus.PENDING, End()
             with telling(lambda: client.problem if goal.status is GoalStatus.PENDING else ""):
                 while not goal.done.done():
-                    if goal.status is not told and not args.json:
-                        told = goal.status
-                        print(style(f"# goal {goal.id_text} {told.value}", "dim"), flush=True)
+                    if goal.status is not printed and not args.json:
+                        printed = goal.status
+                        print(style(f"# goal {goal.id_text} {printed.value}", "dim"), flush=True)
                     if end.wait(0.05):
                         _cancel(goal)
                         break
@@ -195,7 +195,7 @@ def _cancel(goal: ClientGoal) -> None:
             return
         time.sleep(0.02)
     if not goal.done.done():
-        note("the goal goes on: its server does not end it")
+        note("the goal is still running: its server does not cancel it")
 
 
 def _block(what: str, found: object) -> str:

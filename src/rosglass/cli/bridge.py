@@ -29,16 +29,18 @@ _PATIENCE = 3.0
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare the command's options."""
-    parser.add_argument("first", metavar="URL", help="the first world, e.g. ros1://robot:11311")
-    parser.add_argument("second", metavar="URL", help="the second, e.g. zenoh://127.0.0.1:7447")
+    parser.add_argument("first", metavar="URL", help="the first graph, e.g. ros1://robot:11311")
+    parser.add_argument(
+        "second", metavar="URL", help="the second graph, e.g. zenoh://127.0.0.1:7447"
+    )
     parser.add_argument(
         "-t",
         "--topic",
         action="append",
         default=[],
         metavar="NAME",
-        help="relay a topic, both ways; NAME:=OTHER gives it another name in the second world, "
-        "'NAME->' relays it only from the first to the second, 'NAME<-' only back; * stands for "
+        help="relay a topic in both directions; NAME:=OTHER renames it in the second graph, "
+        "'NAME->' relays it only from the first to the second, 'NAME<-' only back; * matches "
         "any characters; may be repeated",
     )
     parser.add_argument(
@@ -47,20 +49,20 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="the same for a service; 'NAME->' is one that the first world offers",
+        help="the same for a service; 'NAME->' is one offered in the first graph",
     )
     parser.add_argument(
         "--action",
         action="append",
         default=[],
         metavar="NAME",
-        help="the same for an action: goals, feedback, results, and requests to cancel",
+        help="the same for an action: goals, feedback, results and cancel requests",
     )
     parser.add_argument(
         "-a",
         "--all",
         action="store_true",
-        help="relay all topics, services and actions, hidden ones and those of every node excepted",
+        help="relay all topics, services and actions, except hidden ones and those of every node",
     )
     parser.add_argument(
         "-x",
@@ -68,12 +70,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--exclude-regex",
         default="",
         metavar="REGEX",
-        help="never relay what matches",
+        help="exclude matching names",
     )
     parser.add_argument(
         "--one-way",
         action="store_true",
-        help="relay only from the first world to the second, unless an arrow says otherwise",
+        help="relay only from the first graph to the second, unless an arrow says otherwise",
     )
     parser.add_argument(
         "--type",
@@ -81,56 +83,56 @@ def configure(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=_type,
         metavar="NAME:=TYPE",
-        help="the type of a topic that nobody publishes yet: it is relayed from its first message",
+        help="the type of a topic without publishers yet: it is relayed from its first message",
     )
     parser.add_argument(
         "--qos",
         default="",
         metavar="PRESET",
-        help="quality of service at both ends, e.g. sensor_data; default: what fits",
+        help="quality of service on both sides, e.g. sensor_data (default: matching)",
     )
     parser.add_argument(
         "--keep",
         action="store_true",
-        help="take messages even while nobody in the other world subscribes to them",
+        help="subscribe even while the other graph has no subscriber",
     )
     parser.add_argument(
         "--service-timeout",
         type=seconds,
         default=10.0,
         metavar="SECONDS",
-        help="how long servers have to answer (default: %(default)g)",
+        help="time for servers to respond (default: %(default)g)",
     )
     parser.add_argument(
         "--list",
         "--dry-run",
         action="store_true",
-        help="show what would be relayed, and as what, and end",
+        help="list what would be relayed, and how, and exit",
     )
     parser.add_argument(
         "--statistics",
         type=seconds,
         default=5.0,
         metavar="SECONDS",
-        help="time between two lines of statistics, 0 for none (default: %(default)g)",
+        help="period of the statistics lines, 0 for none (default: %(default)g)",
     )
     parser.add_argument(
-        "-d", "--duration", type=seconds, metavar="SECONDS", help="end by itself after so long"
+        "-d", "--duration", type=seconds, metavar="SECONDS", help="exit after this time"
     )
     parser.add_argument(
-        "--node-name", default="", metavar="NAME", help="default: one that nobody else has"
+        "--node-name", default="", metavar="NAME", help="name of both nodes (default: a unique one)"
     )
     parser.add_argument(
         "--timeout",
         type=seconds,
         default=TIMEOUT,
         metavar="SECONDS",
-        help="how long to wait for each world to answer (default: %(default)g)",
+        help="time to wait for each graph to answer (default: %(default)g)",
     )
     add_definitions_option(parser)
     add_output_options(parser)
     parser.epilog = (
-        "Ctrl-C ends it. What maps to what, and what gets lost: docs/bridge.md in the source."
+        "Ctrl-C ends it. The mapping of types, and what is lost: docs/bridge.md in the source."
     )
 
 
@@ -146,7 +148,7 @@ def run(args: argparse.Namespace) -> int:
         _check_known(kind)
     name = args.node_name or f"{BRIDGE_NAME}_{secrets.token_hex(4)}"
     if not args.verbose:
-        # What is wrong is told here, once.
+        # This command prints problems itself, once.
         logging.getLogger("rosglass").setLevel(logging.ERROR)
     with (
         join(args.first, name, args.timeout) as first,
@@ -238,8 +240,8 @@ def _list(args: argparse.Namespace, first: Node, second: Node, rules: list[list[
         rows.append((one.kind, names[0], left or "?", one.direction, names[1], right or "?"))
     for line, one in zip(table(rows) if rows else (), found, strict=True):
         print(style(line, "red") if one.problem else line)
-        for told in (*one.notes, *((f"not relayed: {one.problem}",) if one.problem else ())):
-            print(style(f"    {told}", "dim"))
+        for text in (*one.notes, *((f"not relayed: {one.problem}",) if one.problem else ())):
+            print(style(f"    {text}", "dim"))
     if not found:
         note("nothing is there that could be relayed; rosglass doctor looks why")
     return 0
@@ -255,7 +257,7 @@ def _watch(args: argparse.Namespace, bridge: Bridge, end: End, nodes: tuple[Node
         while not end.wait(max(0.0, min(0.5, until - time.monotonic()))):
             now = time.monotonic()
             status = bridge.status()
-            news.tell(status)
+            news.report(status)
             if shown:
                 width = shutil.get_terminal_size().columns - 1
                 print(f"{CLEAR_LINE}{status.line()[:width]}", end="", file=sys.stderr, flush=True)
@@ -282,22 +284,22 @@ class _News:
     def __init__(self, on_terminal: bool) -> None:
         self._before = CLEAR_LINE if on_terminal else ""
         self._since: dict[str, tuple[str, float]] = {}
-        self._told: dict[str, str] = {}
+        self._reported: dict[str, str] = {}
         self._noted: set[tuple[str, str]] = set()
 
-    def tell(self, status: BridgeStatus) -> None:
+    def report(self, status: BridgeStatus) -> None:
         now = time.monotonic()
         problems = {
             f"{one.name} {one.direction}": one.problem for one in status.relays if one.problem
         }
         for number, problem in enumerate(status.worlds):
             if problem:
-                problems[f"the {('first', 'second')[number]} world"] = problem
+                problems[f"the {('first', 'second')[number]} graph"] = problem
         for one in status.relays:
-            told = "; ".join(one.notes)
-            if told and (one.type, told) not in self._noted:
-                self._noted.add((one.type, told))
-                self._note(f"{one.name} {one.direction} [{one.type}]: {told}")
+            notes = "; ".join(one.notes)
+            if notes and (one.type, notes) not in self._noted:
+                self._noted.add((one.type, notes))
+                self._note(f"{one.name} {one.direction} [{one.type}]: {notes}")
         for name, problem in problems.items():
             since = self._since.get(name, ("", now))
             self._since[name] = (problem, since[1] if since[0] == problem else now)

@@ -68,7 +68,7 @@ class _Completer:
         self._what = what
 
     def __call__(self, prefix: str, parsed_args: argparse.Namespace, **_: Any) -> Iterable[str]:
-        """Return the names that may be meant; whatever goes wrong, Tab offers nothing."""
+        """Return the matching names; none on any error."""
         try:
             return [name for name in self._names(parsed_args) if name.startswith(prefix)]
         except Exception:  # nothing may be printed into the line that is being typed

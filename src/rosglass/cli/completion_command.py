@@ -14,10 +14,10 @@ __all__ = ["configure", "run"]
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare the command's options."""
-    parser.add_argument("shell", choices=SHELLS, help="which shell")
+    parser.add_argument("shell", choices=SHELLS, help="the shell")
     parser.epilog = (
         'For bash, put this into ~/.bashrc: eval "$(rosglass completion bash)". '
-        "Topics, services, actions and nodes are asked from the robot that ROSGLASS_URL names."
+        "Topics, services, actions and nodes come from the robot at ROSGLASS_URL."
     )
 
 

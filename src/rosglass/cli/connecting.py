@@ -40,11 +40,11 @@ __all__ = [
 #: Names that a hint shows.
 _EXAMPLES = 3
 _T = TypeVar("_T")
-#: Seconds to wait for the robot, unless told otherwise.
+#: Default of --timeout, in seconds.
 TIMEOUT = 10.0
-#: Seconds that something which is there takes to show up in the graph, or to tell its type.
+#: Seconds that an existing entity may take to appear in the graph, or to announce its type.
 _DISCOVERY = 3.0
-#: Seconds after which a command says what it is waiting for, and knocks where nobody answers.
+#: Seconds after which a command reports what it waits for, and probes an address without answer.
 _PATIENCE, _KNOCK = 2.0, 0.5
 #: The same once the robot has answered.
 _SOON = 1.0
@@ -63,12 +63,12 @@ def add_connection_options(
     group.add_argument(
         "--url",
         default="",
-        help="address of the robot, e.g. zenoh://192.168.1.5:7447, dds://?domain=5 or "
-        "ros1://192.168.1.5:11311; default: ROSGLASS_URL, or what ROS's own variables say, or the "
+        help="URL of the robot, e.g. zenoh://192.168.1.5:7447, dds://?domain=5 or "
+        "ros1://192.168.1.5:11311; default: ROSGLASS_URL, or ROS's own variables, or the "
         "Zenoh router or ROS 1 master of this machine",
     )
     group.add_argument(
-        "--node-name", default="", metavar="NAME", help="default: one that nobody else has"
+        "--node-name", default="", metavar="NAME", help="name of this node (default: a unique one)"
     )
     add_definitions_option(group)
     group.add_argument(
@@ -77,7 +77,7 @@ def add_connection_options(
         action=_Given,
         default=timeout,
         metavar="SECONDS",
-        help="how long to wait for the robot to answer "
+        help="time to wait for the robot to answer "
         + (
             f"(default: {timeout:g})"
             if timeout is not None
@@ -94,15 +94,15 @@ def add_definitions_option(parser: argparse._ActionsContainer) -> None:
         action="append",
         default=[],
         metavar="FOLDER",
-        help="a package or workspace with definitions that the robot does not tell; may be "
-        "repeated",
+        help="a package or workspace with definitions that the robot does not send; may "
+        "be repeated",
     )
 
 
 def connect(args: argparse.Namespace, *, patient: bool = False) -> Node:
-    """Join the graph that the options name, and wait until somebody answers.
+    """Join the graph that the options name, and wait for an answer.
 
-    Says on standard error what it waits for, when that takes a while. Over DDS, where nobody has
+    Reports on standard error what it waits for, if that takes a while. Over DDS, where nobody has
     to answer, it returns after a moment.
 
     Args:
@@ -111,7 +111,7 @@ def connect(args: argparse.Namespace, *, patient: bool = False) -> Node:
             for commands that go on until they are ended. ``--timeout`` asks others to.
 
     Raises:
-        Error: As :func:`rosglass.connect`; ConnectionLostError when nobody answers in time.
+        Error: As :func:`rosglass.connect`; ConnectionLostError if there is no answer in time.
     """
     import rosglass
 
@@ -131,9 +131,9 @@ def connect(args: argparse.Namespace, *, patient: bool = False) -> Node:
 
 
 def join(url: str, name: str, timeout: float) -> Node:
-    """Join the graph at `url`, and wait until somebody answers; for commands that know it.
+    """Join the graph at `url`, and wait for an answer; for commands that have the URL.
 
-    In ROS 2, the node tells others the types that it knows: they may be known nowhere else there.
+    In ROS 2, the node serves its type definitions: they may not exist elsewhere in the graph.
 
     Raises:
         Error: As for :func:`connect`.
@@ -221,21 +221,21 @@ def telling(reason: Callable[[], str]) -> Iterator[None]:
 
     Args:
         reason: Returns it in words, with the names that may be meant; empty for nothing. It is
-            asked each second, from another thread, and what is new is told.
+            called every second, in another thread; a new reason is printed.
     """
     done = threading.Event()
 
-    def tell() -> None:
-        told = ""
+    def report() -> None:
+        reported = ""
         while not done.wait(_SOON):
             text = ""
-            with suppress(Error):  # what ends the waiting is told by who waits
+            with suppress(Error):  # the caller reports what ends the waiting
                 text = reason()
-            if text and text != told and not done.is_set():
-                told = text
+            if text and text != reported and not done.is_set():
+                reported = text
                 note(f"waiting: {text}")
 
-    thread = threading.Thread(target=tell, name="telling", daemon=True)
+    thread = threading.Thread(target=report, name="waiting", daemon=True)
     thread.start()
     try:
         yield
@@ -334,7 +334,7 @@ def _wait_for_connection(node: Node, timeout: float, patient: bool) -> None:
     connected, deadline = threading.Event(), time.monotonic() + timeout
 
     def look(status: Status) -> None:
-        # Over DDS there may be nobody yet, and no way to tell that from a wrong address.
+        # Over DDS, no node yet cannot be distinguished from a wrong address.
         if status.state is ConnectionState.CONNECTED or node.url.startswith("dds:"):
             connected.set()
 
@@ -344,10 +344,10 @@ def _wait_for_connection(node: Node, timeout: float, patient: bool) -> None:
             return
         refusal = refused(node.url)
         if refusal is not None:
-            told = f"{node.url}: {refusal[0]}; {refusal[1]}"
+            problem = f"{node.url}: {refusal[0]}; {refusal[1]}"
             if not patient:
-                raise ConnectionLostError(told)
-            note(f"{told}. Waiting for it")
+                raise ConnectionLostError(problem)
+            note(f"{problem}. Waiting for it")
         elif connected.wait(min(_PATIENCE, timeout)):
             return
         elif timeout > _PATIENCE:
@@ -355,6 +355,6 @@ def _wait_for_connection(node: Node, timeout: float, patient: bool) -> None:
         if connected.wait(max(0.0, deadline - time.monotonic())):
             return
     raise ConnectionLostError(
-        f"{node.url}: {node.status().detail}; nobody answered within {timeout:g} s. Is the robot "
+        f"{node.url}: {node.status().detail}; no answer within {timeout:g} s. Is the robot "
         "on, and the address right? rosglass doctor looks for the reason"
     )

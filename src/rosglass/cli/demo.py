@@ -30,28 +30,27 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--url",
         default=os.environ.get("ROSGLASS_URL") or "zenoh://127.0.0.1:7447",
-        help="where to meet: dds://, or a Zenoh router, which is started when none answers "
-        "(default: %(default)s)",
+        help="dds://, or a Zenoh router, which is started if none answers (default: %(default)s)",
     )
     parser.add_argument(
-        "--no-robot", action="store_true", help="open the cockpit on a robot that runs already"
+        "--no-robot", action="store_true", help="use a robot that is running already"
     )
     parser.add_argument(
         "--seconds",
         type=float,
         metavar="N",
-        help="end after N seconds (default: when the window is closed; without display 20)",
+        help="exit after N seconds (default: when the window is closed; without display 20)",
     )
     parser.add_argument(
         "--screenshot",
         type=Path,
         metavar="FILE.png",
-        help="save a picture of the cockpit before it ends (without display: demo.png)",
+        help="save a screenshot before the end (without display: demo.png)",
     )
     parser.add_argument(
         "--headless",
         action="store_true",
-        help="use a virtual screen and drive by itself, as on a machine without display",
+        help="use a virtual screen and drive automatically, as on a machine without display",
     )
 
 
@@ -169,7 +168,7 @@ def _use_virtual_screen(stack: ExitStack, seconds: float | None) -> None:
 
 
 def _find_router(stack: ExitStack, url: str) -> str:
-    """Return the URL to use, after starting a router on this machine when nobody answers."""
+    """Return the URL to use, after starting a router on this machine if there is no answer."""
     from rosglass.wires.zenoh.options import ZenohOptions
     from rosglass.wires.zenoh.router import Router, is_router_reachable
 

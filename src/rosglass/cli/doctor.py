@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _look(args: argparse.Namespace) -> Iterator[Finding]:
-    urls, told = _urls(args)
+    urls, given = _urls(args)
     ros2 = any(not url.lower().startswith("ros1:") for url in urls)
     yield from _programs()
     yield from _environment()
@@ -108,12 +108,12 @@ def _look(args: argparse.Namespace) -> Iterator[Finding]:
     for url in urls:
         findings = list(_robot(url, args.timeout))
         if any(finding.level == "error" for finding in findings):
-            # Where nobody said that the robot is there, its absence is no fault yet.
-            findings = [replace(f, level=f.level if told else "note") for f in findings]
+            # Without a given URL, a missing robot is not an error yet.
+            findings = [replace(f, level=f.level if given else "note") for f in findings]
         else:
             answering.append(url)
         yield from findings
-    if not told:
+    if not given:
         yield _address(answering)
     if args.scan:
         yield from _scan()
@@ -136,8 +136,8 @@ def _programs() -> Iterator[Finding]:
 
 
 def _environment() -> Iterator[Finding]:
-    told = [f"{name}={os.environ[name]}" for name in _VARIABLES if os.environ.get(name)]
-    yield Finding("ok", "environment", "; ".join(told) or "no variables of ROS or rosglass")
+    shown = [f"{name}={os.environ[name]}" for name in _VARIABLES if os.environ.get(name)]
+    yield Finding("ok", "environment", "; ".join(shown) or "no variables of ROS or rosglass")
     for folder in filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):
         if not Path(folder).is_dir():
             fix = "source the workspace anew, or unset AMENT_PREFIX_PATH"
@@ -193,18 +193,18 @@ def _interfaces(ros2: bool) -> Iterator[Finding]:
 def _address(answering: list[str]) -> Finding:
     """Say what to set where nothing is set."""
     if not answering:
-        text = "nothing says where the robot is, and nobody answers on this machine"
+        text = "no URL is given, and no robot answers on this machine"
         fix = (
             "export ROSGLASS_URL=zenoh://<robot's address> (or dds://, ros1://<its address>), "
             "and see the notes above"
         )
         return Finding("error", "address", text, fix)
-    text = f"nothing says where the robot is; found: {', '.join(answering)}"
+    text = f"no URL is given; found: {', '.join(answering)}"
     return Finding("warning", "address", text, f"export ROSGLASS_URL={shlex.quote(answering[0])}")
 
 
 def _urls(args: argparse.Namespace) -> tuple[list[str], bool]:
-    """Return where to look, and whether somebody said so."""
+    """Return the URLs to check, and whether one was given."""
     from rosglass.connection import default_url
 
     if args.url:
@@ -313,4 +313,4 @@ def _scan() -> Iterator[Finding]:
             shown = ", ".join(others[:5]) + (" ..." if len(others) > 5 else "")
             yield Finding("ok", url, f"{len(others)} nodes: {shown}", f"use --url '{url}'")
         else:
-            yield Finding("note", url, "nobody")
+            yield Finding("note", url, "no nodes")

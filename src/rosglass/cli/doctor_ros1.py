@@ -28,7 +28,7 @@ __all__ = ["look"]
 _CALLER = "/rosglass_doctor"
 #: Nodes that are asked at the same time.
 _AT_ONCE = 16
-#: Seconds that the master may take to tell us that a parameter has changed.
+#: Seconds that the master may take to notify of a parameter change.
 _ECHO = 3.0
 #: What helps against names that ROS's rules forbid.
 _RENAME = "rename them where they are made: letters, digits, '_' and '/', a letter first"
@@ -135,19 +135,19 @@ def _own_address(node: Ros1Node, options: Ros1Options) -> Iterator[Finding]:
     if problem:
         yield Finding("warning", "own address", problem)
     else:
-        told = f"from {options.source}" if options.source else "found out; ROS_IP would set it"
-        yield Finding("ok", "own address", f"{address} ({told})")
+        origin = f"from {options.source}" if options.source else "detected; ROS_IP would set it"
+        yield Finding("ok", "own address", f"{address} ({origin})")
 
 
 def _echo(node: Ros1Node, options: Ros1Options, own: list[Finding]) -> Iterator[Finding]:
-    """Let the master call back: by that it tells nodes who publishes."""
+    """Check that the master can call back: it announces publishers that way."""
     from rosglass.wires.tcpros.master import call_node
 
-    ready, heard = threading.Event(), threading.Event()
+    ready, called = threading.Event(), threading.Event()
     name, master = f"/{node.name}_was_here", options.master
 
     def hear(value: object) -> None:
-        (heard if value == 1 else ready).set()
+        (called if value == 1 else ready).set()
 
     try:
         with node.parameter_server.subscribe(name, hear):
@@ -155,7 +155,7 @@ def _echo(node: Ros1Node, options: Ros1Options, own: list[Finding]) -> Iterator[
             # Somebody else has to set it: what the node sets itself, it knows.
             call_node(master, "setParam", _CALLER, name, 1)
             try:
-                arrived = heard.wait(_ECHO)
+                arrived = called.wait(_ECHO)
             finally:
                 call_node(master, "deleteParam", _CALLER, name)
     except Error as error:
@@ -165,7 +165,7 @@ def _echo(node: Ros1Node, options: Ros1Options, own: list[Finding]) -> Iterator[
         yield Finding("ok", "own address", "the master reaches this machine under it")
         return
     text = (
-        f"the master cannot reach this machine at {node.address}: it cannot tell who publishes, "
+        f"the master cannot reach this machine at {node.address}: it cannot announce publishers, "
         "and the robot's nodes get nothing from here"
     )
     doubted = any(finding.level == "warning" for finding in own)
@@ -208,7 +208,7 @@ def _nodes(node: Ros1Node, options: Ros1Options, timeout: float) -> Iterator[Fin
     for unknown_host, found in unknown.items():
         text = (
             f"{_several(found)} can be reached under the name {unknown_host} only, "
-            "which this machine does not know: nothing comes from there"
+            "which this machine cannot resolve: nothing is received from there"
         )
         address = _address_of(host)
         fix = (
@@ -257,7 +257,7 @@ def _visit(master: str, name: str, timeout: float) -> _Place:
 
 
 def _time(node: Ros1Node) -> Iterator[Finding]:
-    """Look whether simulated time that is waited for comes."""
+    """Check for a publisher of /clock if /use_sim_time is set."""
     try:
         simulated = node.parameter_server.get("/use_sim_time", False)
     except Error as error:
@@ -267,7 +267,7 @@ def _time(node: Ros1Node) -> Iterator[Finding]:
         yield Finding(
             "warning",
             "time",
-            "/use_sim_time is true, but nobody publishes /clock: time stands still for all nodes",
+            "/use_sim_time is true, but /clock has no publisher: time stands still for all nodes",
             "start the simulation, play with --clock, or: rosglass param set /use_sim_time false",
         )
 

@@ -84,10 +84,10 @@ def problems(ends: Sequence[EndpointInfo]) -> list[Problem]:
     found = []
     sinks = [end for end in ends if end.kind is EndpointKind.SUBSCRIPTION]
     if len({end.type for end in ends}) > 1:
-        told = "; ".join(f"{end.node} has {end.type}" for end in ends)
+        differences = "; ".join(f"{end.node} has {end.type}" for end in ends)
         found.append(
             Problem(
-                f"types differ: {told}",
+                f"types differ: {differences}",
                 "let all use one type, or give one of them another topic: -r old:=new when it is "
                 "started",
             )

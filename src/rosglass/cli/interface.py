@@ -21,17 +21,17 @@ __all__ = ["configure", "run"]
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare what can be done with types."""
     add = Subcommands(parser).add
-    sub = add("show", "show the definition of a type, asking the robot if need be", _show)
+    sub = add("show", "show the definition of a type, fetched from the robot if necessary", _show)
     complete(sub.add_argument("type", help="e.g. geometry_msgs/msg/Twist"), "interfaces")
-    sub.add_argument("--no-comments", action="store_true", help="leave out comments")
+    sub.add_argument("--no-comments", action="store_true", help="omit comments")
     sub.add_argument(
-        "--template", action="store_true", help="show an empty message in YAML, to fill in"
+        "--template", action="store_true", help="print a message with all defaults, as YAML"
     )
     _finish(sub)
-    sub = add("list", "list the types that are known on this machine", _list)
-    sub.add_argument("text", nargs="?", default="", help="only names that contain it")
-    sub.add_argument("--kind", choices=("msg", "srv", "action"), help="only these")
-    sub.add_argument("--ros1", action="store_true", help="ROS 1's types")
+    sub = add("list", "list the types available on this machine", _list)
+    sub.add_argument("text", nargs="?", default="", help="only names that contain this text")
+    sub.add_argument("--kind", choices=("msg", "srv", "action"), help="only this kind")
+    sub.add_argument("--ros1", action="store_true", help="list ROS 1 types")
     add_definitions_option(sub)
     add_output_options(sub)
     sub.set_defaults(url="")
@@ -47,7 +47,7 @@ def _finish(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ros1",
         action="store_true",
-        help="the type as in ROS 1; it need not be said with --url ros1://...",
+        help="the ROS 1 type; implied by --url ros1://...",
     )
     add_output_options(parser)
     add_connection_options(parser, timeout=5.0)
@@ -126,8 +126,8 @@ def _find(args: argparse.Namespace) -> MessageType | ServiceType | ActionType:
         close = [name for name in names if name.rpartition("/")[2].lower() == args.type.lower()]
         close = [ros1_name(name) for name in close] if args.ros1 else close
         example = "std_msgs/Bool" if args.ros1 else "std_msgs/msg/Bool"
-        told = f"Did you mean {' or '.join(close)}?" if close else f"Write e.g. {example}"
-        raise TypeNotFoundError(f"{args.type!r} names no package. {told}")
+        hint = f"Did you mean {' or '.join(close)}?" if close else f"Write e.g. {example}"
+        raise TypeNotFoundError(f"{args.type!r} names no package. {hint}")
     try:
         return load(args.type, 1 if args.ros1 else 2)
     except TypeNotFoundError as error:

@@ -15,7 +15,7 @@ from rosglass.errors import Error
 
 __all__ = ["Interface", "ask", "interfaces", "is_loopback", "nearby_url", "refused", "roscore"]
 
-#: Seconds that somebody who refuses may take to do so.
+#: Seconds to wait for a refused connection.
 _KNOCK = 1.0
 #: The request for an interface's flags, and some of these (Linux, netdevice(7)).
 _GET_FLAGS = 0x8913
@@ -32,7 +32,7 @@ class Interface(NamedTuple):
 
 
 def interfaces() -> list[Interface] | None:
-    """Return the network interfaces that are up; None where that cannot be told (not on Linux)."""
+    """Return the network interfaces that are up; None if that is unknown (not on Linux)."""
     if sys.platform != "linux":
         return None
     import fcntl
@@ -89,7 +89,7 @@ def roscore(host: str, port: int) -> str:
 def refused(url: str) -> tuple[str, str] | None:
     """Return what is wrong, and what helps, when nothing listens where an URL says; else None.
 
-    None as well when nobody answers at all: that takes longer to tell from a slow network.
+    None as well without any answer: that takes longer to distinguish from a slow network.
     """
     from rosglass.ros1.options import Ros1Options
     from rosglass.wires.tcpros.address import parse_uri

@@ -31,14 +31,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Declare what can be done with nodes."""
     commands = Subcommands(parser)
     add = commands.add
-    _finish(add("list", "list the nodes there are", _list))
-    sub = add("info", "show what a node publishes, subscribes, offers and calls", _info)
+    _finish(add("list", "list nodes", _list))
+    sub = add("info", "show the topics, services and actions of a node", _info)
     complete(sub.add_argument("node"), "nodes")
     sub.add_argument(
         "--hidden",
         "--include-hidden",
         action="store_true",
-        help="show those of actions, too",
+        help="include those of actions",
     )
     _finish(sub)
     node_ros1.configure(commands)
@@ -106,6 +106,6 @@ def _unknown(node: Node, name: str) -> int:
 
     names = _others(node)
     close = difflib.get_close_matches(name, names, 3, 0.5)
-    told = f"Did you mean {' or '.join(close)}?" if close else f"There are: {', '.join(names)}"
-    note(f"there is no node {name}. {told}")
+    hint = f"Did you mean {' or '.join(close)}?" if close else f"There are: {', '.join(names)}"
+    note(f"there is no node {name}. {hint}")
     return 1

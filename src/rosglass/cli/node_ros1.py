@@ -56,17 +56,17 @@ class _Answer(NamedTuple):
 
 def configure(commands: Subcommands) -> None:
     """Declare them."""
-    sub = commands.add("ping", "ask a node whether it is there, again and again (ROS 1)", _ping)
+    sub = commands.add("ping", "ping a node repeatedly (ROS 1)", _ping)
     complete(sub.add_argument("node"), "nodes")
-    sub.add_argument("-c", "--count", type=natural, metavar="N", help="end after so many")
+    sub.add_argument(
+        "-c", "--count", type=natural, metavar="N", help="exit after this number of pings"
+    )
     _finish(sub)
-    sub = commands.add("kill", "ask nodes to end (ROS 1)", _kill)
+    sub = commands.add("kill", "shut nodes down (ROS 1)", _kill)
     complete(sub.add_argument("node", nargs="+"), "nodes")
     _finish(sub)
-    sub = commands.add(
-        "cleanup", "let the master forget nodes that cannot be reached (ROS 1)", _cleanup
-    )
-    sub.add_argument("-y", "--yes", action="store_true", help="do not ask first")
+    sub = commands.add("cleanup", "unregister nodes that cannot be reached (ROS 1)", _cleanup)
+    sub.add_argument("-y", "--yes", action="store_true", help="do not ask for confirmation")
     _finish(sub)
 
 
@@ -242,7 +242,7 @@ def _agreed(args: argparse.Namespace, count: int) -> bool:
         agreed = False
         print(file=sys.stderr)
     if not agreed:
-        note("nothing was changed; --yes goes on without asking")
+        note("nothing was changed; --yes skips the question")
     return agreed
 
 
@@ -265,5 +265,5 @@ def _unregister(node: Ros1Node, end: EndpointInfo, uri: str) -> None:
         try:
             place = str(call_node(node.master_uri, "lookupService", end.node.full, end.name))
         except MasterError:
-            return  # somebody else has removed it
+            return  # removed in the meantime
     call_node(node.master_uri, _UNREGISTER[end.kind], end.node.full, end.name, place)

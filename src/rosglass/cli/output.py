@@ -49,12 +49,12 @@ _CODES = {"bold": 1, "dim": 2, "red": 31, "green": 32, "yellow": 33, "cyan": 36}
 def add_output_options(parser: argparse.ArgumentParser) -> None:
     """Declare ``--json`` and ``--color``."""
     group = parser.add_argument_group("output")
-    group.add_argument("--json", action="store_true", help="print JSON, for programs")
+    group.add_argument("--json", action="store_true", help="print JSON")
     group.add_argument(
         "--color",
         choices=("auto", "always", "never"),
         default="auto",
-        help="auto: only on a terminal, and not with NO_COLOR set (default: %(default)s)",
+        help="auto: on a terminal, unless NO_COLOR is set (default: %(default)s)",
     )
 
 
@@ -113,7 +113,7 @@ def print_json(value: object) -> None:
 
 
 def require_reader() -> None:
-    """Raise BrokenPipeError if whoever read the output has gone, as in ``... | head -1``.
+    """Raise BrokenPipeError if the reader of the output has exited, as in ``... | head -1``.
 
     Without this, a command that waits for something to print would wait on.
     """

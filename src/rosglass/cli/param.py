@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["configure", "run"]
 
-#: What ROS 2 needs to be told.
+#: The required arguments in ROS 2.
 _NEEDED = {
     "list": (),
     "get": ("node", "parameter"),
@@ -36,7 +36,7 @@ _NEEDED = {
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare what can be done with parameters."""
     parser.epilog = (
-        "In ROS 1, one server has all parameters: a name such as /robot/speed stands for NODE "
+        "In ROS 1, one server has all parameters: a name such as /robot/speed is accepted for NODE "
         "and PARAMETER, and any namespace for NODE."
     )
     add = Subcommands(parser).add
@@ -45,22 +45,22 @@ def configure(parser: argparse.ArgumentParser) -> None:
     _finish(sub, "list")
     for name, summary, handler in (
         ("get", "print the value of a parameter", _get),
-        ("describe", "show what is known about a parameter", _describe),
+        ("describe", "show the descriptor of a parameter", _describe),
         ("set", "set a parameter", _set),
-        ("delete", "take back a parameter that was set without being declared", _delete),
+        ("delete", "delete a parameter that was set without being declared", _delete),
     ):
         sub = add(name, summary, handler)
         _node(sub)
-        sub.add_argument("parameter", nargs="?", help="ROS 1: may be a part of the name before")
+        sub.add_argument("parameter", nargs="?", help="ROS 1: may be part of the node argument")
         if name == "set":
             sub.add_argument("value", nargs="?", help="as in YAML: 1.5, true, hello, [1, 2]")
         _finish(sub, name)
-    sub = add("dump", "print all parameters of a node as a file for load", _dump)
-    _node(sub, nargs="?", help="ROS 1: default is everything")
-    sub.add_argument("-o", "--output", metavar="FILE", help="write into a file instead")
+    sub = add("dump", "print all parameters of a node as a parameter file", _dump)
+    _node(sub, nargs="?", help="ROS 1: default: all")
+    sub.add_argument("-o", "--output", metavar="FILE", help="write to a file")
     _finish(sub, "dump")
     sub = add("load", "set the parameters of a node from a file", _load)
-    _node(sub, help="ROS 1: may be left out, or follow the file")
+    _node(sub, help="ROS 1: optional, also after the file")
     sub.add_argument("file", metavar="FILE.yaml", nargs="?")
     _finish(sub, "load")
 
@@ -150,13 +150,13 @@ def _describe(node: Node, args: argparse.Namespace) -> int:
         found = client.describe([args.parameter], timeout=args.timeout).get(args.parameter)
         if found is None or not found.type:
             return _unknown(client, args)
-    told: dict[str, Any] = asdict(found)
-    told["type"] = found.type.name.lower()
-    told["range"] = None if found.range is None else found.range._asdict()
+    shown: dict[str, Any] = asdict(found)
+    shown["type"] = found.type.name.lower()
+    shown["range"] = None if found.range is None else found.range._asdict()
     if args.json:
-        print_json(told)
+        print_json(shown)
     else:
-        print(to_yaml({key: value for key, value in told.items() if value}).rstrip("\n"))
+        print(to_yaml({key: value for key, value in shown.items() if value}).rstrip("\n"))
     return 0
 
 

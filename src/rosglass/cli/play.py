@@ -34,13 +34,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Declare the command's options."""
     parser.add_argument("file", metavar="FILE", type=Path, help="MCAP file, ROS 2 bag or ROS 1 bag")
     parser.add_argument(
-        "--list", action="store_true", help="show what the recording holds, and end"
+        "--list", action="store_true", help="list the contents of the recording and exit"
     )
     parser.add_argument("--json", action="store_true", help="with --list: as JSON")
     parser.add_argument(
         "-r", "--rate", type=float, default=1.0, help="2 is twice as fast (default: %(default)g)"
     )
-    parser.add_argument("-l", "--loop", action="store_true", help="begin again at the end")
+    parser.add_argument("-l", "--loop", action="store_true", help="start over at the end")
     parser.add_argument(
         "--clock",
         nargs="?",
@@ -48,7 +48,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         const=40.0,
         default=0.0,
         metavar="HZ",
-        help="publish /clock, so that nodes with use_sim_time follow (40 Hz unless told)",
+        help="publish /clock, for nodes with use_sim_time (default rate: 40 Hz)",
     )
     parser.add_argument(
         "-t", "--topics", nargs="+", default=[], metavar="TOPIC", help="play only these"
@@ -59,7 +59,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--exclude-regex",
         default="",
         metavar="REGEX",
-        help="leave out topics that match",
+        help="exclude matching topics",
     )
     parser.add_argument(
         "-m",
@@ -76,11 +76,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         default=0.0,
         metavar="SECONDS",
-        help="begin so far in",
+        help="start at this time in the recording",
     )
     parser.add_argument(
         "--duration", "--playback-duration", type=seconds, metavar="SECONDS",
-        help="play only so long",
+        help="play only this long",
     )  # fmt: skip
     parser.add_argument(
         "-d",
@@ -88,16 +88,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         default=1.0,
         metavar="SECONDS",
-        help="time for subscriptions to be linked before the first message (default: %(default)g)",
+        help="time for subscriptions to connect before the first message (default: %(default)g)",
     )
     parser.add_argument(
-        "-p", "--paused", "--start-paused", action="store_true", help="begin paused"
+        "-p", "--paused", "--start-paused", action="store_true", help="start paused"
     )
     parser.add_argument(
         "--no-keys", "--disable-keyboard-controls", action="store_true", help="ignore keys"
     )
     add_connection_options(parser)
-    parser.epilog = f"Keys while it plays: {_KEYS}."
+    parser.epilog = f"Keys during playback: {_KEYS}."
 
 
 def run(args: argparse.Namespace) -> int:
@@ -109,7 +109,7 @@ def run(args: argparse.Namespace) -> int:
             print(json.dumps(_table(bag), indent=2) if args.json else _listing(bag))
             return 0
         if not args.verbose:
-            # What is not played, and why, is told here.
+            # This command prints what is not played, and why.
             logging.getLogger("rosglass.bags").setLevel(logging.CRITICAL)
         with (
             connect(args, patient=True) as node,
@@ -134,31 +134,31 @@ def run(args: argparse.Namespace) -> int:
                 f"playing {topics} topics of {args.file} ({bag.duration:.1f} s) to {node.url}",
                 flush=True,
             )
-            told: dict[str, str] = {}
+            printed: dict[str, str] = {}
             try:
-                _watch(player, bag, end, told, keys=not args.no_keys)
+                _watch(player, bag, end, printed, keys=not args.no_keys)
             finally:
-                _tell(player, told, last=True)
+                _print_problems(player, printed, last=True)
                 sent = player.status().sent
                 print(f"{sent} messages sent", flush=True)
             return end.code or (0 if sent else 1)
 
 
-def _tell(player: Player, told: dict[str, str], *, last: bool = False) -> None:
-    """Tell what is not played, once; what messages were left out, at the end."""
+def _print_problems(player: Player, printed: dict[str, str], *, last: bool = False) -> None:
+    """Print what is not played, once; and at the end, which messages were skipped."""
     for topic, problem in list(player.problems.items()):
-        if topic and told.get(topic) != problem and (last or topic not in told):
-            told[topic] = problem
+        if topic and printed.get(topic) != problem and (last or topic not in printed):
+            printed[topic] = problem
             note(f"{topic}: {problem}")
 
 
-def _watch(player: Player, bag: Bag, end: End, told: dict[str, str], *, keys: bool) -> None:
+def _watch(player: Player, bag: Bag, end: End, printed: dict[str, str], *, keys: bool) -> None:
     interactive = keys and sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
     if interactive:
         print(_KEYS)
     with _keys() if interactive else contextlib.nullcontext():
         while not end.is_set() and not player.wait(0.0 if interactive else 0.2):
-            _tell(player, told)
+            _print_problems(player, printed)
             if not interactive:
                 continue
             if select.select([sys.stdin], [], [], 0.2)[0] and not _obey(player, bag):

@@ -1,4 +1,4 @@
-"""What the ``rosglass`` command does: find the subcommand, run it, tell what went wrong."""
+"""The ``rosglass`` command: finds the subcommand, runs it, and reports errors."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ __all__ = ["COMMANDS", "run"]
 COMMANDS = {
     "run": ("rosglass.cli.run", "open an interface written in QML"),
     "rviz": ("rosglass.cli.rviz", "open RViz with interfaces over its 3D view"),
-    "qml-path": ("rosglass.cli.qml_path", "tell editors where the QML modules are"),
+    "qml-path": ("rosglass.cli.qml_path", "print the folders of the QML modules, for editors"),
     "demo": ("rosglass.cli.demo", "open the demo cockpit on a simulated robot"),
     "robot": ("rosglass.cli.robot", "run the simulated robot"),
-    "topic": ("rosglass.cli.topic", "look at topics, listen to them, publish on them"),
-    "service": ("rosglass.cli.service", "look at services, call them"),
-    "action": ("rosglass.cli.action", "look at actions, send goals"),
+    "topic": ("rosglass.cli.topic", "inspect topics, receive and publish messages"),
+    "service": ("rosglass.cli.service", "inspect and call services"),
+    "action": ("rosglass.cli.action", "inspect actions and send goals"),
     "param": ("rosglass.cli.param", "read and set the parameters of nodes"),
-    "node": ("rosglass.cli.node", "look at nodes"),
-    "interface": ("rosglass.cli.interface", "look at types of messages, services and actions"),
-    "record": ("rosglass.cli.record", "record topics into an MCAP file or a ROS 1 bag"),
+    "node": ("rosglass.cli.node", "inspect nodes"),
+    "interface": ("rosglass.cli.interface", "show message, service and action types"),
+    "record": ("rosglass.cli.record", "record topics to an MCAP file or a ROS 1 bag"),
     "play": ("rosglass.cli.play", "play a recording: MCAP, ROS 2 bag or ROS 1 bag"),
-    "bridge": ("rosglass.cli.bridge", "relay topics, services and actions between two worlds"),
-    "doctor": ("rosglass.cli.doctor", "find what keeps this machine and the robot apart"),
+    "bridge": ("rosglass.cli.bridge", "relay topics, services and actions between two graphs"),
+    "doctor": ("rosglass.cli.doctor", "find what blocks the connection to the robot"),
     "router": ("rosglass.cli.router", "run a Zenoh router for ROS 2 (rmw_zenoh)"),
-    "completion": ("rosglass.cli.completion_command", "let Tab complete commands and names"),
+    "completion": ("rosglass.cli.completion_command", "print the shell code for Tab completion"),
 }
 
 
@@ -65,8 +65,8 @@ def build_parser(command: str | None = None) -> argparse.ArgumentParser:
     """
     parser = Parser(
         prog="rosglass",
-        description="A glass cockpit for robots: operator screens for ROS, without ROS installed.",
-        epilog="Every command has its own --help. The guide: docs/index.md in the source.",
+        description="Operator screens and tools for ROS 1 and ROS 2 robots, without ROS installed.",
+        epilog="Every command has its own --help. The guide is docs/index.md in the source.",
     )
     parser.add_argument("--version", action="version", version=f"rosglass {rosglass.__version__}")
     add_verbose(parser)
@@ -88,22 +88,22 @@ def _split(arguments: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
     argparse must not see the latter two: it would look for options in them.
     """
     ours: list[str] = []
-    told: list[str] = []
+    ros: list[str] = []
     place = 0
     while place < len(arguments):
         argument = arguments[place]
         if argument == "--":
-            return ours, told, list(arguments[place + 1 :])
+            return ours, ros, list(arguments[place + 1 :])
         if argument == "--ros-args":
             end = place + 1
             while end < len(arguments) and arguments[end] != "--":
                 end += 1
-            told += arguments[place : end + 1]
+            ros += arguments[place : end + 1]
             place = end
         else:
             ours.append(argument)
         place += 1
-    return ours, told, []
+    return ours, ros, []
 
 
 def run(argv: Sequence[str] | None = None) -> int:
@@ -142,16 +142,16 @@ def _explain(error: Exception) -> int:
 
 
 def _run(arguments: list[str]) -> int:
-    arguments, told, rest = _split(arguments)
+    arguments, ros, rest = _split(arguments)
     arguments = _AS_IN_ROS2.get(tuple(arguments[:2]), arguments[:2]) + arguments[2:]
     command = next((a for a in arguments if not a.startswith("-")), None)
     parser = build_parser(command)
     args = parser.parse_args(arguments)
     if rest and not hasattr(args, "arguments"):
         parser.error(f"{args.command} takes no arguments after --")
-    if told and not hasattr(args, "ros_arguments"):
+    if ros and not hasattr(args, "ros_arguments"):
         parser.error(f"{args.command} takes no --ros-args: it is no node of its own")
-    args.arguments, args.ros_arguments = rest, told
+    args.arguments, args.ros_arguments = rest, ros
     level = {0: logging.WARNING, 1: logging.INFO}.get(args.verbose, logging.DEBUG)
     logging.basicConfig(level=level, format="%(levelname)s %(name)s: %(message)s")
     if getattr(args, "looks_nearby", False) and not args.url:
@@ -177,7 +177,7 @@ def _nearby_url() -> str:
 
     url = nearby_url()
     if url:
-        note(f"nothing says where the robot is: using {url} (export ROSGLASS_URL={url} says so)")
+        note(f"no URL is given: using {url} (export ROSGLASS_URL={url} to select it)")
     return url
 
 
@@ -185,7 +185,7 @@ def _prepare_output() -> None:
     """Make sure that what robots say can be printed, and does nothing to the terminal."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if stream is None:  # closed by whoever started us
+        if stream is None:  # closed by the parent process
             setattr(sys, name, io.StringIO())
             continue
         if isinstance(stream, EscapingStream):

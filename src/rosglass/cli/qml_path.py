@@ -21,8 +21,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--qmlls-ini",
         action="store_true",
-        help="write .qmlls.ini in this folder, from which the QML language server of an editor "
-        "learns of the modules; other settings in it stay",
+        help="write .qmlls.ini in this folder, which configures the QML language server of an "
+        "editor; other settings in it are kept",
     )
 
 
@@ -47,7 +47,7 @@ def _with_import_path(file: Path, path: str) -> str:
         Error: The file is not one of settings.
     """
     settings = configparser.ConfigParser(interpolation=None)
-    # Qt tells upper from lower case.
+    # Qt is case-sensitive.
     settings.optionxform = str  # type: ignore[assignment, method-assign]
     try:
         settings.read(file, encoding="utf-8")

@@ -31,7 +31,10 @@ _PATIENCE = 2.0
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare the command's options."""
     parser.add_argument(
-        "topics", nargs="*", metavar="TOPIC", help="topics to record; none: all, new ones included"
+        "topics",
+        nargs="*",
+        metavar="TOPIC",
+        help="topics to record (default: all, including new ones)",
     )
     parser.add_argument(
         "-o",
@@ -40,11 +43,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="file to write; default: recording_<date>_<time>.mcap; from ROS 1 also FILE.bag",
     )
+    parser.add_argument("-a", "--all", action="store_true", help="record all topics (default)")
     parser.add_argument(
-        "-a", "--all", action="store_true", help="record all topics; this is the default"
-    )
-    parser.add_argument(
-        "-e", "--regex", default="", metavar="REGEX", help="record topics that match as well"
+        "-e", "--regex", default="", metavar="REGEX", help="also record matching topics"
     )
     parser.add_argument(
         "-x",
@@ -52,22 +53,22 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--exclude-regex",
         default="",
         metavar="REGEX",
-        help="never record topics that match",
+        help="exclude matching topics",
     )
     parser.add_argument(
         "--hidden",
         "--include-hidden-topics",
         action="store_true",
-        help="record hidden topics, too, e.g. those of actions",
+        help="include hidden topics, e.g. those of actions",
     )
     parser.add_argument(
-        "-d", "--duration", type=seconds, metavar="SECONDS", help="end by itself after so long"
+        "-d", "--duration", type=seconds, metavar="SECONDS", help="exit after this time"
     )
     parser.add_argument(
         "--compression",
         choices=("zstd", "lz4", "bz2", "none"),
         default="",
-        help="how the file is compressed (default: zstd; .bag: none, lz4 or bz2, default none)",
+        help="compression of the file (default: zstd; .bag: none, lz4 or bz2, default none)",
     )
     parser.add_argument("-q", "--quiet", action="store_true", help="show no progress")
     add_connection_options(parser)
@@ -84,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     if args.all and args.topics:
         raise Error("--all and names of topics exclude each other")
     if not args.verbose:
-        # What keeps topics from being recorded is told here, once.
+        # This command prints the problems of topics itself, once.
         logging.getLogger("rosglass.comm").setLevel(logging.ERROR)
     with connect(args, patient=True) as node:
         recorder = Recorder(
@@ -121,13 +122,13 @@ def _watch(node: Node, recorder: Recorder, end: End, args: argparse.Namespace) -
         if time.monotonic() >= until:
             break
         status = recorder.status()
-        news.tell(node, status)
+        news.report(node, status)
         if shown:
             lines = shutil.get_terminal_size().columns
             print(
                 f"{CLEAR_LINE}{_summary(status)[: lines - 1]}", end="", file=sys.stderr, flush=True
             )
-    news.tell(node, recorder.status(), last=True)
+    news.report(node, recorder.status(), last=True)
     if shown:
         print(file=sys.stderr)
 
@@ -140,7 +141,7 @@ class _News:
         self._seen: dict[str, tuple[str, float]] = {}
         self._told: dict[str, str] = {}
 
-    def tell(self, node: Node, status: RecordingStatus, *, last: bool = False) -> None:
+    def report(self, node: Node, status: RecordingStatus, *, last: bool = False) -> None:
         now = time.monotonic()
         problems = dict(status.problems)
         state = node.status()

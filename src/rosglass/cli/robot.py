@@ -23,7 +23,7 @@ __all__ = ["DUPLICATE_EXIT", "configure", "run"]
 
 #: Exit code when a robot of the same name is there already.
 DUPLICATE_EXIT = 3
-#: Seconds after the start in which another robot, whose odometry comes 30 times a second, ends
+#: Seconds after the start in which another robot, whose odometry has 30 Hz, ends
 #: this one.
 _DUPLICATE_WATCH_S = 5.0
 #: Seconds within which the one of two robots that should leave has left.
@@ -35,18 +35,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--url",
         default=_default_url(os.environ),
-        help="where to find the other nodes (default: ROSGLASS_URL, or the ROS 1 master that "
+        help="URL of the graph (default: ROSGLASS_URL, or the ROS 1 master that "
         "ROS_MASTER_URI names, or zenoh://127.0.0.1:7447; here: %(default)s)",
     )
     parser.add_argument("--name", default="robot", help="name of the node (default: %(default)s)")
     parser.add_argument(
-        "--fps", type=float, default=30.0, help="camera pictures per second (default: 30)"
+        "--fps", type=float, default=30.0, help="camera images per second (default: 30)"
     )
+    parser.add_argument("--no-raw", action="store_true", help="publish no raw camera images")
     parser.add_argument(
-        "--no-raw", action="store_true", help="do not send uncompressed camera pictures"
-    )
-    parser.add_argument(
-        "--no-compressed", action="store_true", help="do not send compressed camera pictures"
+        "--no-compressed", action="store_true", help="publish no compressed camera images"
     )
     parser.add_argument(
         "--jpeg-quality", type=int, default=80, metavar="1-100", help="default: %(default)s"
@@ -54,7 +52,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--equipped",
         action="store_true",
-        help="also offer a model and a point cloud for RViz, more cameras, modes, a mission and "
+        help="add a model and a point cloud for RViz, more cameras, modes, a mission and "
         "behaviours",
     )
     parser.add_argument(
@@ -67,13 +65,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--leash",
         action="store_true",
-        help="end when standard input closes, that is, with the program that started the robot",
+        help="exit when standard input closes, that is, with the program that started the robot",
     )
     parser.set_defaults(ros_arguments=[])
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the robot until it is told to end."""
+    """Run the robot until SIGINT or SIGTERM."""
     import rosglass
     from rosglass.cli.network import refused
     from rosglass.demo.robot import Robot, RobotOptions
@@ -102,17 +100,17 @@ def run(args: argparse.Namespace) -> int:
             if refusal is not None:
                 note(f"{args.url}: {refusal[0]}; {refusal[1]}. Waiting for it")
             duplicate = threading.Event()
-            heard: dict[bytes, float] = {}
+            last_seen: dict[bytes, float] = {}
 
             def on_odometry(sample: Sample) -> None:
                 # One that was killed may still be seen, but sends nothing.
                 if full not in node.duplicate_nodes():
                     return
                 now, other = time.monotonic(), sample.publisher
-                since = heard.setdefault(other, now)
+                since = last_seen.setdefault(other, now)
                 own = {end.gid for end in node.publishers("/odom") if end.node.full == full}
                 # Of two that start together one stays: the other leaves at once.
-                if min(own - heard.keys(), default=b"") < other and now - since < _YIELD_S:
+                if min(own - last_seen.keys(), default=b"") < other and now - since < _YIELD_S:
                     return
                 duplicate.set()
 
@@ -122,7 +120,7 @@ def run(args: argparse.Namespace) -> int:
             watched_until = time.monotonic() + _DUPLICATE_WATCH_S
             robot.start()
             while not end.is_set() and not duplicate.is_set() and not robot.wait(0.1):
-                if time.monotonic() > watched_until + _YIELD_S * bool(heard):
+                if time.monotonic() > watched_until + _YIELD_S * bool(last_seen):
                     watch.close()
             if duplicate.is_set():
                 print(f"rosglass: {_duplicate(full, args.url)}", file=sys.stderr, flush=True)
@@ -146,7 +144,7 @@ def _duplicate(name: str, url: str) -> str:
 
 
 def _default_url(env: Mapping[str, str]) -> str:
-    """Return where the robot is to be, so that whoever starts it sees where."""
+    """Return the URL to print at the start."""
     url = env.get("ROSGLASS_URL") or "zenoh://127.0.0.1:7447"
     # Help and completion do without these.
     if env.get("ROSGLASS_URL") or not env.get("ROS_MASTER_URI"):
@@ -158,7 +156,7 @@ def _default_url(env: Mapping[str, str]) -> str:
     with suppress(Error):
         if default_url(env) == "ros1://":
             url = "ros1://"
-            # Connecting to it tells what is wrong with it.
+            # Connecting to it reports what is wrong.
             url += Ros1Options.parse(url, env).master.removeprefix("http://")
     return url
 

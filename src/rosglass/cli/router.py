@@ -20,14 +20,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--listen",
         default="tcp/127.0.0.1:7447",
         metavar="tcp/HOST:PORT",
-        help="where to listen (default: %(default)s, this machine only; port 0 takes a free one)",
+        help="endpoint to listen on (default: %(default)s, this machine only; port 0: a free one)",
     )
     where.add_argument(
         "--open",
         action="store_const",
         const="tcp/[::]:7447",
         dest="listen",
-        help="listen for the whole network, as ROS 2's own router does: tcp/[::]:7447",
+        help="listen on all interfaces, as ROS 2's own router does: tcp/[::]:7447",
     )
 
 

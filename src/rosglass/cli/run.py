@@ -33,38 +33,40 @@ __all__ = [
     "show",
 ]
 
-#: Qt's messages that say nothing to whoever runs an interface.
+#: Qt's messages that are of no use to users of an interface.
 _QUIET = "qt.multimedia.symbolsresolver=false;qt.multimedia.ffmpeg*=false;qt.qpa.theme*=false"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Describe the options."""
     parser.add_argument(
-        "file", metavar="FILE.qml", help="the interface; package://name/path for one in a package"
+        "file",
+        metavar="FILE.qml",
+        help="the interface; package://name/path for a file in a package",
     )
     parser.add_argument(
         "--url",
         default="",
-        help="address of the robot, e.g. zenoh://192.168.1.5:7447, or replay:FILE for a "
-        "recording; default: ROSGLASS_URL, or what ROS's own variables say, or the Zenoh router "
+        help="URL of the robot, e.g. zenoh://192.168.1.5:7447, or replay:FILE for a "
+        "recording; default: ROSGLASS_URL, or ROS's own variables, or the Zenoh router "
         "or ROS 1 master of this machine",
     )
     parser.add_argument("--name", default="", help="node name, instead of the one in the file")
     parser.add_argument(
         "--watch",
         action="store_true",
-        help="show the interface anew whenever a file in its folder is saved",
+        help="reload the interface when a file in its folder is saved",
     )
     parser.add_argument(
-        "--no-watch", dest="watch", action="store_false", help="don't; this is the default"
+        "--no-watch", dest="watch", action="store_false", help="do not reload (default)"
     )
     add_import_paths(parser)
     parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
     parser.add_argument(
         "--kiosk",
         action="store_true",
-        help="fill the screen, ignore what would close the window (Alt-F4), and hide the pointer "
-        "while it is not moved; Ctrl-C, SIGTERM and Qt.quit() end it",
+        help="fill the screen, ignore attempts to close the window (Alt-F4), and hide an idle "
+        "pointer; Ctrl-C, SIGTERM and Qt.quit() end it",
     )
     add_renderer(parser, "the interface")
     add_allow_network(parser)
@@ -73,8 +75,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_definitions_option(parser)
     parser.set_defaults(arguments=[], ros_arguments=[], looks_nearby=True)
     parser.epilog = (
-        "What follows --ros-args is for ROS, as with ros2 run: -r chatter:=talk, -p speed:=1.5 and "
-        "the like. Arguments after -- are the interface's own, in Qt.application.arguments."
+        "Arguments after --ros-args are for ROS, as with ros2 run, e.g. -r chatter:=talk, "
+        "-p speed:=1.5. Arguments after -- are passed to the interface, as "
+        "Qt.application.arguments."
     )
 
 
@@ -97,7 +100,7 @@ def add_import_paths(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         action="append",
         default=[],
-        help="a folder with QML modules, searched besides QML_IMPORT_PATH; may be repeated",
+        help="a folder with QML modules, in addition to QML_IMPORT_PATH; may be repeated",
     )
 
 
@@ -108,7 +111,7 @@ def add_renderer(parser: argparse.ArgumentParser, what: str) -> None:
         choices=("auto", "opengl", "software"),
         default="auto",
         help=f"what draws {what}: OpenGL, Qt's software renderer (no shaders, particles and "
-        "films), or the one that is faster here (auto, the default)",
+        "videos), or the faster one (auto, the default)",
     )
 
 
@@ -117,7 +120,7 @@ def add_allow_network(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--allow-network",
         action="store_true",
-        help="let the interface fetch pictures, QML files and modules from other machines (http:)",
+        help="let the interface load images, QML files and modules from other machines (http:)",
     )
 
 
@@ -128,8 +131,8 @@ def add_longest_script(parser: argparse.ArgumentParser) -> None:
         metavar="SECONDS",
         type=seconds,
         default=5.0,
-        help="how long JavaScript may compute at a time before it is ended, for the screen stands "
-        "still meanwhile; 0 for no limit (default: %(default)g)",
+        help="how long JavaScript may run at a time before it is interrupted, because it blocks "
+        "the interface; 0 for no limit (default: %(default)g)",
     )
 
 
@@ -139,13 +142,13 @@ def add_screenshot(parser: argparse.ArgumentParser, what: str, after: float) -> 
     Args:
         parser: Of the command.
         what: What is in the picture.
-        after: Seconds until it is taken, unless told otherwise.
+        after: Default of --after, in seconds.
     """
     parser.add_argument(
         "--screenshot",
         metavar="PICTURE",
         type=Path,
-        help=f"save a picture of {what} (PNG, JPEG) and end",
+        help=f"save a screenshot of {what} (PNG, JPEG) and exit",
     )
     parser.add_argument(
         "--after",
@@ -324,7 +327,7 @@ def _save(app: Application, target: Path) -> None:
 
 
 def format_log(verbose: bool) -> None:
-    """Show what comes from QML with its file and line, and from its author's level on."""
+    """Show messages of QML with file and line, from the level that their logger has."""
     from rosglass.qml.log import LocationFormatter
 
     for handler in logging.getLogger().handlers:

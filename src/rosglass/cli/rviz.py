@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["configure", "run"]
 
-#: Seconds after which the program ends that was told to, whatever RViz is doing.
+#: Seconds after a signal until the program ends, whatever RViz is doing.
 _PATIENCE = 1.7
 
 
@@ -39,8 +39,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "config",
         metavar="CONFIG.rviz",
         nargs="*",
-        help="what RViz shows; package://name/path for one in a package; default: RViz's own "
-        "default. Also remappings as RViz takes them: scan:=/robot/scan",
+        help="RViz's config; package://name/path for a file in a package (default: RViz's own "
+        "default). Also remappings, as for RViz: scan:=/robot/scan",
     )
     complete_files(config, "rviz")
     overlay = parser.add_argument(
@@ -49,7 +49,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.qml",
         action="append",
         default=[],
-        help="an interface over the 3D view; package://name/path for one in a package; may be "
+        help="an interface over the 3D view; package://name/path for a file in a package; may be "
         "repeated, the last one is uppermost",
     )
     complete_files(overlay, "qml")
@@ -59,38 +59,36 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="the ROS master of RViz and the interfaces, e.g. ros1://192.168.1.5:11311; default: "
         "ROS_MASTER_URI",
     )
-    parser.add_argument(
-        "--name", default="", help="name of RViz's node; default: one that nobody else has"
-    )
+    parser.add_argument("--name", default="", help="name of RViz's node (default: a unique one)")
     parser.add_argument(
         "--timeout",
         metavar="SECONDS",
         type=seconds,
-        help="how long to wait for the master (default: as long as it takes)",
+        help="time to wait for the master (default: no limit)",
     )
     parser.add_argument(
         "--watch",
         action="store_true",
-        help="show interfaces anew whenever a file in their folders is saved",
+        help="reload interfaces when a file in their folders is saved",
     )
     add_import_paths(parser)
     parser.add_argument(
         "--fixed-frame",
         metavar="FRAME",
         default="",
-        help="show everything in this frame, instead of the one in the config",
+        help="the fixed frame, instead of the one in the config",
     )
     parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
     parser.add_argument(
         "--bare",
         action="store_true",
-        help="show the 3D view alone, without RViz's menu, tool bar and panels (F10 brings them)",
+        help="show only the 3D view, without RViz's menu, tool bar and panels (F10 shows them)",
     )
     parser.add_argument("--splash", action="store_true", help="show RViz's splash screen")
     parser.add_argument(
         "--disable-anti-aliasing",
         action="store_true",
-        help="draw the 3D view with hard edges: without a graphics card several times as fast",
+        help="draw the 3D view without anti-aliasing: much faster without a graphics card",
     )
     add_renderer(parser, "interfaces in QML")
     add_allow_network(parser)
@@ -99,11 +97,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_definitions_option(parser)
     parser.set_defaults(arguments=[], ros_arguments=[], ros1=True)
     parser.epilog = (
-        "How the camera moves, by keys as well, and where robots reach it is set in RViz, by the "
-        "menu Overlays > View controller, and kept in the .rviz file; with --name rviz they reach "
-        "it at /rviz/hector_view_controller. "
-        "Needs RViz 1 and the system's own Python: docs/rviz.md. What follows --ros-args is for "
-        "ROS, as remappings are. Arguments after -- are the interfaces' own, in "
+        "The menu Overlays > View controller configures the camera: keyboard control, and the "
+        "namespace of its topics and services (/rviz/hector_view_controller with --name rviz); "
+        "the .rviz file stores it. "
+        "Needs RViz 1 and the system's own Python: docs/rviz.md. Arguments after --ros-args, and "
+        "remappings, are for ROS. Arguments after -- are passed to the interfaces, as "
         "Qt.application.arguments."
     )
 

@@ -44,14 +44,14 @@ __all__ = ["configure", "run"]
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare what can be done with services."""
     add = Subcommands(parser).add
-    sub = add("list", "list the services there are", _list)
-    sub.add_argument("-t", "--types", "--show-types", action="store_true", help="show their types")
+    sub = add("list", "list services", _list)
+    sub.add_argument("-t", "--types", "--show-types", action="store_true", help="show types")
     sub.add_argument(
         "--hidden", "--include-hidden-services", action="store_true",
-        help="show those of actions, too",
+        help="include those of actions",
     )  # fmt: skip
     _finish(sub)
-    sub = add("info", "show who offers and uses a service", _info)
+    sub = add("info", "show the servers and clients of a service", _info)
     complete(sub.add_argument("service"), "services")
     _finish(sub)
     sub = add("call", "call a service and print its response", _call)
@@ -114,7 +114,7 @@ def _info(args: argparse.Namespace) -> int:
         ends = look()
         hint = similar(name, node.services()) or "; rosglass service list shows what there is"
     if not ends:
-        note(f"nobody offers or calls {name}{hint}")
+        note(f"no node offers or calls {name}{hint}")
         return 1
     if args.json:
         print_json({"service": name, "endpoints": [describe(node, end) for end in ends]})
@@ -137,7 +137,7 @@ def _call(args: argparse.Namespace) -> int:
     style = Style(args)
     deadline = time.monotonic() + args.timeout
     if not args.verbose:
-        # What keeps it from being called is told here, once.
+        # This command prints the client's problem itself, once.
         logging.getLogger("rosglass.ros1").setLevel(logging.ERROR)
     with connect(args) as node:
         name = node.resolve(args.service)
@@ -151,7 +151,7 @@ def _call(args: argparse.Namespace) -> int:
             with telling(lambda: client.problem):
                 wait(node, settled, args.timeout)
             if client.type is None:
-                raise ServiceUnavailableError(client.problem or f"nobody offers {name}")
+                raise ServiceUnavailableError(client.problem or f"no node offers {name}")
             request = client.type.request
             values = parse_fields(text, request.name, template(request))
             began = time.monotonic()

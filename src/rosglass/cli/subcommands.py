@@ -83,5 +83,5 @@ def add_verbose(parser: argparse.ArgumentParser) -> None:
         "--verbose",
         action="count",
         default=argparse.SUPPRESS,
-        help="show more; -vv shows everything",
+        help="log more; -vv logs everything",
     )

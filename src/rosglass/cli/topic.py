@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 
 __all__ = ["configure", "run"]
 
-#: What stands for a type that nobody has told.
+#: Shown for an unknown type.
 _UNKNOWN = "unknown"
-#: Seconds that ROS 1's publishers may take to tell what they publish.
+#: Seconds that ROS 1's publishers may take to send their type.
 _ANSWER = 3.0
 #: Samples of which hz, bw and delay keep account.
 _WINDOW = 10_000
@@ -47,31 +47,31 @@ _WINDOW = 10_000
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare what can be done with topics."""
     add = Subcommands(parser).add
-    sub = add("list", "list the topics there are", _list)
-    sub.add_argument("-t", "--types", "--show-types", action="store_true", help="show their types")
-    sub.add_argument("-c", "--count-topics", action="store_true", help="show how many there are")
+    sub = add("list", "list topics", _list)
+    sub.add_argument("-t", "--types", "--show-types", action="store_true", help="show types")
+    sub.add_argument("-c", "--count-topics", action="store_true", help="print the number of topics")
     sub.add_argument(
-        "--hidden", "--include-hidden-topics", action="store_true", help="show hidden ones, too"
+        "--hidden", "--include-hidden-topics", action="store_true", help="include hidden topics"
     )
     _finish(sub)
-    sub = add("info", "show who publishes and subscribes to a topic, and how", _info)
+    sub = add("info", "show the publishers and subscribers of a topic", _info)
     complete(sub.add_argument("topic"), "topics")
     _finish(sub)
     sub = add("echo", "print the messages of a topic", echo)
     complete(sub.add_argument("topic"), "topics")
-    complete(sub.add_argument("type", nargs="?", help="default: what is published"), "messages")
-    sub.add_argument("-f", "--field", metavar="PATH", help="print one field, as pose.position.x")
-    _count(sub)
+    complete(sub.add_argument("type", nargs="?", help="default: the published type"), "messages")
+    sub.add_argument("-f", "--field", metavar="PATH", help="print one field, e.g. pose.position.x")
+    _count(sub, "print")
     sub.add_argument(
-        "--full", "--full-length", action="store_true", help="print every element of long arrays"
+        "--full", "--full-length", action="store_true", help="print long arrays in full"
     )
     sub.add_argument(
         "-l", "--truncate", "--truncate-length", type=natural, metavar="N",
-        help="elements of an array to print (default: 36; with --json 10000; with --csv all)",
+        help="maximum array elements to print (default: 36; 10000 with --json; all with --csv)",
     )  # fmt: skip
-    sub.add_argument("--csv", action="store_true", help="print values separated by commas")
-    sub.add_argument("--raw", action="store_true", help="print the bytes, in hexadecimal")
-    sub.add_argument("--stamps", action="store_true", help="print when messages were received")
+    sub.add_argument("--csv", action="store_true", help="print comma-separated values")
+    sub.add_argument("--raw", action="store_true", help="print the raw bytes in hexadecimal")
+    sub.add_argument("--stamps", action="store_true", help="print the time of reception")
     sub.set_defaults(what="echo")
     _qos(sub, "best_available")
     _finish(sub, timeout=None)
@@ -82,11 +82,17 @@ def configure(parser: argparse.ArgumentParser) -> None:
     ):
         sub = add(name, summary, measure)
         complete(sub.add_argument("topic"), "topics")
-        complete(sub.add_argument("type", nargs="?", help="default: what is published"), "messages")
-        sub.add_argument(
-            "-w", "--window", type=natural, default=_WINDOW, help="messages to look at"
+        complete(
+            sub.add_argument("type", nargs="?", help="default: the published type"), "messages"
         )
-        sub.add_argument("-d", "--duration", type=seconds, help="end after so many seconds")
+        sub.add_argument(
+            "-w",
+            "--window",
+            type=natural,
+            default=_WINDOW,
+            help="number of messages to average over",
+        )
+        sub.add_argument("-d", "--duration", type=seconds, help="exit after this time in seconds")
         sub.set_defaults(what=name)
         _qos(sub, "best_available")
         _finish(sub)
@@ -99,18 +105,18 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "messages",
     )
     sub.add_argument("-r", "--rate", type=_rate, default=1.0, metavar="HZ", help="default: 1")
-    _count(sub)
+    _count(sub, "publish")
     sub.add_argument(
         "-w",
         "--wait",
         "--wait-matching-subscriptions",
         type=int,
         metavar="N",
-        help="wait for so many subscriptions first; with --once 1 unless told otherwise",
+        help="wait for this number of subscriptions first (default: 1 with --once, else 0)",
     )
     sub.add_argument(
         "--keep-alive", type=seconds, default=0.5, metavar="SECONDS",
-        help="stay so long after the last message, so that it arrives (default: %(default)g)",
+        help="wait after the last message for its delivery (default: %(default)g)",
     )  # fmt: skip
     _qos(sub, "default")
     _finish(sub)
@@ -126,10 +132,22 @@ def _finish(parser: argparse.ArgumentParser, *, timeout: float | None = TIMEOUT)
     add_connection_options(parser, timeout=timeout)
 
 
-def _count(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("-n", "-t", "--count", "--times", type=natural, help="end after so many")
+def _count(parser: argparse.ArgumentParser, verb: str) -> None:
     parser.add_argument(
-        "-1", "--once", dest="count", action="store_const", const=1, help="one is enough"
+        "-n",
+        "-t",
+        "--count",
+        "--times",
+        type=natural,
+        help=f"{verb} this number of messages and exit",
+    )
+    parser.add_argument(
+        "-1",
+        "--once",
+        dest="count",
+        action="store_const",
+        const=1,
+        help=f"{verb} one message and exit",
     )
 
 
@@ -142,13 +160,13 @@ def _qos(parser: argparse.ArgumentParser, default: str) -> None:
         metavar="PROFILE",
         help="default, sensor_data, latched, best_available, ... (default: %(default)s)",
     )
-    group.add_argument("--depth", "--qos-depth", type=natural, help="samples to keep")
+    group.add_argument("--depth", "--qos-depth", type=natural, help="history depth")
     for policy, words in (
         ("reliability", ("reliable", "best_effort")),
         ("durability", ("volatile", "transient_local")),
         ("history", ("keep_last", "keep_all")),
     ):
-        group.add_argument(f"--qos-{policy}", choices=words, help="instead of the profile's")
+        group.add_argument(f"--qos-{policy}", choices=words, help="overrides the profile")
 
 
 def _rate(text: str) -> float:
@@ -204,13 +222,13 @@ def _info(args: argparse.Namespace) -> int:
             return _unknown(node, topic)
         ros1 = as_ros1(node)
         if ros1 is not None:
-            told = ros1.ask_publishers(topic, min(args.timeout, _ANSWER))
-            ends = [*told, *node.subscriptions(topic)]
+            publishers = ros1.ask_publishers(topic, min(args.timeout, _ANSWER))
+            ends = [*publishers, *node.subscriptions(topic)]
     if args.json:
         print_json({"topic": topic, "endpoints": [describe(node, end) for end in ends]})
         return 0
     kinds = _types(node, {end.type for end in ends})
-    unknown = "unknown (nobody publishes it)" if kinds == _UNKNOWN and not sources(ends) else kinds
+    unknown = "unknown (no publisher)" if kinds == _UNKNOWN and not sources(ends) else kinds
     print(f"{style(topic, 'bold')} [{unknown}]")
     for problem in problems(ends):
         print(style(f"  {problem.text}", "red"))
@@ -286,7 +304,7 @@ def _announced(node: Node, topic: str, timeout: float) -> str:
         return sorted({end.type for end in ends})
 
     def missing() -> str:
-        return f"nobody uses {topic}{similar(topic, node.topics())}"
+        return f"no node uses {topic}{similar(topic, node.topics())}"
 
     with telling(missing):
         found = wait(node, types, timeout)
@@ -296,7 +314,7 @@ def _announced(node: Node, topic: str, timeout: float) -> str:
         raise TypeNotFoundError(f"{topic} has several types, say which: {', '.join(found)}")
     example = spelled(node, "std_msgs/msg/String")
     hint = similar(topic, node.topics())
-    raise TypeNotFoundError(f"nobody uses {topic} yet: say its type, e.g. {example}{hint}")
+    raise TypeNotFoundError(f"no node uses {topic} yet: give its type, e.g. {example}{hint}")
 
 
 def _unknown(node: Node, topic: str) -> int:

@@ -1,4 +1,4 @@
-"""``rosglass topic echo``: print what comes."""
+"""``rosglass topic echo``: prints received messages."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ def echo(args: argparse.Namespace) -> int:
                 sample = subscription.wait(0.2)
                 if sample is None:
                     late = time.monotonic() > due
-                    reasons.look(last=late)
+                    reasons.report(last=late)
                     if late:
                         break
                     continue
                 received += 1
-                reasons.hear(received)
+                reasons.on_count(received)
                 due = time.monotonic() + (math.inf if args.timeout is None else args.timeout)
                 if args.stamps and not args.json:
                     print(style(f"# received {sample.received.seconds:.6f}", "dim"))

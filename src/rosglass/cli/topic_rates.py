@@ -1,4 +1,4 @@
-"""``rosglass topic hz``, ``bw`` and ``delay``: measure what comes."""
+"""``rosglass topic hz``, ``bw`` and ``delay``: measure received messages."""
 
 from __future__ import annotations
 
@@ -58,17 +58,17 @@ def measure(args: argparse.Namespace) -> int:
                 with lock:
                     samples = [s for s in seen if s.delay is not None or not wants_stamp]
                 total = subscription.statistics().received
-                reasons.hear(total)
+                reasons.on_count(total)
                 if total != shown and len(samples) > 1:
                     shown = total
                     result = _FIGURES[args.what](samples)
                     print(to_json(result) if args.json else result.pop("text"), flush=True)
-                elif reasons.look() and total:
-                    # What comes after an interruption is measured anew.
+                elif reasons.report() and total:
+                    # Start over after an interruption.
                     with lock:
                         seen.clear()
             if shown < 0 and not failure and not end.is_set():
-                reasons.look(last=True)
+                reasons.report(last=True)
     for reason in failure[:1]:
         note(f"{args.topic}: {reason}")
     if end.is_set():

@@ -18,28 +18,28 @@ if TYPE_CHECKING:
 
 __all__ = ["Reasons"]
 
-#: Seconds of silence that nobody asks about.
-_PATIENCE = 2.0
+#: Seconds without messages that are not reported.
+_QUIET_S = 2.0
 #: How many times the usual pause between messages counts as silence.
 _PAUSES = 5
 
 
 class Reasons:
-    """Tells the person who waits why nothing comes, or nothing more; each reason once.
+    """Prints why no messages are received, or no more; each reason once.
 
     Args:
-        node: Who subscribes.
-        subscription: What is waited for; closed at the end.
+        node: The subscribing node.
+        subscription: The subscription; closed at the end.
         args: The command's options.
     """
 
     def __init__(self, node: Node, subscription: Subscription, args: argparse.Namespace) -> None:
         self._node, self._subscription = node, subscription
         self._command = f"rosglass topic {args.what} {args.topic}"
-        self._began = self._heard = time.monotonic()
+        self._began = self._received_at = time.monotonic()
         self._received = 0
         self._pause = 0.0
-        self._told = ""
+        self._printed = ""
         self._log = logging.getLogger("rosglass.comm")
         self._quiet = not args.verbose
 
@@ -51,30 +51,30 @@ class Reasons:
         self._subscription.close()
         self._log.removeFilter(self._passes)
 
-    def hear(self, count: int) -> None:
-        """Take note of how many messages have come so far."""
+    def on_count(self, count: int) -> None:
+        """Update the number of messages received so far."""
         if count == self._received:
             return
         now = time.monotonic()
         self._pause = (now - self._began) / count
-        self._received, self._heard, self._told = count, now, ""
+        self._received, self._received_at, self._printed = count, now, ""
 
-    def look(self, *, last: bool = False) -> str:
-        """Say what is wrong, if that is news, and return it; empty when nothing is.
+    def report(self, *, last: bool = False) -> str:
+        """Print the reason if it is new, and return it; empty when all is well.
 
         Args:
             last: Whether this is the end: there is nothing more to wait for.
 
         Raises:
-            BrokenPipeError: Nobody reads what is printed any more.
+            BrokenPipeError: The reader of the output has exited.
         """
         require_reader()
-        silent = time.monotonic() - self._heard
-        if silent < _PATIENCE and not last:
+        silent = time.monotonic() - self._received_at
+        if silent < _QUIET_S and not last:
             return ""
         reason = self._reason(silent)
-        if reason and reason != self._told:
-            self._told = reason
+        if reason and reason != self._printed:
+            self._printed = reason
             # Definitions that contradict each other take pages.
             shown = reason.partition("\n")[0].rstrip() if self._quiet else reason
             note(f"{self._subscription.topic}: {spelled(self._node, shown)}")
@@ -91,14 +91,14 @@ class Reasons:
             return f"published with several types, say which: {self._command} {types[0]}"
         if not publishers:
             if self._received:
-                return "nobody publishes it any more"
-            return f"nobody publishes it{self._guess()}"
+                return "it has no publisher any more"
+            return f"it has no publisher{self._guess()}"
         if found.problem or found.hint:
             return found.problem or found.hint
         if not self._received:
-            return "published, but nothing has come yet"
-        if self._received > 1 and silent > max(_PATIENCE, _PAUSES * self._pause):
-            return "nothing comes any more, though it is still announced"
+            return "published, but nothing has been received yet"
+        if self._received > 1 and silent > max(_QUIET_S, _PAUSES * self._pause):
+            return "no more messages, although it is still advertised"
         return ""
 
     def _guess(self) -> str:
@@ -106,6 +106,6 @@ class Reasons:
         return similar(self._subscription.topic, known)
 
     def _passes(self, record: logging.LogRecord) -> bool:
-        """Keep what is told here from being told twice."""
+        """Drop log messages that this class prints."""
         ours = record.getMessage().startswith(f"{self._subscription.topic}: ")
         return not (ours and self._quiet and record.levelno == logging.WARNING)

@@ -46,7 +46,7 @@ def is_hidden(node: Node, name: str) -> bool:
 
 
 def spelled(node: Node, text: str) -> str:
-    """Return a type's name, or a text that has some, as the node's world spells them."""
+    """Return a type's name, or a text that has some, as the node's ROS version spells them."""
     from rosglass.interfaces.names import spelled_ros1
 
     return spelled_ros1(text) if is_ros1(node) else text

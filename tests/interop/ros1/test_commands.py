@@ -94,7 +94,7 @@ def test_topic_echo(run):
     assert "publishes /pose as geometry_msgs/PoseStamped with md5" in err
     assert err.count("\n") == 1
     code, _, err = run("topic", "echo", "/posse", "--timeout", "0.5")
-    assert err == "rosglass: /posse: nobody publishes it; did you mean /pose?\n"
+    assert err == "rosglass: /posse: it has no publisher; did you mean /pose?\n"
 
 
 def test_topic_hz_bw_delay(run, robot):
@@ -131,7 +131,7 @@ def test_a_latched_topic_pub_stays_until_ctrl_c(start_command, tool):
 def test_topic_pub_tells_what_is_missing(run):
     code, _, err = run("topic", "pub", "-1", "/nobody", "{}", "--timeout", "0.5")
     assert (code, err) == (
-        1, "rosglass: nobody uses /nobody yet: say its type, e.g. std_msgs/String\n",
+        1, "rosglass: no node uses /nobody yet: give its type, e.g. std_msgs/String\n",
     )  # fmt: skip
 
 
@@ -158,7 +158,7 @@ def test_types_are_spelled_as_in_ros1(run):
 def test_what_is_awaited_is_told_with_similar_names(run):
     twist, trigger = "geometry_msgs/Twist", "std_srvs/Trigger"
     for line, told in (
-        (("topic", "pub", "-1", "/cmd_vell", "{}"), "nobody uses /cmd_vell; did you mean /cmd_vel"),
+        (("topic", "pub", "-1", "/cmd_vell", "{}"), "no node uses /cmd_vell; did you mean /cmd_vel"),
         (("topic", "pub", "-1", "/cmd_vell", twist, "{}"), "; did you mean /cmd_vel?"),
         (("service", "call", "/robot/stopp", trigger, "{}"), "; did you mean /robot/stop?"),
         (("action", "send", "/countt", "{}"), "; did you mean /count?"),
@@ -309,7 +309,7 @@ def test_doctor_finds_what_is_wrong(run, master, monkeypatch):
         code, out, _ = run("doctor")
         assert code == 1
         assert "/test can be reached under the name turtlebot.invalid only" in out
-        assert "/use_sim_time is true, but nobody publishes /clock" in out
+        assert "/use_sim_time is true, but /clock has no publisher" in out
     finally:
         master.call("deleteParam", "/use_sim_time")
         master.call("unregisterPublisher", "/far", far)
@@ -362,7 +362,7 @@ def test_record_and_play_commands(run, robot, start_command, tmp_path, tool, mas
     assert "1 messages sent" in out
 
 
-# -- where nothing says where the robot is ---------------------------------------------------------
+# -- without a URL ---------------------------------------------------------------------------------
 
 #: In a network of its own, with nothing of ROS 2: others' commands must not find this master.
 NEARBY = """
@@ -417,5 +417,5 @@ def test_the_master_of_this_machine_is_used(master, tmp_path, monkeypatch):
     assert "/stop" in shown["service list"].splitlines()
     assert "success: true" in shown["service call /stop std_srvs/Trigger"].lower()
     assert shown["param get /speed"] == "1.5\n"
-    said = "rosglass: nothing says where the robot is: using ros1://127.0.0.1:11311 (export"
+    said = "rosglass: no URL is given: using ros1://127.0.0.1:11311 (export"
     assert done.stderr.count(said) == len(shown)

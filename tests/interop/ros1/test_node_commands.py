@@ -29,7 +29,7 @@ def test_topic_info_says_what_it_cannot_know(run, master, connect, free_port):
     connect("listener").create_subscription("/never")
     eventually(lambda: ["/never", ["/listener"]] in master.call("getSystemState")[1])
     code, out, _ = run("topic", "info", "/never")
-    assert (code, out.splitlines()[0]) == (0, "/never [unknown (nobody publishes it)]")
+    assert (code, out.splitlines()[0]) == (0, "/never [unknown (no publisher)]")
     assert "/never [unknown]" in run("topic", "list", "-t")[1].splitlines()
     gone = f"http://127.0.0.1:{free_port}/"
     master.call("registerPublisher", "/stale", "std_msgs/String", gone, caller="/dead")

@@ -277,7 +277,7 @@ def test_completion(start_command: Any, monkeypatch: pytest.MonkeyPatch, tmp_pat
 
 def test_waiting_says_for_what_and_ctrl_c_ends_it(start_command: Any) -> None:
     process = start_command("topic", "echo", "/lab/nothing")
-    assert "nobody publishes it" in process.stderr.readline()
+    assert "it has no publisher" in process.stderr.readline()
     process.send_signal(signal.SIGINT)
     assert process.wait(30) == 130
     assert process.stderr.read() == ""
@@ -296,19 +296,19 @@ def test_a_robot_that_goes_is_missed(start_command: Any, robot: Node) -> None:
         publisher.publish(data="here")
         process = start_command("topic", "echo", "/brief")
         assert process.stdout.readline() == "data: here\n"
-    assert "/brief: nobody publishes it any more" in process.stderr.readline()
+    assert "/brief: it has no publisher any more" in process.stderr.readline()
 
 
 def test_a_robot_that_is_not_there(run: Any) -> None:
     code, _, err = run("topic", "list", "--url", "zenoh://127.0.0.1:1", "--timeout", "0.3")
     assert code == 1
-    assert "nobody answered within 0.3 s" in err
+    assert "no answer within 0.3 s" in err
     code, _, err = run("topic", "list", "--url", "zenoh://127.0.0.1:1")
     assert (code, "nothing listens on its port 1; start a router" in err) == (1, True)
     began = time.monotonic()
     code, _, err = run("topic", "echo", "/lab/mapp", "--once", "--timeout", "0.3")
     assert code == 1
-    assert "/lab/mapp: nobody publishes it; did you mean /lab/map?" in err
+    assert "/lab/mapp: it has no publisher; did you mean /lab/map?" in err
     assert time.monotonic() - began < 20
 
 
@@ -333,7 +333,7 @@ def test_as_users_of_ros2_write_it(run: Any) -> None:
     assert run("param", "set", "/lab/robot", "speed", "-2.5")[0] == 0
 
 
-# -- where nothing says where the robot is ---------------------------------------------------------
+# -- without a URL ---------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -368,8 +368,8 @@ def test_the_router_of_this_machine_is_used() -> None:
     )
     assert "/nearby" in done.stdout.splitlines()
     assert done.stdout.endswith("1.5\n")
-    told = "rosglass: nothing says where the robot is: using zenoh://127.0.0.1:7447 (export"
-    assert done.stderr.count(told) == 2
+    expected = "rosglass: no URL is given: using zenoh://127.0.0.1:7447 (export"
+    assert done.stderr.count(expected) == 2
 
 
 @pytest.mark.usefixtures("nothing_said")
