@@ -158,7 +158,7 @@ def test_types_are_spelled_as_in_ros1(run):
 def test_what_is_awaited_is_told_with_similar_names(run):
     twist, trigger = "geometry_msgs/Twist", "std_srvs/Trigger"
     for line, told in (
-        (("topic", "pub", "-1", "/cmd_vell", "{}"), "no node uses /cmd_vell; did you mean /cmd_vel"),
+        (("topic", "pub", "-1", "/cmd_vell", "{}"), "uses /cmd_vell; did you mean /cmd_vel"),
         (("topic", "pub", "-1", "/cmd_vell", twist, "{}"), "; did you mean /cmd_vel?"),
         (("service", "call", "/robot/stopp", trigger, "{}"), "; did you mean /robot/stop?"),
         (("action", "send", "/countt", "{}"), "; did you mean /count?"),
