@@ -303,12 +303,12 @@ class _News:
         for name, problem in problems.items():
             since = self._since.get(name, ("", now))
             self._since[name] = (problem, since[1] if since[0] == problem else now)
-            if self._told.get(name) != problem and now - self._since[name][1] >= _PATIENCE:
-                self._told[name] = problem
+            if self._reported.get(name) != problem and now - self._since[name][1] >= _PATIENCE:
+                self._reported[name] = problem
                 self._note(f"{name}: {problem}")
         for name in self._since.keys() - problems.keys():
             del self._since[name]
-            if self._told.pop(name, None) is not None:
+            if self._reported.pop(name, None) is not None:
                 self._note(f"{name}: well again")
 
     def _note(self, text: str) -> None:
