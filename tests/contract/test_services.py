@@ -392,7 +392,7 @@ def test_a_response_that_does_not_fit_is_logged(
         eventually(
             lambda: [str(e.node) for e in robot.service_clients(client.name)] == ["/console"]
         )
-    with refused(wire, f"the server made no valid response: .*{reason}"):
+    with refused(wire, f"the server returned no valid response: .*{reason}"):
         client.call(timeout=patience(wire))
     assert "the callback's response to /console does not fit" in caplog.text
     assert reason in caplog.text

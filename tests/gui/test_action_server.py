@@ -142,7 +142,7 @@ def test_a_handle(live: Bench, robot: Robot, wait: Any) -> None:
     for script, told in (
         ("handle.publishFeedback({sequence: ['x']})", "sequence[0]"),
         ("handle.succeed({sequnce: []})", "sequnce"),
-        ("handle.canceled()", "nobody asked to cancel"),
+        ("handle.canceled()", "there was no request to cancel"),
     ):
         text = run(root, f"(function () {{ try {{ {script} }} catch (e) {{ return '' + e }} }})()")
         assert told in text, text

@@ -1,6 +1,6 @@
-"""Sending goals to an action: the client, and its goals from their sending to their end.
+"""Sending goals to an action: the client, and its goals.
 
-What becomes of a goal depends on the protocol: ``ros1/actionlib_client.py`` and
+The course of a goal depends on the protocol: ``ros1/actionlib_client.py`` and
 ``ros2/action_client.py`` follow it, and put here what users see of it.
 """
 
@@ -48,16 +48,16 @@ __all__ = [
     "GoalStatus",
 ]
 
-#: Feedback that waits for a slow callback.
+#: Most feedback messages that wait for a slow callback.
 FEEDBACK_DEPTH = 10
-#: Time that a goal's server may be away before the goal counts as lost.
+#: How long a goal's server may be unavailable before the goal counts as lost.
 GRACE_S = 5.0
-#: The same while this program itself is cut off, when nothing can be said of the server.
+#: The same while this node is disconnected, so that the server's state is unknown.
 OUTAGE_S = 10.0
 
 
 class GoalStatus(Enum):
-    """What has become of a goal."""
+    """The status of a goal."""
 
     PENDING = "pending"
     REJECTED = "rejected"
@@ -67,7 +67,7 @@ class GoalStatus(Enum):
     SUCCEEDED = "succeeded"
     CANCELED = "canceled"
     ABORTED = "aborted"
-    #: The server went away, or never came: nobody knows.
+    #: The server left, or never appeared: its end is unknown.
     LOST = "lost"
 
     @property
@@ -84,8 +84,8 @@ class ActionResult(NamedTuple):
 
     Attributes:
         status: SUCCEEDED, CANCELED or ABORTED.
-        result: What the server sent with it; the type's defaults for a goal that was cancelled
-            before it was sent.
+        result: The server's result; the type's defaults if the goal was cancelled before it was
+            sent.
     """
 
     status: GoalStatus
@@ -93,11 +93,11 @@ class ActionResult(NamedTuple):
 
 
 class CancelAnswer(NamedTuple):
-    """What a server answers to a request to cancel.
+    """A server's answer to a request to cancel.
 
     Attributes:
         accepted: Ids of the goals that are being cancelled.
-        reason: Why there are none, in words; empty when there are.
+        reason: Why there are none, in words; empty if there are any.
     """
 
     accepted: tuple[bytes, ...]
@@ -106,25 +106,25 @@ class CancelAnswer(NamedTuple):
 
 @hint_at_members
 class ClientGoal(Handle):
-    """A goal that was sent; the same object in every callback, for as long as it lives.
+    """A goal that was sent; callbacks always receive this object.
 
-    Closing it ends its callbacks and the waiting; the goal itself goes on at the server.
+    Closing it ends its callbacks and promises; the goal itself continues at the server.
 
-    All that happens to it happens in jobs that run one after the other, whatever thread they come
-    from: its state needs no lock, and callbacks come in order.
+    Its state changes in jobs only, which run one at a time whatever thread adds them: it needs no
+    lock, and callbacks run in order.
 
     Args:
         client: Its client.
         id: Its id.
-        goal: What is asked for: a message of the action's type, or what becomes one.
-        timeout: Seconds for the server to appear and to answer it, None for ever.
+        goal: The goal message, or the value to make it from while the type is unknown.
+        timeout: Seconds for the server to appear and to answer it; None for no limit.
         typed: Whether the action's type is known.
         jobs: Runs the jobs.
-        log: Where is logged what users should know.
+        log: Where problems are logged.
 
     Attributes:
         id: 16 bytes (a UUID) in ROS 2; a text in UTF-8 in ROS 1.
-        goal: What was asked for; None while the action's type is not discovered yet.
+        goal: The goal message; None while the action's type is not discovered yet.
     """
 
     id: bytes
@@ -152,15 +152,15 @@ class ClientGoal(Handle):
             f"{label} was neither accepted nor rejected", dispatcher, cancellable=False
         )
         self._done: Promise[ActionResult] = Promise(
-            f"{label} has not ended, and goes on: no result", dispatcher, cancellable=False
+            f"{label} has not ended, and continues: no result", dispatcher, cancellable=False
         )
         self._feedback_listeners: Listeners[Message] = Listeners(depth=FEEDBACK_DEPTH, where=label)
         self._status_listeners: Listeners[GoalStatus] = Listeners(where=label)
-        #: Requests to cancel it that are not answered, and the monotonic time of their end.
+        #: Unanswered requests to cancel it, and the monotonic time of their deadlines.
         self._cancels: list[tuple[Promise[CancelAnswer], float | None]] = []
-        #: Ends the waiting for a server.
-        self._waiting: Handle | None = None
-        self._slow = False
+        #: The timeout of the wait for a server.
+        self._server_timeout: Handle | None = None
+        self._logged_slow = False
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.id_text} {self.status.value}>"
@@ -175,10 +175,10 @@ class ClientGoal(Handle):
 
     @property
     def status(self) -> GoalStatus:
-        """What has become of it, as last heard.
+        """The status, as last received.
 
-        In ROS 1, PENDING until the server executes it, and CANCELING once the server says that it
-        is about to end for that; recalled and preempted goals are both CANCELED.
+        In ROS 1 it is PENDING until the server executes the goal, and CANCELING once the server
+        reports a preempt request; recalled and preempted goals are both CANCELED.
         """
         return self._status
 
@@ -194,41 +194,41 @@ class ClientGoal(Handle):
 
     @property
     def acceptance(self) -> Promise[bool]:
-        """The server's decision: whether it accepts the goal, or why it could not be asked."""
+        """The server's decision: True if it accepts the goal, or the error if it did not answer."""
         return self._acceptance
 
     @property
     def done(self) -> Promise[ActionResult]:
-        """The end: a result, or one of :meth:`result`'s errors. Cannot be cancelled itself."""
+        """The end: a result, or one of :meth:`result`'s errors; it cannot be cancelled."""
         return self._done
 
     def result(self, timeout: float | None = None) -> ActionResult:
-        """Wait for the end.
+        """Wait for the end, and return the result.
 
         Args:
-            timeout: Seconds to wait, None for ever.
+            timeout: Seconds to wait; None waits forever.
 
         Raises:
-            TimeoutError: It has not ended within the time, and goes on; or the server did not
-                accept it within the time given to send_goal() (status LOST).
-            GoalRejectedError: The server did not accept it.
-            ServiceUnavailableError: No server appeared within the time given to send_goal(), or the
-                goal was cancelled before any server told the action's type (status CANCELED).
+            TimeoutError: The goal did not end in time, and continues; or the server did not accept
+                it within the timeout of send_goal() (status LOST).
+            GoalRejectedError: The server rejected it.
+            ServiceUnavailableError: No server appeared within the timeout of send_goal(), or the
+                goal was cancelled before the action's type was discovered (status CANCELED).
             ConversionError: A value does not fit the type, which was discovered after sending.
             ServiceError: The server's answer cannot be decoded.
-            ConnectionLostError: The server went away before the end.
-            NodeClosedError: The client is closed, or gets closed meanwhile.
+            ConnectionLostError: The server left before the end.
+            NodeClosedError: The client is closed, or is closed during the wait.
         """
         return self._done.result(timeout)
 
     def cancel(self, timeout: float | None = 10.0) -> Promise[CancelAnswer]:
-        """Ask the server to cancel it; returns at once. A goal not sent yet is not sent at all.
+        """Request the server to cancel it, without waiting. A goal not sent yet is not sent.
 
-        ROS 1 servers do not answer; their status of the goal shows that they know of it.
+        ROS 1 servers do not answer; the status of the goal shows whether they got the request.
 
         Args:
-            timeout: Seconds for the server to answer, None for ever; then a TimeoutError. Some
-                servers never answer.
+            timeout: Seconds after which the promise ends with a TimeoutError; None for no limit.
+                Some servers never answer.
         """
         timeout = check_timeout(timeout, self._label)
         answer: Promise[CancelAnswer] = Promise(
@@ -245,7 +245,7 @@ class ClientGoal(Handle):
         """Call `callback` with each feedback from now on.
 
         Args:
-            callback: Told the feedback; when it is slow, the newest ones only.
+            callback: Called with the feedback; if it is slow, with the newest only.
             executor: Where it runs; None for the node's own dispatcher thread.
         """
         return self._listen(self._feedback_listeners, callback, executor)
@@ -264,17 +264,17 @@ class ClientGoal(Handle):
         return listeners.add(callback, executor or self._dispatcher)
 
     def close(self) -> None:
-        """Watch it no longer; the goal itself goes on. Safe to call twice."""
+        """End callbacks and promises; the goal itself continues. Safe to call twice."""
         self._feedback_listeners.clear()
         self._status_listeners.clear()
-        error = NodeClosedError(f"{self._label} is not watched any more: it was closed")
+        error = NodeClosedError(f"{self._label} was closed: its end is unknown")
         self._jobs.add(lambda: self._lose(error))
 
-    # -- what the protocol does, in jobs ---------------------------------------------------------
+    # -- the protocol, in jobs -------------------------------------------------------------------
 
     @abstractmethod
     def _cancel(self, answer: Promise[CancelAnswer], timeout: float | None) -> None:
-        """Ask the server to cancel it, or end it if it was not sent yet."""
+        """Request the server to cancel it, or end it if it was not sent yet."""
 
     @abstractmethod
     def _lose(self, error: BaseException) -> None:
@@ -282,15 +282,15 @@ class ClientGoal(Handle):
 
     @abstractmethod
     def _give_up(self) -> None:
-        """End it, unless a server has answered it: the time for that is over."""
+        """End it at its timeout, unless a server has answered."""
 
-    # -- what becomes of it, in jobs -------------------------------------------------------------
+    # -- for the protocol, in jobs ---------------------------------------------------------------
 
     def _wait(self) -> None:
-        """Give up waiting for a server after its time."""
+        """Start the timeout of the wait for a server."""
         if self._timeout is not None and not self._done.done():
             give_up = partial(self._jobs.add, self._give_up)
-            self._waiting = self._client._core.timers.after(self._timeout, give_up)
+            self._server_timeout = self._client._core.timers.after(self._timeout, give_up)
 
     def _set_status(self, status: GoalStatus) -> None:
         self._status = status
@@ -298,22 +298,22 @@ class ClientGoal(Handle):
 
     def _add_feedback(self, feedback: Message) -> None:
         self._feedback = feedback
-        if not self._feedback_listeners.notify(feedback) and not self._slow:
-            self._slow = True
+        if not self._feedback_listeners.notify(feedback) and not self._logged_slow:
+            self._logged_slow = True
             self._log.warning(
-                "%s: feedback comes faster than a callback takes it: only the newest %d wait",
+                "%s: feedback arrives faster than a callback handles it: the newest %d are kept",
                 self._label,
                 FEEDBACK_DEPTH,
             )
 
     def _finish(self, end: ActionResult | BaseException) -> None:
-        """End it, as its status says: with a result, or with why there is none."""
+        """End it with its result, or with the error if there is none."""
         self._client._forget(self)
         cancels, self._cancels = self._cancels, []
         for answer, _ in cancels:
             answer.set_result(self._too_late())
-        if self._waiting is not None:
-            self._waiting.close()
+        if self._server_timeout is not None:
+            self._server_timeout.close()
         if isinstance(end, ActionResult):
             self._acceptance.set_result(False)  # unless it was accepted
             self._done.set_result(end)
@@ -327,24 +327,21 @@ class ClientGoal(Handle):
     def _add_cancel(
         self, answer: Promise[CancelAnswer], timeout: float | None, failure: str
     ) -> None:
-        """Let a request to cancel wait for `timeout` seconds; then it fails."""
+        """Add a pending request to cancel, which fails after `timeout` seconds."""
         deadline = None if timeout is None else time.monotonic() + timeout
         self._cancels.append((answer, deadline))
         if timeout is not None:
-
-            def give_up() -> None:
-                answer.set_exception(TimeoutError(failure))
-
-            self._client._core.timers.after(timeout, give_up)
+            error = TimeoutError(failure)
+            self._client._core.timers.after(timeout, lambda: answer.set_exception(error))
 
     def _too_late(self) -> CancelAnswer:
-        """Return the answer to a request to cancel it after its end."""
+        """Return the answer to a request to cancel it that comes after its end."""
         return CancelAnswer((), f"the goal has ended already: {self._status.value}")
 
     def _without_result(self) -> ServiceUnavailableError:
-        """Return the end of a goal that was cancelled while its type was not known."""
+        """Return the error of a goal that was cancelled while its type was unknown."""
         return ServiceUnavailableError(
-            f"{self._label} was cancelled before any server told its type: no result"
+            f"{self._label} was cancelled before its type was discovered: no result"
         )
 
 
@@ -352,13 +349,13 @@ class ClientGoal(Handle):
 class ActionClient(Client):
     """Sends goals to an action; made by :meth:`Node.create_action_client`.
 
-    Closing it leaves its goals to the server: cancel them first if they must not go on.
+    After closing it, its goals continue at the server: cancel them first if they must not.
 
     Args:
         core: The node it belongs to.
         name: Absolute action name.
-        end_of_time: Seconds since 1970 that the protocol's messages cannot carry any more, and the
-            year that this is.
+        end_of_time: First time that the protocol's messages cannot carry: seconds since 1970, and
+            the year.
 
     Attributes:
         name: Absolute action name.
@@ -371,8 +368,9 @@ class ActionClient(Client):
         super().__init__(core, name)
         self.type = None
         self._end_of_time = end_of_time
+        #: Guards the goals, and that none is added after closing.
         self._lock = threading.Lock()
-        #: Those that have not ended, by their ids; of the protocol's own class.
+        #: Those that have not ended, by id; of the protocol's own class.
         self._goals: dict[bytes, Any] = {}
 
     def __repr__(self) -> str:
@@ -386,7 +384,7 @@ class ActionClient(Client):
 
     @property
     def goals(self) -> Sequence[ClientGoal]:
-        """The goals of this client that have not ended, in order of sending."""
+        """The client's goals that have not ended, in order of sending."""
         return tuple(self._live())
 
     def send_goal(
@@ -400,22 +398,23 @@ class ActionClient(Client):
         executor: Executor | None = None,
         timeout: float | None = 10.0,
     ) -> ClientGoal:
-        """Send a goal, as soon as a server is there, and return at once.
+        """Send a goal as soon as there is a server; does not wait.
 
-        A goal that the server does not answer within `timeout` is given up, and the server is
-        asked to cancel it, should it have accepted it: nothing runs that nobody watches.
+        If the server does not answer within `timeout`, the goal ends, and the server is requested
+        to cancel it in case it has accepted it, so that no unobserved goal runs.
 
         Args:
             goal: A message or a dict of fields; missing fields, and None, get the defaults.
             on_feedback: Called with each feedback.
             on_status_change: Called with each new status.
-            on_done: Called with the goal when it has ended, one way or another.
+            on_done: Called with the goal when it has ended, in any way.
             executor: Where callbacks run; None for the node's own dispatcher thread.
-            timeout: Seconds for the server to appear and to accept or reject it; None for ever.
+            timeout: Seconds for the server to appear and to accept or reject it; None for no limit.
 
         Raises:
-            ConversionError: A value does not fit its field; nothing is sent. While the type is not
-                discovered yet, that shows later: the goal ends with it.
+            ConversionError: A value does not fit its field; nothing is sent. If the type is not
+                discovered yet, the goal ends with that error instead.
+            ArgumentError: A callback is not callable, or the executor is not an Executor.
             NodeClosedError: The client is closed.
         """
         made: ClientGoal = self._new_goal(
@@ -455,38 +454,38 @@ class ActionClient(Client):
         return made
 
     def cancel_all(self, timeout: float | None = 10.0) -> Promise[CancelAnswer]:
-        """Ask the server to cancel all its goals, other clients' too; returns at once.
+        """Request the server to cancel all goals, other clients' too; does not wait.
 
-        Goals of this client that wait for a server are not sent any more.
+        Goals of this client that wait for a server are not sent.
 
         Args:
-            timeout: Seconds for the server to appear and to answer, None for ever.
+            timeout: Seconds for the server to appear and to answer; None for no limit.
         """
         self._check_open()
         return self._cancel_many(None, check_timeout(timeout, self.name))
 
     def cancel_before(self, time: Time, timeout: float | None = 10.0) -> Promise[CancelAnswer]:
-        """Ask the server to cancel all goals that it accepted at or before `time`.
+        """Request the server to cancel all goals that it accepted at or before `time`.
 
         Args:
             time: By the server's clock, e.g. :attr:`ClientGoal.accepted`; in ROS 1, by the clocks
-                of those who sent the goals. Servers of actionlib cancel goals with such a stamp
-                that come later, too.
+                of the goals' clients. Actionlib's servers also cancel goals with such a stamp that
+                arrive later.
             timeout: As for :meth:`cancel_all`.
 
         Raises:
-            ArgumentError: It is no time after the epoch that a message can carry.
+            ArgumentError: It is not a time after the epoch that a message can carry.
         """
         self._check_open()
         timeout = check_timeout(timeout, self.name)
         seconds, year = self._end_of_time
         if not isinstance(time, Time) or not 0 < time.nanoseconds < seconds * 1_000_000_000:
-            told = f"a rosglass.Time after 1970 and before {year}; cancel_all() cancels all goals"
-            raise ArgumentError("time", time, told, self.name)
+            expected = f"a rosglass.Time between 1970 and {year}; cancel_all() cancels all goals"
+            raise ArgumentError("time", time, expected, self.name)
         return self._cancel_many(time, timeout)
 
     def close(self) -> None:
-        """End the waiting for goals, which go on, and withdraw the client; safe to call twice."""
+        """Close the client; its goals end here, but continue at the server. Safe to call twice."""
         with self._lock:
             if self._closed:
                 return
@@ -496,19 +495,19 @@ class ActionClient(Client):
         self._withdraw()
         self._readiness.close()
 
-    # -- what the protocol does ------------------------------------------------------------------
+    # -- the protocol ----------------------------------------------------------------------------
 
     @abstractmethod
     def _make_goal(self, goal: Any, timeout: float | None, *, typed: bool) -> ClientGoal:
-        """Return a goal that is not sent yet: a message, or what becomes one (`typed` false)."""
+        """Return a goal that is not sent yet; `typed` as in :class:`ClientGoal`."""
 
     @abstractmethod
     def _begin(self, goal: Any) -> None:
-        """Send a goal, now or once a server is there."""
+        """Send a goal, now or once there is a server."""
 
     @abstractmethod
     def _cancel_many(self, until: Time | None, timeout: float | None) -> Promise[CancelAnswer]:
-        """Ask the server to cancel the goals until a time, or all."""
+        """Request the server to cancel the goals accepted until a time, or all."""
 
     @abstractmethod
     def _withdraw(self) -> None:
@@ -521,14 +520,15 @@ class ActionClient(Client):
             return list(self._goals.values())
 
     def _forget(self, goal: ClientGoal) -> None:
-        """Let a goal go that has ended."""
+        """Remove a goal that has ended."""
         with self._lock:
             self._goals.pop(goal.id, None)
 
     def _ended(self) -> NodeClosedError:
         """Return the error of goals whose client was closed."""
-        told = f"the client of {self.name} was closed before the goal ended, which goes on"
-        return NodeClosedError(told)
+        return NodeClosedError(
+            f"the client of {self.name} was closed before the goal ended, which continues"
+        )
 
     def _unsent(self, timeout: float | None) -> ServiceUnavailableError:
         """Return the error of goals that found no server within `timeout` seconds."""
@@ -545,7 +545,7 @@ class ActionClient(Client):
         )
 
     def _no_server(self, offered: Iterable[str]) -> str:
-        """Say that the action is not offered, and which one may be meant of those that are."""
+        """Say that the action has no server, with a hint at a similar one that has."""
         kind = "" if self.type is None else f" [{self.type.name}]"
         return (
             f"no server offers the action {self.name}{kind} on {self._core.url} "

@@ -1,4 +1,4 @@
-"""Offering an action: the server, its goals, and the protocol that brings them."""
+"""Serving actions: the server, its goals, and the protocol by which they arrive."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import inspect
 import threading
 import time
 from abc import ABC, abstractmethod
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
 from rosglass.comm.action_client import GoalStatus
@@ -31,15 +31,15 @@ _Goal = TypeVar("_Goal", bound="ServerGoal")
 #: What executing a goal returns.
 Result: TypeAlias = "Message | dict[str, Any] | None"
 
-#: Time in all that closing waits for goals to end.
+#: How long closing waits for the goals' threads to end, in all.
 _CLOSE_TIMEOUT_S = 2.0
 
 
 class ActionServerProtocol(ABC, Generic[_Goal]):
-    """How goals reach an action server, and how their clients hear of them.
+    """The protocol of an action server: receives goals, and reports to their clients.
 
-    A protocol receives goals and requests to cancel, and calls the server's ``_on_goal``,
-    ``_run`` and ``_on_cancel`` with them. It never decides or executes anything itself.
+    It receives goals and requests to cancel, and calls the server's ``_on_goal``, ``_run`` and
+    ``_on_cancel`` with them. The server decides on goals and executes them.
 
     Args:
         core: The node.
@@ -50,7 +50,7 @@ class ActionServerProtocol(ABC, Generic[_Goal]):
 
     Attributes:
         dispatcher: Where callbacks run unless the user gives an executor.
-        lock: Held while goals change their status.
+        lock: Guards the status of goals, and the server's lists of them.
         closed: Whether the server was closed; set by the server.
     """
 
@@ -64,61 +64,61 @@ class ActionServerProtocol(ABC, Generic[_Goal]):
 
     @abstractmethod
     def open(self, server: ActionServer) -> None:
-        """Announce the action, and hand what comes to `server`."""
+        """Announce the action, and pass what is received to `server`."""
 
     @abstractmethod
     def withdraw(self) -> None:
-        """Take the action back, once all goals have ended."""
+        """Withdraw the action, once all goals have ended."""
 
     @abstractmethod
     def problems(self) -> list[str]:
-        """Say why some clients cannot be served."""
+        """Return why some clients cannot be served, in words."""
 
     def post(self, job: Callable[[], None]) -> None:
-        """Run what follows a decision of the user's, soon."""
+        """Run the job that follows a decision of the user's callback."""
         job()
 
     @abstractmethod
     def accept(self, goal: _Goal) -> bool:
-        """Note that a goal is accepted, or return False: it was cancelled. The lock is held."""
+        """Register an accepted goal; return False if it was cancelled. The lock is held."""
 
     @abstractmethod
     def start(self, goal: _Goal) -> None:
-        """Answer the client of a goal that was accepted, then have the server run it."""
+        """Answer the client of an accepted goal, then let the server run it."""
 
     @abstractmethod
     def reject(self, goal: _Goal, reason: str) -> None:
-        """Answer the client of a goal that was not accepted."""
+        """Answer the client of a rejected goal."""
 
     def on_returned(self) -> None:
-        """Take note that `execute` has returned, whatever became of the goal."""
+        """Called when `execute` has returned, however the goal ended."""
 
     @abstractmethod
     def publish_feedback(self, goal: _Goal, feedback: Message) -> None:
-        """Send feedback of a goal."""
+        """Send a goal's feedback."""
 
     @abstractmethod
     def publish_status(self) -> None:
-        """Send the status of all goals, as of now."""
+        """Send the current status of all goals."""
 
     @abstractmethod
     def on_end(self, goal: _Goal, text: str) -> None:
-        """Note that a goal has ended, and why. The lock is held."""
+        """Register the end of a goal, and its reason. The lock is held."""
 
     @abstractmethod
     def publish_result(self, goal: _Goal, result: Message) -> None:
-        """Send the result of a goal that has ended, and the status of all."""
+        """Send the result of an ended goal, and the status of all goals."""
 
 
 @hint_at_members
 class ServerGoal(Handle):
     """A goal that a server accepted.
 
-    Closing it aborts it, unless it has ended: ``with goal:`` leaves no goal behind.
+    Closing it aborts it, unless it has ended: ``with goal:`` always ends the goal.
 
     Attributes:
         id: 16 bytes (a UUID) in ROS 2; a text in UTF-8 in ROS 1.
-        goal: What is asked for.
+        goal: The goal message.
         accepted: When it was accepted.
     """
 
@@ -133,9 +133,8 @@ class ServerGoal(Handle):
         self.id, self.goal, self.accepted = id, goal, accepted
         self._status = GoalStatus.ACCEPTED
         self._begun = self._superseded = False
-        self._stop = threading.Event()
         self._cancel_request: Promise[None] = Promise(
-            f"nobody asked to cancel a goal of {protocol.name}",
+            f"there was no request to cancel a goal of {protocol.name}",
             protocol.dispatcher,
             cancellable=False,
         )
@@ -153,25 +152,25 @@ class ServerGoal(Handle):
 
     @property
     def status(self) -> GoalStatus:
-        """What has become of it."""
+        """The status."""
         return self._status
 
     @property
     def is_cancel_requested(self) -> bool:
         """Whether it should end soon: with :meth:`canceled`, or because the server closes.
 
-        That is so, too, once a newer goal waits for its place (in ROS 1, with ``simple=True``).
+        Also when a newer goal preempts it (in ROS 1, with ``simple=True``).
         """
-        return self._stop.is_set()
+        return self._cancel_request.done()
 
     @property
     def cancel_request(self) -> Promise[None]:
-        """Comes when :attr:`is_cancel_requested` becomes true: to be told of it, or to await it."""
+        """A promise that ends when :attr:`is_cancel_requested` becomes true."""
         return self._cancel_request
 
     def wait_for_cancel(self, timeout: float) -> bool:
-        """Sleep up to `timeout` seconds; return early, with True, when it should end."""
-        return self._stop.wait(timeout)
+        """Sleep up to `timeout` seconds; return True as soon as the goal should end."""
+        return bool(wait([self._cancel_request], timeout).done)
 
     def publish_feedback(
         self, feedback: Message | dict[str, Any] | None = None, /, **fields: Any
@@ -181,39 +180,40 @@ class ServerGoal(Handle):
         Raises:
             ConversionError: A value does not fit its field; nothing is sent.
             NodeClosedError: The server was closed.
+            ArgumentError: Both a message and keyword fields are given.
             Error: The goal has ended.
         """
         if not self._status.is_active:
-            raise self._over("feedback comes too late")
+            raise self._ended_error("feedback comes too late")
         kind = self._protocol.type.feedback
         if feedback is not None and fields:
-            told = "either feedback or keyword fields, not both"
-            raise ArgumentError("", fields, told, kind.name)
+            expected = "either feedback or keyword fields, not both"
+            raise ArgumentError("", fields, expected, kind.name)
         made = kind.create(fields if feedback is None else feedback)
         self._protocol.publish_feedback(self, made)
 
     def succeed(self, result: Message | dict[str, Any] | None = None) -> None:
-        """End it as done.
+        """End it as succeeded.
 
         Args:
             result: A message or a dict of fields; missing fields, and None, get the defaults.
 
         Raises:
-            ConversionError: A value does not fit its field; the goal goes on.
+            ConversionError: A value does not fit its field; the goal continues.
             NodeClosedError: The server was closed.
             Error: The goal has ended already.
         """
         self._end(GoalStatus.SUCCEEDED, result)
 
     def abort(self, result: Message | dict[str, Any] | None = None) -> None:
-        """End it as failed; arguments and errors as :meth:`succeed`."""
+        """End it as aborted; arguments and errors as for :meth:`succeed`."""
         self._end(GoalStatus.ABORTED, result)
 
     def canceled(self, result: Message | dict[str, Any] | None = None) -> None:
         """End it as cancelled, after a request to cancel; as :meth:`succeed`.
 
         Raises:
-            Error: Nobody asked to cancel it: abort() is for ends of the server's own choice.
+            Error: There was no request to cancel it: use abort() to end it without.
         """
         self._end(GoalStatus.CANCELED, result)
 
@@ -221,10 +221,10 @@ class ServerGoal(Handle):
         """Abort it, unless it has ended; safe to call twice."""
         self._end(GoalStatus.ABORTED, None, "it was closed", strict=False)
 
-    # -- for its server and the protocol ---------------------------------------------------------
+    # -- for the server and the protocol ---------------------------------------------------------
 
     def _begin(self) -> bool:
-        """Note that it is executed now; return whether it is, and was not cancelled."""
+        """Set it to executing; return False if it was cancelled or has ended."""
         with self._protocol.lock:
             if self._status is not GoalStatus.ACCEPTED:
                 return False
@@ -238,26 +238,21 @@ class ServerGoal(Handle):
         return self._status in (GoalStatus.ACCEPTED, GoalStatus.EXECUTING)
 
     def _request_cancel(self) -> bool:
-        """Let it be cancelled; return whether it still can be."""
+        """Set it to canceling; return whether that was possible."""
         with self._protocol.lock:
             if not self._cancelable:
                 return False
             self._status = GoalStatus.CANCELING
-        self._wake()
+        self._cancel_request.set_result(None)
         return True
 
     def _supersede(self) -> None:
-        """Let it end for a newer goal: it may end as cancelled although no client asked for it."""
+        """Preempt it by a newer goal: it may end as cancelled without a client's request."""
         self._superseded = True
-        self._wake()
-
-    def _wake(self) -> None:
-        """Let what executes it see that it should end; the lock is not held."""
-        self._stop.set()
         self._cancel_request.set_result(None)
 
     def _conclude(self, result: Any) -> None:
-        """End it with what executing it returned: cancelled if that was asked for, or done.
+        """End it with the result of `execute`: as cancelled if that was requested, or succeeded.
 
         Raises:
             ConversionError: `result` does not fit.
@@ -265,7 +260,7 @@ class ServerGoal(Handle):
         self._end(None, result, strict=False)
 
     def _fail(self, error: BaseException) -> None:
-        """End it as failed, unless it has ended."""
+        """End it as aborted, unless it has ended."""
         self._end(GoalStatus.ABORTED, None, f"{type(error).__name__}: {error}", strict=False)
 
     def _end(
@@ -274,34 +269,34 @@ class ServerGoal(Handle):
         """End it.
 
         Args:
-            status: How; None for SUCCEEDED, or CANCELED if that was asked for.
-            result: The result, None for the type's defaults.
-            text: Why, in words for its client, where the protocol has room for it.
-            strict: Whether it is an error that it has ended already.
+            status: The final status; None for SUCCEEDED, or CANCELED if that was requested.
+            result: The result; None for the type's defaults.
+            text: The reason for its client, where the protocol carries one.
+            strict: Whether to raise an error if it has ended already.
         """
         protocol, kind = self._protocol, self._protocol.type.result
         made = kind.decode(kind.encode(result, wire=protocol.wire), wire=protocol.wire)
         with protocol.lock:
-            asked = self._superseded or self._status is GoalStatus.CANCELING
+            requested = self._superseded or self._status is GoalStatus.CANCELING
             if status is None:
-                status = GoalStatus.CANCELED if asked else GoalStatus.SUCCEEDED
+                status = GoalStatus.CANCELED if requested else GoalStatus.SUCCEEDED
             ends = self._status.is_active
-            if ends and status is GoalStatus.CANCELED and not asked:
+            if ends and status is GoalStatus.CANCELED and not requested:
                 raise Error(
-                    f"nobody asked to cancel goal {self.id_text} of {protocol.name}; end it with "
-                    "abort() instead"
+                    f"there was no request to cancel goal {self.id_text} of {protocol.name}; end "
+                    "it with abort() instead"
                 )
             if ends:
                 self._status = status
                 protocol.on_end(self, text)
         if ends:
-            self._wake()
+            self._cancel_request.set_result(None)
             protocol.publish_result(self, made)
         elif strict:
-            raise self._over(f"it cannot end as {status.value}")
+            raise self._ended_error(f"it cannot end as {status.value}")
 
-    def _over(self, what: str) -> Error:
-        """Return the error of what comes after its end."""
+    def _ended_error(self, what: str) -> Error:
+        """Return the error of an operation after its end."""
         where = f"goal {self.id_text} of {self._protocol.name}"
         if self._protocol.closed:
             return NodeClosedError(f"{where} was aborted when its server closed: {what}")
@@ -310,19 +305,19 @@ class ServerGoal(Handle):
 
 @hint_at_members
 class ActionServer(Handle):
-    """Offers an action; made by :meth:`Node.create_action_server`.
+    """Serves an action; made by :meth:`Node.create_action_server`.
 
-    Closing it aborts the goals that run, and tells their clients.
+    Closing it aborts the goals that run, and notifies their clients.
 
     Args:
         core: The node it belongs to.
-        protocol: How goals come and go; it is opened here.
+        protocol: The protocol by which goals arrive; it is opened here.
         execute: Called with each accepted goal.
-        accept: Told a goal, says whether it is accepted; None accepts all.
-        cancel: Told a goal, says whether it may be cancelled; None accepts all.
-        executor: Where all three run; None for a thread for each goal and, for the latter two,
-            the node's dispatcher. When `execute` is a coroutine function, all run in the event
-            loop.
+        accept: Receives the goal message and returns True to accept it; None accepts all.
+        cancel: Receives the goal and returns True to accept a request to cancel it; None accepts
+            all.
+        executor: Where all three run; None for one thread per goal and, for the latter two, the
+            node's dispatcher. If `execute` is a coroutine function, all run in the event loop.
 
     Attributes:
         name: Absolute action name.
@@ -351,9 +346,9 @@ class ActionServer(Handle):
         self._execute, self._accept, self._cancel = execute, accept, cancel
         self._decider = chosen
         given = executor is not None or isinstance(chosen, LoopExecutor)
-        #: Where goals run; None for a thread for each.
+        #: Where goals run; None for one thread each.
         self._executor = chosen if given else None
-        #: Those that have not ended.
+        #: Those that have not ended; ended ones are removed when the next one is accepted.
         self._goals: dict[bytes, ServerGoal] = {}
         self._threads: set[threading.Thread] = set()
         protocol.open(self)
@@ -374,14 +369,14 @@ class ActionServer(Handle):
 
     @property
     def problem(self) -> str:
-        """Why some clients cannot be served, in words; empty when all is well."""
+        """Why some clients cannot be served, in words; empty if there is no problem."""
         if self.closed:
             return "the server is closed"
         problems = self._protocol.problems()
         return "; ".join(dict.fromkeys(problem for problem in problems if problem))
 
     def close(self) -> None:
-        """Abort the goals that run, tell their clients, and withdraw; safe to call twice."""
+        """Abort the goals that run, notify their clients, and withdraw; safe to call twice."""
         with self._protocol.lock:
             if self._protocol.closed:
                 return
@@ -395,7 +390,7 @@ class ActionServer(Handle):
         self._join()
 
     def _join(self) -> None:
-        """Wait for the threads of goals."""
+        """Wait for the goals' threads to end."""
         with self._protocol.lock:
             threads = [t for t in self._threads if t is not threading.current_thread()]
         until = time.monotonic() + _CLOSE_TIMEOUT_S
@@ -406,23 +401,23 @@ class ActionServer(Handle):
                     "%s still runs %.0f s after closing", thread.name, _CLOSE_TIMEOUT_S
                 )
 
-    # -- deciding --------------------------------------------------------------------------------
+    # -- decisions -------------------------------------------------------------------------------
 
     def _on_goal(self, goal: ServerGoal) -> None:
-        """Decide on a goal that has come."""
+        """Decide on a received goal."""
         if self._accept is None:
-            self._take(goal, "")
+            self._on_decision(goal, "")
             return
 
         def decide() -> None:
             refusal = "" if self._accepts(goal) else "It is not accepted"
-            self._protocol.post(lambda: self._take(goal, refusal))
+            self._protocol.post(lambda: self._on_decision(goal, refusal))
 
         if not self._decide_later(decide):
-            self._take(goal, "It cannot be decided on")
+            self._on_decision(goal, "It cannot be decided on")
 
-    def _take(self, goal: ServerGoal, refusal: str) -> None:
-        """Start a goal that was decided on, or reject it."""
+    def _on_decision(self, goal: ServerGoal, refusal: str) -> None:
+        """Start a goal, or reject it if there is a `refusal`."""
         protocol = self._protocol
         with protocol.lock:
             if not refusal and protocol.closed:
@@ -441,7 +436,7 @@ class ActionServer(Handle):
     def _on_cancel(
         self, goals: Sequence[ServerGoal], then: Callable[[Sequence[ServerGoal]], None]
     ) -> None:
-        """Decide which goals may be cancelled, and hand them to `then`."""
+        """Decide which goals may be cancelled, and pass them to `then`."""
         if self._cancel is None or not goals:
             then(goals)
             return
@@ -450,12 +445,12 @@ class ActionServer(Handle):
             allowed = [goal for goal in goals if self._allows(goal)]
             self._protocol.post(lambda: then(allowed))
 
-        # What cannot be asked must not hold up a stop.
+        # A broken executor must not prevent a stop.
         if not self._decide_later(decide):
             then(goals)
 
     def _decide_later(self, decide: Callable[[], None]) -> bool:
-        """Have a callback of the user's decide; return whether its executor takes that."""
+        """Run a callback of the user's; return False if its executor raises."""
         try:
             self._decider.post(decide)
         except Exception:
@@ -467,7 +462,7 @@ class ActionServer(Handle):
         return True
 
     def _accepts(self, goal: ServerGoal) -> bool:
-        """Return whether the user accepts a goal."""
+        """Return whether the user's callback accepts a goal; False if it fails."""
         assert self._accept is not None
         decision: Any = False
         try:
@@ -484,7 +479,7 @@ class ActionServer(Handle):
         return decision is True
 
     def _allows(self, goal: ServerGoal) -> bool:
-        """Return whether a goal may be cancelled; a callback that fails must not hold up a stop."""
+        """Return whether a goal may be cancelled; True if the callback fails, to permit a stop."""
         assert self._cancel is not None
         try:
             decision: Any = self._cancel(goal)
@@ -500,10 +495,10 @@ class ActionServer(Handle):
             )
         return decision is not False
 
-    # -- executing -------------------------------------------------------------------------------
+    # -- execution -------------------------------------------------------------------------------
 
     def _run(self, goal: ServerGoal) -> None:
-        """Execute a goal soon, and end it with what comes of that."""
+        """Execute a goal on its executor or thread, and end it with the result."""
         try:
             if self._executor is not None:
                 self._executor.post(lambda: self._execute_goal(goal))
@@ -514,7 +509,7 @@ class ActionServer(Handle):
                 name=f"{self.name} {goal.id_text}",
                 daemon=True,
             )
-            with self._protocol.lock:  # closing must find it started
+            with self._protocol.lock:  # so that close() joins it
                 thread.start()
                 self._threads.add(thread)
         except Exception as error:
@@ -555,7 +550,7 @@ class ActionServer(Handle):
         self._protocol.on_returned()
 
     def _on_done(self, goal: ServerGoal, done: Future[Any]) -> None:
-        """Take the end of a goal whose execution has returned a future."""
+        """End a goal whose execution returned a future."""
         try:
             result = done.result(0)
         except BaseException as error:

@@ -1,4 +1,4 @@
-"""Offering a service: from a request to its answer by a callback, a coroutine or a future."""
+"""Serving services: requests, and their responses by a callback, a coroutine or a future."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _log = logging.getLogger("rosglass.comm")
 Answer: TypeAlias = (
     "Message | dict[str, Any] | Future[Message] | Future[dict[str, Any] | None] | None"
 )
-#: Requests that wait for the callback; more come only from a client gone wild.
+#: Most requests that wait for the callback; more are refused.
 _MAX_WAITING = 1000
 
 
@@ -47,9 +47,9 @@ class ServiceServer(Handle):
         callback: Called with each request; see :meth:`Node.create_service_server`.
         qos: The quality of service of requests and replies.
         executor: Where `callback` runs; None for the node's dispatcher, or for the running event
-            loop when `callback` is a coroutine function.
-        create_replier: Announces the service; called with what takes its requests, and whether
-            that only puts them aside for another thread (:attr:`Replier.quick`).
+            loop if `callback` is a coroutine function.
+        create_replier: Announces the service; called with the handler of its requests, and whether
+            that only passes them to another thread (:attr:`Replier.quick`).
 
     Attributes:
         name: Absolute service name.
@@ -70,14 +70,15 @@ class ServiceServer(Handle):
         self._core, self.name, self.type, self.qos = core, name, type, qos
         self._executor = executor_for(callback, executor, core.dispatcher, name)
         self._callback = callback
+        #: Guards the members below, and that nothing is added to them after closing.
         self._lock = threading.Lock()
         self._closed = False
         self._waiting = 0
         self._running: set[Future[Any]] = set()
         self._log_once = LogOnce()
-        #: Requests received before the replier that answers them is here; None from then on.
+        #: Requests received before the replier is set; None from then on.
         self._early: deque[tuple[RequestId, bytes]] | None = deque()
-        # Executors other than our own may do anything.
+        # Other executors may block.
         quick = isinstance(self._executor, (Dispatcher, LoopExecutor))
         self._replier = create_replier(self._on_request, quick)
         core.servers.add(self)
@@ -89,11 +90,11 @@ class ServiceServer(Handle):
 
     @property
     def problem(self) -> str:
-        """Why some clients cannot be served, in words; empty when all is well."""
+        """Why some clients cannot be served, in words; empty if there is no problem."""
         return "the server is closed" if self._closed else self._replier.problem
 
     def close(self) -> None:
-        """Withdraw the service; requests without response end unanswered. Safe to call twice."""
+        """Withdraw the service; pending requests stay unanswered. Safe to call twice."""
         with self._lock:
             if self._closed:
                 return
@@ -107,15 +108,15 @@ class ServiceServer(Handle):
         for future in running:
             future.cancel()
 
-    # -- from a request to its answer --------------------------------------------------------------
+    # -- from a request to its response ----------------------------------------------------------
 
     def _on_request(self, request: RequestId, data: bytes | memoryview) -> None:
-        """Hand a request to the callback's executor."""
+        """Pass a request to the callback's executor."""
         with self._lock:
             if self._closed:
                 return
             if self._early is not None:
-                # The buffer is the wire's, and ends with this call.
+                # Copied: the wire's buffer is valid during this call only.
                 self._early.append((request, bytes(data)))
                 return
         self._post(request, data)
@@ -136,7 +137,7 @@ class ServiceServer(Handle):
             if not full:
                 self._waiting += 1
         if full:
-            self._refuse(request, f"{_MAX_WAITING} requests wait for the callback already")
+            self._refuse(request, f"{_MAX_WAITING} requests are waiting for the callback")
             return
         try:
             self._executor.post(lambda: self._serve(request, data))
@@ -155,7 +156,7 @@ class ServiceServer(Handle):
         try:
             message = decode_checked(self.type.request, data)
         except DecodeError as error:
-            self._refuse(request, f"the request is no {self.type.request.name}: {error}")
+            self._refuse(request, f"the request is not a {self.type.request.name}: {error}")
             return
         try:
             answer = self._callback(message)
@@ -180,7 +181,7 @@ class ServiceServer(Handle):
             self._respond(request, answer)
 
     def _finish(self, request: RequestId, future: Future[Any]) -> None:
-        """Answer a request whose response was promised."""
+        """Answer a request whose callback returned a future."""
         with self._lock:
             self._running.discard(future)
         if self._closed:
@@ -195,12 +196,12 @@ class ServiceServer(Handle):
             self._respond(request, answer)
 
     def _respond(self, request: RequestId, answer: Any) -> None:
-        """Send what the callback answers."""
+        """Send the callback's response."""
         try:
             data = self.type.response.encode(answer)
             most = self._replier.max_reply
             if most is not None and len(data) > most:
-                raise ServiceError(f"it has {len(data)} bytes, and clients take at most {most}")
+                raise ServiceError(f"it has {len(data)} bytes, and clients accept at most {most}")
         except Error as error:
             _log.error(
                 "%s: the callback's response to %s does not fit: %s; %s",
@@ -209,32 +210,32 @@ class ServiceServer(Handle):
                 error,
                 self._consequence,
             )
-            self._replier.fail(request, f"the server made no valid response: {error}")
+            self._replier.fail(request, f"the server returned no valid response: {error}")
             return
         try:
             self._replier.reply(request, data)
         except NodeClosedError:
-            pass  # another thread has closed it
+            pass  # closed by another thread
         except Error as error:
             client = self._replier.client_name(request)
             _log.error("%s: cannot answer %s: %s", self.name, client, error)
 
-    # -- what goes wrong ---------------------------------------------------------------------------
+    # -- failures --------------------------------------------------------------------------------
 
     @property
     def _consequence(self) -> str:
-        """What a client gets instead of a response, for people."""
-        tells = self._replier.tells_failures
-        return "it is told the error instead" if tells else "it gets no response, and waits"
+        """The effect of a failure on the client, for log lines."""
+        reported = self._replier.tells_failures
+        return "it receives the error instead" if reported else "it gets no response, and waits"
 
     def _on_failure(self, request: RequestId, error: Exception) -> None:
-        """Log that the callback failed, and tell the client where the wire can."""
+        """Log that the callback failed, and report it to the client if the wire can."""
         client = self._replier.client_name(request)
         if isinstance(error, ServiceError) and self._replier.has_refusals:
-            # Raised on purpose, as rospy's ServiceException: the client is told, that is all.
+            # Raised on purpose, like rospy's ServiceException: not a failure of the server.
             _log.info("%s: the request of %s is refused: %s", self.name, client, error)
         else:
-            # Our own errors say where and why, as those of handlers in QML do.
+            # Our own errors need no traceback.
             reason = f": {error}" if isinstance(error, Error) else ""
             _log.error(
                 "%s: the callback failed on a request of %s; %s%s",
@@ -247,7 +248,7 @@ class ServiceServer(Handle):
         self._replier.fail(request, self._replier.describe_failure(error))
 
     def _refuse(self, request: RequestId, reason: str) -> None:
-        """Turn a client's fault down, and name it in the log once."""
+        """Refuse an invalid request, and log that once per client."""
         if self._log_once.is_first(request.client):
             client = self._replier.client_name(request)
             _log.warning("%s: refusing requests of %s: %s", self.name, client, reason)
@@ -255,15 +256,15 @@ class ServiceServer(Handle):
 
 
 def decode_checked(kind: MessageType, data: bytes | memoryview) -> Message:
-    """Return the request or response in `data`; raises DecodeError for anything else."""
-    # Each ROS 2 implementation fills what is empty with another number of bytes.
+    """Return the request or response in `data`; raises DecodeError if it is invalid."""
+    # Each ROS 2 implementation pads empty messages with another number of bytes.
     if kind.fields or kind.wire == "ros1":
         kind.validate(data)
     return kind.decode(data)
 
 
 def served_by_this_thread(core: NodeCore, name: str) -> bool:
-    """Return whether only the calling thread can answer a service of its own node."""
+    """Return whether a service has no server but one that runs on the calling thread."""
     for server in list(core.servers):
         if not isinstance(server, ServiceServer) or server.name != name:
             continue

@@ -460,7 +460,7 @@ def test_a_client_closed_in_mid_goal_leaves_it_to_the_server(client, peer, name,
     eventually(lambda: goal.feedback is not None)
     client.close()
     client.close()
-    with pytest.raises(NodeClosedError, match="which goes on"):
+    with pytest.raises(NodeClosedError, match="which continues"):
         goal.result(30)
     with pytest.raises(NodeClosedError):
         client.send_goal({"goal": 1})

@@ -731,7 +731,7 @@ def test_a_request_that_makes_no_sense_is_refused(connect, dial):
     sock.sendall(struct.pack("<I", 3) + b"abc")
     ok, size = struct.unpack("<BI", receive(sock, 5))
     assert not ok
-    assert b"the request is no rospy_tutorials" in receive(sock, size)
+    assert b"the request is not a rospy_tutorials" in receive(sock, size)
     assert seen == []
 
 

@@ -532,7 +532,7 @@ def test_rubbish_is_named_once_per_client_and_disturbs_nobody(robot, client, cap
     assert client.call({"a": 1}, timeout=30).sum == 1
     told = [r.getMessage() for r in caplog.records if "refusing requests" in r.getMessage()]
     assert len(told) == 100
-    assert f"the request is no {ADD}_Request: " in told[0]
+    assert f"the request is not a {ADD}_Request: " in told[0]
     assert len(replier.failures) == 206
 
 
@@ -560,7 +560,7 @@ def test_a_client_gone_wild_cannot_fill_the_memory(robot, middleware, client, ca
         replier.handle_request(RequestId(b"w" * 16, number), data)
     release.set()
     assert 499 <= len(replier.failures) <= 500
-    assert caplog.text.count("1000 requests wait for the callback already") == 1
+    assert caplog.text.count("1000 requests are waiting for the callback") == 1
 
 
 def test_another_version_of_the_response_alone_is_named_and_taken(middleware, eventually):
