@@ -179,7 +179,7 @@ def test_wrong_arguments_are_refused(client):
     with pytest.raises(ParameterError, match="/robot: prefixes must be a list of names, got 5"):
         client.names(5)
     for name in ("", 5, ["a"], None):
-        with pytest.raises(ParameterError, match="name must be a text that is not empty"):
+        with pytest.raises(ParameterError, match="name must be a non-empty string"):
             client.get([name])
     for depth in (-1, 1.5, True, "1", None):
         with pytest.raises(rosglass.ArgumentError, match="/robot: depth"):

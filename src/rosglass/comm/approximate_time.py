@@ -1,9 +1,9 @@
-"""Matching messages of several topics by their time stamps.
+"""Synchronizing messages of several topics by their time stamps.
 
 The policy is that of ROS's message_filters (``sync_policies::ApproximateTime``, described at
-https://wiki.ros.org/message_filters/ApproximateTime): sets are chosen by stamps alone, not by when
-messages arrive; no message is in two sets; sets do not cross; among the sets around one message,
-the pivot, the one that spans the least time is chosen.
+https://wiki.ros.org/message_filters/ApproximateTime): sets depend on stamps only, not on the order
+of arrival; no message is in two sets; sets do not cross; of the sets around one message, the pivot,
+the one with the shortest time span is chosen.
 """
 
 from __future__ import annotations
@@ -16,27 +16,26 @@ from rosglass.errors import ArgumentError
 __all__ = ["ApproximateTime"]
 
 _T = TypeVar("_T")
-#: How much more a later set must gain in length, in tenths of what it is later: the age penalty.
-_PENALTY = 11
+#: The age penalty: tenths of a later set's delay by which it must be shorter.
+_AGE_PENALTY = 11
 
 
 class ApproximateTime(Generic[_T]):
-    """Finds sets of messages, one of each topic, whose stamps lie close together.
+    """Finds sets of messages, one per topic, whose stamps are close together.
 
-    Of each topic, the messages from the candidate's on are kept until it is clear that no better
-    set can follow: as a rule until the next message of the topic that is not the pivot's. Stamps
-    that are equal match at once. Not safe for threads.
+    The messages from the candidate set on are kept until no better set can follow: usually until
+    the next message of each topic but the pivot's. Equal stamps match at once. Not thread-safe.
 
     Args:
-        count: Topics, at least two.
-        queue_size: Messages of a topic that wait at most; the oldest one makes room.
-        slop: Nanoseconds that a set may span.
+        count: Number of topics, at least two.
+        queue_size: Most messages of a topic that wait; beyond it, the oldest is dropped.
+        slop: Longest time span of a set in nanoseconds.
 
     Attributes:
-        dropped: Messages that came into no set.
+        dropped: Number of messages that are in no set.
 
     Raises:
-        ArgumentError: An argument makes no sense.
+        ArgumentError: An argument is out of range.
     """
 
     def __init__(self, count: int, queue_size: int = 10, slop: int = 100_000_000) -> None:
@@ -48,10 +47,10 @@ class ApproximateTime(Generic[_T]):
             raise ArgumentError("slop", slop, "a time of 0 or more")
         self._size, self._slop = queue_size, slop
         self._queues: list[deque[tuple[int, _T]]] = [deque() for _ in range(count)]
-        #: What was passed over since the candidate was found, the candidate's own messages first.
+        #: Messages passed over since the candidate was found, starting with its own.
         self._past: list[list[tuple[int, _T]]] = [[] for _ in range(count)]
         self._newest: list[int | None] = [None] * count
-        #: Whether messages were thrown out that could have made a better set.
+        #: By topic, whether messages were dropped that could have made a better set.
         self._cut = [False] * count
         self._candidate: list[tuple[int, _T]] | None = None
         self._pivot = 0
@@ -59,12 +58,13 @@ class ApproximateTime(Generic[_T]):
         self.dropped = 0
 
     def add(self, index: int, stamp: int, item: _T) -> list[list[_T]]:
-        """Take a message in.
+        """Add a message.
 
-        Stamps that go back, as when a recording begins again, throw away all that waits.
+        A stamp older than the topic's last one, as when a recording restarts, discards all waiting
+        messages.
 
         Args:
-            index: Its topic.
+            index: Number of its topic.
             stamp: Its time in nanoseconds.
             item: The message.
 
@@ -92,7 +92,7 @@ class ApproximateTime(Generic[_T]):
         return found
 
     def clear(self) -> None:
-        """Throw away all that waits."""
+        """Discard all waiting messages."""
         self.dropped += sum(map(len, self._queues)) + sum(map(len, self._past))
         for queue, past in zip(self._queues, self._past, strict=True):
             queue.clear()
@@ -127,22 +127,22 @@ class ApproximateTime(Generic[_T]):
         return min(stamps), max(stamps)
 
     def _is_better(self, first: int, last: int) -> bool:
-        """Return whether a set is better than the candidate."""
+        """Return whether the set from `first` to `last` is better than the candidate."""
         start, end = self._bounds()
-        return (last - end) * _PENALTY < (first - start) * 10
+        return (last - end) * _AGE_PENALTY < (first - start) * 10
 
     def _is_late(self, last: int) -> bool:
         """Return whether no set that ends at `last` or later can be better than the candidate."""
         start, end = self._bounds()
-        return (last - end) * _PENALTY >= (self._pivot_time - start) * 10
+        return (last - end) * _AGE_PENALTY >= (self._pivot_time - start) * 10
 
     def _is_best(self) -> bool:
-        """Return whether no better set can follow, whatever comes next on topics without more."""
+        """Return whether no better set can follow, whatever arrives on topics with empty queues."""
         if all(self._queues):
             return False
         at = [0] * len(self._queues)
         while True:
-            # What is to come of a topic without more may at best have the pivot's stamp.
+            # The next message of an empty queue has the pivot's stamp at best.
             heads = [
                 queue[i][0] if i < len(queue) else max(self._newest_of(index), self._pivot_time)
                 for index, (queue, i) in enumerate(zip(self._queues, at, strict=True))
@@ -160,7 +160,7 @@ class ApproximateTime(Generic[_T]):
         return newest
 
     def _keep(self) -> None:
-        """Make the heads the candidate."""
+        """Make the heads of the queues the candidate."""
         self._candidate = [queue[0] for queue in self._queues]
         for past in self._past:
             self.dropped += len(past)

@@ -1,4 +1,4 @@
-"""Lifecycle nodes: their states, and the transitions between them.
+"""Lifecycle nodes: a client that drives them through their states and transitions.
 
 States, transitions and services: design article "Managed nodes" and ``lifecycle_msgs``.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from rosglass.comm.executor import check_plain
 from rosglass.comm.promise import Deadline
 from rosglass.comm.service_client import OtherNode
 from rosglass.comm.time import Time
@@ -47,13 +48,13 @@ class State(NamedTuple):
 
 
 class Transition(NamedTuple):
-    """A way from one state to another.
+    """A transition from one state to another.
 
     Attributes:
         id: Its number (``lifecycle_msgs/msg/Transition``), e.g. 3.
         label: Its name, e.g. ``activate``.
-        start: The state it begins in.
-        goal: The state it leads to, by way of the states that the node passes through.
+        start: The state in which it starts.
+        goal: The state to which it leads; the node may pass through others on the way.
     """
 
     id: int
@@ -66,11 +67,11 @@ class Transition(NamedTuple):
 
 
 class TransitionEvent(NamedTuple):
-    """A lifecycle node that went from one state to another.
+    """A transition that a lifecycle node has made.
 
     Attributes:
-        time: When, by the node's clock; zero when it does not say.
-        transition: What it did; its states are those it came from and went to.
+        time: Time by the node's clock; zero if the node does not report it.
+        transition: The transition, with the actual start and goal states.
     """
 
     time: Time
@@ -80,12 +81,12 @@ class TransitionEvent(NamedTuple):
 class LifecycleClient(OtherNode):
     """Drives a lifecycle node; made by :meth:`Node.create_lifecycle_client`.
 
-    Every method that asks the node takes `timeout`, seconds in all (None waits for ever), and
-    raises ServiceUnavailableError when the node is not there or is no lifecycle node,
-    TimeoutError when it does not answer, and NodeClosedError.
+    Methods that call the node take `timeout`, the seconds to wait in all (None for no limit), and
+    raise ServiceUnavailableError if the node is not available or not a lifecycle node, TimeoutError
+    if it does not answer, and NodeClosedError.
 
     Args:
-        owner: The node that asks.
+        owner: The node that the client belongs to.
         node: Full name of the lifecycle node.
 
     Attributes:
@@ -99,16 +100,16 @@ class LifecycleClient(OtherNode):
         super().__init__(owner, node, _SERVICES, "get_state")
 
     def state(self, *, timeout: float | None = 10.0) -> State:
-        """Return the state that the node is in."""
+        """Return the current state of the node."""
         return _state(self._ask("get_state", timeout).current_state)
 
     def available_states(self, *, timeout: float | None = 10.0) -> list[State]:
-        """Return the states that the node can be in."""
+        """Return all states of the node."""
         response = self._ask("get_available_states", timeout)
         return [_state(state) for state in response.available_states]
 
     def available_transitions(self, *, timeout: float | None = 10.0) -> list[Transition]:
-        """Return the transitions that are possible in the state that the node is in."""
+        """Return the transitions that are possible in the current state."""
         response = self._ask("get_available_transitions", timeout)
         return _transitions(response.available_transitions)
 
@@ -118,23 +119,23 @@ class LifecycleClient(OtherNode):
         return _transitions(response.available_transitions)
 
     def change_state(self, transition: str | int, *, timeout: float | None = 10.0) -> State:
-        """Let the node take a transition, wait until it has, and return the state it is in then.
+        """Request a transition, wait for its end, and return the state of the node after it.
 
-        A node may take its time for that: give a driver that looks for its hardware more than the
-        usual 10 s.
+        A transition may take long: give a driver that searches for its hardware more than the
+        default of 10 s.
 
         Args:
-            transition: Its name, e.g. ``configure`` (``shutdown`` is possible in several states
-                under one name), or its number.
+            transition: Its name, e.g. ``configure`` (``shutdown`` stands for those of all states),
+                or its number.
             timeout: Seconds to wait in all.
 
         Raises:
-            TransitionError: It is not possible now (the message names those that are), or the
-                node tried and failed.
+            TransitionError: It is not possible in the current state (the message lists those that
+                are), or it failed.
         """
         deadline = Deadline(timeout, self.node)
         allowed = self.available_transitions(timeout=deadline.left())
-        chosen = next((t for t in allowed if _is_called(t, transition)), None)
+        chosen = next((t for t in allowed if _matches(t, transition)), None)
         if chosen is None:
             state = self.state(timeout=deadline.left())
             names = ", ".join(map(str, allowed)) or "none"
@@ -167,16 +168,15 @@ class LifecycleClient(OtherNode):
         return self.change_state("cleanup", timeout=timeout)
 
     def shutdown(self, *, timeout: float | None = 10.0) -> State:
-        """Go to finalized, from which there is no way back."""
+        """Go to finalized, which is final."""
         return self.change_state("shutdown", timeout=timeout)
 
     def watch(
         self, callback: Callable[[TransitionEvent], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` with each transition of the node, whoever asked for it."""
+        """Call `callback` with each transition of the node, whatever requested it."""
         self._check_open()
-        if not callable(callback):
-            raise TransitionError(f"watch() needs something that can be called, got {callback!r}")
+        check_plain(callback, f"{self.node}: watch()")
         return self._subscribe(
             f"{self.node}/transition_event",
             _EVENT_TYPE,
@@ -189,10 +189,10 @@ class LifecycleClient(OtherNode):
         return self._call(service, {}, Deadline(timeout, self.node))
 
 
-def _is_called(transition: Transition, wanted: str | int) -> bool:
+def _matches(transition: Transition, wanted: str | int) -> bool:
     if not isinstance(wanted, str):
         return transition.id == wanted
-    # Older distributions have a shutdown for each state: unconfigured_shutdown and so on.
+    # Older distributions have one per state: unconfigured_shutdown and so on.
     label = transition.label
     return label == wanted or (wanted == "shutdown" and label.endswith("_shutdown"))
 
@@ -209,6 +209,6 @@ def _transitions(descriptions: Iterable[Message]) -> list[Transition]:
 
 
 def _event(message: Message) -> TransitionEvent:
-    taken = message.transition
+    made = message.transition
     start, goal = _state(message.start_state), _state(message.goal_state)
-    return TransitionEvent(Time(message.timestamp), Transition(taken.id, taken.label, start, goal))
+    return TransitionEvent(Time(message.timestamp), Transition(made.id, made.label, start, goal))

@@ -1,8 +1,8 @@
-"""A node's log: a logger of Python's whose messages go to its handlers, and to ``/rosout``.
+"""A node's log: a Python logger whose records go to Python's handlers and to ``/rosout``.
 
-Behaviour: ROS wiki, "rosout"; design article "Logging" and ``rcl``'s ``logging_rosout``. What a
-message on ``/rosout`` looks like is ROS 1's or ROS 2's own: a :class:`RosoutTopic` says it. The
-terminal shows messages where the program has not configured `logging`.
+Behaviour: ROS wiki, "rosout"; design article "Logging" and ``rcl``'s ``logging_rosout``. A
+:class:`RosoutTopic` describes the messages of ROS 1's or ROS 2's ``/rosout``. Records are shown on
+the terminal if the program has not configured `logging`.
 """
 
 from __future__ import annotations
@@ -40,26 +40,26 @@ __all__ = [
 ]
 
 _TOPIC = "/rosout"
-#: Messages that may wait to be published, and that are published in a second.
+#: Most messages that wait to be published, and that are published per second.
 _MAX_WAITING = _MAX_RATE = 1000
-#: Characters of a message.
+#: Most characters of a message.
 _MAX_TEXT = 32 * 1024
-#: Pause of the publishing thread; it is woken when there is something to do.
+#: Longest pause of the publishing thread, which each record wakes.
 _IDLE_POLL_S = 3600.0
-#: Pause between looks for the first subscription.
+#: Pause between checks for the first subscription.
 _SUBSCRIPTION_POLL_S = 0.02
 _FORMATTER = logging.Formatter("%(message)s")
 
 
 class RosoutTopic(NamedTuple):
-    """What the messages of ``/rosout`` look like.
+    """The messages of ``/rosout``.
 
     Attributes:
-        type: Their type's name.
+        type: Name of their type.
         qos: The publisher's profile.
         fields: Returns a message's fields; called in the thread that logs.
-        first_wait_s: How long the first messages wait for a subscription, where those that come
-            later would miss them.
+        first_wait_s: How long the first messages wait for a subscription, if late subscriptions
+            would miss them.
     """
 
     type: str
@@ -72,12 +72,12 @@ class NodeLog:
     """A node's log: its logger, and its publisher of ``/rosout``.
 
     Args:
-        core: What the node consists of.
+        core: The node.
         name: The logger's name.
-        rosout: What is published; None publishes nothing.
-        level: Least severe level that the logger lets pass.
-        levels: The same for it and its children, by name.
-        to_python: Whether messages also go to Python's handlers, and so to the terminal.
+        rosout: The messages to publish; None publishes nothing.
+        level: The logger's level.
+        levels: Levels of the logger and its children, by name.
+        to_python: Whether records also go to Python's handlers, and so to the terminal.
     """
 
     def __init__(
@@ -104,12 +104,12 @@ class NodeLog:
             show_on_terminal(self.logger)
 
     def open(self) -> None:
-        """Announce the publisher, if there is to be one."""
+        """Announce the publisher, if there is one."""
         if self._handler is not None:
             self._handler.open()
 
     def close(self) -> None:
-        """Publish what waits, and let go of all handlers; safe to call twice."""
+        """Publish waiting messages, and remove all handlers; safe to call twice."""
         if self._library is not None:
             self._library.close()
         if self._handler is not None:
@@ -121,14 +121,14 @@ class NodeLog:
 class NodeLogger(logging.Logger):
     """A node's logger, or a child of it.
 
-    A :class:`logging.Logger` like any other, except that :func:`logging.getLogger` does not know
-    it: several nodes in one process, in one graph or in several, may bear the same name. It starts
-    with level INFO, as ROS's loggers do, and hands its messages on to Python's root logger.
+    An ordinary :class:`logging.Logger` that is not registered with :func:`logging.getLogger`, as
+    several nodes of a process may have the same name. Its initial level is INFO, as in ROS, and it
+    propagates to Python's root logger.
 
     Args:
         name: Its name.
-        parent: Where its messages go, too.
-        levels: Least severe levels of it and its children, by name.
+        parent: The logger it propagates to.
+        levels: Levels of it and its children, by name.
     """
 
     def __init__(
@@ -140,7 +140,7 @@ class NodeLogger(logging.Logger):
         self._children: dict[str, NodeLogger] = {}
 
     def getChild(self, suffix: str) -> NodeLogger:  # noqa: N802 - logging's spelling
-        """Return the logger ``<name>.<suffix>``, whose messages go where this one's go."""
+        """Return the logger ``<name>.<suffix>``, which propagates to this one."""
         first, _, rest = suffix.partition(".")
         child = self._children.get(first)
         if child is None:
@@ -149,15 +149,15 @@ class NodeLogger(logging.Logger):
         return child.getChild(rest) if rest else child
 
     def family(self) -> list[NodeLogger]:
-        """Return it and all loggers below it that were asked for, sorted by name."""
+        """Return it and all its descendants, sorted by name."""
         found = [self]
         for _, child in sorted(self._children.copy().items()):
             found += child.family()
         return found
 
     def isEnabledFor(self, level: int) -> bool:  # noqa: N802 - logging's spelling
-        """Return whether messages of `level` pass."""
-        # Asked anew each time: logging only clears the caches of loggers that it knows.
+        """Return whether records of `level` are logged."""
+        # Not cached: logging clears the caches of registered loggers only.
         if self.disabled or self.manager.disable >= level:
             return False
         return level >= self.getEffectiveLevel()
@@ -166,8 +166,8 @@ class NodeLogger(logging.Logger):
 class RosoutHandler(logging.Handler):
     """Publishes log records; never waits, never raises.
 
-    Messages come faster than 1000 in a second, or than they can be sent, are left out and counted;
-    long ones are cut.
+    Messages beyond 1000 per second, or faster than they can be sent, are dropped and counted; long
+    ones are cut.
 
     Args:
         core: What the node consists of.
@@ -182,14 +182,15 @@ class RosoutHandler(logging.Handler):
         self._waiting: deque[dict[str, Any]] = deque()
         self._lost = 0
         self._second, self._count = 0, 0
-        #: Reentrant: a node that is just closing closes the handler as it adds its publisher.
+        #: Guards the creation of publisher and worker. Reentrant: a node that is closing closes the
+        #: handler when that adds its publisher.
         self._start = threading.RLock()
         self._publisher: Publisher | None = None
         self._worker: Worker | None = None
         self._closed = False
 
     def open(self) -> None:
-        """Announce the publisher, so that subscriptions are there before the first message."""
+        """Announce the publisher, so that subscriptions match before the first message."""
         with self._start:
             if self._publisher is None and not self._closed:
                 topic = self._topic
@@ -197,7 +198,7 @@ class RosoutHandler(logging.Handler):
                 core.check_open()
                 message_type = core.types.message(topic.type)
                 self._publisher = Publisher(core, core.resolve(_TOPIC), message_type, topic.qos)
-                # Members close in reverse order: what waits is published before the publisher ends.
+                # Members close in reverse order: this one before its publisher.
                 self._core.add(_Flush(self, self._core))
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -210,7 +211,7 @@ class RosoutHandler(logging.Handler):
             self._lost += 1
 
     def close(self) -> None:
-        """Publish what waits, and end; safe to call twice."""
+        """Publish waiting messages, and end; safe to call twice."""
         with self._start:
             closed, self._closed = self._closed, True
             worker, self._worker = self._worker, None
@@ -243,7 +244,7 @@ class RosoutHandler(logging.Handler):
         worker.wake()
 
     def _publish(self) -> None:
-        # An error here must not be logged: its record would come here.
+        # Errors are not logged, as their records would end up here.
         with suppress(Error, OSError):
             self.open()
         publisher = self._publisher
@@ -266,7 +267,7 @@ class RosoutHandler(logging.Handler):
             time.sleep(_SUBSCRIPTION_POLL_S)
 
     def _loss(self, lost: int) -> logging.LogRecord:
-        text = "%d log messages were left out: there are too many"
+        text = "%d log messages were dropped: there are too many"
         record = logging.LogRecord(
             self._label, logging.WARNING, __file__, 0, text, (lost,), None, "_loss"
         )
@@ -286,9 +287,9 @@ class _Flush(NodeMember):
 
 
 class LibraryLog(logging.Handler):
-    """Publishes the library's warnings that a node's own threads make: they are about the node.
+    """Publishes the library's warnings that a node's own threads log, as they are about the node.
 
-    It listens from the start, until it is closed.
+    It is active until it is closed.
 
     Args:
         handler: Publishes them.
@@ -302,36 +303,36 @@ class LibraryLog(logging.Handler):
         warn_on_terminal()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Hand on a record."""
+        """Publish a record of the node's threads."""
         if self._runs_here():
             self._handler.emit(record)
 
     def close(self) -> None:
-        """Listen no more; safe to call twice."""
+        """Remove the handler; safe to call twice."""
         logging.getLogger("rosglass").removeHandler(self)
         super().close()
 
 
 def message_of(record: logging.LogRecord) -> str:
-    """Return a record's text, with the error that it reports."""
+    """Return a record's text, with its traceback."""
     return clean(_FORMATTER.format(record))
 
 
 def clean(text: str) -> str:
-    """Return what a ROS string can hold of `text`, which may not be all of it."""
+    """Return `text` as a ROS string can carry it: cut, and without invalid characters."""
     if len(text) > _MAX_TEXT:
         text = f"{text[:_MAX_TEXT]}... (cut; {len(text)} characters)"
     return text.replace("\0", "\\0").encode("utf-8", "backslashreplace").decode()
 
 
 class _TerminalHandler(logging.Handler):
-    """Does what `logging.lastResort` does, which says nothing once there is any handler.
+    """Takes the place of `logging.lastResort`, which is inactive if a logger has any handler.
 
-    There always is: what is logged goes to /rosout as well.
+    A node's logger always has one, for /rosout.
 
     Args:
-        logger: The logger that it is for.
-        level: Least severe level that it shows.
+        logger: The logger whose handlers are considered.
+        level: Its level.
     """
 
     def __init__(self, logger: logging.Logger, level: int) -> None:
@@ -340,7 +341,7 @@ class _TerminalHandler(logging.Handler):
         self.setFormatter(logging.Formatter("%(levelname)s %(name)s: %(message)s"))
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write a record to stderr, unless the program has made its own arrangements."""
+        """Write a record to stderr, unless the program has configured logging."""
         if logging.lastResort is None or logging.getLogger().handlers:
             return
         if any(isinstance(handler, logging.StreamHandler) for handler in self._logger.handlers):
@@ -355,15 +356,15 @@ _handler = _TerminalHandler(logging.getLogger("rosglass"), logging.WARNING)
 
 
 def show_on_terminal(logger: logging.Logger) -> None:
-    """Show what a node's logger logs, as ROS does, where `logging` has not been configured."""
+    """Show a node's log on the terminal, as ROS does, if `logging` is not configured."""
     logger.addHandler(_TerminalHandler(logger, logging.NOTSET))
 
 
 def warn_on_terminal(formatter: logging.Formatter | None = None) -> None:
-    """Have warnings of the library be seen where `logging` has not been configured.
+    """Show the library's warnings on the terminal if `logging` is not configured.
 
     Args:
-        formatter: How they look; as before, or with level and logger, by default.
+        formatter: The format; None keeps the current one, initially with level and logger.
     """
     if formatter is not None:
         _handler.setFormatter(formatter)

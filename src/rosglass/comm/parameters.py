@@ -1,4 +1,4 @@
-"""Parameters: the settings of this node, and those of other nodes."""
+"""Parameters of this node and of other nodes."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ __all__ = [
     "check_values",
 ]
 
-#: What a parameter can be; None stands for "not set".
+#: The value of a parameter; None if it is not set.
 ParameterValue: TypeAlias = (
     "bool | int | float | str | bytes | list[bool] | list[int] | list[float] | list[str] | None"
 )
@@ -59,7 +59,7 @@ class Range(NamedTuple):
     Attributes:
         low: Smallest value.
         high: Greatest value.
-        step: Distance between allowed values from `low` on; 0 for any. `high` is always allowed.
+        step: Distance between allowed values, from `low` on; 0 for any. `high` is always allowed.
     """
 
     low: float
@@ -69,16 +69,16 @@ class Range(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ParameterDescriptor:
-    """What is known about a parameter besides its value.
+    """The properties of a parameter besides its value.
 
     Attributes:
         name: Its name, e.g. ``camera.exposure``.
         type: Its type.
-        description: For people.
-        constraints: Further rules, for people.
+        description: A description for users.
+        constraints: Further constraints, described for users.
         read_only: Whether it can only be set when it is declared.
         dynamic_typing: Whether its type may change.
-        range: Allowed values of a number, None for all.
+        range: Allowed values of a number; None for all.
     """
 
     name: str = ""
@@ -94,8 +94,8 @@ class SetResult(NamedTuple):
     """Whether a parameter was set.
 
     Attributes:
-        successful: Whether it was.
-        reason: Why not, in the words of the node.
+        successful: Whether it was set.
+        reason: Why not, as the node reports it.
     """
 
     successful: bool
@@ -108,9 +108,9 @@ class ParameterEvent:
 
     Attributes:
         node: Full name of the node.
-        new: Declared just now, with their values.
-        changed: Their new values.
-        deleted: Names.
+        new: Values of the parameters that were declared.
+        changed: New values of the parameters that were changed.
+        deleted: Names of the parameters that were deleted.
     """
 
     node: str
@@ -120,10 +120,10 @@ class ParameterEvent:
 
 
 class Parameters(Handle):
-    """The parameters of this node, which other nodes may read and set; :attr:`Node.parameters`.
+    """The parameters of this node, which other nodes may read and set; see :attr:`Node.parameters`.
 
-    A parameter keeps the type that it is declared with: neither 1 nor "1.0" can become the value
-    of one declared as 1.0. `dynamic_typing` in its descriptor lifts that.
+    A parameter keeps the type it was declared with: one declared as 1.0 can be set to neither 1
+    nor "1.0", unless its descriptor has `dynamic_typing`.
     """
 
     def __contains__(self, name: object) -> bool:
@@ -136,36 +136,36 @@ class Parameters(Handle):
         default: ParameterValue = None,
         descriptor: ParameterDescriptor | None = None,
     ) -> ParameterValue:
-        """Make a parameter known and return its value: an override from the start, or `default`.
+        """Declare a parameter and return its value: the override from the start, or `default`.
 
         Args:
             name: Its name; dots group parameters, as in ``camera.exposure``.
-            default: Its value unless the program was started with another one.
-            descriptor: What else is to be known about it. Its type is the default's; without a
-                default, give the type here, or allow any with `dynamic_typing`.
+            default: Its value, unless the program was started with another one.
+            descriptor: Its other properties. The type is that of `default`; without a default, set
+                it here, or allow any type with `dynamic_typing`.
 
         Raises:
-            ParameterError: It is declared already, or the value breaks the descriptor's rules.
+            ParameterError: It is declared already, or the value violates the descriptor.
         """
 
     @abstractmethod
     def undeclare(self, name: str) -> None:
-        """Forget a parameter; raises ParameterError."""
+        """Remove a parameter; raises ParameterError if it is not declared or read-only."""
 
     @abstractmethod
     def get(self, name: str) -> ParameterValue:
-        """Return its value; raises ParameterError for one that is not declared."""
+        """Return the value of a parameter; raises ParameterError if it is not declared."""
 
     @abstractmethod
     def set(self, values: Mapping[str, ParameterValue]) -> None:
         """Set parameters, all or none; raises ParameterError with the reason.
 
-        An empty list keeps the parameter's type. None forgets a parameter with dynamic typing.
+        An empty list keeps the parameter's type. None removes a parameter with dynamic typing.
         """
 
     @abstractmethod
     def describe(self, name: str) -> ParameterDescriptor:
-        """Return what is known about it; raises ParameterError."""
+        """Return the properties of a parameter; raises ParameterError if it is not declared."""
 
     @abstractmethod
     def names(self) -> list[str]:
@@ -173,20 +173,22 @@ class Parameters(Handle):
 
     @abstractmethod
     def on_set(self, validate: Callable[[Mapping[str, ParameterValue]], str]) -> Handle:
-        """Let `validate` say why values must not be set; an empty string lets them pass.
+        """Validate values before they are set.
 
-        It runs in the thread that sets them, before anything changes; for values that another
-        node sets, that is a thread of the node's own. An exception refuses the values, too.
+        Args:
+            validate: Returns why the values must not be set; an empty string accepts them. An
+                exception refuses them, too. It runs in the thread that sets them, before anything
+                changes; if another node sets them, on a thread of this node's own.
         """
 
     @abstractmethod
     def on_change(
         self, callback: Callable[[ParameterEvent], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` with each change."""
+        """Call `callback` with each change of parameters."""
 
     def load(self, path: str | PathLike[str]) -> None:
-        """Set, all or none, the declared parameters that a file has for this node.
+        """Set declared parameters, all or none, to a file's values for this node.
 
         Raises:
             ParameterError: The file cannot be read, names a parameter that is not declared, or
@@ -195,14 +197,14 @@ class Parameters(Handle):
         raise UnsupportedError(f"{type(self).__name__} has no parameter files")
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the parameters to a file that can be loaded; raises ParameterError."""
+        """Write the parameters to a file for :meth:`load`; raises ParameterError."""
         raise UnsupportedError(f"{type(self).__name__} has no parameter files")
 
 
 class RemoteParameters(Handle):
-    """Another node's parameters, as ROS 1 or ROS 2 lets them be read and set.
+    """The protocol of a :class:`ParameterClient`, of ROS 1 or ROS 2.
 
-    A :class:`ParameterClient` asks it, and has checked what the caller gave.
+    Its arguments have been checked by the client.
 
     Attributes:
         node: Full name of the other node.
@@ -216,25 +218,25 @@ class RemoteParameters(Handle):
     @property
     @abstractmethod
     def ready(self) -> bool:
-        """Whether the parameters can be reached."""
+        """Whether the parameters are available."""
 
     @abstractmethod
     def wait_for_server(self, timeout: float | None = None) -> bool:
-        """Wait until they can be reached; return whether they can."""
+        """Wait until they are available; return whether they are."""
 
     @abstractmethod
     def find(self, prefixes: list[str], depth: int, deadline: Deadline) -> list[str]:
-        """Return the names under one of `prefixes` (all without), up to `depth` levels (0: all)."""
+        """Return the names below one of `prefixes` (none: all), up to `depth` levels (0: all)."""
 
     @abstractmethod
     def values(self, names: list[str] | None, deadline: Deadline) -> dict[str, ParameterValue]:
-        """Return values by name, of all without `names`; None for what has none."""
+        """Return values by name, without `names` of all parameters; None for those not set."""
 
     @abstractmethod
     def descriptors(
         self, names: list[str] | None, deadline: Deadline
     ) -> dict[str, ParameterDescriptor]:
-        """Return what is known by name, of all without `names`."""
+        """Return descriptors by name, without `names` of all parameters."""
 
     @abstractmethod
     def set(self, values: Mapping[str, ParameterValue], deadline: Deadline) -> dict[str, SetResult]:
@@ -248,32 +250,32 @@ class RemoteParameters(Handle):
     def watch(
         self, callback: Callable[[ParameterEvent], None], executor: Executor | None
     ) -> Handle:
-        """Call `callback` with each change, until the handle, or this, is closed."""
+        """Call `callback` with each change, until the handle or this object is closed."""
 
     @abstractmethod
     def load(self, path: str | PathLike[str], deadline: Deadline) -> list[str]:
-        """Set what a file has for the node; return the names; raises ParameterError."""
+        """Set the parameters that a file has for the node; return their names."""
 
     @abstractmethod
     def save(self, path: str | PathLike[str], deadline: Deadline) -> None:
-        """Write a file that can be loaded; raises ParameterError."""
+        """Write the parameters to a file for :meth:`load`; raises ParameterError."""
 
 
 class ParameterClient(Handle):
     """Reads and sets another node's parameters; made by :meth:`Node.create_parameter_client`.
 
-    Every method that asks the node takes `timeout`, seconds in all (None waits for ever), and
-    raises ServiceUnavailableError when the node (or its parameters) cannot be reached,
-    TimeoutError when it does not answer, and NodeClosedError.
+    Methods that call the node take `timeout`, the seconds to wait in all (None for no limit), and
+    raise ServiceUnavailableError if the node or its parameters are not available, TimeoutError if
+    it does not answer, and NodeClosedError.
 
-    In ROS 1, parameters live on the master's parameter server, whether the node runs or not, and
-    so do those in any other namespace, ``/`` included. Groups are namespaces there:
-    ``camera/exposure``. Values may be what only ROS 1 has: namespaces as dicts, lists of several
-    types, dates; None deletes. A master that does not answer within `timeout`, 5 s at most, is a
-    ConnectionLostError.
+    In ROS 1, parameters are on the master's parameter server, whether the node runs or not, and so
+    are those of any other namespace, ``/`` included. Groups are namespaces there:
+    ``camera/exposure``. Values may also be namespaces as dicts, lists of several types, and dates;
+    None deletes. If the master does not answer within `timeout`, 5 s at most, ConnectionLostError
+    is raised.
 
     Args:
-        remote: The other node's parameters.
+        remote: The protocol by which the parameters are reached.
 
     Attributes:
         node: Full name of the other node.
@@ -288,11 +290,11 @@ class ParameterClient(Handle):
 
     @property
     def ready(self) -> bool:
-        """Whether the node is there and serves its parameters; in ROS 1, the master."""
+        """Whether the node, in ROS 1 the master, is available and serves parameters."""
         return not self._closed and self._remote.ready
 
     def wait_for_server(self, timeout: float | None = None) -> bool:
-        """Wait for the node, in ROS 1 for the master; return whether it is there."""
+        """Wait for the node, in ROS 1 for the master; return whether it is available."""
         self._check_open()
         return self._remote.wait_for_server(timeout)
 
@@ -302,8 +304,8 @@ class ParameterClient(Handle):
         """Return the names of its parameters, sorted.
 
         Args:
-            prefixes: Only those under one of these; none for all.
-            depth: Levels below the prefix, 0 for all.
+            prefixes: Only names below one of these; none for all.
+            depth: Levels below the prefix; 0 for all.
             timeout: Seconds to wait.
         """
         deadline = self._deadline(timeout)
@@ -315,9 +317,9 @@ class ParameterClient(Handle):
     def get(
         self, names: Iterable[str] | None = None, *, timeout: float | None = 10.0
     ) -> dict[str, ParameterValue]:
-        """Return the values of parameters, of all without `names`.
+        """Return the values of parameters by name; without `names`, of all.
 
-        Those that are not declared, or have no value, are None.
+        The value is None if a parameter is not declared or not set.
         """
         deadline = self._deadline(timeout)
         return self._remote.values(self._names(names), deadline)
@@ -325,9 +327,9 @@ class ParameterClient(Handle):
     def describe(
         self, names: Iterable[str] | None = None, *, timeout: float | None = 10.0
     ) -> dict[str, ParameterDescriptor]:
-        """Return what is known about parameters, about all without `names`.
+        """Return the properties of parameters by name; without `names`, of all.
 
-        Those that are not declared have the type NOT_SET. ROS 1 knows no more than the type.
+        The type is NOT_SET if a parameter is not declared. ROS 1 has no properties but the type.
         """
         deadline = self._deadline(timeout)
         return self._remote.descriptors(self._names(names), deadline)
@@ -335,13 +337,13 @@ class ParameterClient(Handle):
     def set(
         self, values: Mapping[str, ParameterValue], *, timeout: float | None = 10.0
     ) -> dict[str, SetResult]:
-        """Set parameters one by one; return what the node says to each.
+        """Set parameters one by one; return the node's answer by name.
 
-        The type matters: a node refuses 1 for a parameter that is 1.0. For an empty list, the node
-        is asked for the type first.
+        Types matter: a node refuses 1 for a parameter that is 1.0. For an empty list, the node is
+        asked for the type first.
 
         Raises:
-            ParameterError: A value can be no parameter's; nothing is sent.
+            ParameterError: A value has a type that parameters cannot have; nothing is sent.
         """
         deadline = self._deadline(timeout)
         check_values(values, self.node)
@@ -350,12 +352,12 @@ class ParameterClient(Handle):
     def set_atomically(
         self, values: Mapping[str, ParameterValue], *, timeout: float | None = 10.0
     ) -> SetResult:
-        """Set parameters, all or none; return what the node says.
+        """Set parameters, all or none; return the node's answer.
 
         Types and errors as in :meth:`set`.
 
         Raises:
-            UnsupportedError: There are several, which ROS 1 cannot set at once.
+            UnsupportedError: ROS 1 cannot set several parameters at once.
         """
         deadline = self._deadline(timeout)
         check_values(values, self.node)
@@ -366,30 +368,30 @@ class ParameterClient(Handle):
     ) -> Handle:
         """Call `callback` with each change of the node's parameters.
 
-        In ROS 1 this waits for the values that changes are compared with, and changes in quick
-        succession may be merged.
+        In ROS 1 this waits for the current values, to compare with, and changes in quick succession
+        may be merged.
         """
         self._check_open()
         check_plain(callback, f"{self.node}: watch()")
         return self._remote.watch(callback, executor)
 
     def load(self, path: str | PathLike[str], *, timeout: float | None = 10.0) -> list[str]:
-        """Set, one by one, the parameters that a file has for the node; return their names.
+        """Set parameters, one by one, to a file's values for the node; return their names.
 
-        In ROS 1 as ``rosparam load FILE /node`` does.
+        In ROS 1 like ``rosparam load FILE /node``.
 
         Raises:
-            ParameterError: The file cannot be read or has nothing for the node, or the node
-                refuses a value; the message lists all that it refused.
+            ParameterError: The file cannot be read or has no values for the node, or the node
+                refuses values; the message lists them.
         """
         return self._remote.load(path, self._deadline(timeout))
 
     def save(self, path: str | PathLike[str], *, timeout: float | None = 10.0) -> None:
-        """Write the node's parameters to a file that can be loaded; raises ParameterError."""
+        """Write the node's parameters to a file for :meth:`load`; raises ParameterError."""
         self._remote.save(path, self._deadline(timeout))
 
     def close(self) -> None:
-        """Ask and watch no more; safe to call twice."""
+        """End all calls and callbacks; safe to call twice."""
         self._closed = True
         self._remote.close()
 
@@ -408,8 +410,7 @@ class ParameterClient(Handle):
         for name in wanted:
             if not isinstance(name, str) or not name:
                 raise ParameterError(
-                    f"{self.node}: a parameter's name must be a text that is not empty, "
-                    f"got {name!r}"
+                    f"{self.node}: a parameter's name must be a non-empty string, got {name!r}"
                 )
         return list(dict.fromkeys(wanted))
 
@@ -422,7 +423,7 @@ class ParameterClient(Handle):
 
 
 def check_values(values: object, node: str) -> None:
-    """Raise ParameterError unless `values` gives values by name."""
+    """Raise ParameterError unless `values` maps names to values."""
     if not isinstance(values, Mapping):
         raise ParameterError(
             f"{node}: parameters are set by a dict of names and values, e.g. "

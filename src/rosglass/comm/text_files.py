@@ -1,4 +1,4 @@
-"""Small text files that people write: read whole, written in one go; and YAML from anywhere."""
+"""Parameter files: read whole and replaced atomically; and YAML within limits."""
 
 from __future__ import annotations
 
@@ -12,38 +12,38 @@ from rosglass.errors import ParameterError
 
 __all__ = ["check_yaml", "explain_yaml_error", "load_yaml", "read_text", "write_text"]
 
-#: Values that YAML may stand for, aliases written out: ``&a [*b, *b]`` makes small texts large.
-_MOST_VALUES = 1_000_000
-#: Levels that it may have; libyaml's and PyYAML's loaders recurse.
-_DEEPEST = 100
+#: Most values of a YAML text, with aliases expanded: ``&a [*b, *b]`` makes small texts large.
+_MAX_VALUES = 1_000_000
+#: Most levels of nesting; the loaders of libyaml and PyYAML recurse.
+_MAX_DEPTH = 100
 
 
 def load_yaml(text: str, loader: Any = None) -> list[Any]:
-    """Return the documents of a YAML text, whose aliases may stand for a million values at most.
+    """Return the documents of a YAML text of at most a million values, with aliases expanded.
 
     Args:
         text: The text.
-        loader: A class of loaders; PyYAML's safe one by default.
+        loader: The loader class; None for PyYAML's SafeLoader.
 
     Raises:
-        yaml.YAMLError: It is no YAML, or stands for too much.
+        yaml.YAMLError: The text is not valid YAML, or exceeds the limits.
     """
-    import yaml  # noqa: PLC0415 - few programs read any
+    import yaml  # noqa: PLC0415 - few programs need it
 
     check_yaml(text)
     try:
         return list(yaml.load_all(text, Loader=loader or yaml.SafeLoader))
     except yaml.YAMLError:
         raise
-    except Exception as error:  # dates and numbers that there are not, tags that do not fit
+    except Exception as error:  # invalid dates, numbers and tags
         raise yaml.YAMLError(f"{type(error).__name__}: {error}") from error
 
 
 def check_yaml(text: str) -> None:
-    """Raise yaml.YAMLError if what a text stands for is too large or too deep to be loaded."""
+    """Raise yaml.YAMLError if a text is too large to be loaded, or too deep."""
     import yaml  # noqa: PLC0415
 
-    #: Anchor and number of values of each list and mapping that is open; the text's first.
+    #: Anchor and number of values of each open list and mapping; the text itself is the first.
     open_ = [("", 0)]
     sizes: dict[str, int] = {}
     events = yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
@@ -51,12 +51,12 @@ def check_yaml(text: str) -> None:
         try:
             event = next(events)
         except (StopIteration, yaml.YAMLError):
-            return  # what is no YAML at all is the loader's to say
+            return  # the loader reports invalid YAML
         anchor, size = getattr(event, "anchor", None) or "", 1
         if isinstance(event, yaml.CollectionStartEvent):
             open_.append((anchor, 1))
-            sizes.pop(anchor, None)  # it stands for nothing before its end
-            problem = f"more than {_DEEPEST} levels" if len(open_) > _DEEPEST + 1 else ""
+            sizes.pop(anchor, None)  # undefined before its end
+            problem = f"more than {_MAX_DEPTH} levels" if len(open_) > _MAX_DEPTH + 1 else ""
             size = 0
         elif isinstance(event, yaml.CollectionEndEvent):
             anchor, size = open_.pop()
@@ -64,26 +64,26 @@ def check_yaml(text: str) -> None:
         elif isinstance(event, (yaml.ScalarEvent, yaml.AliasEvent)):
             size = sizes.get(anchor, 1) if isinstance(event, yaml.AliasEvent) else 1
             inside = isinstance(event, yaml.AliasEvent) and anchor in dict(open_)
-            problem = f"*{anchor} is recursive: it stands for what it is in" if inside else ""
+            problem = f"*{anchor} is recursive: it contains itself" if inside else ""
         else:
             continue
         if size:
             sizes[anchor] = size
             open_[-1] = open_[-1][0], open_[-1][1] + size
-        if open_[-1][1] > _MOST_VALUES:
-            problem = f"it stands for more than {_MOST_VALUES} values"
+        if open_[-1][1] > _MAX_VALUES:
+            problem = f"it has more than {_MAX_VALUES} values"
         if problem:
             mark: Any = event.start_mark
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=mark)
 
 
 def explain_yaml_error(error: Exception, label: str, fault: str) -> str:
-    """Return where a text is wrong, and why.
+    """Return the error message for an invalid text.
 
     Args:
         error: A yaml.YAMLError.
-        label: Where the text came from.
-        fault: What it is, or is not, e.g. ``not YAML``.
+        label: The text's origin, e.g. its file.
+        fault: What is wrong, e.g. ``not YAML``.
     """
     mark = getattr(error, "problem_mark", None)
     where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
@@ -92,14 +92,14 @@ def explain_yaml_error(error: Exception, label: str, fault: str) -> str:
 
 
 def read_text(path: str | os.PathLike[str], most: int) -> tuple[str, str]:
-    """Return a parameter file's text, and its path for messages.
+    """Return a parameter file's text, and its path for error messages.
 
     Args:
         path: The file.
-        most: Bytes that it may have.
+        most: Its largest size in bytes.
 
     Raises:
-        ParameterError: It cannot be read, is too large, or is no UTF-8.
+        ParameterError: It cannot be read, is too large, or is not UTF-8.
     """
     label = _checked(path)
     try:
@@ -114,10 +114,10 @@ def read_text(path: str | os.PathLike[str], most: int) -> tuple[str, str]:
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write a file such that others see the old one or the new one, never a part.
+    """Replace a file atomically: readers see the old text or the new one, never a part.
 
     Raises:
-        ParameterError: That is not possible.
+        ParameterError: The file cannot be written.
     """
     target = Path(_checked(path))
     try:
@@ -138,7 +138,7 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 
 
 def _checked(path: str | os.PathLike[str]) -> str:
-    """Return a path that the system can be asked for."""
+    """Return a path as a string; raises ParameterError if it is not valid."""
     name = os.fspath(path) if isinstance(path, (str, os.PathLike)) else None
     if not isinstance(name, str):
         raise ParameterError(f"a parameter file is given by its path, got {path!r:.200}")
@@ -147,5 +147,5 @@ def _checked(path: str | os.PathLike[str]) -> str:
     except UnicodeEncodeError:
         impossible = True
     if impossible or not name:
-        raise ParameterError(f"{name!r:.200} is no path of a file")
+        raise ParameterError(f"{name!r:.200} is not a valid path")
     return name

@@ -70,7 +70,7 @@ class ParameterNamespace:
         """Return the absolute name of a parameter; raises ParameterError."""
         if not isinstance(name, str) or not name:
             raise ParameterError(
-                f"{self.name}: a parameter's name must be a text that is not empty, got {name!r}"
+                f"{self.name}: a parameter's name must be a non-empty string, got {name!r}"
             )
         if name[0] in "/~":
             raise ParameterError(

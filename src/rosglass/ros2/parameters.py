@@ -520,7 +520,7 @@ def _below(name: str, prefix: str, depth: int) -> bool:
 def check_name(name: object) -> str:
     """Return `name` if a parameter can have it; raises ParameterError."""
     if not isinstance(name, str) or not name:
-        raise ParameterError(f"a parameter's name must be a text that is not empty, got {name!r}")
+        raise ParameterError(f"a parameter's name must be a non-empty string, got {name!r}")
     _check_text(f"the parameter name {name!r}", name)
     return name
 
