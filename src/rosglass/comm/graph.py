@@ -1,4 +1,4 @@
-"""What can be seen of the other nodes: names, endpoints, connection state."""
+"""The ROS graph: nodes, endpoints, and the state of a node's connection to it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["ConnectionState", "EndpointInfo", "EndpointKind", "Graph", "NodeName
 
 
 class EndpointKind(Enum):
-    """What a node offers or uses at a name."""
+    """The kind of an endpoint."""
 
     PUBLISHER = "publisher"
     SUBSCRIPTION = "subscription"
@@ -52,15 +52,15 @@ class EndpointInfo:
     """A publisher, subscription, service server or service client seen in the graph.
 
     Attributes:
-        kind: What it is.
+        kind: Its kind.
         name: Topic or service name, absolute.
         type: Type name, ``pkg/msg/Type``.
         node: The node it belongs to.
-        qos: Its quality of service as announced.
-        type_hash: RIHS01 hash (REP 2016) or md5 (ROS 1); empty when not announced. Over DDS, ROS 2
-            nodes announce a service by the hash of its request, and
-        response_hash: that of its response; empty when it is not announced apart.
-        gid: Identity of the endpoint, as bytes; empty when the world has none.
+        qos: Its announced quality of service.
+        type_hash: RIHS01 hash (REP 2016) or md5 sum (ROS 1); empty if not announced. Over DDS, a
+            service is announced with the hash of its request.
+        response_hash: The same of a service's response; empty if not announced.
+        gid: Identity of the endpoint; empty if the wire has none.
     """
 
     kind: EndpointKind
@@ -74,7 +74,7 @@ class EndpointInfo:
 
 
 class ConnectionState(Enum):
-    """Whether the world a node lives in can be reached."""
+    """State of a node's connection to the graph."""
 
     CONNECTING = "connecting"
     CONNECTED = "connected"
@@ -84,14 +84,14 @@ class ConnectionState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """A node's connection, as shown to a person.
+    """The status of a node's connection, for users.
 
     Attributes:
         state: The state.
-        detail: One line saying what was tried and what happens next, e.g.
+        detail: One line about what was tried and what happens next, e.g.
             ``no router at tcp/127.0.0.1:7447, retrying every second``.
-        killed: Whether another node asked this one to end, as ``rosnode kill`` does, and has not
-            taken its name.
+        killed: Whether another node requested this one to shut down, as ``rosnode kill`` does;
+            False if a new node has taken its name.
     """
 
     state: ConnectionState
@@ -107,16 +107,16 @@ _SERVICES = (EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT)
 
 
 class GraphView(Protocol):
-    """What a node shows of the ROS graph, whoever keeps it."""
+    """The read-only interface of a graph."""
 
     def topics(self) -> dict[str, list[str]]:
-        """Return every topic with the types announced for it."""
+        """Return all topics with their announced types."""
 
     def nodes(self) -> list[NodeName]:
-        """Return every node, sorted."""
+        """Return all nodes, sorted."""
 
     def invalid_names(self) -> list[str]:
-        """Return what is left out; see :meth:`rosglass.comm.Node.invalid_names`."""
+        """Return invalid names; see :meth:`rosglass.comm.Node.invalid_names`."""
 
     def endpoints(self, kind: EndpointKind, name: str) -> list[EndpointInfo]:
         """Return the endpoints of a kind at a topic or service."""
@@ -129,18 +129,18 @@ class GraphView(Protocol):
 
 
 class Graph:
-    """Nodes and endpoints, each under the key its middleware knows it by.
+    """Nodes and endpoints by the middleware's keys; thread-safe.
 
-    Middlewares put and remove entries from their threads; everyone may read from any thread.
-    What has a name that ROS's rules forbid is left out, for nothing could be done with it, and its
-    name is kept apart; see :meth:`invalid_names`.
+    Entries with names that ROS's rules forbid are left out, as they would be of no use; see
+    :meth:`invalid_names`.
 
     Args:
-        changed: Called after each change, in the thread that made it; must return at once.
+        changed: Called after each change, in the thread that made it; must not block.
     """
 
     def __init__(self, changed: Callable[[], None]) -> None:
         self._changed = changed
+        #: Guards all members below, which belong together.
         self._lock = threading.Lock()
         self._nodes: dict[Hashable, NodeName] = {}
         self._invalid: dict[Hashable, str] = {}
@@ -150,26 +150,26 @@ class Graph:
         self._watchers: dict[str, list[Callable[[EndpointInfo], None]]] = {}
 
     def watch(self, name: str, on_endpoint_removed: Callable[[EndpointInfo], None]) -> None:
-        """Report each endpoint of a topic or service that is removed, however briefly it was there.
+        """Report each endpoint of a topic or service that is removed, however briefly it existed.
 
         Args:
-            name: Of the topic or service.
-            on_endpoint_removed: Called in the thread that removes it; must return at once.
+            name: Name of the topic or service.
+            on_endpoint_removed: Called in the thread that removes it; must not block.
         """
         with self._lock:
             self._watchers.setdefault(name, []).append(on_endpoint_removed)
 
     def unwatch(self, name: str, on_endpoint_removed: Callable[[EndpointInfo], None]) -> None:
-        """Take back what :meth:`watch` was given; safe to call twice."""
+        """Undo :meth:`watch`; safe to call twice."""
         with self._lock:
             left = [one for one in self._watchers.pop(name, ()) if one != on_endpoint_removed]
             if left:
                 self._watchers[name] = left
 
     def put_node(self, key: Hashable, node: NodeName) -> None:
-        """Add the node known as `key`."""
+        """Add a node, or replace the one of the same key."""
         if not is_valid_node(node.full):
-            self._leave_out(key, node.full)
+            self._put_invalid(key, node.full)
             return
         with self._lock:
             known = self._nodes.get(key) == node
@@ -179,16 +179,16 @@ class Graph:
             self._changed()
 
     def put_endpoint(self, key: Hashable, endpoint: EndpointInfo) -> None:
-        """Add the endpoint known as `key`, or replace what was known about it."""
+        """Add an endpoint, or replace the one of the same key."""
         name, kind, node = endpoint.name, endpoint.type, endpoint.node.full
         if not (is_valid_topic(name) and kind.isprintable() and is_valid_node(node)):
-            self._leave_out(key, f"{name} [{kind}] of {node}")
+            self._put_invalid(key, f"{name} [{kind}] of {node}")
             return
         with self._lock:
             self._invalid.pop(key, None)
             known = self._endpoints.get(key)
             if known is not None and (known.name, known.node) != (endpoint.name, endpoint.node):
-                self._forget(key, known)
+                self._remove_endpoint(key, known)
             self._endpoints[key] = endpoint
             self._by_name.setdefault(endpoint.name, {})[key] = endpoint
             self._by_node.setdefault(endpoint.node, {})[key] = endpoint
@@ -196,7 +196,7 @@ class Graph:
             self._changed()
 
     def remove(self, key: Hashable) -> None:
-        """Remove the node or endpoint known as `key`, if there is one."""
+        """Remove the node or endpoint of a key, if there is one."""
         with self._lock:
             endpoint = self._endpoints.get(key)
             watchers = [] if endpoint is None else self._watchers.get(endpoint.name, []).copy()
@@ -214,18 +214,18 @@ class Graph:
         return sorted(names)
 
     def invalid_names(self) -> list[str]:
-        """Return what is left out because ROS's rules forbid its name, sorted."""
+        """Return the names that ROS's rules forbid, sorted."""
         with self._lock:
             return sorted(set(self._invalid.values()))
 
     def duplicate_nodes(self) -> dict[str, int]:
-        """Return the full names that several nodes bear, and how many do."""
+        """Return the full names that several nodes share, with the number of nodes."""
         with self._lock:
             counts = Counter(self._nodes.values())
         return {name.full: count for name, count in sorted(counts.items()) if count > 1}
 
     def topics(self, *, hidden: bool = True) -> dict[str, list[str]]:
-        """Return every topic with the types announced for it, both sorted.
+        """Return all topics with their announced types, both sorted.
 
         Args:
             hidden: Whether to include hidden topics; see :func:`rosglass.comm.names.hidden`.
@@ -233,13 +233,13 @@ class Graph:
         return self._names(_TOPICS, hidden)
 
     def services(self, *, hidden: bool = True) -> dict[str, list[str]]:
-        """Return every service that is offered or called; arguments as for :meth:`topics`."""
+        """Return all services with a server or a client; arguments as for :meth:`topics`."""
         return self._names(_SERVICES, hidden)
 
     def actions(self) -> dict[str, list[str]]:
-        """Return every action with the types announced for it, both sorted.
+        """Return all actions with their announced types, both sorted.
 
-        An action shows by the names of its service ``send_goal`` and its topic ``feedback``.
+        They are derived from the names of their services ``send_goal`` and topics ``feedback``.
         """
         with self._lock:
             hits = [
@@ -270,7 +270,7 @@ class Graph:
         return found
 
     def clear(self) -> None:
-        """Forget everything: what cannot be seen any more must not look alive."""
+        """Remove all entries, so that nothing out of reach looks alive."""
         with self._lock:
             self._nodes.clear()
             self._invalid.clear()
@@ -290,7 +290,7 @@ class Graph:
             ]
         return _sorted(found)
 
-    def _leave_out(self, key: Hashable, name: str) -> None:
+    def _put_invalid(self, key: Hashable, name: str) -> None:
         with self._lock:
             moved = self._remove(key) or self._invalid.get(key) != name
             self._invalid[key] = name
@@ -298,14 +298,14 @@ class Graph:
             self._changed()
 
     def _remove(self, key: Hashable) -> bool:
-        """Remove what is known as `key`; return whether there was anything. The lock is held."""
+        """Remove the entries of a key; return whether there were any. The lock is held."""
         endpoint = self._endpoints.pop(key, None)
         if endpoint is not None:
-            self._forget(key, endpoint)
+            self._remove_endpoint(key, endpoint)
         node, name = self._nodes.pop(key, None), self._invalid.pop(key, None)
         return not (endpoint is None and node is None and name is None)
 
-    def _forget(self, key: Hashable, endpoint: EndpointInfo) -> None:
+    def _remove_endpoint(self, key: Hashable, endpoint: EndpointInfo) -> None:
         named, owned = self._by_name[endpoint.name], self._by_node[endpoint.node]
         del named[key], owned[key]
         if not named:
@@ -315,7 +315,7 @@ class Graph:
 
 
 def _sorted(pairs: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
-    """Return the second items of the pairs under their first ones."""
+    """Return the second items of pairs by their first ones, both sorted."""
     found: dict[str, set[str]] = {}
     for name, type_name in pairs:
         found.setdefault(name, set()).add(type_name)

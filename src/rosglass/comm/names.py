@@ -1,6 +1,6 @@
-"""ROS 2's names: which are valid, what they expand to, and how types are spelled on the wire.
+"""Names of nodes, topics, services and types: ROS 2's rules, expansion, and spelling over DDS.
 
-Also what names of either ROS are compared and made with: :func:`similar`, :func:`anonymous_name`.
+For both ROS versions: :func:`similar` and :func:`anonymous_name`.
 
 Rules: design article "Topic and Service name mapping to DDS" and the behaviour of ``rcl`` and
 ``rmw`` (``rcl_expand_topic_name``, ``rmw_validate_full_topic_name``, ``rmw_validate_node_name``,
@@ -37,7 +37,7 @@ __all__ = [
     "validate_node_name",
 ]
 
-#: Longest topic or service name in characters; DDS allows 255, less the prefix ``rq/`` + ``Reply``.
+#: Longest topic or service name in characters; DDS allows 255 with ``rq/`` and ``Reply``.
 MAX_TOPIC_NAME = 247
 #: Longest node name in characters.
 MAX_NODE_NAME = 255
@@ -52,7 +52,7 @@ _DIGIT_FIRST = re.compile(r"(?:^|/)([0-9])")
 _SUBSTITUTION = re.compile(r"\{([^{}]*)\}")
 _DDS_TYPE = re.compile(r"([A-Za-z]\w*)::(\w+)::dds_::(\w+)_\Z")
 _ACTION_PARTS = {"/_action/send_goal": "_SendGoal", "/_action/feedback": "_FeedbackMessage"}
-#: What a DDS topic of ROS 2 begins and ends with.
+#: Prefixes and suffixes of ROS 2's DDS topics.
 _DDS_TOPICS = {"rt/": "", "rq/": "Request", "rr/": "Reply"}
 _ROS_TYPE = re.compile(r"([A-Za-z]\w*)/(\w+)/(\w+)\Z")
 
@@ -60,7 +60,7 @@ _ROS_TYPE = re.compile(r"([A-Za-z]\w*)/(\w+)/(\w+)\Z")
 def validate_node_name(name: str) -> None:
     """Raise InvalidNameError unless `name` can be a node's base name."""
     if not isinstance(name, str):
-        raise InvalidNameError(f"a node name must be a text, got {name!r}")
+        raise InvalidNameError(f"a node name must be a string, got {name!r}")
     if not name:
         raise InvalidNameError("a node name must not be empty")
     _reject(_FORBIDDEN_IN_NODE, "node name", name, "only letters, digits and '_' are allowed")
@@ -74,7 +74,7 @@ def validate_node_name(name: str) -> None:
 def validate_namespace(namespace: str) -> None:
     """Raise InvalidNameError unless `namespace` is a valid absolute namespace."""
     if not isinstance(namespace, str):
-        raise InvalidNameError(f"a namespace must be a text, got {namespace!r}")
+        raise InvalidNameError(f"a namespace must be a string, got {namespace!r}")
     if not namespace.startswith("/"):
         raise InvalidNameError(
             f"namespace {namespace!r} is not absolute; write {'/' + namespace!r}"
@@ -84,17 +84,17 @@ def validate_namespace(namespace: str) -> None:
 
 
 def is_valid_topic(name: str) -> bool:
-    """Return whether `name` is an absolute topic or service name after ROS 2's rules."""
+    """Return whether `name` is a valid absolute topic or service name in ROS 2."""
     return len(name) <= MAX_TOPIC_NAME and _FULL_NAME.match(name) is not None
 
 
 def is_valid_node(full: str) -> bool:
-    """Return whether a node's full name can be shown: some peers have others than rcl's rules."""
+    """Return whether a node's full name is printable; some peers allow more than rcl does."""
     return full.isprintable() and " " not in full
 
 
 def expand(name: str, node: str, namespace: str) -> str:
-    """Return the absolute topic or service name that `name` means for a node.
+    """Return the absolute topic or service name that `name` stands for in a node.
 
     Relative names get the namespace in front, ``~`` and ``~/rest`` the node's full name;
     ``{node}``, ``{ns}`` and ``{namespace}`` are replaced.
@@ -105,7 +105,7 @@ def expand(name: str, node: str, namespace: str) -> str:
         namespace: The node's absolute namespace.
 
     Raises:
-        InvalidNameError: `name`, or what it expands to, breaks the rules; the message says where.
+        InvalidNameError: `name` or its expansion is invalid; the message gives the position.
     """
     what = "topic or service name"
     if not isinstance(name, str) or not name:
@@ -135,15 +135,15 @@ def expand(name: str, node: str, namespace: str) -> str:
 def hidden(name: str) -> bool:
     """Return whether a topic, service or node is hidden: a part of its name begins with ``_``.
 
-    Listings for people leave such names out; an action's topics and services are among them.
+    Listings omit such names, those of an action's topics and services included.
     """
     return "/_" in f"/{name}"
 
 
 def action_of(name: str, type_name: str) -> tuple[str, str] | None:
-    """Return name and type of the action that a topic or service shows; None when it shows none.
+    """Return name and type of the action that a topic or service belongs to; None if unknown.
 
-    Only ``<action>/_action/send_goal`` and ``<action>/_action/feedback`` tell the action's type.
+    Only ``<action>/_action/send_goal`` and ``<action>/_action/feedback`` show the action's type.
     """
     for ending, suffix in _ACTION_PARTS.items():
         if name.endswith(ending) and type_name.endswith(suffix):
@@ -152,7 +152,7 @@ def action_of(name: str, type_name: str) -> tuple[str, str] | None:
 
 
 def mangle_type(type_name: str) -> str:
-    """Return the wire's spelling of a type: ``pkg/msg/T`` becomes ``pkg::msg::dds_::T_``."""
+    """Return the spelling of a type over DDS: ``pkg/msg/T`` becomes ``pkg::msg::dds_::T_``."""
     match = _ROS_TYPE.match(type_name)
     if match is None:
         raise InvalidNameError(
@@ -168,10 +168,9 @@ def demangle_type(dds_type: str) -> str:
 
 
 def demangle_topic(dds_topic: str) -> tuple[str, str] | None:
-    """Return what a DDS topic carries: ``rt`` and a topic, or ``rq`` or ``rr`` and a service.
+    """Return the prefix of a DDS topic, and the ROS topic or service; None if it is not ROS 2's.
 
-    ``rt`` is a topic's messages, ``rq`` a service's requests, ``rr`` its replies; None is no topic
-    of ROS 2.
+    ``rt`` carries a topic's messages, ``rq`` a service's requests, ``rr`` its replies.
     """
     ending = _DDS_TOPICS.get(dds_topic[:3])
     name = dds_topic[2:]
@@ -229,23 +228,22 @@ _numbers = itertools.count(1)
 
 
 def anonymous_name(name: str) -> str:
-    """Return a node name that begins with `name` and that nobody else has.
+    """Return a unique node name that begins with `name`.
 
-    In ROS 1 a second node of a name ends the first one, and process numbers alone are no
-    distinction: programs in containers often have the same.
-
-    Made as rospy and roscpp do: host, process and time in milliseconds are appended.
+    As in rospy and roscpp, host, process and time in milliseconds are appended. Process numbers
+    alone are not unique: programs in containers often have the same. In ROS 1 a second node of a
+    name ends the first one.
     """
     import socket  # noqa: PLC0415 - only needed to connect
 
     host = re.sub(r"[^A-Za-z0-9_]", "_", socket.gethostname())
-    # Two underscores in a row are no name in ROS 2.
+    # ROS 2 forbids two underscores in a row.
     text = f"{name}_{host}_{os.getpid()}_{int(time.time() * 1000)}_{next(_numbers)}"
     return re.sub("__+", "_", text)
 
 
 def similar(name: str, known: Iterable[str]) -> str:
-    """Return a hint at a known name that `name` may stand for, empty when there is none."""
+    """Return a hint at known names that are similar to `name`; empty if there are none."""
     import difflib  # noqa: PLC0415 - only needed to explain an error
 
     names = [other for other in known if other != name]
@@ -258,5 +256,5 @@ def similar(name: str, known: Iterable[str]) -> str:
 
 
 def _plain(name: str) -> str:
-    """Return a name without what languages spell differently: frameId and frame_id."""
+    """Return a name without differences of spelling, as between frameId and frame_id."""
     return name.replace("_", "").lower()

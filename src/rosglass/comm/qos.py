@@ -1,4 +1,4 @@
-"""Quality of service: what a publisher offers and a subscription requests.
+"""Quality of service (QoS): profiles that publishers offer and subscriptions request.
 
 Policies and presets follow ROS 2's (design article "ROS 2 Quality of Service policies", rmw's
 ``types.h`` and ``qos_profiles.h``). ROS 1: transient local is latching, depth is the queue size.
@@ -18,51 +18,51 @@ if TYPE_CHECKING:
 
 __all__ = ["BEST_AVAILABLE", "Durability", "History", "Liveliness", "QoS", "Reliability"]
 
-#: What rmw's profile can carry (a signed 32-bit integer in every middleware).
+#: Limit of rmw's profile (a signed 32-bit integer in every middleware).
 _MAX_DEPTH = 2**31 - 1
 #: A deadline or lease duration as strict as all peers allow (rmw's ``..._BEST_AVAILABLE``).
 BEST_AVAILABLE = Duration(2**63 - 2)
 
 
 class Reliability(Enum):
-    """Whether samples may get lost on the way."""
+    """Whether lost samples are sent again."""
 
     RELIABLE = "reliable"
     BEST_EFFORT = "best_effort"
-    #: What the middleware would do by itself; reliable everywhere in rosglass.
+    #: The middleware's default; reliable everywhere in rosglass.
     SYSTEM_DEFAULT = "system_default"
-    #: Reliable if that matches everybody on the topic.
+    #: Reliable if that matches all endpoints on the topic.
     BEST_AVAILABLE = "best_available"
 
 
 class Durability(Enum):
-    """Whether late subscriptions get earlier samples."""
+    """Whether late subscriptions receive earlier samples."""
 
     VOLATILE = "volatile"
     TRANSIENT_LOCAL = "transient_local"
-    #: What the middleware would do by itself; volatile everywhere in rosglass.
+    #: The middleware's default; volatile everywhere in rosglass.
     SYSTEM_DEFAULT = "system_default"
-    #: Transient local if that matches everybody on the topic.
+    #: Transient local if that matches all endpoints on the topic.
     BEST_AVAILABLE = "best_available"
 
 
 class History(Enum):
-    """Which samples are kept while nobody has taken them."""
+    """Which samples are kept until they are taken."""
 
     KEEP_LAST = "keep_last"
     KEEP_ALL = "keep_all"
-    #: What the middleware would do by itself; keep last everywhere in rosglass.
+    #: The middleware's default; keep last everywhere in rosglass.
     SYSTEM_DEFAULT = "system_default"
 
 
 class Liveliness(Enum):
-    """How a publisher shows that it is alive."""
+    """How a publisher asserts that it is alive."""
 
     AUTOMATIC = "automatic"
     MANUAL_BY_TOPIC = "manual_by_topic"
-    #: What the middleware would do by itself; automatic everywhere in rosglass.
+    #: The middleware's default; automatic everywhere in rosglass.
     SYSTEM_DEFAULT = "system_default"
-    #: Manual by topic if everybody on the topic does that, or asks for it.
+    #: Manual by topic if all publishers of the topic offer it, or a subscription requests it.
     BEST_AVAILABLE = "best_available"
 
 
@@ -75,15 +75,15 @@ class QoS:
         reliability: Reliable or best effort.
         durability: Volatile or transient local (ROS 1: latched).
         history: Keep last or keep all.
-        deadline: Longest time between two samples, None for no limit.
-        lifespan: Age at which a sample is worthless, None for no limit.
+        deadline: Longest time between two samples; None for no limit.
+        lifespan: Age at which a sample expires; None for no limit.
         liveliness: How a publisher's liveliness is asserted.
-        lease_duration: Time without assertion after which it counts as dead, None for no limit.
+        lease_duration: Time without assertion after which liveliness is lost; None for no limit.
 
     The constant :data:`BEST_AVAILABLE` may stand for a deadline or a lease duration.
 
     Raises:
-        ArgumentError: A policy has a value that it cannot have.
+        ArgumentError: A policy has an invalid value.
     """
 
     depth: int = 10
@@ -174,7 +174,7 @@ class QoS:
 
     @classmethod
     def system_default(cls) -> QoS:
-        """Whatever the middleware does by itself: reliable, volatile, the newest 10."""
+        """The middleware's defaults: reliable, volatile, the newest 10."""
         return cls(
             reliability=Reliability.SYSTEM_DEFAULT,
             durability=Durability.SYSTEM_DEFAULT,
@@ -184,7 +184,7 @@ class QoS:
 
     @classmethod
     def best_available(cls, depth: int = 10) -> QoS:
-        """The strongest that matches everybody on the topic: for tools that look at any topic."""
+        """The strongest profile that matches all endpoints on the topic: for generic tools."""
         return cls(
             depth=depth,
             reliability=Reliability.BEST_AVAILABLE,
@@ -196,10 +196,10 @@ class QoS:
 
     @classmethod
     def preset(cls, name: str) -> QoS:
-        """Return the preset that is called `name`, e.g. ``sensor_data``.
+        """Return the preset of a name, e.g. ``sensor_data``.
 
         Raises:
-            ArgumentError: There is none of that name; the message lists them.
+            ArgumentError: There is no preset of that name; the message lists them.
         """
         if not isinstance(name, str) or name not in _PRESETS:
             raise ArgumentError("name", name, f"one of {', '.join(_PRESETS)}", "QoS.preset()")
@@ -211,7 +211,7 @@ class QoS:
 
     @property
     def is_decided(self) -> bool:
-        """Whether no policy is left to the middleware or to what is available."""
+        """Whether no policy is a middleware default or best available."""
         return (
             self.reliability in (Reliability.RELIABLE, Reliability.BEST_EFFORT)
             and self.durability in (Durability.VOLATILE, Durability.TRANSIENT_LOCAL)
@@ -221,11 +221,11 @@ class QoS:
         )
 
     def for_subscription(self, offered: Collection[QoS] = ()) -> QoS:
-        """Return this profile with nothing left open, for a subscription.
+        """Return this profile with all policies decided, for a subscription.
 
         Args:
-            offered: Profiles of the topic's publishers. What is best available becomes the
-                strongest that all of them match; without any, reliable and transient local.
+            offered: Profiles of the topic's publishers. Best-available policies become the
+                strongest that match all of them; without any, reliable and transient local.
         """
         if self.is_decided:
             return self
@@ -237,17 +237,17 @@ class QoS:
             ),
             manual=bool(offered)
             and all(o.liveliness is Liveliness.MANUAL_BY_TOPIC for o in offered),
-            # A publisher without limit matches none.
+            # A publisher without a limit matches no limit.
             deadline=_limit([o.deadline for o in offered], max, weakest=True),
             lease_duration=_limit([o.lease_duration for o in offered], max, weakest=True),
         )
 
     def for_publisher(self, requested: Collection[QoS] = ()) -> QoS:
-        """Return this profile with nothing left open, for a publisher.
+        """Return this profile with all policies decided, for a publisher.
 
         Args:
-            requested: Profiles of the topic's subscriptions. What is best available becomes what
-                all of them match: reliable and transient local always do.
+            requested: Profiles of the topic's subscriptions. Best-available policies become the
+                weakest that match all of them; reliable and transient local always do.
         """
         if self.is_decided:
             return self
@@ -267,7 +267,7 @@ class QoS:
         deadline: Duration | None,
         lease_duration: Duration | None,
     ) -> QoS:
-        """Fill in the system's defaults, and for what is best available the values given."""
+        """Replace default policies, and best-available ones by the given values."""
         reliability, durability = self.reliability, self.durability
         history, liveliness = self.history, self.liveliness
         if reliability is Reliability.BEST_AVAILABLE:
@@ -297,12 +297,12 @@ class QoS:
         )
 
     def conflicts(self, offered: QoS) -> dict[str, str]:
-        """Say why a subscription asking for this profile cannot match a publisher's `offered` one.
+        """Return why a subscription with this profile does not match a publisher's `offered` one.
 
         Returns:
-            The conflict in words for each policy that does not match, e.g. ``{"reliability":
-            "reliable requested, best effort offered"}``; empty when the two match. The rules are
-            DDS's request/offer rules (OMG DDS 1.4, section 2.2.3).
+            The conflict in words by policy, e.g. ``{"reliability": "reliable requested, best effort
+            offered"}``; empty if the two match. The rules are DDS's request/offer rules (OMG DDS
+            1.4, section 2.2.3).
         """
         offered = offered.for_publisher((self,))
         ours = self.for_subscription((offered,))
@@ -317,20 +317,20 @@ class QoS:
             Durability.VOLATILE,
         ):
             found["durability"] = "transient local requested, volatile offered"
-        if told := _too_long(ours.deadline, offered.deadline):
-            found["deadline"] = told
+        if conflict := _too_long(ours.deadline, offered.deadline):
+            found["deadline"] = conflict
         if (ours.liveliness, offered.liveliness) == (
             Liveliness.MANUAL_BY_TOPIC,
             Liveliness.AUTOMATIC,
         ):
             found["liveliness"] = "manual by topic requested, automatic offered"
-        if told := _too_long(ours.lease_duration, offered.lease_duration):
-            found["lease duration"] = told
+        if conflict := _too_long(ours.lease_duration, offered.lease_duration):
+            found["lease duration"] = conflict
         return found
 
     def incompatibility(self, offered: QoS) -> str:
-        """Return :meth:`conflicts` as one line; empty when the two profiles match."""
-        return "; ".join(f"{policy}: {told}" for policy, told in self.conflicts(offered).items())
+        """Return :meth:`conflicts` as one line; empty if the two profiles match."""
+        return "; ".join(f"{policy}: {text}" for policy, text in self.conflicts(offered).items())
 
 
 _PRESETS: dict[str, Callable[[], QoS]] = {
@@ -349,7 +349,7 @@ _PRESETS: dict[str, Callable[[], QoS]] = {
 
 
 def check_profile(qos: QoS | int, place: str) -> QoS:
-    """Return the profile that a user gave, or the usual one with the depth that he gave.
+    """Return the profile for a `qos` argument, which may be the depth of a default profile.
 
     Raises:
         ArgumentError: It is neither; the message names the place, such as a topic.
@@ -367,7 +367,7 @@ def _limit(
     choose: Callable[[list[Duration]], Duration],
     weakest: bool = False,
 ) -> Duration | None:
-    """Choose among the limits that are given; with `weakest`, who gives none wins."""
+    """Choose one of the limits; None if there are none, or with `weakest`, if one is missing."""
     given = [limit for limit in limits if limit is not None and limit != BEST_AVAILABLE]
     if not given or (weakest and len(given) < len(limits)):
         return None
@@ -377,5 +377,5 @@ def _limit(
 def _too_long(requested: Duration | None, offered: Duration | None) -> str:
     if requested is None or (offered is not None and offered <= requested):
         return ""
-    told = "none" if offered is None else f"{offered.seconds} s"
-    return f"{requested.seconds} s requested, {told} offered"
+    limit = "none" if offered is None else f"{offered.seconds} s"
+    return f"{requested.seconds} s requested, {limit} offered"

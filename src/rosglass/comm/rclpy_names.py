@@ -1,4 +1,4 @@
-"""What users of rclpy and rospy write, and what it is here: for errors that say so."""
+"""Names in rclpy and rospy, and their counterparts here, for hints in errors."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _PARAMETERS = {
     "add_on_set_parameters_callback": "node.parameters.on_set(callback)",
     "add_post_set_parameters_callback": "node.parameters.on_change(callback)",
 }
-#: Class -> member of rclpy's or rospy's class -> what to use instead.
+#: Class -> member of rclpy's or rospy's class -> its replacement.
 MEMBERS: dict[str, dict[str, str]] = {
     "Node": {
         "create_client": "node.create_service_client(name, type)",
@@ -136,10 +136,10 @@ MEMBERS: dict[str, dict[str, str]] = {
         "is_enabled_for": "isEnabledFor(level)",
     },
 }
-_CONNECT = "rosglass.connect(url, name='panel') makes the node, and nothing else is set up"
+_CONNECT = "rosglass.connect(url, name='panel') creates the node; no other setup is needed"
 _LOG = "node.logger, as in node.logger.info('docked')"
 _OWN_PARAMETERS = "node.parameters, or in ROS 1 node.parameter_server"
-#: Function or class of the modules rclpy and rospy -> what to use instead.
+#: Function or class of the modules rclpy and rospy -> its replacement.
 FUNCTIONS = {
     "init": _CONNECT,
     "init_node": _CONNECT,
@@ -178,10 +178,9 @@ FUNCTIONS = {
 
 
 class _Missing:
-    """A member that only rclpy's or rospy's class has.
+    """A member that only rclpy's or rospy's class has; raises AttributeError with a hint.
 
-    A class's ``__getattr__`` could say the same, but makes all attributes of its objects slow:
-    19 ns instead of 4.
+    A class's ``__getattr__`` would do, too, but slows down all attributes: 19 ns instead of 4.
     """
 
     def __init__(self, error: str) -> None:
@@ -195,7 +194,7 @@ class _Missing:
 
 
 def hint_at_members(kind: type[_T]) -> type[_T]:
-    """Let errors about members that only rclpy's or rospy's class has name what to use instead."""
+    """Add hints about members that only rclpy's or rospy's class has; a class decorator."""
     for name, instead in MEMBERS[kind.__name__].items():
         if not hasattr(kind, name):
             setattr(kind, name, _Missing(f"{kind.__name__} has no {name}: use {instead}"))
@@ -204,23 +203,23 @@ def hint_at_members(kind: type[_T]) -> type[_T]:
 
 
 def _present(self: object) -> list[str]:
-    """Return the members that are there; a class's ``__dir__``."""
+    """Return the members without hints; a class's ``__dir__``."""
     names = object.__dir__(self)
     return [n for n in names if not isinstance(inspect.getattr_static(self, n, None), _Missing)]
 
 
 def hint_at_function(name: str) -> str:
-    """Return what takes the place of a function of the modules rclpy and rospy; empty for none."""
+    """Return the replacement of a function of the modules rclpy and rospy; empty for none."""
     return FUNCTIONS.get(name, "")
 
 
 def check_order(method: str, name: object, type: object) -> None:
-    """Raise an error for a type given before the name, as rclpy has it, or as one of its classes.
+    """Raise an error for rclpy's order of arguments, the type first, or for rclpy's classes.
 
     Args:
-        method: What was called, e.g. ``create_subscription``.
-        name: What was given as the name of a topic, service or action.
-        type: What was given as the type.
+        method: The method that was called, e.g. ``create_subscription``.
+        name: Its argument for the name of a topic, service or action.
+        type: Its argument for the type.
 
     Raises:
         InvalidNameError: The two are swapped.
@@ -233,18 +232,18 @@ def check_order(method: str, name: object, type: object) -> None:
             raise InvalidNameError(f"{method}() takes the name first, then the type: {call}")
     elif inspect.isclass(type):
         raise TypeNotFoundError(
-            f"{method}({name!r}): {type!r} is no type of rosglass; give the type's name, e.g. "
+            f"{method}({name!r}): {type!r} is not a type of rosglass; give the type's name, e.g. "
             f"{method}({name!r}, {_type_name(type, 'std_msgs/msg/String')!r}, ...)"
         )
     elif inspect.isroutine(type):
         raise TypeNotFoundError(
-            f"{method}({name!r}): {type!r} is no type; name the callback where the type is left "
-            f"out: {method}({name!r}, callback=...)"
+            f"{method}({name!r}): {type!r} is not a type; to omit the type, name the callback: "
+            f"{method}({name!r}, callback=...)"
         )
 
 
 def _is_type(text: str, *, strictly: bool = False) -> bool:
-    """Return whether a text can be a type's name; strictly, whether it can hardly be a topic's."""
+    """Return whether a text can be a type's name; strictly, whether it is unlikely a topic's."""
     try:
         base = split_name(text)[2]
     except InvalidNameError:
@@ -253,7 +252,7 @@ def _is_type(text: str, *, strictly: bool = False) -> bool:
 
 
 def _type_name(type: object, otherwise: str = "") -> object:
-    """Return the name of a type, of rclpy's and rospy's classes, too; what is none as it is."""
+    """Return the name of a type, or of rclpy's or rospy's class; other objects unchanged."""
     if isinstance(type, str):
         return type
     ros1, module = getattr(type, "_type", None), getattr(type, "__module__", "")

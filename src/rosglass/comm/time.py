@@ -1,4 +1,4 @@
-"""Points in time and spans of time with nanosecond accuracy."""
+"""Points in time and durations with nanosecond accuracy."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class Duration:
         try:
             return cls(round(seconds * _NS))
         except (TypeError, ValueError, OverflowError):
-            told = "a finite number of seconds"
-            raise ArgumentError("seconds", seconds, told, "Duration.from_seconds()") from None
+            expected = "a finite number of seconds"
+            raise ArgumentError("seconds", seconds, expected, "Duration.from_seconds()") from None
 
     @property
     def seconds(self) -> float:
@@ -86,7 +86,7 @@ class Time:
 
     @classmethod
     def from_parts(cls, sec: int, nanosec: int) -> Time:
-        """Return the time given as ROS messages carry it (seconds, nanoseconds)."""
+        """Return the time of a ROS message's seconds and nanoseconds."""
         return cls(sec * _NS + nanosec)
 
     @property
@@ -139,10 +139,10 @@ class Time:
 
 
 def _from_field(value: object) -> object:
-    """Return the time or duration that a message's field holds; anything else as it is."""
+    """Return the Time or Duration of a message's field; other objects unchanged."""
     if isinstance(value, (Time, Duration)):
         return value
-    from rosglass.messages.message import Stamp  # noqa: PLC0415 - only for those who calculate
+    from rosglass.messages.message import Stamp  # noqa: PLC0415 - numpy
 
     if not isinstance(value, Stamp):
         return value

@@ -1,4 +1,4 @@
-"""Finding the types that a node's topics, services and actions have."""
+"""Looking up the types of topics, services and actions."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Fetcher", "Types"]
 
-#: Seconds that creating something may wait for the robot to send the type.
-_PATIENCE = 2.0
-#: By the ROS: how its types are loaded, and an example of each kind.
+#: How long a create_...() method waits for the robot to send a definition.
+_FETCH_TIMEOUT_S = 2.0
+#: By ROS version: how its types are loaded, and an example of each kind.
 _LOADED = {1: "rosglass.load(..., ros=1)", 2: "rosglass.load()"}
 _EXAMPLES = {
     1: {
@@ -39,7 +39,7 @@ _EXAMPLES = {
 
 
 class Fetcher(Protocol):
-    """Asks the robot for definitions; see :meth:`Types.request` and :meth:`Types.ensure`."""
+    """Requests definitions from the robot; see :meth:`Types.request` and :meth:`Types.ensure`."""
 
     def __call__(
         self,
@@ -48,33 +48,33 @@ class Fetcher(Protocol):
         endpoints: Sequence[EndpointInfo],
         on_done: Callable[[], None],
     ) -> str:
-        """Start asking, unless that goes on already, and return at once."""
+        """Start a request, unless one is in progress; does not wait."""
 
     def knows(self, name: str) -> bool:
-        """Return whether somebody in the graph uses a type, so that asking makes sense."""
+        """Return whether a node in the graph uses a type, and so may send its definition."""
 
     def fetch(
         self, name: str, *, timeout: float | None
     ) -> Promise[MessageType | ServiceType | ActionType]:
-        """Ask for the version of a type that is in the graph."""
+        """Request the version of a type that is used in the graph."""
 
 
 class Types:
-    """Finds types for one node, in its library.
+    """Looks up types for one node, in its library.
 
     Args:
         library: Where definitions come from; None for the shared library.
         url: The node's URL, for messages.
-        ros: The ROS whose types these are.
+        ros: The ROS version of the types.
 
     Attributes:
-        fetcher: Asks the robot; None while nobody can.
+        fetcher: Requests definitions from the robot; None if that is not possible.
     """
 
     def __init__(self, library: Library | None, url: str, ros: int = 2) -> None:
         self._library, self._url, self._ros = library, url, ros
         self.fetcher: Fetcher | None = None
-        #: Each once: those of an action are derived anew for each server and client.
+        #: Definitions in use that are not in `_by_hash` yet, each once.
         self._used: list[InterfaceDefinition] = []
         self._by_hash: dict[str, InterfaceDefinition] = {}
 
@@ -90,20 +90,19 @@ class Types:
 
         Args:
             wanted: Its name, or the type itself.
-            hash: RIHS01 hash, or md5 sum in ROS 1, that a peer announced for it; picks the version
-                that has it.
+            hash: RIHS01 hash, or md5 sum in ROS 1, that a peer announced; selects the version.
 
         Raises:
-            TypeNotFoundError: Nobody has it, or it is not a message.
-            UnsupportedError: It is the other ROS's.
-            DefinitionConflictError: Nobody's definition has `hash`.
+            TypeNotFoundError: No source has a definition, or it is not a message type.
+            UnsupportedError: It is a type of the other ROS version.
+            DefinitionConflictError: No definition has `hash`.
         """
         from rosglass.messages import MessageType  # noqa: PLC0415 - numpy
 
         return self._find(wanted, MessageType, hash, "message")
 
     def opaque(self, name: str, hash: str, reason: str) -> OpaqueType:
-        """Return what stands for a message type without definition."""
+        """Return a placeholder for a message type without definition."""
         from rosglass.messages import OpaqueType  # noqa: PLC0415 - numpy
 
         return OpaqueType(name, hash, reason, ros=self._ros)
@@ -127,32 +126,31 @@ class Types:
         endpoints: Sequence[EndpointInfo],
         on_done: Callable[[], None],
     ) -> str:
-        """Ask the robot for a definition that the library does not have; returns at once.
+        """Request a definition that the library does not have from the robot; does not wait.
 
-        Meant to be called again, with the same arguments, for as long as it is missing.
+        To be called again, with the same arguments, while the definition is missing.
 
         Args:
             name: Full name of the message, service or action.
-            hash: RIHS01 hash that was announced for it; empty when none was.
-            endpoints: Who uses it, and may be asked.
-            on_done: Called, from any thread, when there is an answer: the library has the
-                definition then, or calling this again says why not.
+            hash: Its announced RIHS01 hash; empty if none was announced.
+            endpoints: The endpoints that use it; their nodes are asked.
+            on_done: Called, from any thread, when there is an answer: then the library has the
+                definition, or another call returns why not.
 
         Returns:
-            Why the definition cannot be had; empty while an answer is awaited.
+            Why the definition is not available; empty while an answer is pending.
         """
         if self.fetcher is None:
             return "the robot cannot be asked for it"
         return self.fetcher(name, hash, endpoints, on_done)
 
     def ensure(self, wanted: object) -> None:
-        """Wait for the robot to send a type that is named and that the library does not have.
+        """Wait for the robot to send a named type that the library does not have.
 
-        For what a user creates: takes 2 s at most, and no time at all unless somebody in the graph
-        uses the type.
+        For create_...() methods: waits up to 2 s, and only if a node in the graph uses the type.
 
         Raises:
-            TypeNotFoundError: Somebody uses it, but nobody sends it; says why.
+            TypeNotFoundError: No node that uses it sends its definition; the message says why.
         """
         if not isinstance(wanted, str) or self.fetcher is None:
             return
@@ -160,12 +158,12 @@ class Types:
             self.library.definition(wanted)
         except TypeNotFoundError:
             if self.fetcher.knows(wanted):
-                self.fetcher.fetch(wanted, timeout=_PATIENCE).result()
+                self.fetcher.fetch(wanted, timeout=_FETCH_TIMEOUT_S).result()
         except Error:
-            pass  # it is known, and what is wrong with it is said by who uses it
+            pass  # it exists; the error is raised when it is used
 
     def in_use(self, hash: str) -> InterfaceDefinition | None:
-        """Return the definition, among those in use here, that is announced by a hash."""
+        """Return the definition, of those in use here, that has an announced hash."""
         found = self._by_hash.get(hash)
         if found is None:
             while True:

@@ -306,7 +306,7 @@ def test_a_goal_may_be_pending_for_longer_than_the_timeout(client, puppet, event
     eventually(lambda: puppet.goals)
     puppet.say(g0="PENDING")
     eventually(lambda: goal.comm_state is CommState.PENDING)
-    with pytest.raises(TimeoutError, match="has not ended, and goes on"):
+    with pytest.raises(TimeoutError, match="has not ended, and continues"):
         goal.result(0.6)
     puppet.end("SUCCEEDED")
     assert goal.result(5).status is GoalStatus.SUCCEEDED

@@ -474,7 +474,7 @@ def test_a_server_that_goes_in_mid_call_ends_it_at_once(client, start_robot):
     ("data", "error", "told"),
     [
         (b"\1\xff\xff\xff\xff", rosglass.ConnectionLostError, "4294967295"),
-        (b"\1\3\0\0\0abc", rosglass.ServiceError, "no rospy_tutorials"),
+        (b"\1\3\0\0\0abc", rosglass.ServiceError, "not a rospy_tutorials"),
         (b"\1\x09\0\0\0" + b"123456789", rosglass.ServiceError, "1 bytes left over"),
         (b"\0\4\0\0\0oops", rosglass.ServiceError, "the call of /add failed: oops"),
         (b"\0\0\0\0\0", rosglass.ServiceError, "does not say why"),
