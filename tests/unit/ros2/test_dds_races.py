@@ -268,7 +268,7 @@ def lost_requests(caplog):
     return [record.getMessage() for record in caplog.records if "are lost" in record.getMessage()]
 
 
-def test_who_looked_first_for_counterparts_has_not_the_last_word():
+def test_who_looked_first_for_counterparts_has_not_the_last_word(server):
     looked, go_on = threading.Event(), threading.Event()
     answers = [[1], [1, 2]]
 
@@ -279,17 +279,20 @@ def test_who_looked_first_for_counterparts_has_not_the_last_word():
             assert go_on.wait(30)
         return found
 
-    matched = Matched(1, handles, lambda _, handle: SimpleNamespace(guid=bytes([handle])))
-    first = threading.Thread(target=matched.refresh)
+    cyclone_dds = b"\x01\x10"
+    matched = server.ends.writers = Matched(
+        1, handles, lambda _, handle: SimpleNamespace(guid=cyclone_dds + bytes([handle]))
+    )
+    first = threading.Thread(target=server.ends.look)
     first.start()
     assert looked.wait(30)
-    second = threading.Thread(target=matched.refresh)
+    second = threading.Thread(target=server.ends.look)
     second.start()
     second.join(0.1)
     go_on.set()
     first.join(5)
     second.join(5)
-    assert set(matched.by_guid) == {b"\1", b"\2"}
+    assert set(matched.by_guid) == {cyclone_dds + b"\1", cyclone_dds + b"\2"}
 
 
 def test_some_who_left_are_remembered(monkeypatch):

@@ -511,7 +511,7 @@ def write_reply(
     _told.identity = False
     begin = _MARK + inline_qos(identity)
     small = sum(map(len, parts)) <= COPIED
-    writer.write((b"".join((begin, *parts)),) if small else (begin, *parts))
+    writer.write_parts((b"".join((begin, *parts)),) if small else (begin, *parts))
     return bool(_told.identity)
 
 

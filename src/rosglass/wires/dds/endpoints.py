@@ -1,4 +1,4 @@
-"""Writers and readers of a DDS participant: the sending and receiving ends of ROS 2's topics."""
+"""Writers and readers of a DDS participant, and those of ROS 2's topics."""
 
 from __future__ import annotations
 
@@ -33,20 +33,20 @@ if TYPE_CHECKING:
 
 __all__ = ["DdsReader", "DdsWriter", "SampleReader", "SampleWriter", "Taken", "topic_name"]
 
-#: Samples that a reader holds at least until they are handed on, so that it is the subscription's
-#: inbox that drops what is too much, where it is counted.
+#: Samples that a reader holds at least until they are delivered: a surplus is to be dropped in the
+#: subscription's inbox, where it is counted.
 _MIN_DEPTH = 128
-#: Samples per second above which a reader would lose some if it were looked at as rarely as others.
-_FAST = 2000
-#: Batches that are taken in a row.
-_MOST = 64
-#: Seconds that a write waits in the library before it comes back to see what has happened.
-_SLICE = 0.1
-#: Seconds that the pump waits for a thread that is handing samples on.
-_SOON = 0.001
-#: Seconds that the first samples of a reader wait for it to be made.
-_PATIENCE = 5.0
-#: Writers that a reader remembers; more come only from a robot that restarts for days.
+#: Samples per second above which a reader is polled more often, as it would lose some.
+_FAST_HZ = 2000
+#: Batches that are taken in a row by :meth:`SampleReader.flush`.
+_MAX_BATCHES = 64
+#: Seconds that a write blocks in the library, between checks for signals and closing.
+_WRITE_SLICE_S = 0.1
+#: Seconds that the pump waits for a thread that is delivering samples.
+_DELIVERY_TIMEOUT_S = 0.001
+#: Seconds that leaving the domain waits for a write in another thread.
+_STOP_TIMEOUT_S = 5.0
+#: Writers that a reader remembers; more appear only when a robot restarts for days.
 _MAX_WRITERS = 1024
 
 
@@ -59,14 +59,14 @@ class SampleWriter:
     """A DDS writer of payloads.
 
     Args:
-        participant: Who it belongs to.
+        participant: The participant it belongs to.
         topic: Its DDS topic.
         dds_type: Its DDS type.
         qos: Its profile.
-        user_data: What everyone sees who discovers it.
-        place: What it is for, in errors.
+        user_data: What it announces with its discovery.
+        place: The topic or service it is for, in errors.
         make_topic: Creates the topic, instead of :func:`cyclone.create_topic`.
-        patience: Seconds that a write may wait for reliable readers, None for ever.
+        timeout_s: Seconds that a write may wait for reliable readers, None for ever.
 
     Attributes:
         entity: Cyclone's number for it.
@@ -85,11 +85,12 @@ class SampleWriter:
         user_data: bytes,
         place: str,
         make_topic: Callable[[int, str, str], int] = cyclone.create_topic,
-        patience: float | None = None,
+        timeout_s: float | None = None,
     ) -> None:
         self._participant, self._place = participant, place
-        self._patience = math.inf if patience is None else patience
-        self._slice = min(self._patience, _SLICE)
+        self._timeout_s = math.inf if timeout_s is None else timeout_s
+        self._slice_s = min(self._timeout_s, _WRITE_SLICE_S)
+        #: Held by a write: the topic must not be deleted before it has ended.
         self._lock = threading.Lock()
         self._closed = False
         with participant.in_use():
@@ -97,7 +98,7 @@ class SampleWriter:
             try:
                 policies = qos_of(qos, writer=True, user_data=user_data)
                 if qos.reliability is Reliability.RELIABLE:
-                    policies.wait_at_most(self._slice)
+                    policies.wait_at_most(self._slice_s)
                 self.entity = cyclone.create_writer(
                     participant.entity, self._topic, policies, place
                 )
@@ -108,12 +109,12 @@ class SampleWriter:
                 raise
             participant.before_leaving(self.entity, self._stop)
 
-    def write(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
-        """Send a payload that comes in one part or several.
+    def write_parts(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
+        """Send a payload in one part or several; they are copied once, by Cyclone DDS.
 
         Raises:
             NodeClosedError: The writer was closed.
-            TimeoutError: A reliable reader took nothing for too long.
+            TimeoutError: A reliable reader did not take it in time.
         """
         with self._lock:
             if self._closed:
@@ -121,13 +122,13 @@ class SampleWriter:
             serdata = sample(self._type, parts, self._place)
             try:
                 if not send(self.entity, serdata, self._place):
-                    self._insist(serdata)
+                    self._retry(serdata)
             finally:
                 discard(serdata)
 
-    def _insist(self, serdata: int) -> None:
-        """Try again and again; in between, signals are handled, such as Ctrl-C."""
-        deadline = time.monotonic() + self._patience - self._slice
+    def _retry(self, serdata: int) -> None:
+        """Repeat a write until its timeout; signals such as Ctrl-C are handled in between."""
+        deadline = time.monotonic() + self._timeout_s - self._slice_s
         while time.monotonic() < deadline:
             if self._closed:
                 raise NodeClosedError(f"{self._place}: the publisher is closed")
@@ -136,9 +137,9 @@ class SampleWriter:
         raise TimeoutError(f"{self._place}: the readers took nothing for too long")
 
     def close(self) -> None:
-        """End it; a write that waits in another thread ends with an error.
+        """Close the writer; a write that waits in another thread ends with an error.
 
-        It is deleted once its readers have what was sent, or do not take it for too long.
+        It is deleted once its readers have everything, or a second later.
         """
         if self._closed:
             return
@@ -149,34 +150,34 @@ class SampleWriter:
             self._participant.lingering.add(self.entity, self._delete)
 
     def _stop(self) -> None:
-        """Let nobody write any more, nor be about to: all goes with the participant."""
+        """Wait for writes in other threads: the writer will be deleted with the participant."""
         self._closed = True
-        # Not for ever: it may be this very thread that was interrupted by a signal.
-        if self._lock.acquire(timeout=_PATIENCE):
+        # With a timeout: this thread may hold the lock itself, interrupted by a signal.
+        if self._lock.acquire(timeout=_STOP_TIMEOUT_S):
             self._lock.release()
 
     def _delete(self) -> None:
         self._participant.before_leaving(self.entity, None)
         cyclone.delete(self.entity)
-        # The topic keeps the type alive that a write in another thread may be using.
+        # A write in another thread may be using the topic's type.
         with self._lock:
             cyclone.delete(self._topic)
 
 
 class SampleReader:
-    """A DDS reader of payloads, which hands them on from the participant's pump.
+    """A DDS reader of payloads, which delivers them on the participant's pump.
 
     Args:
-        participant: Who it belongs to.
+        participant: The participant it belongs to.
         topic: Its DDS topic.
         dds_type: Its DDS type.
-        qos: Its profile; it holds more samples than that says, until they are handed on.
-        user_data: What everyone sees who discovers it.
-        place: What it is for, in errors.
-        on_taken: Takes the samples, some at a time and in order, and must return at once.
+        qos: Its profile; samples beyond its depth are held until they are delivered.
+        user_data: What it announces with its discovery.
+        place: The topic or service it is for, in errors.
+        on_taken: Takes the samples, in batches and in order, and must return at once.
         make_topic: Creates the topic, instead of :func:`cyclone.create_topic`.
-        describe: Returns what to tell besides of the sample in a serdata (its address).
-        on_matched: Called, on the pump's thread, when writers came or went.
+        describe: Returns what `on_taken` gets besides of a sample, by the address of its serdata.
+        on_matched: Called, on the pump's thread, when writers appeared or left.
 
     Attributes:
         entity: Cyclone's number for it.
@@ -204,8 +205,9 @@ class SampleReader:
         self._closed = False
         self._eager = True
         self._lost = self._count = 0
-        self._visited = 0.0
-        self._busy, self._changing = threading.Lock(), threading.RLock()
+        self._polled = 0.0
+        #: Held while samples are taken and delivered, one thread at a time.
+        self._delivering = threading.Lock()
         self._batch = Batch(describe)
         policies = qos_of(qos, writer=False, user_data=user_data)
         if qos.history is History.KEEP_LAST:
@@ -218,78 +220,82 @@ class SampleReader:
                     participant.entity, self._topic, policies, place
                 )
                 self.guid = cyclone.guid(self.entity)
-                events = self._events | Event.DATA_AVAILABLE
-                participant.pump.watch(self.entity, events, self._serve)
             except BaseException:
                 cyclone.delete(self._topic)
                 raise
 
+    def start(self) -> None:
+        """Start to deliver samples."""
+        events = self._events | Event.DATA_AVAILABLE
+        self._participant.pump.watch(self.entity, events, self._serve)
+
     def set_eager(self, eager: bool) -> None:
-        """Say whether samples are handed on as they come, or some thirty times a second."""
-        with self._changing, suppress(NodeClosedError):
-            if eager == self._eager or self._closed:
-                return
-            self._eager = eager
+        """Set whether samples are delivered at once, or some thirty times a second."""
+        if eager == self._eager or self._closed:
+            return
+        self._eager = eager
+        with suppress(NodeClosedError):
             set_events(self.entity, self._events | (Event.DATA_AVAILABLE if eager else Event.NONE))
-            self._participant.pump.visit(self.entity, None if eager else self._visit)
+            self._participant.pump.visit(self.entity, None if eager else self._poll)
 
     def flush(self) -> None:
-        """Hand on what waits, unless another thread is about to."""
-        if self._busy.acquire(blocking=False):
+        """Deliver the waiting samples, unless another thread is delivering."""
+        if self._delivering.acquire(blocking=False):
             more = True
             try:
-                more = self._hand_on(_MOST)
+                more = self._deliver(_MAX_BATCHES)
             finally:
-                self._busy.release()
+                self._delivering.release()
                 if more and self._eager:
                     self._participant.pump.visit(self.entity, None)
 
-    def _visit(self) -> bool:
-        """Hand on what waits; return whether so much comes that it should not wait so long."""
-        before, count = self._visited, self._count
+    def _poll(self) -> bool:
+        """Deliver the waiting samples; return whether there are so many as to poll more often."""
+        if self._closed:
+            self._participant.pump.forget(self.entity)
+        before, count = self._polled, self._count
         self.flush()
-        self._visited = time.monotonic()
-        return self._count - count > _FAST * (self._visited - before)
+        self._polled = time.monotonic()
+        return self._count - count > _FAST_HZ * (self._polled - before)
 
     def lost(self) -> int:
-        """Return how many samples were announced but never came."""
+        """Return how many samples were announced but never received."""
         with suppress(NodeClosedError):
             self._lost = lost_samples(self.entity)
         return self._lost
 
     def alive(self) -> int:
-        """Return how many of the writers it is matched with are alive."""
+        """Return how many of the matched writers assert their liveliness."""
         with suppress(NodeClosedError):
             return alive_writers(self.entity)
         return 0
 
     def close(self) -> None:
-        """Delete it; nothing more is taken."""
-        with self._changing:
-            if self._closed:
-                return
-            self._closed = True
+        """Delete the reader; no sample is delivered afterwards. Safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
         cyclone.delete(self.entity)
         self._participant.pump.forget(self.entity)
         cyclone.delete(self._topic)
 
     def _serve(self) -> bool:
-        busy, count = self._busy, self._count
-        if not (busy.acquire(False) or busy.acquire(True, _SOON)):
+        delivering, count = self._delivering, self._count
+        if not (delivering.acquire(False) or delivering.acquire(True, _DELIVERY_TIMEOUT_S)):
             return True
         try:
-            more = self._hand_on(1)
+            more = self._deliver(1)
         finally:
-            busy.release()
-        # The status calls until it is read, and costs as much as taking a sample.
+            delivering.release()
+        # The status wakes the pump until it is read, which costs as much as taking a sample.
         if self._on_matched is not None and self._count == count:
             with suppress(NodeClosedError):
                 if subscription_matched(self.entity):
                     self._on_matched()
         return more
 
-    def _hand_on(self, batches: int) -> bool:
-        """Hand on so many batches at most; return whether there may be more."""
+    def _deliver(self, batches: int) -> bool:
+        """Deliver at most so many batches; return whether there may be more."""
         for _ in range(batches):
             if self._closed:
                 return False
@@ -305,86 +311,63 @@ class SampleReader:
         return True
 
 
-class DdsWriter(Writer):
-    """The sending end of a publisher."""
+class DdsWriter(SampleWriter, Writer):
+    """The DDS writer of a publisher."""
 
     def __init__(self, participant: Participant, endpoint: EndpointInfo) -> None:
-        self._participant = participant
-        self._place = f"topic {endpoint.name}"
-        self._writer = SampleWriter(
-            participant,
-            topic_name(endpoint.name),
-            mangle_type(endpoint.type),
-            endpoint.qos,
-            format_user_data({"typehash": endpoint.type_hash}),
-            self._place,
-        )
-        self.gid = self._writer.guid
-        participant.add_endpoint(endpoint.node, self.gid, writer=True)
-        participant.add_writer(cyclone.handle(self._writer.entity), self.gid, endpoint.type_hash)
-
-    def write(self, data: bytes | bytearray) -> None:
-        """Send a payload; a reliable writer that keeps all waits for slow readers."""
-        self._writer.write((data,))
-
-    def write_parts(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
-        """Send a payload that comes in parts; they are copied once, by Cyclone DDS."""
-        self._writer.write(parts)
-
-    def assert_liveliness(self) -> None:
-        """Show that the publisher is alive."""
-        cyclone.assert_liveliness(self._writer.entity, self._place)
-
-    def close(self) -> None:
-        """Take it out of the graph and delete it."""
-        self._participant.remove_endpoint(self.gid)
-        self._writer.close()
-
-
-class DdsReader(Reader):
-    """The receiving end of a subscription."""
-
-    def __init__(
-        self, participant: Participant, endpoint: EndpointInfo, on_sample: OnSample
-    ) -> None:
-        self._participant, self._on_sample = participant, on_sample
-        self._writers: dict[int, tuple[bytes, str]] = {}
-        self._made = threading.Event()
-        self._reader = SampleReader(
+        super().__init__(
             participant,
             topic_name(endpoint.name),
             mangle_type(endpoint.type),
             endpoint.qos,
             format_user_data({"typehash": endpoint.type_hash}),
             f"topic {endpoint.name}",
-            self._hand_on,
         )
-        self._made.set()
-        self.gid = self._reader.guid
-        participant.add_endpoint(endpoint.node, self.gid, writer=False)
+        self.gid = self.guid
+        participant.add_endpoint(endpoint.node, self.gid, writer=True)
+        participant.add_writer(cyclone.handle(self.entity), self.gid, endpoint.type_hash)
 
-    def set_eager(self, eager: bool) -> None:
-        """Hand samples on as they come, or now and then."""
-        self._reader.set_eager(eager)
+    def write(self, data: bytes | bytearray) -> None:
+        """Send a payload; a reliable writer that keeps all waits for slow readers."""
+        self.write_parts((data,))
 
-    def flush(self) -> None:
-        """Hand on what waits."""
-        self._reader.flush()
-
-    def lost(self) -> int:
-        """Return how many samples were announced but never came."""
-        return self._reader.lost()
-
-    def alive(self) -> int:
-        """Return how many publishers asserted their liveliness in time."""
-        return self._reader.alive()
+    def assert_liveliness(self) -> None:
+        """Show that the publisher is alive."""
+        cyclone.assert_liveliness(self.entity, self._place)
 
     def close(self) -> None:
-        """Take it out of the graph and delete it."""
+        """Remove the writer from the graph and close it."""
         self._participant.remove_endpoint(self.gid)
-        self._reader.close()
+        super().close()
 
-    def _hand_on(self, taken: list[Taken]) -> None:
+
+class DdsReader(SampleReader, Reader):
+    """The DDS reader of a subscription."""
+
+    def __init__(
+        self, participant: Participant, endpoint: EndpointInfo, on_sample: OnSample
+    ) -> None:
+        self._on_sample = on_sample
+        self._writers: dict[int, tuple[bytes, str]] = {}
+        super().__init__(
+            participant,
+            topic_name(endpoint.name),
+            mangle_type(endpoint.type),
+            endpoint.qos,
+            format_user_data({"typehash": endpoint.type_hash}),
+            f"topic {endpoint.name}",
+            self._on_samples,
+        )
+        self.gid = self.guid
+        participant.add_endpoint(endpoint.node, self.gid, writer=False)
+        self.start()
+
+    def close(self) -> None:
+        """Remove the reader from the graph and delete it."""
+        self._participant.remove_endpoint(self.gid)
+        super().close()
+
+    def _on_samples(self, taken: list[Taken]) -> None:
         received, on_sample, writers = time.time_ns(), self._on_sample, self._writers
         for data, sent, handle, _ in taken:
             writer = writers.get(handle)
@@ -393,12 +376,10 @@ class DdsReader(Reader):
             on_sample(data, received, sent, writer[0], -1, writer[1])
 
     def _identify(self, handle: int) -> tuple[bytes, str]:
-        """Return a writer's identity and type hash; both empty when it is gone already."""
+        """Return a writer's GUID and type hash; both empty if it was deleted before."""
         writer = self._participant.writers.get(handle)
         if writer is None:
-            # What is latched comes before the constructor has returned.
-            self._made.wait(_PATIENCE)
-            found = cyclone.matched_publication(self._reader.entity, handle)
+            found = cyclone.matched_publication(self.entity, handle)
             if found is None:
                 return b"", ""
             writer = found.guid, hash_of(found.user_data)

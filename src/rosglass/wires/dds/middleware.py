@@ -40,21 +40,23 @@ __all__ = ["DdsDiscovery", "DdsMiddleware"]
 
 _log = logging.getLogger("rosglass.ros2")
 _PLACE = f"topic {TOPIC}"
-#: Participants whose rubbish is logged, once each.
-_MAX_STRANGE = 100
+#: Participants whose malformed samples are logged, once each.
+_MAX_LOGGED = 100
 
 
 class DdsDiscovery:
-    """Keeps a graph up to date, on the participant's pump; ends with the participant.
+    """The discovery of a domain: fills a graph and announces the nodes of a participant.
+
+    It runs on the participant's pump, and ends with the participant.
 
     Args:
-        participant: Our participant; its nodes are announced.
+        participant: The participant.
         graph: The graph to fill.
-        humble: Whether to announce them as ROS 2 Humble does; None does as the others do.
-        changed: Called when other participants came or went.
+        humble: Whether to announce its nodes as ROS 2 Humble does; None follows the others.
+        changed: Called when other participants appeared or left.
 
     Attributes:
-        had_peers: Whether there ever were other participants in the domain.
+        had_peers: Whether there have been other participants in the domain.
     """
 
     def __init__(
@@ -65,15 +67,16 @@ class DdsDiscovery:
         changed: Callable[[], None],
     ) -> None:
         self._participant, self._humble, self._changed = participant, humble, changed
+        #: Guards the graph and the nodes: both change on users' threads, too.
         self._lock = threading.Lock()
         self._seen = DdsGraph(graph, participant.guid)
         own = participant.guid
         self._seen.put_participants([Discovered(True, own, 0, own, PARTICIPANT_USER_DATA)])
         self._nodes: tuple[NodeEntities, ...] = ()
-        self._told: ParticipantEntities | None = None
-        self._late = False
+        self._announced: ParticipantEntities | None = None
+        self._scheduled = False
         self.had_peers = False
-        self._strange: set[int] = set()
+        self._logged: set[int] = set()
         self._readers: dict[BuiltinTopic, int] = {}
         self._writer = SampleWriter(participant, TOPIC, TYPE, WRITER_QOS, USER_DATA, _PLACE)
         for topic in BuiltinTopic:
@@ -84,6 +87,7 @@ class DdsDiscovery:
         self._reader = SampleReader(
             participant, TOPIC, TYPE, READER_QOS, USER_DATA, _PLACE, self._on_entities
         )
+        self._reader.start()
         participant.seen = self._seen
         participant.on_nodes = self._on_nodes
         self._on_nodes(participant.nodes())
@@ -95,27 +99,27 @@ class DdsDiscovery:
 
     @property
     def unnamed(self) -> int:
-        """How many other participants have not said which nodes they have."""
+        """How many other participants have not announced their nodes."""
         return self._seen.unnamed
 
     def show(self, endpoint: EndpointInfo) -> None:
-        """Show an endpoint of ours in the graph at once; it goes when its reader or writer does.
+        """Put an endpoint of ours into the graph; it is removed with its reader or writer.
 
-        A service's server or client shows under the GUID of its reader or writer of requests.
+        A service's server or client has the GUID of its reader or writer of requests.
         """
         with self._lock:
             self._seen.put_own(endpoint)
 
     def is_foreign(self, guid: bytes) -> bool:
-        """Return whether a reader or writer knows no encoding of ours."""
+        """Return whether a reader or writer has no encoding in common with ours."""
         return self._seen.is_foreign(guid)
 
     def participant(self, guid: bytes) -> Discovered | None:
-        """Return the participant that a GUID is of, or belongs to; None when it is gone."""
+        """Return the participant that a GUID belongs to; None if it has left."""
         return self._seen.participant(guid)
 
     def _take(self) -> bool:
-        """Take in some news; returns whether there may be more, as samples want their turn, too."""
+        """Take some discovered endpoints; return whether there may be more, after other events."""
         self._take_participants()
         more = False
         for topic in (BuiltinTopic.PUBLICATION, BuiltinTopic.SUBSCRIPTION):
@@ -129,11 +133,11 @@ class DdsDiscovery:
     def _put_endpoint(self, found: Discovered, *, reader: bool) -> None:
         try:
             self._seen.put_endpoint(found, reader=reader)
-        except Exception:  # the others' news must not go with it
-            _log.exception("what DDS tells of endpoint %s is not understood", found.guid.hex())
+        except Exception:  # the others must not be lost with it
+            _log.exception("the discovered DDS endpoint %s is not understood", found.guid.hex())
 
     def _take_participants(self) -> None:
-        """Take them first, always: they are what the others belong to."""
+        """Take participants, always before the endpoints that belong to them."""
         news: list[Discovered] = []
         topic = BuiltinTopic.PARTICIPANT
         while found := take(self._readers[topic], topic, _PLACE):
@@ -143,11 +147,11 @@ class DdsDiscovery:
         with self._lock:
             peers = self._seen.peers
             self._seen.put_participants(news)
-            moved = self._seen.peers != peers
+            changed = self._seen.peers != peers
             self.had_peers = self.had_peers or self._seen.peers > 0
-        if moved:
+        if changed:
             self._changed()
-        self._tell()
+        self._announce()
 
     def _on_entities(self, taken: list[Taken]) -> None:
         # Each sample replaces its participant's earlier ones.
@@ -159,19 +163,17 @@ class DdsDiscovery:
             if not self._put(info):
                 self._take_participants()
                 self._put(info)
-        self._tell()
+        self._announce()
 
     def _decode(self, writer: int, data: bytes | memoryview) -> ParticipantEntities | None:
         try:
             return ParticipantEntities.decode(data)
         except DecodeError as error:
-            if writer not in self._strange and len(self._strange) < _MAX_STRANGE:
-                self._strange.add(writer)
+            if writer not in self._logged and len(self._logged) < _MAX_LOGGED:
+                self._logged.add(writer)
                 found = matched_publication(self._reader.entity, writer)
                 sender = "that left" if found is None else found.participant.hex()
-                _log.warning(
-                    "ignoring what DDS participant %s says of its nodes: %s", sender, error
-                )
+                _log.warning("ignoring the nodes of DDS participant %s: %s", sender, error)
             return None
 
     def _put(self, info: ParticipantEntities) -> bool:
@@ -179,26 +181,26 @@ class DdsDiscovery:
             return self._seen.put_entities(info)
 
     def _on_nodes(self, nodes: tuple[NodeEntities, ...]) -> None:
-        """Tell the others soon: many changes at once are told together."""
+        """Schedule an announcement, so that many changes at once make one."""
         with self._lock:
-            self._nodes, self._late = nodes, True
+            self._nodes, self._scheduled = nodes, True
             self._seen.put_entities(ParticipantEntities(self._participant.guid, nodes))
-            self._participant.pump.visit(self._writer.entity, self._tell)
+            self._participant.pump.visit(self._writer.entity, self._announce)
 
-    def _tell(self) -> None:
-        """Tell the others of our nodes, if there is anything new; on the pump's thread."""
+    def _announce(self) -> None:
+        """Announce our nodes if they have changed; on the pump's thread."""
         with self._lock:
-            if self._late:
-                self._late = False
+            if self._scheduled:
+                self._scheduled = False
                 self._participant.pump.visit(self._writer.entity, None)
             humble = self._seen.humble if self._humble is None else self._humble
             info = ParticipantEntities(self._participant.guid, self._nodes, humble)
-        if info != self._told:
-            self._told = info
+        if info != self._announced:
+            self._announced = info
             try:
-                self._writer.write([info.encode()])
+                self._writer.write_parts([info.encode()])
             except Error as error:
-                _log.warning("cannot tell the others of the nodes here: %s", error)
+                _log.warning("%s: the nodes of this process cannot be announced: %s", _PLACE, error)
 
 
 class DdsMiddleware(Middleware):
@@ -206,14 +208,13 @@ class DdsMiddleware(Middleware):
 
     matches_qos = True
     matches_hashes = False
-    # Cyclone labels every payload as little endian, but knows no types whose bytes to swap.
+    # Cyclone DDS labels every payload as little endian, but does not swap the bytes.
     keeps_byte_order = False
     announces_requests = True
     describes_types = True
 
     def __init__(self, options: DdsOptions) -> None:
         self._options = options
-        self._lock = threading.Lock()
         self._participant: Participant | None = None
         self._discovery: DdsDiscovery | None = None
         self._closed = False
@@ -228,7 +229,7 @@ class DdsMiddleware(Middleware):
         changed()
 
     def status(self) -> Status:
-        """Return whether anyone else is in the domain."""
+        """Return whether other participants are in the domain."""
         where = f"DDS domain {self._options.domain}"
         discovery = self._discovery
         if self._closed:
@@ -241,11 +242,11 @@ class DdsMiddleware(Middleware):
         return Status(ConnectionState.CONNECTING, f"nobody else is in {where}, waiting for them")
 
     def unnamed(self) -> int:
-        """Return how many participants of ROS 2 have not said which nodes they have."""
+        """Return how many participants of ROS 2 have not announced their nodes."""
         return 0 if self._discovery is None else self._discovery.unnamed
 
     def announce(self, node: NodeName) -> Handle:
-        """Show a node in the graph until the handle is closed."""
+        """Announce a node until the handle is closed."""
         return _Announcement(self._joined(), node)
 
     def create_writer(self, endpoint: EndpointInfo) -> Writer:
@@ -261,19 +262,19 @@ class DdsMiddleware(Middleware):
         return reader
 
     def create_requester(self, endpoint: EndpointInfo, on_reply: OnReply) -> Requester:
-        """Create a service client's DDS writer and reader."""
+        """Create the DDS writer and reader of a service client."""
         requester = DdsRequester(self._joined(), self._graph, endpoint, on_reply)
         self._show(endpoint, requester.gid)
         return requester
 
     def create_replier(self, endpoint: EndpointInfo, on_request: OnRequest) -> Replier:
-        """Create a service server's DDS reader and writer."""
+        """Create the DDS reader and writer of a service server."""
         replier = DdsReplier(self._joined(), self._graph, endpoint, on_request)
         self._show(endpoint, replier.gid)
         return replier
 
     def conflicts(self, endpoint: EndpointInfo) -> Mapping[str, str]:
-        """Say so when it is another encoding that an endpoint offers or requests."""
+        """Return the conflict with an endpoint that has no encoding in common with ours."""
         if self._discovery is None or not self._discovery.is_foreign(endpoint.gid):
             return {}
         verb = "offered" if endpoint.kind is EndpointKind.PUBLISHER else "requested"
@@ -281,7 +282,7 @@ class DdsMiddleware(Middleware):
 
     def describe_type(self, endpoint: EndpointInfo, timeout: float) -> Definition | None:
         """Return the definition that an endpoint announces by XTypes."""
-        from rosglass.wires.dds.type_lookup import announced_definition  # noqa: PLC0415 - rarely needed
+        from rosglass.wires.dds.type_lookup import announced_definition  # noqa: PLC0415 - rarely used
 
         provider = f"wire {endpoint.node} (TypeLookup)"
         entity = self._joined().entity
@@ -292,17 +293,15 @@ class DdsMiddleware(Middleware):
 
     def close(self) -> None:
         """Leave the domain with everything created here."""
-        with self._lock:
-            if self._closed:
-                return
-            self._closed = True
-            participant = self._participant
-        if participant is not None:
-            participant.close()
+        if self._closed:
+            return
+        self._closed = True
+        if self._participant is not None:
+            self._participant.close()
         self._changed()
 
     def _show(self, endpoint: EndpointInfo, gid: bytes) -> None:
-        """Show an endpoint of ours in our graph at once; discovery hides it when it is gone."""
+        """Put an endpoint of ours into our graph; discovery removes it."""
         if self._discovery is not None:
             self._discovery.show(replace(endpoint, gid=gid))
 
@@ -321,7 +320,7 @@ class _Announcement(Handle):
         participant.add_node(node)
 
     def close(self) -> None:
-        """Take it out of the graph."""
+        """Remove the node from the graph."""
         if not self._closed:
             self._closed = True
             self._participant.remove_node(self._node)

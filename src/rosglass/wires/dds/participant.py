@@ -1,4 +1,4 @@
-"""One node's place in a DDS domain: its participant, and the one thread that hands things on."""
+"""The DDS participant of a node, and its pump, the thread that handles all its events."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ if TYPE_CHECKING:
 __all__ = ["Participant"]
 
 _log = logging.getLogger("rosglass.ros2")
-#: Time that closing waits for users of the participant, which take milliseconds, and for its pump.
+#: Seconds that closing waits for users of the participant, which take milliseconds, and its pump.
 _CLOSE_TIMEOUT_S = 5.0
-#: Time between two looks at readers that are polled: usually, and when much comes.
+#: Poll interval of the pump in seconds: usually, and with many samples.
 _IDLE_POLL_S, _BUSY_POLL_S = 0.03, 0.005
-#: Time until an act of the pump that failed is repeated.
+#: Seconds until a handler of the pump that raised is repeated.
 _BACKOFF_S = 0.1
-#: Time that readers have to acknowledge what was sent last, as long as Cyclone DDS gives them.
+#: Seconds that readers have to acknowledge the last samples, as many as Cyclone DDS gives them.
 _ACKNOWLEDGE_TIMEOUT_S = 1.0
-#: Time between two looks at lingering writers while a participant is closed.
+#: Poll interval of lingering writers in seconds, while a participant is closed.
 _LINGER_POLL_S = 0.002
 #: Writers that are remembered; older ones are known as long as they are matched.
 _MAX_WRITERS = 1000
-#: What the pump knows the lingering writers by; no entity has that number.
+#: Key of the lingering writers in the pump; no entity has that number.
 _LINGERING = 0
 
 
@@ -45,18 +45,18 @@ class Participant:
     """A DDS participant with its pump and the list of its nodes.
 
     Args:
-        options: Which domain, and how to join it.
+        options: The domain and its configuration.
 
     Attributes:
         entity: Cyclone's number for it.
         guid: Its 16 bytes of identity.
         born: Monotonic time when it joined the domain.
-        pump: Where everything that arrives is handed on.
-        lingering: Where closed writers wait until what they sent has arrived.
-        on_nodes: Called with all nodes whenever they or their endpoints change, never twice at a
-            time; what announces them sets it.
+        pump: Handles the events of its entities.
+        lingering: The closed writers whose samples are not acknowledged yet.
+        on_nodes: Called with all nodes when they or their endpoints change, one call at a time;
+            set by discovery.
         writers: GUIDs and type hashes of the last writers of topics, by their handles.
-        seen: What is seen of the others; what follows them sets it.
+        seen: The graph of the domain; set by discovery.
 
     Raises:
         ConnectionLostError: This machine has no network interface to use, or no free port.
@@ -70,8 +70,8 @@ class Participant:
         self._nodes: dict[NodeName, int] = {}
         self._endpoints: dict[bytes, tuple[NodeName, bool]] = {}
         self.writers: dict[int, tuple[bytes, str]] = {}
-        self._lock = threading.Lock()
-        self._use = threading.Condition()
+        #: Guards all of its state; notified when :meth:`in_use` ends.
+        self._lock = threading.Condition()
         self._users = 0
         self._leaving: dict[int, Callable[[], None]] = {}
         self._closed = False
@@ -89,12 +89,12 @@ class Participant:
             raise
 
     def nodes(self) -> tuple[NodeEntities, ...]:
-        """Return its nodes with the identities of their readers and writers."""
+        """Return its nodes with the GUIDs of their readers and writers."""
         with self._lock:
             return self._entities()
 
     def add_node(self, node: NodeName) -> None:
-        """Add a node; one that is added twice has to be removed twice."""
+        """Add a node; a node that is added twice must be removed twice."""
         with self._lock:
             self._nodes[node] = self._nodes.get(node, 0) + 1
             self._tell()
@@ -128,41 +128,38 @@ class Participant:
 
     @contextmanager
     def in_use(self) -> Iterator[None]:
-        """Keep the participant from being deleted meanwhile.
-
-        What belongs to it goes with it, and with that memory that another thread may be using.
+        """Keep the participant, and memory of its entities, from being deleted.
 
         Raises:
             NodeClosedError: It is being closed.
         """
-        with self._use:
+        with self._lock:
             if self._closed:
                 raise NodeClosedError("the node is closed; connect again")
             self._users += 1
         try:
             yield
         finally:
-            with self._use:
+            with self._lock:
                 self._users -= 1
-                self._use.notify_all()
+                self._lock.notify_all()
 
     def before_leaving(self, entity: int, end: Callable[[], None] | None) -> None:
-        """Have `end` called before what belongs to the participant is deleted; None ends that."""
-        with self._use:
+        """Register what to call before the entities are deleted; None removes it."""
+        with self._lock:
             if end is None:
                 self._leaving.pop(entity, None)
             else:
                 self._leaving[entity] = end
 
     def close(self) -> None:
-        """Leave the domain with all that belongs to it; nothing is handed on afterwards."""
-        with self._lock, self._use:
+        """Delete the participant with its entities; nothing is called back afterwards."""
+        with self._lock:
             if self._closed:
                 return
             self._closed = True
             self.on_nodes = lambda _: None
-        with self._use:
-            self._use.wait_for(lambda: not self._users, _CLOSE_TIMEOUT_S)
+            self._lock.wait_for(lambda: not self._users, _CLOSE_TIMEOUT_S)
         self.pump.close()
         for end in list(self._leaving.values()):
             end()
@@ -185,13 +182,13 @@ class Participant:
 
 
 class Pump:
-    """Waits for a participant's readers and writers, and acts on one after the other.
+    """The thread that waits for events of a participant's entities and calls their handlers.
 
-    A waitset instead of callbacks: those run on the threads that receive, where waiting for the
-    interpreter would let the socket's buffer overflow and hold up every acknowledgement.
+    It uses a waitset instead of Cyclone DDS's listeners: those run on the receiving threads, where
+    waiting for the GIL would let the socket's buffer overflow and delay every acknowledgement.
 
     Args:
-        participant: Whose entities it waits for.
+        participant: The participant.
         name: The thread's name.
     """
 
@@ -206,20 +203,20 @@ class Pump:
         self._thread.start()
 
     def watch(self, entity: int, events: Event, act: Callable[[], bool | None]) -> None:
-        """Call `act`, on the pump's thread, when one of `events` happens to an entity.
+        """Call `act`, on the pump's thread, at each of `events` of an entity.
 
         New data is reported once, and then only after some was taken: `act` returns whether there
-        may be more, and is called again after the others had their turn. A status is reported until
-        it is read. Deleting the entity ends it; :meth:`forget` lets go of `act`.
+        may be more, and is called again after the other handlers. A status is reported until it is
+        read. Deleting the entity ends it; :meth:`forget` releases `act`.
         """
         set_events(entity, events)
         self._acts[entity] = act
         self._waitset.attach(entity, entity)
 
     def visit(self, entity: int, act: Callable[[], object] | None) -> None:
-        """Call `act` some thirty times a second, whatever happens; more often when it says so.
+        """Call `act` some thirty times a second; more often while it returns True.
 
-        None ends that, and lets what :meth:`watch` was given look for data at once.
+        None ends that, and calls the entity's handler once, for data that arrived before.
         """
         if act is None:
             self._idle.pop(entity, None)
@@ -229,7 +226,7 @@ class Pump:
         self._waitset.wake()
 
     def forget(self, entity: int) -> None:
-        """Let go of what was to be done for an entity that was deleted."""
+        """Release the handlers of an entity that was deleted."""
         self._acts.pop(entity, None)
         self._idle.pop(entity, None)
 
@@ -239,7 +236,7 @@ class Pump:
         return threading.current_thread() is self._thread
 
     def close(self) -> None:
-        """End the thread; nothing is done afterwards, except what called this."""
+        """End the thread; no handler is called afterwards, except one that called this."""
         self._closed = True
         if self.current:
             return
@@ -268,51 +265,47 @@ class Pump:
             return None
         try:
             return act()
-        except BaseException:  # whatever a callback raises, the others' messages must go on
+        except BaseException:  # the other handlers must go on, whatever this one raises
             if not self._closed:
                 _log.exception("%s: what arrived cannot be handed on", self._thread.name)
                 time.sleep(_BACKOFF_S)
-            return True  # there may be more, which is not reported again
+            return True  # there may be more data, which is not reported again
 
 
 class Lingering:
-    """Keeps a participant's closed writers until their readers have everything, a second at most.
+    """The closed writers of a participant that linger until their samples are acknowledged.
 
-    Cyclone DDS can do that, too (``WriterLingerDuration``), but holds up who deletes a writer:
-    where a peer was killed, for a second, and one writer after the other. Here all wait together.
+    Cyclone DDS can do that, too (``WriterLingerDuration``), but blocks the thread that deletes a
+    writer: for a second if a peer was killed, and for one writer after the other.
 
     Args:
-        pump: What looks after them, some thirty times a second.
+        pump: Polls them, some thirty times a second.
     """
 
     def __init__(self, pump: Pump) -> None:
         self._pump = pump
-        self._lock = threading.Lock()
+        #: Deadlines and deleters, by writer; added to by any thread.
         self._waiting: dict[int, tuple[float, Callable[[], None]]] = {}
 
     def add(self, writer: int, delete: Callable[[], None]) -> None:
-        """Call `delete` once what a writer sent has arrived, or will not; returns at once."""
-        set_events(writer, Event.NONE)  # no thread reads them any more
-        with self._lock:
-            self._waiting[writer] = time.monotonic() + _ACKNOWLEDGE_TIMEOUT_S, delete
-            self._pump.visit(_LINGERING, self._look)
+        """Call `delete` once a writer's samples are acknowledged, or a second later."""
+        set_events(writer, Event.NONE)  # no thread handles them any more
+        self._waiting[writer] = time.monotonic() + _ACKNOWLEDGE_TIMEOUT_S, delete
+        self._pump.visit(_LINGERING, self._poll)
 
     def close(self) -> None:
         """Wait until all are deleted; for the thread that has closed the pump."""
         while self._waiting:
-            self._look()
+            self._poll()
             time.sleep(_LINGER_POLL_S)
 
-    def _look(self) -> None:
-        """Delete those that are done."""
-        with self._lock:
-            waiting = list(self._waiting.items())
+    def _poll(self) -> None:
         now = time.monotonic()
-        for writer, (deadline, delete) in waiting:
+        for writer, (deadline, delete) in self._waiting.copy().items():
             if now >= deadline or cyclone.acknowledged(writer):
                 delete()
-                with self._lock:
-                    self._waiting.pop(writer, None)
-        with self._lock:
-            if not self._waiting:
-                self._pump.forget(_LINGERING)
+                self._waiting.pop(writer, None)
+        if not self._waiting:
+            self._pump.forget(_LINGERING)
+            if self._waiting:  # another thread has just added one
+                self._pump.visit(_LINGERING, self._poll)

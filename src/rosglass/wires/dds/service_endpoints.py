@@ -78,8 +78,6 @@ _SETTLING = 0.2
 #: or after a time that is long enough. A client that finds a server before the server knows it
 #: loses its first request.
 _ANSWERED, _HEARTBEAT, _QUIET, _PATIENT = 0.1, 1.2, 0.3, 4.0
-#: Seconds that the first samples wait for their receiver to be made.
-_START = 5.0
 #: Peers whose rubbish is logged, once each.
 _MAX_NAMED = 100
 #: Peers that left which are remembered, as what they sent may be handed on after that.
@@ -114,14 +112,15 @@ def _vendor(guid: bytes) -> str:
 
 
 class Matched:
-    """Whom a reader or writer is matched with.
+    """The readers or writers that a writer or reader is matched with.
 
     Args:
-        handles: Returns their handles.
-        look_up: Returns the one with a handle.
+        entity: The writer or reader.
+        handles: Returns the handles of its counterparts.
+        look_up: Returns the counterpart with a handle.
 
     Attributes:
-        all: Those that were there at the last look.
+        all: The counterparts at the last :meth:`refresh`.
         by_guid: The same by their GUIDs.
     """
 
@@ -132,14 +131,13 @@ class Matched:
         look_up: Callable[[int, int], Discovered | None],
     ) -> None:
         self._entity, self._handles, self._look_up = entity, handles, look_up
-        #: With some who left.
+        #: With some that have left.
         self._known: dict[int, Discovered] = {}
-        self._looking = threading.Lock()
         self.all: tuple[Discovered, ...] = ()
         self.by_guid: dict[bytes, Discovered] = {}
 
     def get(self, handle: int) -> Discovered | None:
-        """Return the one with a handle; None when it is gone, and was not seen lately."""
+        """Return the counterpart with a handle; None if it left, and was not seen lately."""
         known = self._known.get(handle)
         if known is None:
             known = self._look_up(self._entity, handle)
@@ -148,17 +146,16 @@ class Matched:
         return known
 
     def refresh(self) -> None:
-        """Look who is there now; to be called when that changes."""
-        with self._looking:  # who looked first must not have the last word
-            try:
-                handles = self._handles(self._entity)
-            except Error:  # deleted meanwhile
-                handles = []
-            here = {handle: found for handle in handles if (found := self.get(handle)) is not None}
-            if len(self._known) > len(here) + _MAX_DEPARTED:
-                self._known = dict(here)
-            self.all = tuple(here.values())
-            self.by_guid = {found.guid: found for found in self.all}
+        """Update the counterparts; not by several threads at once."""
+        try:
+            handles = self._handles(self._entity)
+        except Error:  # it was deleted
+            handles = []
+        here = {handle: found for handle in handles if (found := self.get(handle)) is not None}
+        if len(self._known) > len(here) + _MAX_DEPARTED:
+            self._known = dict(here)
+        self.all = tuple(here.values())
+        self.by_guid = {found.guid: found for found in self.all}
 
 
 class Ends:
@@ -196,11 +193,12 @@ class Ends:
         self._service, self._place = endpoint.name, f"service {endpoint.name}"
         self._server = server = endpoint.kind is EndpointKind.SERVICE_SERVER
         self._kind = EndpointKind.SERVICE_CLIENT if server else EndpointKind.SERVICE_SERVER
-        self._on_taken, self._on_matched = on_taken, on_matched
-        self._started = threading.Event()
+        self._on_matched = on_matched
+        self._started = False
         self._named: set[bytes] = set()
         self._since: dict[bytes, float] = {}
-        self._looking, self._probing = threading.Lock(), threading.Lock()
+        #: Held while matches are looked up, and while writer and probe are created or deleted.
+        self._lock = threading.RLock()
         self._probe: list[int] = []
         self.closed = False
         requests = f"rq{endpoint.name}Request", mangle_type(f"{endpoint.type}_Request")
@@ -222,7 +220,7 @@ class Ends:
             self._qos,
             self._user_data,
             self._place,
-            self._hand_on,
+            on_taken,
             self.origins.create_topic,
             self.origins.of,
             self.look,
@@ -240,8 +238,9 @@ class Ends:
                 raise
 
     def start(self) -> None:
-        """Let what is received be handed on, and matches be told."""
-        self._started.set()
+        """Start to deliver samples and to report matches."""
+        self._started = True
+        self.reader.start()
         self.look()
         if self.writer is None:
             self._wake(False)
@@ -318,7 +317,7 @@ class Ends:
         self.reader.close()
         self.origins.close()
         self.outbox.close()
-        with self._probing:
+        with self._lock:
             self._end_probe()
             writer = self.writer
         if writer is not None:
@@ -346,7 +345,7 @@ class Ends:
                 cyclone_identity.create_reply_topic if self._server else cyclone.create_topic,
                 _PATIENCE,
             )
-            with self._probing:
+            with self._lock:
                 if self.closed:
                     writer.close()
                     return
@@ -370,40 +369,28 @@ class Ends:
         strangers = any(scheme_of(guid) is Scheme.IDENTITY for guid in seen.prefixes())
         return not strangers or (age >= _HEARTBEAT and now - seen.moved >= _QUIET)
 
-    def _hand_on(self, taken: list[Taken]) -> None:
-        # The first may come while their receiver is being made.
-        if self._started.wait(_START):
-            self._on_taken(taken)
-        elif not self.closed:
-            text = "%s: %d messages are lost: their receiver was not made within %.0f s"
-            _log.error(text, self._service, len(taken), _START)
-
     def look(self) -> None:
-        """Look who came or went, and tell."""
-        if not self._started.is_set() or self.closed:
+        """Look up the matched peers, and report changes."""
+        if not self._started or self.closed:
             return
-        with self._looking:  # who looked first must not have the last word
-            self._look_around()
-
-    def _look_around(self) -> None:
-        self.writers.refresh()
-        if self.readers is not None:
-            self.readers.refresh()
-        strangers = {
-            found.guid for found in self.writers.all if scheme_of(found.guid) is Scheme.IDENTITY
-        }
-        with self._probing:
+        with self._lock:  # a thread must not overwrite what another looked up later
+            self.writers.refresh()
+            if self.readers is not None:
+                self.readers.refresh()
+            strangers = {
+                found.guid for found in self.writers.all if scheme_of(found.guid) is Scheme.IDENTITY
+            }
             new = not strangers <= self._since.keys()
             now, before = time.monotonic(), self._since
             self._since = {guid: before.get(guid, now) for guid in strangers}
             if new and not self.closed:
                 self._start_probe()
-        if new:
-            self._wake(False)
-        try:
-            self._on_matched()
-        except Error as error:
-            _log.warning("%s: %s", self._service, error)
+            if new:
+                self._wake(False)
+            try:
+                self._on_matched()
+            except Error as error:
+                _log.warning("%s: %s", self._service, error)
 
     def _start_probe(self) -> None:
         """Have a second reader for a while.
@@ -461,7 +448,7 @@ class Ends:
             return
         unsettled = not all(self.settled(guid) for guid in self._since)
         if not unsettled and self._probe:
-            with self._probing:
+            with self._lock:
                 self._end_probe()
             self.look()
         if self.writer is None and self._synced():
@@ -520,14 +507,14 @@ class Outbox:
 
     def __init__(self, wake: Callable[[bool], None], *, in_order: bool) -> None:
         self._wake, self._in_order = wake, in_order
-        self._lock = threading.Lock()
+        #: Added to by any thread, removed from by the one that retries.
         self._items: deque[_Item] = deque()
         self._closed = False
 
     def put(
         self,
         attempt: Callable[[], bool],
-        patience: float,
+        timeout_s: float,
         expired: Callable[[], None],
         *,
         now: bool = True,
@@ -536,25 +523,21 @@ class Outbox:
 
         Args:
             attempt: Sends it; returns False to be called again a little later.
-            patience: Seconds after which it is given up.
+            timeout_s: Seconds after which it is given up.
             expired: Called then, and when it cannot be sent at all.
             now: Whether to try it in the calling thread; what it raises comes out of here then.
         """
         if now and not (self._in_order and self._items) and attempt():
             return
-        with self._lock:
-            if self._closed:
-                return
-            self._items.append(_Item(attempt, time.monotonic() + patience, expired))
-        self._wake(not now)
+        if not self._closed:
+            self._items.append(_Item(attempt, time.monotonic() + timeout_s, expired))
+            self._wake(not now)
 
     def retry(self) -> bool:
         """Try again what is left; returns whether there is still something. For one thread."""
-        with self._lock:
-            items = list(self._items)
-        for item in items:
+        for item in self._items.copy():
             if self._try(item):
-                with self._lock, suppress(ValueError):
+                with suppress(ValueError):  # it was closed
                     self._items.remove(item)
             elif self._in_order:
                 break
@@ -568,9 +551,8 @@ class Outbox:
 
     def close(self) -> None:
         """Forget what is left."""
-        with self._lock:
-            self._closed = True
-            self._items.clear()
+        self._closed = True
+        self._items.clear()
 
     def _try(self, item: _Item) -> bool:
         try:

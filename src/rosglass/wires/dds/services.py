@@ -223,7 +223,7 @@ class DdsRequester(Requester):
                 )
             sequence, self._sequence = self._sequence, -1
             try:
-                self._writer.write(parts)
+                self._writer.write_parts(parts)
             except (NodeClosedError, TimeoutError, UnsupportedError) as error:
                 self._sequence = sequence  # nothing was sent
                 if isinstance(error, TimeoutError):
@@ -537,7 +537,7 @@ class DdsReplier(Replier):
         parts = with_header(data, answer.header) if answer.header else (data,)
         try:
             if answer.header and not self._strangers:
-                writer.write(parts)
+                writer.write_parts(parts)
             elif (
                 not cyclone_identity.write_reply(writer, answer.identity, parts)
                 and not answer.header
