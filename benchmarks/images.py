@@ -22,7 +22,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent.parent / "src"))
 
 from rosglass.images import ANY_FORMAT, DepthColors, RawImage, convert, decompress
-from rosglass.images.compressed_depth import decompress_depth
+from rosglass.images.compressed import decompress_depth
 
 if TYPE_CHECKING:
     from collections.abc import Callable

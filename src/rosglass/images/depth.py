@@ -1,4 +1,4 @@
-"""Depth pictures in colours: near and far at a glance, black where nothing is known."""
+"""Depth images in colors, black where the depth is unknown."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rosglass.errors import UnsupportedError
-from rosglass.images.encodings import ENCODINGS, opencv, pixels_of
-from rosglass.images.frame import Frame, PixelFormat
+from rosglass.images.encodings import ENCODINGS, Frame, PixelFormat, opencv, pixels_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,25 +16,25 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rosglass.comm.time import Time
-    from rosglass.images.frame import RawImage
+    from rosglass.images.encodings import RawImage
 
 __all__ = ["COLOR_MAPS", "DEPTH_ENCODINGS", "DepthColors"]
 
-#: Colour maps, from near to far.
+#: Color maps, from near to far.
 COLOR_MAPS = ("turbo", "viridis", "jet", "gray")
 #: Encodings that can hold depths.
 DEPTH_ENCODINGS = ("16UC1", "mono16", "32FC1")
-#: Share of the depths that the automatic range leaves out at either end: they are noise.
-_OUTLIERS = 2.0
-#: How far the automatic range follows a picture: colours that flicker cannot be read.
-_FOLLOW = 0.15
+#: Percentage of the depths that the automatic range excludes at each end, as noise.
+_OUTLIERS_PERCENT = 2.0
+#: Smoothing factor of the automatic range, against flickering.
+_SMOOTHING = 0.15
 _SAMPLES = 20_000
 _MIN_SPAN = 0.01
 
 
 @cache
 def _palette(name: str) -> NDArray[np.uint32]:
-    """Return 256 colours as RGBX, and black for unknown depths."""
+    """Return 256 colors as RGBX, and black for unknown depths."""
     ramp = np.arange(256, dtype=np.uint8)
     colors = np.zeros((257, 4), np.uint8)
     if name == "gray":
@@ -49,15 +48,15 @@ def _palette(name: str) -> NDArray[np.uint32]:
 
 
 class DepthColors:
-    """Colours the depth pictures of one camera.
+    """Colors the depth images of a camera.
 
     Args:
-        colors: Name of the colour map, one of :data:`COLOR_MAPS`.
-        near: Depth of the first colour, metres; None follows the pictures.
-        far: Depth of the last colour, metres; None follows the pictures.
+        colors: Name of the color map, one of :data:`COLOR_MAPS`.
+        near: Depth of the first color in metres; None to follow the images.
+        far: Depth of the last color in metres; None to follow the images.
 
     Raises:
-        UnsupportedError: The colour map is unknown, or the range is empty.
+        UnsupportedError: The color map is unknown, or the range is empty.
     """
 
     def __init__(
@@ -79,13 +78,13 @@ class DepthColors:
 
     @property
     def range(self) -> tuple[float, float]:
-        """Depths of the first and the last colour, metres."""
+        """Depths of the first and the last color in metres."""
         near, far = self._seen or (0.0, 1.0)
         near = near if self._near is None else self._near
         far = far if self._far is None else self._far
         if far - near >= _MIN_SPAN or None not in {self._near, self._far}:
             return near, far
-        # A wall seen head-on has one depth: the fixed end stays where it was put.
+        # A wall seen head-on has one depth: the fixed end stays.
         return (max(0.0, far - _MIN_SPAN), far) if self._near is None else (near, near + _MIN_SPAN)
 
     def convert(
@@ -94,16 +93,16 @@ class DepthColors:
         received: Time | None = None,
         allocate: Callable[[int, int], NDArray[Any]] | None = None,
     ) -> Frame:
-        """Colour a picture of 16UC1 (millimetres), mono16 (the same) or 32FC1 (metres).
+        """Color an image of 16UC1 (millimetres), mono16 (the same) or 32FC1 (metres).
 
         Args:
-            image: The picture as received.
-            received: When it arrived.
-            allocate: Gives memory for a picture of a width and height, as rows x columns x RGBX.
+            image: The image as received.
+            received: Time of reception.
+            allocate: Returns memory for an image of a width and height, as rows x columns x RGBX.
 
         Raises:
-            UnsupportedError: The encoding holds no depths.
-            DecodeError: Sizes, step and data contradict each other.
+            UnsupportedError: The encoding has no depths.
+            DecodeError: Sizes, step and data are inconsistent.
         """
         if image.encoding not in DEPTH_ENCODINGS:
             raise UnsupportedError(
@@ -113,7 +112,7 @@ class DepthColors:
         depths = pixels_of(image, ENCODINGS[image.encoding])
         unit = 1.0 if image.encoding == "32FC1" else 0.001
         if self._near is None or self._far is None:
-            self._look(depths, unit)
+            self._update_range(depths, unit)
         near, far = (limit / unit for limit in self.range)
         palette = _palette(self._colors)
         if unit == 1.0:
@@ -139,22 +138,25 @@ class DepthColors:
             received,
         )
 
-    def _look(self, depths: NDArray[Any], unit: float) -> None:
-        """Let the automatic range follow a picture."""
+    def _update_range(self, depths: NDArray[Any], unit: float) -> None:
+        """Adapt the automatic range to an image."""
         stride = max(1, int((depths.size / _SAMPLES) ** 0.5))
         some = depths[::stride, ::stride]
         some = some[np.isfinite(some) & (some > 0)]
         if not some.size:
             return
-        near, far = (float(v) * unit for v in np.percentile(some, [_OUTLIERS, 100 - _OUTLIERS]))
+        near, far = (
+            float(v) * unit
+            for v in np.percentile(some, [_OUTLIERS_PERCENT, 100 - _OUTLIERS_PERCENT])
+        )
         if self._seen is not None:
-            near = self._seen[0] + _FOLLOW * (near - self._seen[0])
-            far = self._seen[1] + _FOLLOW * (far - self._seen[1])
+            near = self._seen[0] + _SMOOTHING * (near - self._seen[0])
+            far = self._seen[1] + _SMOOTHING * (far - self._seen[1])
         self._seen = near, far
 
 
 def _steps(depths: NDArray[Any], near: float, far: float) -> NDArray[np.uint16]:
-    """Return the number of each depth's colour; 256 where the depth is unknown."""
+    """Return the index of each depth's color; 256 where the depth is unknown."""
     scale = 255.0 / (far - near)
     steps = depths * np.float32(scale)
     steps -= np.float32(near * scale)

@@ -1,13 +1,14 @@
-"""Image encodings: from a camera's pixels to something a display takes, in at most one pass.
+"""Image encodings: received images, frames for a display, and the conversion in at most one pass.
 
-Names follow ROS's ``sensor_msgs/image_encodings.hpp``. What can be shown as it is shares the
-received buffer.
+Names follow ROS's ``sensor_msgs/image_encodings.hpp``. Images that a display accepts as they are
+share the received buffer.
 """
 
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from enum import Enum
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rosglass.errors import DecodeError, UnsupportedError
-from rosglass.images.frame import Frame, PixelFormat, RawImage
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,31 +31,108 @@ __all__ = [
     "ENCODINGS",
     "MAX_PIXELS",
     "Encoding",
+    "Frame",
+    "PixelFormat",
+    "RawImage",
     "convert",
     "opencv",
     "pixels_of",
+    "reduce",
     "to_rgbx",
 ]
 
-#: A display that takes everything.
+
+class PixelFormat(Enum):
+    """Memory layouts that a display accepts; bytes in order of rising address."""
+
+    RGBX = "rgbx"
+    RGBA = "rgba"
+    BGRA = "bgra"
+    GRAY8 = "gray8"
+    GRAY16 = "gray16"
+    UYVY = "uyvy"
+    YUYV = "yuyv"
+    NV12 = "nv12"
+    NV21 = "nv21"
+
+
+@dataclass(frozen=True, slots=True)
+class RawImage:
+    """The fields of a ``sensor_msgs/msg/Image`` that conversion needs.
+
+    Attributes:
+        width: Number of columns in pixels.
+        height: Number of rows in pixels.
+        encoding: Encoding name as in ``sensor_msgs/image_encodings.hpp``.
+        step: Distance between rows in bytes.
+        data: The pixels.
+        big_endian: Whether values of more than one byte are big-endian.
+        stamp: Time of the image; None if the header has none.
+        frame_id: Coordinate frame of the camera.
+    """
+
+    width: int
+    height: int
+    encoding: str
+    step: int
+    data: Any
+    big_endian: bool = False
+    stamp: Time | None = None
+    frame_id: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """An image that can be displayed without further conversion.
+
+    Attributes:
+        format: Layout of the planes.
+        width: Number of columns in pixels.
+        height: Number of rows in pixels.
+        planes: One array of rows x bytes per plane; they may share the received buffer.
+        encoding: Encoding as received.
+        stamp: Time of the image; None if the header has none.
+        received: Time of reception; None if it was created here.
+    """
+
+    format: PixelFormat
+    width: int
+    height: int
+    planes: tuple[NDArray[np.uint8], ...] = field(repr=False)
+    encoding: str = ""
+    stamp: Time | None = None
+    received: Time | None = None
+
+    @property
+    def has_alpha(self) -> bool:
+        """Whether pixels can be transparent."""
+        return self.format in {PixelFormat.RGBA, PixelFormat.BGRA}
+
+    @property
+    def is_color(self) -> bool:
+        """Whether it has colors."""
+        return self.format not in {PixelFormat.GRAY8, PixelFormat.GRAY16}
+
+
+#: The formats of a display that accepts all.
 ANY_FORMAT = frozenset(PixelFormat)
-#: Larger pictures are refused: they are garbage, or would fill the memory of the operator's PC.
+#: Larger images are refused: they are corrupt, or would exhaust the memory of the operator's PC.
 MAX_PIXELS = 1 << 26
 _IMAGE = "sensor_msgs/msg/Image"
 
 
 @dataclass(frozen=True, slots=True)
 class Encoding:
-    """How pixels lie in memory and how they get onto a display.
+    """The memory layout of an encoding, and its conversion for a display.
 
     Attributes:
         channels: Values per pixel (2 for packed YUV 4:2:2).
         size: Bytes per value.
-        direct: Layout under which a display takes the pixels unchanged, None when there is none.
-        code: Name of OpenCV's conversion to RGBA, empty when `direct` is always accepted.
-        special: Conversion by a function of this module instead.
+        direct: Format in which a display accepts the pixels unchanged; None if there is none.
+        code: Name of OpenCV's conversion to RGBA; empty if `direct` is always accepted.
+        special: Conversion function to use instead.
         rows: Rows in memory per row of pixels, as a fraction: (3, 2) for planar 4:2:0, (3, 1) for
-            planar 4:4:4, whose rows of chroma are twice as long.
+            planar 4:4:4, whose chroma rows are twice as long.
     """
 
     channels: int
@@ -71,7 +148,7 @@ def _high_bytes(pixels: Array) -> Array:
 
 
 def _depth_in_millimetres(pixels: Array) -> tuple[PixelFormat, Array]:
-    """Turn metres into millimetres; 0 means unknown, as in 16UC1 depth images (REP 118)."""
+    """Convert metres to millimetres; 0 means unknown, as in 16UC1 depth images (REP 118)."""
     known = np.isfinite(pixels) & (pixels > 0)
     out = np.zeros(pixels.shape, np.uint16)
     np.clip(np.where(known, pixels, 0) * 1000, 1, 65535, out=out, where=known, casting="unsafe")
@@ -94,14 +171,14 @@ def _nv24(pixels: Array) -> tuple[PixelFormat, Array]:
     cv2 = opencv()
     luma = pixels[:height]
     u, v = cv2.split(chroma)
-    # OpenCV knows no 4:4:4 of this range: each pixel becomes a pair of 4:2:2, of which one is kept.
+    # OpenCV has no 4:4:4 of this range: each pixel becomes a pair of 4:2:2, of which one is kept.
     pairs = cv2.merge([luma, u, luma, v]).reshape(height, 2 * width, 2)
     twice = _to_rgba(pairs, "YUV2RGBA_YUY2").view(np.uint32)
     return PixelFormat.RGBX, twice.reshape(height, 2 * width)[:, ::2].copy()
 
 
 def _wide(code: str, format: PixelFormat) -> Callable[[Array], tuple[PixelFormat, Array]]:
-    """Return a conversion of 16-bit colours that keeps the high bytes."""
+    """Return a conversion of 16-bit colors that keeps the high bytes."""
 
     def convert_wide(pixels: Array) -> tuple[PixelFormat, Array]:
         return format, _to_rgba(_high_bytes(pixels), code)
@@ -109,7 +186,7 @@ def _wide(code: str, format: PixelFormat) -> Callable[[Array], tuple[PixelFormat
     return convert_wide
 
 
-#: Every encoding that can be shown.
+#: All supported encodings.
 ENCODINGS: dict[str, Encoding] = {
     "rgb8": Encoding(3, code="RGB2RGBA"),
     "bgr8": Encoding(3, code="BGR2RGBA"),
@@ -143,7 +220,7 @@ for _order in ("rggb", "bggr", "gbrg", "grbg"):
 
 @cache
 def opencv() -> Any:
-    """Return OpenCV; imported late because it takes its time.
+    """Import OpenCV when it is first needed, and return it.
 
     Raises:
         UnsupportedError: It is not installed.
@@ -172,7 +249,7 @@ def pixels_of(image: RawImage, encoding: Encoding) -> Array:
     """Return the pixels as rows x columns (x channels), sharing the received buffer.
 
     Raises:
-        DecodeError: Sizes, step and data contradict each other.
+        DecodeError: Sizes, step and data are inconsistent.
     """
     rows, remainder = divmod(image.height * encoding.rows[0], encoding.rows[1])
     row_bytes = image.width * encoding.channels * encoding.size
@@ -198,7 +275,7 @@ def pixels_of(image: RawImage, encoding: Encoding) -> Array:
             f"step is {image.step}",
             "step",
         )
-    # Some drivers leave out the padding of the last row.
+    # Some drivers omit the padding of the last row.
     needed = image.step * (rows - 1) + row_bytes
     if size < needed:
         raise DecodeError(
@@ -223,7 +300,7 @@ _EVEN_WIDTH = {PixelFormat.UYVY, PixelFormat.YUYV, PixelFormat.NV12, PixelFormat
 
 
 def _rows_of_bytes(pixels: Array) -> NDArray[np.uint8]:
-    """View pixels as rows x bytes; copies only when a row's values are not adjacent."""
+    """View pixels as rows x bytes; copies only if the values of a row are not adjacent."""
     if not pixels[0].flags.c_contiguous:
         pixels = np.ascontiguousarray(pixels)
     width = pixels[0].nbytes
@@ -234,10 +311,10 @@ def _rows_of_bytes(pixels: Array) -> NDArray[np.uint8]:
 
 
 def to_rgbx(frame: Frame) -> Frame:
-    """Return a picture of YUV, or of 8-bit grey, as RGBX.
+    """Convert a YUV or 8-bit grey frame to RGBX.
 
     Raises:
-        UnsupportedError: OpenCV is not installed, or the layout is another.
+        UnsupportedError: OpenCV is not installed, or the format is another.
     """
     cv2 = opencv()
     layout, width = frame.format, frame.width
@@ -262,22 +339,22 @@ def convert(
     received: Time | None = None,
     allocate: Callable[[int, int], Array] | None = None,
 ) -> Frame:
-    """Make a picture showable.
+    """Convert an image for display.
 
-    Depth in metres (32FC1) becomes millimetres, like 16UC1 depth images; 16-bit colours keep their
-    high bytes; 8UC3 and 8UC4 are taken for BGR(A) as OpenCV does; 8UC2 is shown as red and green.
+    Depth in metres (32FC1) becomes millimetres, as in 16UC1 depth images; 16-bit colors keep their
+    high bytes; 8UC3 and 8UC4 are BGR(A) as in OpenCV; 8UC2 is displayed as red and green.
 
     Args:
-        image: The picture as received.
-        accept: Layouts that all its displays take; RGBX, RGBA, BGRA, GRAY8 and GRAY16 are always
+        image: The image as received.
+        accept: Formats that all displays accept; RGBX, RGBA, BGRA, GRAY8 and GRAY16 are always
             assumed.
-        received: When it arrived.
-        allocate: Gives memory for a picture of a width and height, as rows x columns x RGBX; used
-            when colours must be converted, so that they land where the display wants them.
+        received: Time of reception.
+        allocate: Returns memory for an image of a width and height, as rows x columns x RGBX; used
+            if colors are converted, to write them directly to the display's memory.
 
     Raises:
-        UnsupportedError: The encoding cannot be shown.
-        DecodeError: Sizes, step and data contradict each other.
+        UnsupportedError: The encoding is not supported.
+        DecodeError: Sizes, step and data are inconsistent.
     """
     encoding = ENCODINGS.get(image.encoding)
     if encoding is None:
@@ -306,3 +383,28 @@ def convert(
         image.stamp,
         received,
     )
+
+
+#: Encodings whose pixels can be averaged. Depths cannot: 0 is unknown, not near. YUV is small
+#: anyway.
+_REDUCIBLE = frozenset({"rgb8", "bgr8", "rgba8", "bgra8", "mono8", "8UC1", "8UC3", "8UC4"})
+
+
+def reduce(image: RawImage, factor: int) -> RawImage:
+    """Reduce width and height of an image by a factor, averaging pixels.
+
+    An image whose encoding does not allow it, or that is too small, is returned unchanged.
+
+    Raises:
+        DecodeError: Sizes, step and data are inconsistent.
+        UnsupportedError: OpenCV is not installed.
+    """
+    width, height = image.width // factor, image.height // factor
+    if factor < 2 or image.encoding not in _REDUCIBLE or not width or not height:
+        return image
+    cv2 = opencv()
+    pixels = pixels_of(image, ENCODINGS[image.encoding])
+    # Remaining columns and rows would shift all others by a fraction of a pixel.
+    pixels = pixels[: height * factor, : width * factor]
+    small = cv2.resize(pixels, (width, height), interpolation=cv2.INTER_AREA)
+    return replace(image, width=width, height=height, step=small.strides[0], data=small.reshape(-1))

@@ -1,4 +1,4 @@
-"""A camera stream: subscribes, converts in a thread of its own, keeps only the newest picture."""
+"""A camera stream, which decodes and converts the newest image on its own thread."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rosglass.comm.inbox import Sample
     from rosglass.comm.node import Node
     from rosglass.comm.subscription import Subscription
-    from rosglass.images.frame import RawImage
+    from rosglass.images.encodings import RawImage
     from rosglass.images.transports import Choice, PictureReader, Transport
     from rosglass.messages import MessageType
 
@@ -30,29 +30,29 @@ __all__ = ["ImageStream", "StreamStatistics"]
 
 _T = TypeVar("_T")
 _log = logging.getLogger("rosglass.images")
-#: Seconds after which the graph is looked at again while there is nothing to receive.
-_RETRY = 1.0
-#: Seconds between two log lines about the same stream.
-_LOG_EVERY = 5.0
-#: Packets of a video that may wait: more would show the past, so the next key frame is awaited.
+#: Seconds between two checks of the graph while not subscribed.
+_RETRY_INTERVAL_S = 1.0
+#: Seconds between two log messages of a stream.
+_LOG_INTERVAL_S = 5.0
+#: Queue size for video packets; beyond it, decoding continues at the next key frame.
 MAX_BACKLOG = 60
 _QUEUE = 16
-#: Arrivals from which the time between two pictures is told, and how few are enough.
-_ARRIVALS, _ENOUGH = 12, 4
+#: Number of arrivals for measuring the period, and the minimum.
+_MAX_ARRIVALS, _MIN_ARRIVALS = 12, 4
 _STILLS = QoS(depth=1, reliability=Reliability.BEST_EFFORT)
 _VIDEO = QoS(depth=_QUEUE, reliability=Reliability.BEST_AVAILABLE)
 
 
 @dataclass(frozen=True, slots=True)
 class StreamStatistics:
-    """How a stream is doing.
+    """The statistics of a stream.
 
     Attributes:
-        received: Pictures received.
-        shown: Pictures handed on.
-        dropped: Pictures overtaken by a newer one before they were handed on.
-        lost: Pictures that never arrived, by the publisher's running numbers.
-        invalid: Pictures that could not be shown; :attr:`ImageStream.problem` says why.
+        received: Images received.
+        shown: Images displayed.
+        dropped: Images dropped for a newer one.
+        lost: Images lost on the way, by the publisher's sequence numbers.
+        invalid: Images that could not be displayed; see :attr:`ImageStream.problem`.
     """
 
     received: int = 0
@@ -63,23 +63,23 @@ class StreamStatistics:
 
 
 class ImageStream(Handle):
-    """Receives the pictures of one camera.
+    """Receives the images of a camera.
 
-    Subscribes to the preferred transport, or to another one while that is not published: best
-    effort, but reliably to videos whose publisher offers it. Decompression and conversion run in
-    the stream's own thread, so that neither the middleware nor the user interface waits for them;
-    a picture that is overtaken by a newer one is dropped.
+    Subscribes to the preferred transport, or to another one while that is not published; best
+    effort, except for videos with a reliable publisher. Images are decoded and converted on the
+    stream's own thread, so that neither the middleware nor the user interface waits; an image is
+    dropped if a newer one has arrived.
 
     Args:
-        node: Where to subscribe.
-        topic: The camera's base topic, or a transport's own topic.
-        show: Called in the stream's thread with each picture and its sample; converts and shows
+        node: Node that subscribes.
+        topic: The camera's base topic, or the topic of a transport.
+        show: Called on the stream's thread with each image and its sample, to convert and display
             it. A rosglass.Error that it raises becomes the stream's problem.
-        preferred: Name of the transport to prefer.
-        changed: Called from any thread when :attr:`problem` or :attr:`transport` changed.
-        wanted: Asked by any thread whether a picture that has come is wanted; one that is not
-            is neither decoded nor counted as dropped. Not asked for videos, whose pictures build
-            upon each other. None wants them all.
+        preferred: Name of the preferred transport.
+        changed: Called from any thread after changes of :attr:`problem` or :attr:`transport`.
+        wanted: Called from any thread, returns whether to decode a received image; others are not
+            counted as dropped. Not called for videos, whose frames depend on each other. None to
+            decode all.
 
     Raises:
         InvalidNameError: The topic name breaks ROS's rules.
@@ -97,11 +97,12 @@ class ImageStream(Handle):
         self.topic = node.resolve(topic)
         self._node, self._preferred = node, preferred
         self._show_picture, self._changed, self._wanted = show, changed, wanted
+        #: Guards the state below; notified when the thread has something to do.
         self._wake = threading.Condition()
         self._samples: deque[tuple[Transport, Sample]] = deque()
         self._overflow = False
         self._look, self._closing, self._resting = True, False, False
-        self._arrivals: deque[float] = deque(maxlen=_ARRIVALS)
+        self._arrivals: deque[float] = deque(maxlen=_MAX_ARRIVALS)
         self._choice: Choice | None = None
         self._subscription: Subscription | None = None
         self._reader: tuple[MessageType, str, PictureReader] | None = None
@@ -114,71 +115,71 @@ class ImageStream(Handle):
 
     @property
     def problem(self) -> str:
-        """Why no picture can be shown, in words; empty when all is well."""
+        """Why no image is displayed; empty if there is no problem."""
         subscription = self._subscription
         return self._problem or (subscription.problem if subscription is not None else "")
 
     @property
     def transport(self) -> str:
-        """Name of the transport received; empty while nothing is published."""
+        """Name of the transport in use; empty while none is published."""
         return self._choice.transport.name if self._choice is not None else ""
 
     @property
     def subscribed(self) -> bool:
-        """Whether there is a subscription, or there would be if the stream did not :meth:`rest`."""
+        """Whether it is subscribed, or would be without :meth:`rest`."""
         return self._subscription is not None or self._resting
 
     @property
     def video(self) -> bool:
-        """Whether the transport received is a video, which must be received without a gap."""
+        """Whether the transport in use is a video, which must be received without gaps."""
         return self._choice is not None and self._choice.transport.video
 
     @property
     def period(self) -> float:
-        """Seconds between two pictures of the camera, as last seen; 0 until that is known."""
+        """Measured period of the camera in seconds; 0 until it is known."""
         with self._wake:
             arrivals = list(self._arrivals)
-        if len(arrivals) < _ENOUGH:
+        if len(arrivals) < _MIN_ARRIVALS:
             return 0.0
         return (arrivals[-1] - arrivals[0]) / (len(arrivals) - 1)
 
     def rest(self) -> None:
-        """Receive nothing until :meth:`resume`: the robot neither compresses nor sends for us."""
+        """Unsubscribe until :meth:`resume`, so that the robot neither compresses nor sends."""
         with self._wake:
             self._resting = True
             self._wake.notify_all()
 
     def resume(self) -> bool:
-        """Receive again after :meth:`rest`; return whether it was resting."""
+        """Subscribe again after :meth:`rest`; return whether it was resting."""
         with self._wake:
             if not self._resting:
                 return False
             self._resting, self._look = False, True
-            # The time between this picture and the last, and the numbers skipped, were our wish.
+            # The interval and the numbers skipped while resting do not count.
             self._arrivals.clear()
             self._sequence = (b"", -1)
             self._wake.notify_all()
         return True
 
     def publisher_count(self) -> int:
-        """Return how many publishers the transport in use has."""
+        """Return the number of publishers of the transport in use."""
         choice = self._choice
         return len(self._node.publishers(choice.topic)) if choice is not None else 0
 
     def lateness(self, sample: Sample) -> float:
-        """Return by how many seconds a picture was kept back on its way."""
+        """Return the delay of an image on the way in seconds."""
         subscription = self._subscription
         return 0.0 if subscription is None else subscription.lateness(sample).seconds
 
     def statistics(self) -> StreamStatistics:
-        """Return the counts as of now."""
+        """Return the current statistics."""
         with self._wake:
             return StreamStatistics(
                 self._received, self._shown, self._dropped, self._lost, self._invalid
             )
 
     def close(self) -> None:
-        """Stop receiving. Returns at once; the thread ends after the picture it works on."""
+        """Stop receiving. Returns at once; the thread ends after the current image."""
         with self._wake:
             if self._closing:
                 return
@@ -187,7 +188,7 @@ class ImageStream(Handle):
         self._graph.close()
 
     def join(self, timeout: float) -> bool:
-        """Wait up to `timeout` seconds for the thread after :meth:`close`; True when it ended."""
+        """Wait up to `timeout` seconds for the thread after :meth:`close`; True if it ended."""
         self._thread.join(timeout)
         return not self._thread.is_alive()
 
@@ -223,8 +224,8 @@ class ImageStream(Handle):
             with self._wake:
                 idle = self._subscription is None
                 self._wake.wait_for(
-                    lambda: self._samples or self._is_called,
-                    _RETRY if idle and not self._resting else None,
+                    lambda: self._samples or self._has_work,
+                    _RETRY_INTERVAL_S if idle and not self._resting else None,
                 )
                 if self._closing:
                     break
@@ -243,8 +244,8 @@ class ImageStream(Handle):
         self._unsubscribe()
 
     @property
-    def _is_called(self) -> bool:
-        """Whether the thread has something else to do than to decode."""
+    def _has_work(self) -> bool:
+        """Whether the thread has something to do besides decoding."""
         idle = self._subscription is None
         return self._closing or (not idle if self._resting else self._look)
 
@@ -261,10 +262,10 @@ class ImageStream(Handle):
                 if name.startswith(self.topic) and self._node.publishers(name)
             }
             choice = choose(self.topic, self._preferred, published)
-            # A camera that went away may come back as it was: keep listening.
+            # Stay subscribed to a camera that has left, as it may return.
             listening = self._subscription is not None
             if choice is None or (choice == self._choice and listening):
-                self._say("" if choice is not None else self._problem)
+                self._set_problem("" if choice is not None else self._problem)
                 return
             subscription = self._node.create_subscription(
                 choice.topic,
@@ -274,20 +275,20 @@ class ImageStream(Handle):
                 executor=IMMEDIATE,
             )
         except NodeClosedError:
-            self._say("")
+            self._set_problem("")
             return
         except Error as error:
-            self._say(str(error))
+            self._set_problem(str(error))
             return
         previous, self._subscription = self._subscription, subscription
         self._choice, self._reader = choice, None
         if previous is not None:
             previous.close()
         self._problem = ""
-        self._tell()
+        self._notify()
 
     def _decode(self, samples: deque[tuple[Transport, Sample]]) -> None:
-        """Decode what has come, and show the newest picture."""
+        """Decode the received samples, and display the newest image."""
         newest: tuple[RawImage, Sample] | None = None
         for transport, sample in samples:
             choice = self._choice
@@ -299,7 +300,7 @@ class ImageStream(Handle):
                     self._dropped += newest is not None
                 newest = (picture, sample)
         if newest is not None and self._guarded(self._show, *newest):
-            self._say("")
+            self._set_problem("")
 
     def _read(self, transport: Transport, sample: Sample) -> RawImage | None:
         if self._reader is None or self._reader[:2] != (sample.type, sample.wire):
@@ -314,32 +315,32 @@ class ImageStream(Handle):
         return True
 
     def _guarded(self, step: Callable[..., _T], *arguments: Any) -> _T | None:
-        """Call a step; None when it failed: whatever a camera sends must not end the stream."""
+        """Call a step; return None if it fails: no image may end the stream."""
         try:
             return step(*arguments)
         except NoPictureError as error:
-            self._say(str(error))
+            self._set_problem(str(error))
         except Error as error:
             with self._wake:
                 self._invalid += 1
-            self._say(str(error))
+            self._set_problem(str(error))
         except Exception as error:
             _log.exception("%s: a picture could not be converted", self.topic)
-            self._say(f"internal error: {error}")
+            self._set_problem(f"internal error: {error}")
         return None
 
-    def _say(self, problem: str) -> None:
-        """Remember why nothing is shown; log it, but not for every picture of a bad stream."""
+    def _set_problem(self, problem: str) -> None:
+        """Set the problem, and log it, but not for every image of a bad stream."""
         if problem:
             now = time.monotonic()
             last, at = self._logged
-            if problem != last or now - at > _LOG_EVERY:
+            if problem != last or now - at > _LOG_INTERVAL_S:
                 self._logged = (problem, now)
                 _log.warning("%s: %s", self.topic, problem)
         if problem != self._problem:
             self._problem = problem
-            self._tell()
+            self._notify()
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         if self._changed is not None:
             self._changed()

@@ -1,7 +1,7 @@
-"""Image transports: under which topic and type a camera's pictures travel.
+"""Image transports: topics, message types and decoders.
 
-Topic names follow ROS's image_transport: the camera's base topic carries raw pictures, and each
-other transport a subtopic named after it.
+Topic names follow ROS's image_transport: raw images on the camera's base topic, and each other
+transport on a subtopic of its name.
 """
 
 from __future__ import annotations
@@ -11,11 +11,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from rosglass.comm.time import Time
 from rosglass.errors import UnsupportedError
-from rosglass.images.compressed import decompress
-from rosglass.images.compressed_depth import decompress_depth
-from rosglass.images.ffmpeg import FfmpegDecoder
-from rosglass.images.frame import RawImage
-from rosglass.images.theora import TheoraDecoder
+from rosglass.images.compressed import decompress, decompress_depth
+from rosglass.images.encodings import RawImage
+from rosglass.images.video import FfmpegDecoder, TheoraDecoder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -25,40 +23,40 @@ if TYPE_CHECKING:
 
 __all__ = ["TRANSPORTS", "Choice", "PictureReader", "Transport", "choose"]
 
-_KNOWN_ELSEWHERE = ("zstd", "draco")
+_UNSUPPORTED = ("zstd", "draco")
 
 
 class _Decoder(Protocol):
-    """Decodes one stream; the arguments of `read` are the stamp and the transport's fields."""
+    """Decodes a stream; the arguments of `read` are the stamp and the transport's fields."""
 
     @property
     def read(self) -> Callable[..., RawImage | None]:
-        """Make a picture."""
+        """Decode an image."""
 
     def lost(self) -> None:
-        """Tell that packets are missing."""
+        """Record that packets are missing."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Still:
-    """Decodes pictures that need no other."""
+    """Decodes still images."""
 
     read: Callable[..., RawImage]
 
     def lost(self) -> None:
-        """Do nothing: the next picture is whole."""
+        """Do nothing: still images are independent."""
 
 
 @dataclass(frozen=True, slots=True)
 class Transport:
-    """One way pictures are sent.
+    """An image transport.
 
     Attributes:
-        name: Its name, as ROS's image_transport knows it.
+        name: Name as in ROS's image_transport.
         type: Message type.
         fields: Paths of the message's fields that the decoder needs.
-        decoder: Makes a stream's decoder.
-        video: Whether packets build upon earlier ones, so that each must be decoded.
+        decoder: Creates the decoder of a stream.
+        video: Whether packets depend on earlier ones, so that all must be decoded.
     """
 
     name: str
@@ -68,25 +66,25 @@ class Transport:
     video: bool = False
 
     def topic(self, base: str) -> str:
-        """Return the topic that carries the pictures of the camera `base`."""
+        """Return the topic for the images of a camera with base topic `base`."""
         return base if self.name == "raw" else f"{base}/{self.name}"
 
     def reader(self, type: MessageType, wire: str) -> PictureReader:
-        """Return what reads the pictures of one stream out of its samples."""
+        """Create a reader for the samples of a stream."""
         return PictureReader(self, type, wire)
 
 
 class PictureReader:
-    """Reads the pictures of one stream out of its samples, without copying where possible.
+    """Reads the images of a stream from its samples, without copying where possible.
 
     Args:
-        transport: How they are sent.
-        type: The samples' type.
-        wire: The samples' format.
+        transport: The transport.
+        type: Type of the samples.
+        wire: Wire format of the samples.
     """
 
     def __init__(self, transport: Transport, type: MessageType, wire: str) -> None:
-        # ROS 1 has other names for the two parts of a time.
+        # The fields of a time have other names in ROS 1.
         stamp = ("secs", "nsecs") if type.ros == 1 else ("sec", "nanosec")
         header = [*(f"header.stamp.{part}" for part in stamp), "header.frame_id"]
         self._get = type.path(*header, *transport.fields, wire=wire)
@@ -94,12 +92,12 @@ class PictureReader:
         self._publisher, self._sequence = b"", -1
 
     def __call__(self, sample: Sample) -> RawImage | None:
-        """Return the picture in a sample; None when the next sample is needed first.
+        """Return the image of a sample; None if the next sample is needed first.
 
         Raises:
             DecodeError: The sample is malformed.
-            NoPictureError: A video cannot be shown before its next key frame.
-            UnsupportedError: The picture cannot be shown.
+            NoPictureError: A video needs its next key frame first.
+            UnsupportedError: The image is not supported.
         """
         if sample.sequence >= 0:
             follows = (self._publisher, self._sequence + 1) == (sample.publisher, sample.sequence)
@@ -111,13 +109,13 @@ class PictureReader:
         return self._decoder.read(stamp, frame_id, *fields)
 
     def lost(self) -> None:
-        """Tell that samples were left out before the next one."""
+        """Record that samples were left out before the next one."""
         self._decoder.lost()
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Where a camera's pictures are received from.
+    """The topic and transport of a camera's images.
 
     Attributes:
         base: The camera's base topic.
@@ -154,7 +152,7 @@ def _read_depth(stamp: Time | None, frame_id: str, format: str, data: Any) -> Ra
     return decompress_depth(data, format, stamp, frame_id)
 
 
-#: Every transport that can be shown, those that need least to decode first.
+#: All supported transports, the cheapest to decode first.
 TRANSPORTS = {
     transport.name: transport
     for transport in (
@@ -195,20 +193,18 @@ TRANSPORTS = {
 
 
 def choose(topic: str, preferred: str, published: Mapping[str, list[str]]) -> Choice | None:
-    """Choose where to receive a camera's pictures from.
-
-    The preferred transport is taken when it is published, otherwise one that is.
+    """Choose the transport of a camera: the preferred one, or else another one that is published.
 
     Args:
-        topic: The camera's base topic, or a transport's own topic such as ``.../compressed``.
-        preferred: Name of the transport to prefer.
-        published: The topics that have publishers, with their types.
+        topic: The camera's base topic, or the topic of a transport such as ``.../compressed``.
+        preferred: Name of the preferred transport.
+        published: Topics with publishers, with their types.
 
     Returns:
-        The choice; None when the camera publishes nothing yet.
+        The choice; None if the camera does not publish yet.
 
     Raises:
-        UnsupportedError: `preferred` is unknown, or the camera only offers unknown transports.
+        UnsupportedError: `preferred` is unknown, or the camera has unsupported transports only.
     """
     if preferred not in TRANSPORTS:
         raise UnsupportedError(
@@ -221,7 +217,7 @@ def choose(topic: str, preferred: str, published: Mapping[str, list[str]]) -> Ch
         transport = TRANSPORTS[name]
         if transport.type in published.get(transport.topic(topic), ()):
             return Choice(topic, transport)
-    others = [name for name in _KNOWN_ELSEWHERE if f"{topic}/{name}" in published]
+    others = [name for name in _UNSUPPORTED if f"{topic}/{name}" in published]
     if others:
         raise UnsupportedError(
             f"{topic} is only sent as {', '.join(others)}; "

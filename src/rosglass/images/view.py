@@ -1,20 +1,22 @@
-"""How a picture is looked at: a region of it, enlarged, mirrored, turned."""
+"""Region, zoom, mirroring and rotation of a frame for display, and saving it to a file."""
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rosglass.errors import UnsupportedError
-from rosglass.images.encodings import opencv, to_rgbx
-from rosglass.images.frame import PixelFormat
+from rosglass.images.encodings import PixelFormat, opencv, to_rgbx
 
 if TYPE_CHECKING:
-    from rosglass.images.frame import Frame
+    from rosglass.images.encodings import Frame
 
-__all__ = ["View"]
+__all__ = ["FILE_TYPES", "View", "save"]
+
 
 _PIXEL_BYTES = {
     PixelFormat.RGBX: 4,
@@ -27,16 +29,16 @@ _PIXEL_BYTES = {
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """How a picture is looked at: the region is cut out, its middle enlarged, mirrored, turned.
+    """The view of an image: a region, whose center is zoomed, mirrored and rotated.
 
     Attributes:
-        rotation: Degrees clockwise, a multiple of 90.
-        mirrored: Whether left and right change places.
-        flipped: Whether top and bottom change places.
-        region: x, y, width and height of the part to show, pixels of the picture as received;
-            None shows it whole.
-        zoom: How many times the middle is enlarged: 2 shows the middle half of width and height.
-            Pixels are left as they are: enlarging them is the display's work.
+        rotation: Rotation clockwise in degrees, a multiple of 90.
+        mirrored: Whether left and right are swapped.
+        flipped: Whether top and bottom are swapped.
+        region: x, y, width and height of the part to show, in pixels of the received image; None
+            for all of it.
+        zoom: Zoom factor: 2 shows the center half of width and height. Pixels are not scaled; the
+            display does that.
 
     Raises:
         UnsupportedError: The rotation is no multiple of 90, the region is empty, or the zoom is
@@ -67,17 +69,17 @@ class View:
             )
 
     def apply(self, frame: Frame) -> Frame:
-        """Return the picture as it is looked at; shares its memory where nothing moves.
+        """Return the view of a frame; shares its memory if it is not mirrored or rotated.
 
         Raises:
-            UnsupportedError: The region is not within the picture, or OpenCV is not installed.
+            UnsupportedError: The region is not within the image, or OpenCV is not installed.
         """
         turned = self.rotation % 360
         moves = turned or self.mirrored or self.flipped
         if self.region is not None:
-            frame = _cut(frame, *self.region)
+            frame = _crop(frame, *self.region)
         if self.zoom > 1:
-            frame = _cut(frame, *_middle(frame.width, frame.height, self.zoom))
+            frame = _crop(frame, *_center_region(frame.width, frame.height, self.zoom))
         if not moves:
             return frame
         if frame.format not in _PIXEL_BYTES:
@@ -98,14 +100,14 @@ class View:
         return replace(frame, width=width, height=height, planes=(plane,))
 
 
-def _middle(width: int, height: int, zoom: float) -> tuple[int, int, int, int]:
-    """Return the middle of a picture, at even places: those cost no conversion of YUV."""
+def _center_region(width: int, height: int, zoom: float) -> tuple[int, int, int, int]:
+    """Return the center region at even coordinates, which needs no conversion of YUV."""
     x, y = (round(size * (1 - 1 / zoom) / 4) * 2 for size in (width, height))
     x, y = min(x, (width - 1) // 4 * 2), min(y, (height - 1) // 4 * 2)
     return x, y, width - 2 * x, height - 2 * y
 
 
-def _cut(frame: Frame, x: int, y: int, width: int, height: int) -> Frame:
+def _crop(frame: Frame, x: int, y: int, width: int, height: int) -> Frame:
     if x + width > frame.width or y + height > frame.height:
         raise UnsupportedError(
             f"the region x={x} y={y} {width}x{height} is not within the picture of "
@@ -125,3 +127,69 @@ def _cut(frame: Frame, x: int, y: int, width: int, height: int) -> Frame:
     size = _PIXEL_BYTES.get(frame.format, 2)
     plane = frame.planes[0][y : y + height, x * size : (x + width) * size]
     return replace(frame, width=width, height=height, planes=(plane,))
+
+
+#: File extensions that :func:`save` supports.
+FILE_TYPES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
+_DEEP = (".png", ".tif", ".tiff")
+_JPEG_QUALITY = 95
+
+
+def save(frame: Frame, path: str | Path) -> Path:
+    """Save a frame to a file of the type given by its extension (:data:`FILE_TYPES`).
+
+    The file is written atomically. 16-bit greys (depth in millimetres) keep all bits; PNG and TIFF
+    keep transparency.
+
+    Args:
+        frame: The frame.
+        path: The file; an existing one is replaced.
+
+    Returns:
+        The absolute path.
+
+    Raises:
+        UnsupportedError: The type is unknown or cannot store the image, the file cannot be
+            written, or OpenCV is not installed.
+    """
+    file = Path(path).expanduser().absolute()
+    kind = file.suffix.lower()
+    if kind not in FILE_TYPES:
+        raise UnsupportedError(
+            f"{file}: a picture cannot be saved as {kind or 'a file without an ending'!r}; "
+            f"these work: {', '.join(FILE_TYPES)}"
+        )
+    if frame.format is PixelFormat.GRAY16 and kind not in _DEEP:
+        raise UnsupportedError(
+            f"{file}: {kind} cannot hold 16-bit greys such as depths; save it as .png or .tiff"
+        )
+    cv2 = opencv()
+    settings = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if kind in {".jpg", ".jpeg"} else []
+    try:
+        good, data = cv2.imencode(kind, _pixels(frame, kind in _DEEP), settings)
+    except cv2.error as error:
+        raise UnsupportedError(f"{file}: the picture cannot be saved: {error}") from None
+    if not good:
+        raise UnsupportedError(f"{file}: the picture cannot be saved as {kind}")
+    part = file.with_name(f".{file.name}.{os.getpid()}.part")
+    try:
+        part.write_bytes(data)
+        part.replace(file)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise UnsupportedError(f"{file}: cannot be written: {error.strerror}") from None
+    return file
+
+
+def _pixels(frame: Frame, alpha: bool) -> np.ndarray[tuple[int, ...], np.dtype[np.generic]]:
+    """Return the pixels in OpenCV's channel order."""
+    if frame.format is PixelFormat.GRAY8:
+        return frame.planes[0]
+    if frame.format is PixelFormat.GRAY16:
+        return np.ascontiguousarray(frame.planes[0]).view(np.uint16)
+    if frame.format not in {PixelFormat.RGBX, PixelFormat.RGBA, PixelFormat.BGRA}:
+        frame = to_rgbx(frame)
+    pixels = frame.planes[0].reshape(frame.height, frame.width, 4)
+    if frame.format is not PixelFormat.BGRA:
+        pixels = pixels[..., [2, 1, 0, 3]]
+    return np.ascontiguousarray(pixels if alpha and frame.has_alpha else pixels[..., :3])

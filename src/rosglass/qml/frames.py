@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rosglass.errors import UnsupportedError
-from rosglass.images.frame import PixelFormat
+from rosglass.images.encodings import PixelFormat
 from rosglass.qt import QT6, QtCore, QtGui, optional
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rosglass.images.frame import Frame
+    from rosglass.images.encodings import Frame
 
 __all__ = ["IMAGE_FORMATS", "VIDEO_FORMATS", "VideoFrame", "to_image"]
 

@@ -437,7 +437,7 @@ def _fields(
     """Return the fields of a picture's message besides its header; on any thread."""
     pixels = pixels_of(image, size, encoding)
     if transport == "compressed":
-        from rosglass.images.compressing import compress  # noqa: PLC0415 - needs numpy
+        from rosglass.images.compressed import compress  # noqa: PLC0415 - needs numpy
 
         data, told = compress(pixels, encoding, kind, quality)
         return {"format": told, "data": data}

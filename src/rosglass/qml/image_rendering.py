@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from rosglass.comm.time import Time
-    from rosglass.images.frame import Frame, RawImage
+    from rosglass.images.encodings import Frame, RawImage
     from rosglass.qt import QtGui
 
 __all__ = ["Look", "Picture", "Renderer", "whole_frame"]

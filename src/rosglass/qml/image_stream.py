@@ -17,7 +17,7 @@ from rosglass.qt import QtCore, is_alive
 if TYPE_CHECKING:
     from rosglass.comm.inbox import Sample
     from rosglass.comm.node import Node
-    from rosglass.images.frame import RawImage
+    from rosglass.images.encodings import RawImage
     from rosglass.qml.session import Session
 
 __all__ = ["SharedStream", "Viewer"]

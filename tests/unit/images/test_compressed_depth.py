@@ -11,7 +11,7 @@ import pytest
 
 from rosglass.errors import DecodeError, UnsupportedError
 from rosglass.images import decompress_depth
-from rosglass.images.compressed_depth import decode_rvl
+from rosglass.images.compressed import decode_rvl
 
 W, H = 37, 23
 

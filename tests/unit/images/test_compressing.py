@@ -7,7 +7,7 @@ import pytest
 
 from rosglass.errors import UnsupportedError
 from rosglass.images import decompress
-from rosglass.images.compressing import compress
+from rosglass.images.compressed import compress
 
 CHANNELS = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "mono8": 1}
 #: Encodings as they are decoded: what OpenCV gives, or what the message says.
