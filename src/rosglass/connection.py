@@ -1,4 +1,4 @@
-"""Connecting to a robot: which world a URL or the environment names."""
+"""Connecting to a ROS graph, given by a URL or the environment."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _MIDDLEWARES = {
     "rmw_connextdds": "dds://",
     "rmw_gurumdds_cpp": "dds://",
 }
-#: Packages that are not always installed, and the extra that installs them.
+#: Optional packages, and the extra that installs them.
 _EXTRA_OF = {
     "PySide6": "qml",
     "zenoh": "zenoh",
@@ -58,35 +58,35 @@ def connect(
     arguments: Sequence[str] = (),
     own_services: bool = True,
 ) -> Node:
-    """Join a robot's graph and return the node that stands for this program in it.
+    """Connect to a ROS graph, and return this program's node in it.
 
-    Returns at once: when nobody answers, the node keeps trying, says so in
-    :meth:`~rosglass.comm.Node.status`, and catches up when someone does.
+    Returns at once: without an answer, the node retries, as its
+    :meth:`~rosglass.comm.Node.status` says, and completes everything once connected.
 
     Args:
-        url: ``dds://`` joins a DDS domain, where ROS 2 nodes find each other by themselves.
+        url: ``dds://`` joins a DDS domain, where ROS 2 nodes discover each other.
             Options follow as in ``dds://?domain=5&interface=eth0``: ``domain`` (default:
-            ROS_DOMAIN_ID, or 0), ``range`` (where to look for others: ``subnet``, ``localhost``,
+            ROS_DOMAIN_ID, or 0), ``range`` (where to discover nodes: ``subnet``, ``localhost``,
             ``off``, ``system_default``; default: ROS_AUTOMATIC_DISCOVERY_RANGE, or ``subnet``),
-            ``peers`` (machines to ask besides, as in ``peers=192.168.1.5,robot``; short:
+            ``peers`` (further machines, as in ``peers=192.168.1.5,robot``; short:
             ``dds://192.168.1.5``; ROS_STATIC_PEERS adds some), ``interface`` (network
-            interfaces, by name or address), ``distro=humble`` (announce nodes as Humble does;
-            default: as the others do). ROS_LOCALHOST_ONLY and CYCLONEDDS_URI are respected.
+            interfaces, by name or address), ``distro=humble`` (announce nodes as in Humble;
+            default: as in later distributions). ROS_LOCALHOST_ONLY and CYCLONEDDS_URI apply.
 
-            ``zenoh://host:port`` of a Zenoh router (rmw_zenoh), port 7447 when left out. Options
+            ``zenoh://host:port`` of a Zenoh router (rmw_zenoh), by default port 7447. Options
             follow as in ``zenoh://robot:7447?domain=5&mode=client``: ``domain`` (default:
             ROS_DOMAIN_ID, or 0), ``mode`` (``peer`` links directly with other nodes, ``client``
-            only with the router), ``distro=humble`` (announce types as Humble does),
+            only with the router), ``distro=humble`` (announce types as in Humble),
             ``shm=true`` (shared memory between programs of one machine that both allow it).
             ``zenoh://`` alone means the router that ZENOH_SESSION_CONFIG_URI names, or one on this
             machine.
 
-            ``ros1://host:port`` of a ROS 1 master, port 11311 when left out. Options follow as in
-            ``ros1://robot?ip=192.168.1.5``: ``ip`` (host or address under which others reach this
+            ``ros1://host:port`` of a ROS 1 master, by default port 11311. Options follow as in
+            ``ros1://robot?ip=192.168.1.5``: ``ip`` (host or address at which other nodes reach this
             machine; default: ROS_HOSTNAME, ROS_IP, or the address from which the master is
             reached), ``tcpros_port`` and ``slave_port`` (to listen on, for firewalls; default:
-            any), ``anonymous=true`` (append to the node's name what makes it the only one: a
-            second node of a name ends the first one). ``ros1://`` alone means the master that
+            any), ``anonymous=true`` (make the node's name unique: a second node of the same
+            name ends the first one). ``ros1://`` alone means the master that
             ROS_MASTER_URI names, or one on this machine.
 
             ``replay:drive.mcap`` plays a recording (MCAP file, ROS 2 bag, ROS 1 bag) to the node's
@@ -101,13 +101,13 @@ def connect(
 
             None asks the environment: ROSGLASS_URL, then RMW_IMPLEMENTATION,
             ZENOH_SESSION_CONFIG_URI, ROS_DISTRO, ROS_DOMAIN_ID and ROS_MASTER_URI.
-        name: Base name of the node; None for one that nobody else has, ``rosglass_<process id>``;
-            in ROS 1 with host and time, too.
+        name: Base name of the node; None for a unique one, ``rosglass_<process id>``, in ROS 1 also
+            with host and time.
         namespace: Absolute namespace of the node; None for ROS_NAMESPACE in ROS 1, which
-            counts for ``/``, too, else ``/``.
-        library: Where message definitions come from; None for the shared library.
-        arguments: A command line such as ``sys.argv``: what stands in it between ``--ros-args``
-            and ``--`` can rename the node, its topics and services (``-r chatter:=talk``,
+            also applies to ``/``, or else ``/``.
+        library: Source of message definitions; None for the shared library.
+        arguments: A command line such as ``sys.argv``: its part between ``--ros-args`` and ``--``
+            can rename the node, its topics and services (``-r chatter:=talk``,
             ``-r __node:=left``, ``-r __ns:=/arm``), set parameters (``-p speed:=1.5``,
             ``--params-file robot.yaml``) and log levels (``--log-level debug``).
 
@@ -115,17 +115,16 @@ def connect(
             private parameters, ``__name:=left``, ``__ns:=/arm``, ``__ip:=192.168.1.5``,
             ``__hostname:=panel`` and ``__master:=http://robot:11311``, anywhere; between
             ``--ros-args`` and ``--`` also ``-r chatter:=talk`` and ``-p speed:=1.5``.
-        own_services: Whether other nodes find what every node offers: in ROS 2 its parameters, its
-            log, descriptions of its types; in ROS 1 its log and services for log levels. They
-            appear shortly after connecting.
+        own_services: Whether to offer the standard services and topics of a node: in ROS 2
+            parameters, log and type descriptions; in ROS 1 log and logger levels. They appear
+            shortly after connecting.
 
     Raises:
         ArgumentError: A part of the URL, an environment variable or an option is not valid.
-        RosArgumentError: One of `arguments` is not valid; the message says which, and what to
-            write instead.
-        UnsupportedError: The URL's scheme is unknown, or there is neither URL nor environment.
+        RosArgumentError: One of `arguments` is not valid; the message says what to write instead.
+        UnsupportedError: The URL's scheme is unknown, or neither URL nor environment is given.
         InvalidNameError: The name or namespace breaks ROS's rules.
-        ConnectionLostError: This machine cannot open a session at all.
+        ConnectionLostError: This machine cannot open a session.
         BagError: The recording cannot be read.
     """
     if url is None:
@@ -142,7 +141,7 @@ def connect(
     if url.lower().startswith("replay:"):
         from rosglass.bags.replay_node import connect_replay  # noqa: PLC0415
 
-        return connect_replay(url, *_named(name, namespace, arguments))
+        return connect_replay(url, *_resolve_name(name, namespace, arguments))
     if scheme not in ("dds", "zenoh", "ros1", "local") or not separator:
         reason = f"unknown scheme {scheme!r}" if separator else "no scheme"
         raise UnsupportedError(
@@ -165,32 +164,34 @@ def connect(
         )
     from rosglass.ros2.ros_arguments import Arguments  # noqa: PLC0415
 
-    told = Arguments.parse(arguments)
-    name, namespace = _named(name, namespace, arguments)
+    parsed = Arguments.parse(arguments)
+    name, namespace = _resolve_name(name, namespace, arguments)
     middleware = {"dds": _dds, "zenoh": _zenoh, "local": _local}[scheme](url)
     from rosglass.ros2.node import Ros2Node  # noqa: PLC0415
 
-    return Ros2Node(middleware, url, name, namespace, library, told, own_services=own_services)
+    return Ros2Node(middleware, url, name, namespace, library, parsed, own_services=own_services)
 
 
-def _named(name: str | None, namespace: str | None, arguments: Sequence[str]) -> tuple[str, str]:
-    """Return what a node is called, by ROS 2's rules."""
+def _resolve_name(
+    name: str | None, namespace: str | None, arguments: Sequence[str]
+) -> tuple[str, str]:
+    """Return the name and namespace of a node by ROS 2's rules."""
     from rosglass.ros2.ros_arguments import Arguments  # noqa: PLC0415
 
     if name is None:
         number = next(_anonymous)
         name = f"rosglass_{os.getpid()}" + (f"_{number}" if number > 1 else "")
-    told = Arguments.parse(arguments)
-    name = told.node_name(name)
-    return name, told.namespace(name, "/" if namespace is None else namespace)
+    parsed = Arguments.parse(arguments)
+    name = parsed.node_name(name)
+    return name, parsed.namespace(name, "/" if namespace is None else namespace)
 
 
 def default_url(env: Mapping[str, str]) -> str:
-    """Return the URL that the environment `env` asks for; raises UnsupportedError when it doesn't.
+    """Return the URL for the environment `env`; raises UnsupportedError if it specifies none.
 
-    ROSGLASS_URL wins; otherwise RMW_IMPLEMENTATION names the middleware, as for ROS 2's own
-    programs, and a Zenoh session configuration implies Zenoh. Where ROS 2 is set up, or a domain is
-    chosen, without any of these, it means DDS, ROS 2's default. ROS_MASTER_URI alone means ROS 1.
+    ROSGLASS_URL has priority; then RMW_IMPLEMENTATION names the middleware, as for ROS 2's own
+    programs; a Zenoh session configuration implies Zenoh. Without these, a ROS 2 environment or a
+    domain means DDS, ROS 2's default. ROS_MASTER_URI alone means ROS 1.
     """
     choice = (
         "pass a URL to connect() (--url on the command line), or set ROSGLASS_URL, "
@@ -217,7 +218,7 @@ def default_url(env: Mapping[str, str]) -> str:
 
 
 def _zenoh(url: str) -> Middleware:
-    # Zenoh's package is an extra, and takes a while to import.
+    # Zenoh's package is optional, and slow to import.
     if find_spec("zenoh") is None or find_spec("xxhash") is None:
         raise UnsupportedError(
             f"cannot connect to {url!r}: Zenoh is not installed; "
@@ -254,7 +255,7 @@ def _local(url: str) -> Middleware:
 
 
 def explain_missing(error: ModuleNotFoundError) -> str:
-    """Return which package is missing, and how to install it; empty where no extra installs it."""
+    """Return how to install a missing package; empty if no extra installs it."""
     extra = _EXTRA_OF.get((error.name or "").partition(".")[0])
     if extra is None:
         return ""
