@@ -150,18 +150,16 @@ class GoalProbe(Member):
 
     def register(self, master: Master) -> None:
         """Tell the master."""
-        with self._topics.registering:
-            if self._topic not in self._topics.published():
-                name = ros1_name(self._name)
-                master.call("registerPublisher", self._topic, name, self._core.uri)
+        if self._topic not in self._topics.published():
+            name = ros1_name(self._name)
+            master.call("registerPublisher", self._topic, name, self._core.uri)
 
     def unregister(self, master: Master) -> Member | None:
         """Tell the master that goals are not published here, unless they are by now."""
-        with self._topics.registering:
-            heir = self._topics.published().get(self._topic)
-            if self._core.closed or heir is None:
-                master.call("unregisterPublisher", self._topic, self._core.uri)
-                return None
+        heir = self._topics.published().get(self._topic)
+        if self._core.closed or heir is None:
+            master.call("unregisterPublisher", self._topic, self._core.uri)
+            return None
         return heir
 
     def close(self) -> None:

@@ -6,6 +6,7 @@ import http.client
 import socket
 import threading
 import xmlrpc.client
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -45,23 +46,21 @@ class Connected(socket.socket):
         return (self.ends[1], 5000)
 
 
-class Api:
-    """A node's API: its master, and what ended it."""
+class Core:
+    """A node: its master, and what ended it."""
 
     def __init__(self) -> None:
+        self.master = SimpleNamespace(uri=f"http://{MASTER}:11311")
         self.ended: list[tuple[str, str]] = []
-
-    def master_uri(self) -> str:
-        return f"http://{MASTER}:11311"
 
     def shut_down(self, caller: str, reason: str) -> None:
         self.ended.append((caller, reason))
 
 
-def call_from(peer: str, own: str) -> tuple[list[Any], Api]:
-    """Call a node's `shutdown` between these addresses: the answer, and the API."""
-    api = Api()
-    slave = Slave(api)  # type: ignore[arg-type]
+def call_from(peer: str, own: str) -> tuple[list[Any], Core]:
+    """Call a node's `shutdown` between these addresses: the answer, and the node."""
+    core = Core()
+    slave = Slave(core, lambda _: None)  # type: ignore[arg-type]
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def serve() -> None:
@@ -75,7 +74,7 @@ def call_from(peer: str, own: str) -> tuple[list[Any], Api]:
             answer: Any = node.shutdown("/other", "user request")
         thread.join(30)
     slave.close()
-    return answer, api
+    return answer, core
 
 
 @pytest.mark.parametrize(
@@ -94,20 +93,20 @@ def call_from(peer: str, own: str) -> tuple[list[Any], Api]:
     ],
 )
 def test_own_addresses_and_the_masters_may_end_a_node(peer: str, own: str) -> None:
-    answer, api = call_from(peer, own)
+    answer, core = call_from(peer, own)
     assert answer[0] == 1
-    assert api.ended == [("/other", "user request")]
+    assert core.ended == [("/other", "user request")]
 
 
 @pytest.mark.parametrize(
     "peer", ["192.0.2.8", "::ffff:192.0.2.8", "198.51.100.2", "2001:db8::1", "fe80::8%eth0"]
 )
 def test_other_hosts_may_not(peer: str, caplog: pytest.LogCaptureFixture) -> None:
-    answer, api = call_from(peer, "192.0.2.7")
+    answer, core = call_from(peer, "192.0.2.7")
     assert answer[0] == -1
     plain = peer.removeprefix("::ffff:")
     assert f"taken from this node's own and the master's host, not from {plain}" in answer[1]
-    assert not api.ended
+    assert not core.ended
     assert f"/other at {plain} wanted to end this node" in caplog.text
 
 

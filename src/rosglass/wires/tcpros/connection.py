@@ -527,11 +527,11 @@ class Connection:
         self._loop, self._sock = loop, sock
         self._on_header, self._on_frame, self._on_closed = on_header, on_frame, on_closed
         self._incoming = Incoming(peer, lead, self._take)
-        #: Held while another thread than the loop's reads from the socket, which the loop closes.
-        self._io = threading.Lock()
-        #: Held while frames are handed on, in order; outside of the loop by this thread.
+        #: Guards reading: frames are handed on in order, and the socket is closed by no other
+        #: thread until then. Outside of the loop, this thread has it.
         self._turn = threading.Lock()
         self._turn_of = 0
+        #: Guards sending: frames that publishers on any threads send, and those that wait.
         self._lock = threading.Lock()
         self._outgoing = Outgoing()
         self._unacked = UnackedBytes(sock)
@@ -624,16 +624,18 @@ class Connection:
 
     def quiet(self) -> bool:
         """Return whether nothing waits in the socket, nor its end; from any thread."""
-        with self._io:
-            if self._closed:
-                return False
-            try:
-                self._sock.recv(1, socket.MSG_PEEK)
-            except (BlockingIOError, InterruptedError):
-                return True
-            except OSError:
-                pass  # whoever reads it next tells why
+        if not self._turn.acquire(blocking=False):
             return False
+        try:
+            if not self._closed:
+                self._sock.recv(1, socket.MSG_PEEK)
+        except (BlockingIOError, InterruptedError):
+            return True
+        except OSError:
+            pass  # the next read reports it
+        finally:
+            self._release_turn()
+        return False
 
     # -- sending ---------------------------------------------------------------------------------
 
@@ -728,7 +730,7 @@ class Connection:
 
     def _go_on(self) -> None:
         if self._reading and not self._closed and self._turn.acquire(blocking=False):
-            self._receive(self._sock.recv, self._sock.recv_into, go_on=True)
+            self._receive(go_on=True)
 
     def take_together(self, take: Callable[[list[Received], int], None]) -> None:
         """Have frames handed on as they come, several at once; `take` must not raise anything."""
@@ -759,7 +761,7 @@ class Connection:
             self._send_waiting()
         if events & READ and self._turn.acquire(blocking=False):
             before = self._incoming.total
-            self._receive(self._sock.recv, self._sock.recv_into)
+            self._receive()
             if not self._hurried and self._incoming.total - before > _HURRY_BYTES:
                 self.hurry(True)
 
@@ -771,29 +773,26 @@ class Connection:
         # Whoever reads just now hands on the same messages.
         if self._turn.acquire(timeout=_TURN_TIMEOUT_S):
             self._turn_of = me
-            self._receive(self._recv, self._recv_into)
+            self._receive()
 
-    def _recv(self, size: int) -> bytes:
-        """Read in a thread other than the loop's, which may close the socket at any time."""
-        with self._io:
-            if self._closed:
-                raise BlockingIOError
-            return self._sock.recv(size)
+    def _release_turn(self) -> None:
+        self._turn_of = 0
+        self._turn.release()
+        if self._closed:  # while the socket could not be closed
+            if self._loop.is_current:
+                self._close_socket()
+            else:
+                self._loop.call(self._close_socket)
 
-    def _recv_into(self, room: memoryview) -> int:
-        with self._io:
-            if self._closed:
-                raise BlockingIOError
-            return self._sock.recv_into(room)
+    def _close_socket(self) -> None:
+        """Close the socket unless a thread reads from it, which calls this again afterwards."""
+        if self._turn.acquire(blocking=False):
+            self._sock.close()
+            self._turn.release()
 
-    def _receive(
-        self,
-        recv: Callable[[int], bytes],
-        recv_into: Callable[[memoryview], int],
-        go_on: bool = False,
-    ) -> None:
-        """Take in what has come; with the turn, which ends here."""
-        incoming = self._incoming
+    def _receive(self, go_on: bool = False) -> None:
+        """Read what the socket has; with the turn, which ends here."""
+        incoming, sock = self._incoming, self._sock
         try:
             if go_on:
                 incoming.feed(b"")
@@ -803,14 +802,14 @@ class Connection:
                 room = incoming.room
                 if room is None:
                     most = self._ask
-                    data = recv(most)
+                    data = sock.recv(most)
                     count = len(data)
                     self._ask = CHUNK if count == most else _SMALL_READ_BYTES
                     if count:
                         incoming.feed(data)
                 else:
                     most = len(room)
-                    count = recv_into(room)
+                    count = sock.recv_into(room)
                     if count:
                         incoming.filled(count)
                 if not count:
@@ -824,8 +823,7 @@ class Connection:
         except OSError as error:
             self._lose(error.strerror or str(error))
         finally:
-            self._turn_of = 0
-            self._turn.release()
+            self._release_turn()
 
     def _take(self, frames: list[Received], first: int) -> None:
         if not self.header:
@@ -889,11 +887,10 @@ class Connection:
             self._limit.cancel()
         self._loop.linger(self, False)
         self._loop.watch(self._sock, 0, self)
-        with self._io:
-            with suppress(OSError):
-                # A process that was forked has the socket, too, and would keep the other end.
-                self._sock.shutdown(socket.SHUT_RDWR)
-            self._sock.close()
+        with suppress(OSError):
+            # A process that was forked has the socket, too, and would keep the other end.
+            self._sock.shutdown(socket.SHUT_RDWR)
+        self._close_socket()
         self._on_closed(reason)
 
     def _watch(self) -> None:

@@ -21,7 +21,7 @@ from rosglass.wires.tcpros.io_loop import Acceptor, IoLoop, listen
 from rosglass.wires.tcpros.master import Master
 from rosglass.wires.tcpros.registrations import Member, Registrations
 from rosglass.wires.tcpros.service_replier import TcprosReplier
-from rosglass.wires.tcpros.slave import NodeApi, Slave
+from rosglass.wires.tcpros.slave import Slave
 from rosglass.wires.tcpros.topic_subscription import UnreachableLog
 from rosglass.wires.tcpros.topics import Topics
 
@@ -109,7 +109,6 @@ class TcprosCore(NodeCore):
         self.address, self.uri = ("", 0), ""
         self._acceptors: list[Acceptor] = []
         self._api: Slave | None = None
-        self._telling = threading.Lock()
         self._status = Status(ConnectionState.CONNECTING, f"looking for {options.master}")
         sockets: list[socket.socket] = []
         try:
@@ -139,7 +138,7 @@ class TcprosCore(NodeCore):
         Args:
             on_parameter_changed: Called with the name of a parameter that was subscribed to.
         """
-        self._api = Slave(NodeApi(self, self.topics, on_parameter_changed))
+        self._api = Slave(self, on_parameter_changed)
         self._acceptors = [
             Acceptor(self.loop, self._tcpros, self._accept),
             Acceptor(self.loop, self._slave, self._api.accept),
@@ -210,7 +209,7 @@ class TcprosCore(NodeCore):
 
     def tell(self, status: Status) -> None:
         """Take a new status, and tell it; one that comes after the end is ignored."""
-        with self._telling:
+        with self._lock:
             if status == self._status or self._status.state is ConnectionState.CLOSED:
                 return
             self._status = status

@@ -64,7 +64,6 @@ class IoLoop:
         #: Sockets that are looked at now and then: one look for all costs next to nothing.
         self._unhurried = selectors.DefaultSelector()
         self._next_look, self._leisurely = 0.0, False
-        self._lock = threading.Lock()
         self._jobs: deque[Callable[[], None]] = deque()
         self._later: list[tuple[float, int, Later]] = []
         self._numbers = itertools.count()
@@ -94,9 +93,8 @@ class IoLoop:
     def call(self, job: Callable[[], None]) -> None:
         """Run `job` in the loop's thread soon; forgotten when the loop has ended."""
         self._jobs.append(job)
-        with self._lock:
-            if self._awake:
-                return
+        # Without a lock: at worst two threads wake the loop at once. See _on_wake().
+        if not self._awake:
             self._awake = True
             with suppress(OSError):
                 self._wake_in.send(b"\0")
@@ -106,13 +104,12 @@ class IoLoop:
 
         Safe to call twice, and from the loop's own thread, which ends soon after then.
         """
-        with self._lock:
-            if self._closed:
-                return
-            self._deadline = time.monotonic() + _LINGER_S
-            self._closed = True
-            with suppress(OSError):
-                self._wake_in.send(b"\0")
+        if self._closed:
+            return
+        self._deadline = time.monotonic() + _LINGER_S
+        self._closed = True
+        with suppress(OSError):
+            self._wake_in.send(b"\0")
         if self.is_current:
             return
         self._thread.join(_LINGER_S + _HANDLER_TIMEOUT_S)
@@ -155,12 +152,9 @@ class IoLoop:
             for key, events in self._selector.select(self._pause()):
                 handler = key.data
                 if handler is None:
-                    self._wake()
-                    continue
-                try:  # as _run() does, a step sooner
-                    handler.ready(events)
-                except BaseException as error:  # nothing may end this thread
-                    self._fail(handler, error)
+                    self._on_wake()
+                else:
+                    self._run(handler, events)
             if self._leisurely:
                 self._look()
             while self._later and self._later[0][0] <= time.monotonic():
@@ -206,28 +200,22 @@ class IoLoop:
             self._run_job(lambda handler=handler: handler.end(""))  # type: ignore[misc]
         for selector in selectors:
             selector.close()
-        with self._lock:
-            self._awake = True  # nobody is to be woken any more
-            self._wake_in.close()
-            self._wake_out.close()
+        # The wake-up sockets are left to the garbage collector: a thread in call() may have one.
 
-    def _wake(self) -> None:
-        # In this order, and together: a byte that is read must not be one that was sent since.
-        with self._lock, suppress(OSError):
-            self._awake = False
+    def _on_wake(self) -> None:
+        with suppress(OSError):
             self._wake_out.recv(4096)
+        # In this order: jobs of threads that see the old value run in this round.
+        self._awake = False
 
     def _run(self, handler: Ready, events: int) -> None:
         try:
             handler.ready(events)
-        except BaseException as error:
-            self._fail(handler, error)
-
-    def _fail(self, handler: Ready, error: BaseException) -> None:
-        _log.exception("%s failed", handler)
-        reason = f"an error of ours, {error!r}"
-        # Whatever it did not take would make it fail again, at once and for ever.
-        self._run_job(lambda: handler.end(reason))
+        except BaseException as error:  # nothing may end this thread
+            _log.exception("%s failed", handler)
+            reason = f"an error of ours, {error!r}"
+            # What the handler left in the socket would make it fail again, at once and for ever.
+            self._run_job(lambda: handler.end(reason))
 
     def _run_job(self, job: Callable[[], None]) -> None:
         try:

@@ -10,7 +10,6 @@ import http.client
 import math
 import reprlib
 import socket
-import threading
 import time
 import xmlrpc.client
 from contextlib import suppress
@@ -333,23 +332,22 @@ class Master:
         self.uri, self.caller = uri, caller
         self.reached_from = ""
         self._server = _Server(uri)
-        self._lock = threading.Lock()
-        #: One connection is kept: a new one each second would cost the master a thread each.
-        self._idle: _Connection | None = None
+        #: At most one connection is kept: a new one each second would cost the master a thread
+        #: each. Any thread calls; every use of these is atomic.
+        self._idle: list[_Connection] = []
         self._busy: set[_Connection] = set()
         self._closed = False
 
     def call(self, method: str, *arguments: Any, timeout: float = _TIMEOUT) -> Any:
         """Call a method, the node's name in front; errors as of :func:`call_node`."""
-        with self._lock:
-            if self._closed:
-                raise ConnectionLostError(f"{self.uri} is not asked any more: the node is closed")
-            connection, self._idle = self._idle, None
-            if connection is None:
-                connection = self._server.connection()
-            self._busy.add(connection)
+        connection = self._server.connection()
+        with suppress(IndexError):
+            connection = self._idle.pop()
+        self._busy.add(connection)  # before the look at `_closed`, which close() sets first
         answered = False
         try:
+            if self._closed:
+                raise ConnectionLostError(f"{self.uri} is not called any more: the node is closed")
             value = self._server.call(connection, method, (self.caller, *arguments), timeout)
             answered = True
             return value
@@ -361,22 +359,18 @@ class Master:
 
     def close(self) -> None:
         """End the calls under way, and refuse others; safe to call twice, from any thread."""
-        with self._lock:
-            self._closed = True
-            busy, idle = list(self._busy), self._idle
-            self._idle = None
-        for connection in busy:
+        self._closed = True
+        for connection in list(self._busy):
             connection.end_now()
-        if idle is not None:
-            idle.close()
+        while self._idle:
+            self._idle.pop().close()
 
     def _put_back(self, connection: _Connection, answered: bool) -> None:
         if connection.sock is not None:
             with suppress(OSError):
                 self.reached_from = str(connection.sock.getsockname()[0])
-        with self._lock:
-            self._busy.discard(connection)
-            if answered and self._idle is None and not self._closed:
-                self._idle = connection
-                return
-        connection.close()
+        self._busy.discard(connection)
+        if answered and not self._idle and not self._closed:
+            self._idle.append(connection)
+        else:
+            connection.close()

@@ -250,16 +250,14 @@ class Publication(Member):
     def register(self, master: Master) -> None:
         """Tell the master."""
         name = ros1_name(self.type.name)
-        with self._topics.registering:
-            master.call("registerPublisher", self.topic, name, self._core.uri)
+        master.call("registerPublisher", self.topic, name, self._core.uri)
 
     def unregister(self, master: Master) -> Member | None:
         """Tell the master that it is published here no more, unless it is again."""
-        with self._topics.registering:
-            heir = self._topics.published().get(self.topic)
-            if self._core.closed or heir is None:
-                master.call("unregisterPublisher", self.topic, self._core.uri)
-                return None
+        heir = self._topics.published().get(self.topic)
+        if self._core.closed or heir is None:
+            master.call("unregisterPublisher", self.topic, self._core.uri)
+            return None
         return heir
 
     def _refusals(self) -> list[str]:

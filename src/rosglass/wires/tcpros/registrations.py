@@ -81,8 +81,8 @@ class Registrations:
 
     def __init__(self, core: TcprosCore) -> None:
         self._core = core
+        #: Wakes the thread: there is something to register, or the node is closed.
         self._wanted = threading.Event()
-        self._lock = threading.Lock()
         self._closing = False
         #: Members that the master knows, and those that it may know.
         self._registered: set[Member] = set()
@@ -123,9 +123,8 @@ class Registrations:
 
         What it could not be told then, it is told in the background when it answers again.
         """
-        with self._lock:
-            self._closing = True
-            known = bool(self._tried)
+        self._closing = True
+        known = bool(self._tried)
         self._wanted.set()
         if self.is_current:
             self._leave()
@@ -231,11 +230,12 @@ class Registrations:
         for member in self._core.registrable():
             if member in self._registered:
                 continue
-            with self._lock:
-                if self._closing:
-                    break
-                # It may know the member although its answer gets lost.
-                self._tried.add(member)
+            # First: the master may know the member although its answer gets lost, and close()
+            # looks at these after it has set `_closing`.
+            self._tried.add(member)
+            if self._closing:
+                self._tried.discard(member)
+                break
             try:
                 member.register(self._core.master)
                 self._registered.add(member)
@@ -301,143 +301,65 @@ class Registrations:
         with suppress(ConnectionLostError):
             for member in [*self._leaving, *self._tried]:
                 if member in self._tried:
-                    try:
-                        member.unregister(core.master)
-                    except ConnectionLostError:
-                        raise
-                    except Error as error:
-                        _log.debug("%s: %s", member, error)
+                    _unregister_member(member, core.master)
                     self._tried.discard(member)
 
 
-#: Seconds for which a master is tried again, and between two tries.
+#: Seconds for which a master that does not answer is called again, and between two calls.
 _RETRY_LIMIT_S, _RETRY_PAUSE_S = 60.0, 1.0
 
 
-class _Unregistration:
-    """What a closed node has to tell its master yet.
-
-    Args:
-        core: The node.
-        members: What the master may know of it.
-
-    Attributes:
-        uri: The master's.
-        answered: Whether the master has answered the last time.
-    """
-
-    def __init__(self, core: TcprosCore, members: Iterable[Member]) -> None:
-        self._core, self._members = core, list(members)
-        self._left, self._again = list(self._members), True
-        self.uri, self.answered = core.master.uri, True
-        self._master = Master(self.uri, core.name.full)
-        self._until = time.monotonic() + _RETRY_LIMIT_S
-
-    def go_on(self) -> bool:
-        """Tell the master what is left; return whether that was all."""
-        try:
-            while self._left:
-                self._tell(self._left[-1])
-                self._left.pop()
-            self.answered = True
-            if self._forgotten():
-                return True
-        except ConnectionLostError as error:
-            self.answered = False
-            _log.debug("%s has left, but its master does not know: %s", self._core.name, error)
-            return False
-        # A registration from before it hung was taken up after the end of it. Once is enough: who
-        # has this name and address then is another node, on the same ports.
-        again, self._again = self._again, False
-        self._left = list(self._members)
-        return not again
-
-    def expired(self) -> bool:
-        """Return whether to give up, and tell it then."""
-        if time.monotonic() < self._until:
-            return False
-        _log.info(
-            "%s does not answer, and may list %s still when it does: rosglass node cleanup "
-            "removes what is gone",
-            self.uri,
-            self._core.name,
-        )
-        return True
-
-    def end(self) -> None:
-        """Close the connection with the master."""
-        self._master.close()
-
-    def _tell(self, member: Member) -> None:
-        try:
-            member.unregister(self._master)
-        except ConnectionLostError:
-            raise
-        except Error as error:
-            _log.debug("%s: %s", member, error)
-
-    def _forgotten(self) -> bool:
-        try:
-            return self._master.call("lookupNode", self._core.name.full) not in self._core.uris
-        except MasterError:
-            return True
-
-
-class _Unregistrations:
-    """Retries all unregistrations on one daemon thread, until none is left."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._open: list[_Unregistration] = []
-        self._thread: threading.Thread | None = None
-
-    def add(self, unregistration: _Unregistration) -> None:
-        """Take one in."""
-        with self._lock:
-            self._open.append(unregistration)
-            if self._thread is None or not self._thread.is_alive():
-                self._thread = threading.Thread(
-                    target=self._work, name="rosglass unregister", daemon=True
-                )
-                self._thread.start()
-
-    def _work(self) -> None:
-        while True:
-            with self._lock:
-                around = list(self._open)
-                if not around:
-                    self._thread = None
-                    return
-            done = self._round(around)
-            with self._lock:
-                self._open = [one for one in self._open if one not in done]
-                left = bool(self._open)
-            if left:
-                time.sleep(_RETRY_PAUSE_S)
-
-    def _round(self, around: list[_Unregistration]) -> list[_Unregistration]:
-        """Return those that are over."""
-        silent: set[str] = set()
-        done = []
-        for one in around:
-            over = one.uri not in silent and one.go_on()
-            if not one.answered:
-                silent.add(one.uri)
-            if over or one.expired():
-                one.end()
-                done.append(one)
-        return done
-
-
-#: One for the process: nodes are gone when theirs is due.
-_unregistrations = _Unregistrations()
-
-
 def unregister_later(core: TcprosCore, members: Iterable[Member]) -> None:
-    """Let the master of a closed node forget it once it answers, within a minute.
+    """Unregister a closed node in the background, once its master answers within a minute.
 
     Args:
         core: The node.
         members: What the master may know of it.
     """
-    _unregistrations.add(_Unregistration(core, members))
+    threading.Thread(
+        target=_unregister, args=(core, list(members)), name="rosglass unregister", daemon=True
+    ).start()
+
+
+def _unregister(core: TcprosCore, members: list[Member]) -> None:
+    master = Master(core.master.uri, core.name.full)
+    left, again = list(members), True
+    until = time.monotonic() + _RETRY_LIMIT_S
+    while time.monotonic() < until:
+        try:
+            while left:
+                _unregister_member(left[-1], master)
+                left.pop()
+            if not again or _has_forgotten(master, core):
+                break
+            # A registration from before the master hung was processed after its end. Once is
+            # enough: whoever has this name and address then is another node, on the same ports.
+            left, again = list(members), False
+        except ConnectionLostError as error:
+            _log.debug("%s is closed, but its master does not know: %s", core.name, error)
+        time.sleep(_RETRY_PAUSE_S)
+    else:
+        _log.info(
+            "%s does not answer, and may still list %s when it does: rosglass node cleanup "
+            "removes what is gone",
+            master.uri,
+            core.name,
+        )
+    master.close()
+
+
+def _unregister_member(member: Member, master: Master) -> None:
+    """Unregister a member; raises ConnectionLostError, and logs what the master refuses."""
+    try:
+        member.unregister(master)
+    except ConnectionLostError:
+        raise
+    except Error as error:
+        _log.debug("%s: %s", member, error)
+
+
+def _has_forgotten(master: Master, core: TcprosCore) -> bool:
+    try:
+        return master.call("lookupNode", core.name.full) not in core.uris
+    except MasterError:
+        return True

@@ -239,19 +239,15 @@ class TopicSubscription(Member):
         """Tell the master, and connect with the publishers it names."""
         self._epoch += 1
         updates = self._updates
-        told: list[str] = []
-        with self._topics.registering:
-            told = master.call("registerSubscriber", self.topic, self.type_name, self.core.uri)
-        uris = list(told)
+        uris = list(master.call("registerSubscriber", self.topic, self.type_name, self.core.uri))
         self.core.loop.call(lambda: self._take_answer(uris, updates))
 
     def unregister(self, master: Master) -> Member | None:
         """Tell the master that it is subscribed here no more, unless it is again."""
-        with self._topics.registering:
-            heir = self._topics.subscribed().get(self.topic)
-            if self.core.closed or heir is None:
-                master.call("unregisterSubscriber", self.topic, self.core.uri)
-                return None
+        heir = self._topics.subscribed().get(self.topic)
+        if self.core.closed or heir is None:
+            master.call("unregisterSubscriber", self.topic, self.core.uri)
+            return None
         return heir
 
     def follow(self, moved: bool, idle: bool) -> None:

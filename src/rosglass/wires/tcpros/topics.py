@@ -41,16 +41,12 @@ class Topics:
 
     Args:
         core: The node.
-
-    Attributes:
-        registering: Held while the master is told of a topic: who ends and who begins at the same
-            time must not take the other's registration away.
     """
 
     def __init__(self, core: TcprosCore) -> None:
         self._core = core
+        #: Guards which endpoint of a topic is the first one, and which the last.
         self._lock = threading.Lock()
-        self.registering = threading.Lock()
         self._publications: dict[str, Publication] = {}
         #: Who takes connections of topics that are about to be published.
         self._stand_ins: dict[str, Callable[[Connection, dict[str, str]], str]] = {}
