@@ -15,6 +15,7 @@ import time
 import xmlrpc.client
 from collections import deque
 from collections.abc import Mapping
+from contextlib import suppress
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -94,6 +95,7 @@ class ParameterServer(Handle):
 
     def __init__(self, core: TcprosCore, start: Mapping[str, Any]) -> None:
         self._core, self._start = core, start
+        #: Guards the start parameters: no thread sets them after another one has changed them.
         self._beginning = threading.Lock()
         self._begun = not start
         self._calls = MasterCallQueue(core)
@@ -212,8 +214,7 @@ class ParameterServer(Handle):
 
     def changed(self, name: str) -> None:
         """Look at a name that the master says has changed; for the node."""
-        for watch in self._watches.touched(name.rstrip("/") or "/"):
-            watch.ask()
+        self._reread([name.rstrip("/") or "/"])
 
     # -- files -----------------------------------------------------------------------------------
 
@@ -301,7 +302,7 @@ class ParameterServer(Handle):
     def later(self, what: str, job: Callable[[], _T]) -> Promise[_T]:
         """Run `job`, which waits for the master, after what was asked before; return at once."""
         self._check_open()
-        return self._calls.ask(what, job)
+        return self._calls.add(what, job)
 
     # -- the node's ------------------------------------------------------------------------------
 
@@ -381,7 +382,7 @@ class ParameterServer(Handle):
     def _reread(self, names: list[str]) -> None:
         """Read what is followed of these: the master notifies all nodes but the one that set it."""
         for watch in {watch for name in names for watch in self._watches.touched(name)}:
-            watch.ask()
+            watch.read_soon()
 
     def _call(self, method: str, *arguments: Any, timeout: float) -> Any:
         self._check_open()
@@ -397,10 +398,11 @@ class ParameterServer(Handle):
 
 
 class MasterCallQueue:
-    """Puts questions to the master on a thread that may wait.
+    """Runs calls of the master one after the other, on a thread that may wait.
 
-    Answers come in order, so that of two values that are set the second one stays. When the master
-    is gone, all that wait are told at once, instead of one after the other.
+    In order, so that of two values that are set the second one stays. When the master does not
+    answer, all that wait fail at once, instead of one after the other. The I/O loop's thread owns
+    the state.
 
     Args:
         core: The node.
@@ -408,71 +410,73 @@ class MasterCallQueue:
 
     def __init__(self, core: TcprosCore) -> None:
         self._core = core
-        self._lock = threading.Lock()
         self._waiting: deque[tuple[Promise[Any], Callable[[], Any]]] = deque()
-        self._asked: Promise[Any] | None = None
-        self._busy = self._closed = False
+        self._current: Promise[Any] | None = None
+        self._closed = False
 
-    def ask(self, what: str, job: Callable[[], _T]) -> Promise[_T]:
-        """Run `job`, which waits for the master; return the promise of what it returns.
+    def add(self, what: str, job: Callable[[], _T]) -> Promise[_T]:
+        """Run `job`, which waits for the master; return the promise of its result.
 
         Args:
             what: What is asked for, for messages.
-            job: Asks.
+            job: Calls the master.
         """
         made: Promise[_T] = Promise(
             f"{self._core.master.uri} has not answered ({what})",
             self._core.dispatcher,
             cancellable=True,
         )
-        with self._lock:
-            closed, start = self._closed, not self._busy
-            if not closed:
-                self._busy = True
-                self._waiting.append((made, job))
-        if closed:
-            made.set_exception(self._end())
-        elif start:
-            self._core.pool.run(self._work)
+
+        def add() -> None:
+            self._waiting.append((made, job))
+            self._advance()
+
+        self._core.loop.call(add)
+        if self._closed:
+            made.set_exception(self._closed_error())
         return made
 
     def close(self) -> None:
-        """Give up what was asked; safe to call twice."""
-        with self._lock:
-            self._closed = True
-            waiting = [promise for promise, _ in self._waiting]
-            self._waiting.clear()
-            asked, self._asked = self._asked, None
-        for promise in waiting if asked is None else [asked, *waiting]:
-            promise.set_exception(self._end())
+        """Fail all promises; safe to call twice."""
+        self._closed = True
+        self._core.loop.call(self._end)
 
-    def _work(self) -> None:
-        while True:
-            with self._lock:
-                if not self._waiting:
-                    self._busy = False
-                    return
-                promise, job = self._waiting.popleft()
-                self._asked = promise
-            if promise.done():
-                continue  # it was given up
-            try:
-                promise.set_result(job())
-            except ConnectionLostError as error:
-                promise.set_exception(error)
-                self._lose(error)
-            except Exception as error:
-                promise.set_exception(error)
+    def _end(self) -> None:
+        current, self._current = self._current, None
+        if current is not None:
+            current.set_exception(self._closed_error())
+        self._fail_waiting(self._closed_error())
 
-    def _lose(self, error: ConnectionLostError) -> None:
-        with self._lock:
-            waiting = [promise for promise, _ in self._waiting]
-            self._waiting.clear()
-        for promise in waiting:
+    def _fail_waiting(self, error: Error) -> None:
+        while self._waiting:
+            self._waiting.popleft()[0].set_exception(error)
+
+    def _advance(self) -> None:
+        while self._current is None and self._waiting:
+            promise, job = self._waiting.popleft()
+            if self._closed:
+                promise.set_exception(self._closed_error())
+            elif not promise.done():  # not cancelled
+                self._current = promise
+                self._core.pool.run(lambda: self._run(promise, job))  # noqa: B023 - runs once
+
+    def _run(self, promise: Promise[Any], job: Callable[[], Any]) -> None:
+        failure: Exception | None = None
+        try:
+            promise.set_result(job())
+        except Exception as error:
+            failure = error
             promise.set_exception(error)
+        self._core.loop.call(lambda: self._on_done(failure))
 
-    def _end(self) -> NodeClosedError:
-        return NodeClosedError(f"node {self._core.name} was closed meanwhile")
+    def _on_done(self, failure: Exception | None) -> None:
+        self._current = None
+        if isinstance(failure, ConnectionLostError):
+            self._fail_waiting(failure)
+        self._advance()
+
+    def _closed_error(self) -> NodeClosedError:
+        return NodeClosedError(f"node {self._core.name} was closed before the master answered")
 
 
 class StartParameters(Member):
@@ -509,24 +513,25 @@ class ParameterSubscription(Handle):
     def __init__(self, watches: ParameterWatches, name: str) -> None:
         self.name = name
         self._watches = watches
-        self._changed = threading.Condition()
-        self._known = self._closed = False
+        #: Wakes the threads in :meth:`wait`.
+        self._known = threading.Event()
+        self._closed = False
         self._value: Any = None
         self.listeners: Listeners[Any] = Listeners(where=name)
 
     def __repr__(self) -> str:
-        value = repr(self._value) if self.is_set else "not set" if self._known else "not known yet"
+        value = repr(self._value) if self.is_set else "not set" if self.known else "unknown"
         return f"<{type(self).__name__} of {self.name}: {value:.80}>"
 
     @property
     def known(self) -> bool:
         """Whether the master has answered."""
-        return self._known
+        return self._known.is_set()
 
     @property
     def is_set(self) -> bool:
         """Whether it is set, as far as is known."""
-        return self._known and self._value is not None
+        return self.known and self._value is not None
 
     @property
     def value(self) -> Any:
@@ -540,23 +545,19 @@ class ParameterSubscription(Handle):
         """Wait up to `timeout` seconds, None for ever, until it is known; return whether it is."""
         timeout = check_timeout(timeout, self.name)
         deadline = None if timeout is None else time.monotonic() + timeout
-        while not (self._known or self._closed):
+        while not (self.known or self._closed):
             check_may_wait(self.name)
             left = _WAIT_SLICE_S if deadline is None else deadline - time.monotonic()
             if left <= 0:
                 break
-            with self._changed:
-                if not self._known:
-                    self._changed.wait(min(left, _WAIT_SLICE_S))
-        return self._known
+            self._known.wait(min(left, _WAIT_SLICE_S))
+        return self.known
 
     def _on_value(self, value: Any) -> None:
         if self._closed:
             return
         self._value = value
-        with self._changed:
-            self._known = True
-            self._changed.notify_all()
+        self._known.set()
         self.listeners.notify(value)
 
     def close(self) -> None:
@@ -568,11 +569,11 @@ class ParameterSubscription(Handle):
 
 
 class ParameterWatches:
-    """What one node follows, each name subscribed to once.
+    """The parameters that one node follows, each name subscribed to once.
 
-    What the master says of a change only makes us read: it leaves out a caller's own changes and a
+    A notification of the master only makes us read: it leaves out a caller's own changes and a
     namespace that became a plain value, gives up after one attempt, and forgets all subscribers
-    when it is restarted.
+    when it is restarted. The I/O loop's thread owns the watches.
 
     Args:
         core: The node.
@@ -580,48 +581,50 @@ class ParameterWatches:
 
     def __init__(self, core: TcprosCore) -> None:
         self._core = core
-        self._lock = threading.Lock()
         self._watches: dict[str, ParameterWatch] = {}
-        #: Held while the master is called to subscribe to a name, or to unsubscribe.
+        #: Held while the master is called to subscribe to a name, or to unsubscribe: values are
+        #: numbered in the order of the calls.
         self.subscribing = threading.Lock()
 
     def subscribe(
         self, name: str, callback: Callable[[Any], None] | None, executor: Executor | None
     ) -> ParameterSubscription:
-        """Follow an absolute name; raises NodeClosedError, and ConversionError for callbacks."""
+        """Follow an absolute name; raises ConversionError for callbacks."""
         made = ParameterSubscription(self, name)
         if callback is not None:
             made.listeners.add(callback, executor or self._core.dispatcher)
-        with self._lock:
-            watch = self._watches.get(name)
-            new = watch is None
-            if watch is None:
-                watch = self._watches[name] = ParameterWatch(self._core, self, name)
-            watch.join(made)
-        if new:
-            self._core.add(watch)
-        else:
-            watch.share(made)
+        self._core.loop.call(lambda: self._join(made))
         return made
 
+    def _join(self, subscription: ParameterSubscription) -> None:
+        watch = self._watches.get(subscription.name)
+        if watch is not None:
+            watch.join(subscription)
+            return
+        watch = self._watches[subscription.name] = ParameterWatch(
+            self._core, self, subscription.name
+        )
+        watch.join(subscription)
+        with suppress(NodeClosedError):
+            self._core.add(watch)
+
     def leave(self, subscription: ParameterSubscription) -> None:
-        """Follow its name no more if it was the last one; for subscriptions."""
-        with self._lock:
-            watch = self._watches.get(subscription.name)
-            last = watch is not None and watch.leave(subscription)
-            if last:
-                del self._watches[subscription.name]
-        if watch is not None and last:
+        """Remove a subscription, and its watch if it was the last one; from any thread."""
+        self._core.loop.call(lambda: self._leave(subscription))
+
+    def _leave(self, subscription: ParameterSubscription) -> None:
+        watch = self._watches.get(subscription.name)
+        if watch is not None and watch.leave(subscription):
+            del self._watches[subscription.name]
             watch.close()
 
     def current(self, name: str) -> ParameterWatch | None:
-        """Return what follows a name, if it is followed."""
+        """Return the watch of a name; None if it is not followed."""
         return self._watches.get(name)
 
     def touched(self, name: str) -> list[ParameterWatch]:
-        """Return what follows a name, what is in it, or what it is in."""
-        with self._lock:
-            watches = list(self._watches.values())
+        """Return the watches of a name, of what is in it, and of what it is in."""
+        watches = list(self._watches.values())
         return [w for w in watches if _within(name, w.name) or _within(w.name, name)]
 
 
@@ -631,13 +634,14 @@ class ParameterWatch(Member):
     def __init__(self, core: TcprosCore, watches: ParameterWatches, name: str) -> None:
         self.name = name
         self._core, self._watches = core, watches
+        #: Runs what passes values on; its jobs own the values.
         self._turn = InOrder()
-        #: Changed under the watches' lock; read by jobs of `_turn`, which own the rest.
+        #: Replaced by the loop's thread.
         self._subscriptions: tuple[ParameterSubscription, ...] = ()
         self._known, self._value, self._newest = False, None, 0
         self._readings = 0
-        self._asking = threading.Lock()
-        self._asked = self._busy = False
+        #: Whether a read is wanted, and whether one is in progress; of the loop's thread.
+        self._wanted = self._reading = False
         self._read_at = 0.0
         self._closed = False
 
@@ -645,26 +649,23 @@ class ParameterWatch(Member):
         return f"the subscription to parameter {self.name}"
 
     def join(self, subscription: ParameterSubscription) -> None:
-        """Pass values on to a subscription from now on; under the watches' lock."""
+        """Pass values on to a subscription from now on, first the one that is known."""
         self._subscriptions += (subscription,)
 
-    def leave(self, subscription: ParameterSubscription) -> bool:
-        """Forget a subscription; return whether it was the last one."""
-        self._subscriptions = tuple(s for s in self._subscriptions if s is not subscription)
-        return not self._subscriptions
-
-    def share(self, subscription: ParameterSubscription) -> None:
-        """Give a subscription that has just joined the value that is known."""
-
-        def job() -> None:
+        def share() -> None:
             if self._known and not subscription.known:
                 subscription._on_value(self._value)
 
-        self._turn.add(job)
+        self._turn.add(share)
+
+    def leave(self, subscription: ParameterSubscription) -> bool:
+        """Remove a subscription; return whether it was the last one."""
+        self._subscriptions = tuple(s for s in self._subscriptions if s is not subscription)
+        return not self._subscriptions
 
     def register(self, master: Master) -> None:
         """Subscribe, and read; again after the master's restart."""
-        self.read(master)
+        self._read(master)
 
     def unregister(self, master: Master) -> Member | None:
         """Unsubscribe, unless the name is followed again."""
@@ -675,20 +676,36 @@ class ParameterWatch(Member):
         return heir
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - not all that moves counts
-        """Look now and then whether a change was missed."""
+        """Read it again now and then, in case a change was missed."""
         if idle and time.monotonic() - self._read_at > _REREAD_S:
-            self.ask()
+            self.read_soon()
 
-    def ask(self) -> None:
-        """Read it soon; from any thread, without waiting."""
-        with self._asking:
-            self._asked = True
-            if self._busy or self._closed:
-                return
-            self._busy = True
-        self._core.pool.run(self._run)
+    def read_soon(self) -> None:
+        """Read it on a thread that may wait; from any thread."""
+        self._core.loop.call(self._request_read)
 
-    def read(self, master: Master) -> None:
+    def _request_read(self) -> None:
+        self._wanted = True
+        if not self._reading and not self._closed:
+            self._reading = True
+            self._core.pool.run(self._read_safely)
+
+    def _read_safely(self) -> None:
+        self._wanted = False
+        try:
+            self._read(self._core.master)
+        except Error:
+            pass  # the core looks for a master that is gone, and registers this again
+        except Exception:
+            _log.exception("%s failed", self)
+        self._core.loop.call(self._on_read)
+
+    def _on_read(self) -> None:
+        self._reading = False
+        if self._wanted:
+            self._request_read()
+
+    def _read(self, master: Master) -> None:
         """Read it, and pass it on if it has changed.
 
         Raises:
@@ -701,32 +718,10 @@ class ParameterWatch(Member):
             self._readings += 1
             number = self._readings
         value = None if value == {} else value
-        self._turn.add(lambda: self._on_reading(number, value))
+        self._turn.add(lambda: self._on_value(number, value))
 
-    def close(self) -> None:
-        """Follow it no more; safe to call twice."""
-        if not self._closed:
-            self._closed = True
-            for subscription in self._subscriptions:
-                subscription.close()
-            self._core.remove(self)
-
-    def _run(self) -> None:
-        while True:
-            with self._asking:
-                if not self._asked or self._closed:
-                    self._busy = False
-                    return
-                self._asked = False
-            try:
-                self.read(self._core.master)
-            except Error:
-                pass  # the core looks for a master that is gone, and registers this again
-            except Exception:
-                _log.exception("%s failed", self)
-
-    def _on_reading(self, number: int, value: Any) -> None:
-        """Pass a value on; one thread at a time, the newest reading only."""
+    def _on_value(self, number: int, value: Any) -> None:
+        """Pass a value on, unless a newer one was read."""
         if number < self._newest:
             return
         self._newest = number
@@ -735,6 +730,14 @@ class ParameterWatch(Member):
         for subscription in self._subscriptions:
             if changed or not subscription.known:
                 subscription._on_value(value)
+
+    def close(self) -> None:
+        """Follow it no more; safe to call twice."""
+        if not self._closed:
+            self._closed = True
+            for subscription in self._subscriptions:
+                subscription.close()
+            self._core.remove(self)
 
 
 def _within(name: str, namespace: str) -> bool:

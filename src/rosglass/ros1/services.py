@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections import deque
 from contextlib import suppress
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING
 from rosglass.comm import EndpointKind, QoS
 from rosglass.comm.service_client import ServiceClient
 from rosglass.comm.service_server import ServiceServer
-from rosglass.errors import ConnectionLostError, ConversionError
+from rosglass.errors import ConnectionLostError, ConversionError, NodeClosedError
 from rosglass.wires.tcpros.registrations import Member
 from rosglass.wires.tcpros.service_requester import TcprosRequester, locate, probe
 
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
     from rosglass.comm.service_client import PendingCall
     from rosglass.messages import Message, ServiceType
     from rosglass.wires.base import OnReply, OnRequest
-    from rosglass.wires.tcpros.core import BlockingPool, TcprosCore
+    from rosglass.wires.tcpros.core import TcprosCore
     from rosglass.wires.tcpros.service_replier import TcprosReplier
     from rosglass.wires.tcpros.service_requester import Peer, Place
 
@@ -42,7 +41,7 @@ class Services:
 
     def __init__(self, core: TcprosCore) -> None:
         self._core = core
-        self.types = ServiceTypes(core, core.lookups)
+        self.types = ServiceTypes(core)
 
     # -- making ----------------------------------------------------------------------------------
 
@@ -118,136 +117,127 @@ def _profile(qos: QoS | None, name: str) -> QoS:
     return qos or QoS.services()
 
 
-#: Servers asked at once; a robot has hundreds of services, and other things to do.
-_AT_ONCE = 4
-#: Seconds until a server that did not tell is asked again.
-_AGAIN = 10.0
-#: How many answers are told together while more are awaited.
+#: Servers probed at once; a robot has hundreds of services, and other things to do.
+_MAX_PROBES = 4
+#: Seconds until a server that did not answer is probed again.
+_RETRY_S = 10.0
+#: Answers after which the graph is reported as changed while more are awaited.
 _BATCH = 32
 
 
 class ServiceTypes(Member):
-    """Remembers what services' servers say of them, and asks those that are new.
+    """Caches the types that services' servers announce, and probes the servers of new services.
 
-    Nobody is asked before :meth:`of` is called for the first time.
+    Nothing is probed before the first call of :meth:`of`. The I/O loop's thread owns the state;
+    other threads only read what is known.
 
     Args:
         core: The node.
-        pool: Runs lookups.
     """
 
-    def __init__(self, core: TcprosCore, pool: BlockingPool) -> None:
-        self._core, self._pool = core, pool
-        self._lock = threading.Lock()
-        #: What is known, by service: whose it was according to the master, and what it says.
+    def __init__(self, core: TcprosCore) -> None:
+        self._core = core
+        #: By service: its nodes according to the master, and what its server announces.
         self._known: dict[str, tuple[list[str], Peer]] = {}
+        #: When a probe failed, by monotonic time.
         self._failed: dict[str, float] = {}
+        #: Services whose types users have asked for.
         self._wanted: set[str] = set()
         self._queue: deque[str] = deque()
-        self._asked: set[str] = set()
+        self._probed: set[str] = set()
         self._news = 0
         self._following = self._closed = False
 
     def of(self, name: str) -> Peer | None:
-        """Return what a service's server says of it, None until it has said so.
+        """Return what a service's server announces; None until it has answered.
 
-        The first time, the server is asked in the background; the graph changes when it has
-        answered.
+        The first time, the server is probed in the background; the graph changes when it has
+        answered. From any thread.
         """
         nodes = self._core.graph.services().get(name)
-        with self._lock:
-            known = self._known.get(name)
-            if nodes is None:
-                return None
-            if known is not None and known[0] == nodes:
-                return known[1]
-            self._wanted.add(name)
-            begin, self._following = not self._following, True
-        if begin and not self._core.closed:
-            self._core.add(self)
-        self._ask(name)
+        if nodes is None:
+            return None
+        known = self._known.get(name)
+        if known is not None and known[0] == nodes:
+            return known[1]
+        self._core.loop.call(lambda: self._want(name))
         return None
 
     def note(self, name: str, peer: Peer) -> None:
-        """Remember what a server said to somebody else."""
+        """Remember what a server announced to a client; in the loop's thread."""
         nodes = self._core.graph.services().get(name)
         if nodes == [peer.node]:
-            with self._lock:
-                self._known[name] = (nodes, peer)
+            self._known[name] = (nodes, peer)
 
     def follow(self, moved: bool, idle: bool) -> None:
-        """Forget services that are gone, and ask the servers of those that are new."""
-        if not (moved or idle):
-            return
-        services = self._core.graph.services()
-        with self._lock:
-            for name in [name for name in self._known if name not in services]:
-                del self._known[name]
-            self._wanted &= services.keys()
-            open_ = [
-                name
-                for name in sorted(self._wanted)
-                if self._known.get(name, (None,))[0] != services[name]
-            ]
-        for name in open_:
-            self._ask(name)
+        """Forget services that are gone, and probe the servers of new ones."""
+        if moved or idle:
+            self._core.loop.call(self._compare)
 
     def close(self) -> None:
-        """Ask nobody any more."""
-        with self._lock:
-            self._closed = True
-            self._queue.clear()
+        """Probe no more servers."""
+        self._closed = True
         self._core.remove(self)
 
-    # -- asking ----------------------------------------------------------------------------------
+    # -- in the loop's thread --------------------------------------------------------------------
 
-    def _ask(self, name: str) -> None:
-        with self._lock:
-            recent = time.monotonic() - self._failed.get(name, -_AGAIN) < _AGAIN
-            if self._closed or recent or name in self._asked or name in self._queue:
-                return
+    def _want(self, name: str) -> None:
+        self._wanted.add(name)
+        if not self._following:
+            self._following = True
+            with suppress(NodeClosedError):
+                self._core.add(self)
+        self._enqueue(name)
+
+    def _compare(self) -> None:
+        services = self._core.graph.services()
+        for name in self._known.keys() - services.keys():
+            del self._known[name]
+        self._wanted &= services.keys()
+        for name in sorted(self._wanted):
+            known = self._known.get(name)
+            if known is None or known[0] != services[name]:
+                self._enqueue(name)
+
+    def _enqueue(self, name: str) -> None:
+        recent = time.monotonic() - self._failed.get(name, -_RETRY_S) < _RETRY_S
+        if not (recent or name in self._probed or name in self._queue):
             self._queue.append(name)
-        self._next()
+            self._advance()
 
-    def _next(self) -> None:
-        while True:
-            with self._lock:
-                if not self._queue or len(self._asked) >= _AT_ONCE:
-                    return
-                name = self._queue.popleft()
-                self._asked.add(name)
-            self._pool.run(lambda name=name: self._look_up(name))  # type: ignore[misc]
+    def _advance(self) -> None:
+        while self._queue and len(self._probed) < _MAX_PROBES and not self._closed:
+            name = self._queue.popleft()
+            self._probed.add(name)
+            self._core.lookups.run(lambda name=name: self._locate(name))  # type: ignore[misc]
 
-    def _look_up(self, name: str) -> None:
+    def _locate(self, name: str) -> None:
+        """Ask the master where the server is; on a thread that may wait."""
         place: Place | None = None
         with suppress(ConnectionLostError):
             place = locate(self._core.master, name)
-        if place is None:
-            self._take(name, None)
-            return
-        found = place
-        self._core.loop.call(lambda: self._probe(name, found))
+        self._core.loop.call(lambda: self._probe(name, place))
 
-    def _probe(self, name: str, place: Place) -> None:
+    def _probe(self, name: str, place: Place | None) -> None:
         try:
-            probe(self._core, name, place, lambda peer, _: self._take(name, peer))
+            if place is not None:
+                probe(self._core, name, place, lambda peer, _: self._on_answer(name, peer))
+                return
         except OSError:  # no more sockets
-            self._take(name, None)
+            pass
+        self._on_answer(name, None)
 
-    def _take(self, name: str, peer: Peer | None) -> None:
+    def _on_answer(self, name: str, peer: Peer | None) -> None:
         nodes = self._core.graph.services().get(name)
-        with self._lock:
-            self._asked.discard(name)
-            if peer is None or nodes is None:
-                self._failed[name] = time.monotonic()
-            else:
-                self._failed.pop(name, None)
-                self._known[name] = (nodes, peer)
-                self._news += 1
-            pause = not self._queue and not self._asked
-            tell = self._news > 0 and (pause or self._news >= _BATCH)
-            if tell:
-                self._news = 0
-        self._next()
-        if tell:
+        self._probed.discard(name)
+        if peer is None or nodes is None:
+            self._failed[name] = time.monotonic()
+        else:
+            self._failed.pop(name, None)
+            self._known[name] = (nodes, peer)
+            self._news += 1
+        pause = not self._queue and not self._probed
+        if self._news and (pause or self._news >= _BATCH):
+            self._news = 0
             self._core.wake()
+        self._advance()

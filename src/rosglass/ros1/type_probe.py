@@ -7,7 +7,6 @@ md5 sum only; of actions, see :mod:`rosglass.ros1.actionlib_discovery`.
 from __future__ import annotations
 
 import re
-import threading
 import time
 from contextlib import suppress
 from typing import TYPE_CHECKING
@@ -119,8 +118,8 @@ class _Fetch(Member):
         self._core, self._topics, self._services = core, topics, services
         self._name, self._hash, self._node, self._promise = name, hash, node, promise
         self._package, self._kind, self._base = split_name(name)
-        self._lock = threading.Lock()
-        #: What publishers said of themselves, by node; and why others did not, and when.
+        #: The publishers' headers, by node; why others did not answer, and when. Written by the
+        #: threads that ask, read by the node's own; every use is atomic.
         self._headers: dict[str, dict[str, str]] = {}
         self._failed: dict[str, tuple[str, float]] = {}
         self._asked: set[str] = set()
@@ -155,9 +154,7 @@ class _Fetch(Member):
     def finish(self, _: Future[AnyType]) -> None:
         """Leave the node: it has come, failed or was given up."""
         self._core.remove(self)
-        with self._lock:
-            open_, self._discoveries = list(self._discoveries.values()), {}
-        for discovery in open_:
+        for discovery in list(self._discoveries.values()):
             discovery.close()
 
     def close(self) -> None:
@@ -219,10 +216,9 @@ class _Fetch(Member):
         now = time.monotonic()
         for node, topic in users.items():
             self._ask(node, topic, now)
-        with self._lock:
-            headers = {node: self._headers[node] for node in users if node in self._headers}
-            waited = [node for node in users if node not in headers and node not in self._failed]
-            failed = "; ".join(reason for reason, _ in self._failed.values())
+        headers = {node: self._headers[node] for node in users if node in self._headers}
+        waited = [node for node in users if node not in headers and node not in self._failed]
+        failed = "; ".join(reason for reason, _ in self._failed.copy().values())
         if not headers:
             self._problem = failed or f"{', '.join(sorted(users))} did not answer yet"
             if not waited and now - self._began > _GRACE:
@@ -250,25 +246,19 @@ class _Fetch(Member):
 
     def _ask(self, node: str, topic: str, now: float) -> None:
         """Ask a publisher for its definition, unless it was."""
-        with self._lock:
-            _, failed = self._failed.get(node, ("", -_AGAIN))
-            if node in self._asked or node in self._headers or now - failed < _AGAIN:
-                return
-            self._asked.add(node)
+        _, failed = self._failed.get(node, ("", -_AGAIN))
+        if node in self._asked or node in self._headers or now - failed < _AGAIN:
+            return
+        self._asked.add(node)
         self._core.pool.run(lambda: self._question(node, topic))
 
     def _question(self, node: str, topic: str) -> None:
         try:
-            header = self._topics.header(topic, NodeName(*split(node)), _TIMEOUT)
+            self._headers[node] = self._topics.header(topic, NodeName(*split(node)), _TIMEOUT)
+            self._failed.pop(node, None)
         except Error as error:
-            with self._lock:
-                self._failed[node] = str(error), time.monotonic()
-        else:
-            with self._lock:
-                self._headers[node] = header
-                self._failed.pop(node, None)
-        with self._lock:
-            self._asked.discard(node)
+            self._failed[node] = str(error), time.monotonic()
+        self._asked.discard(node)
         self._core.wake()
 
     # -- actions ---------------------------------------------------------------------------------
@@ -289,13 +279,13 @@ class _Fetch(Member):
     def _action(self, names: list[str]) -> ActionType | None:
         found: dict[str, tuple[str, ActionType]] = {}
         for name in names:
-            with self._lock:
-                if self._promise.done():
-                    return None
-                discovery = self._discoveries.get(name)
-                if discovery is None:
-                    discovery = ActionDiscovery(self._core, self._topics, name)
-                    self._discoveries[name] = discovery
+            discovery = self._discoveries.get(name)
+            if discovery is None:
+                discovery = ActionDiscovery(self._core, self._topics, name)
+                self._discoveries[name] = discovery
+            if self._promise.done():  # by another thread, which may not have seen this one
+                discovery.close()
+                return None
             types = discovery.look()
             self._problem = self._problem or discovery.problem
             if types is not None and self._hash in ("", types.action.md5):
