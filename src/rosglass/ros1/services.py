@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rosglass.wires.base import OnReply, OnRequest
     from rosglass.wires.tcpros.core import TcprosCore
     from rosglass.wires.tcpros.service_replier import TcprosReplier
-    from rosglass.wires.tcpros.service_requester import Peer, Place
+    from rosglass.wires.tcpros.service_requester import ServerInfo, ServiceLocation
 
 __all__ = ["ServiceTypes", "Services"]
 
@@ -138,7 +138,7 @@ class ServiceTypes(Member):
     def __init__(self, core: TcprosCore) -> None:
         self._core = core
         #: By service: its nodes according to the master, and what its server announces.
-        self._known: dict[str, tuple[list[str], Peer]] = {}
+        self._known: dict[str, tuple[list[str], ServerInfo]] = {}
         #: When a probe failed, by monotonic time.
         self._failed: dict[str, float] = {}
         #: Services whose types users have asked for.
@@ -148,7 +148,7 @@ class ServiceTypes(Member):
         self._news = 0
         self._following = self._closed = False
 
-    def of(self, name: str) -> Peer | None:
+    def of(self, name: str) -> ServerInfo | None:
         """Return what a service's server announces; None until it has answered.
 
         The first time, the server is probed in the background; the graph changes when it has
@@ -163,7 +163,7 @@ class ServiceTypes(Member):
         self._core.loop.call(lambda: self._want(name))
         return None
 
-    def note(self, name: str, peer: Peer) -> None:
+    def note(self, name: str, peer: ServerInfo) -> None:
         """Remember what a server announced to a client; in the loop's thread."""
         nodes = self._core.graph.services().get(name)
         if nodes == [peer.node]:
@@ -213,21 +213,21 @@ class ServiceTypes(Member):
 
     def _locate(self, name: str) -> None:
         """Ask the master where the server is; on a thread that may wait."""
-        place: Place | None = None
+        location: ServiceLocation | None = None
         with suppress(ConnectionLostError):
-            place = locate(self._core.master, name)
-        self._core.loop.call(lambda: self._probe(name, place))
+            location = locate(self._core.master, name)
+        self._core.loop.call(lambda: self._probe(name, location))
 
-    def _probe(self, name: str, place: Place | None) -> None:
+    def _probe(self, name: str, location: ServiceLocation | None) -> None:
         try:
-            if place is not None:
-                probe(self._core, name, place, lambda peer, _: self._on_answer(name, peer))
+            if location is not None:
+                probe(self._core, name, location, lambda peer, _: self._on_answer(name, peer))
                 return
         except OSError:  # no more sockets
             pass
         self._on_answer(name, None)
 
-    def _on_answer(self, name: str, peer: Peer | None) -> None:
+    def _on_answer(self, name: str, peer: ServerInfo | None) -> None:
         nodes = self._core.graph.services().get(name)
         self._probed.discard(name)
         if peer is None or nodes is None:

@@ -326,7 +326,7 @@ def test_doctor_finds_what_is_wrong(run, master, monkeypatch):
     monkeypatch.setenv("ROS_IP", "192.0.2.77")
     code, out, _ = run("doctor")
     assert code == 1
-    assert "ROS_IP=192.0.2.77 is no address of this machine" in out
+    assert "ROS_IP=192.0.2.77 is not an address of this machine" in out
     assert "the master cannot reach this machine at 192.0.2.77" in out
 
 

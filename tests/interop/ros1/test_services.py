@@ -93,7 +93,7 @@ def test_large_requests_and_responses_are_whole(rospy_peer, roscpp_peer, node):
         ("rospy", "refusal", "service cannot process request: not homed"),
         ("rospy", "none", "service cannot process request: service handler returned None"),
         ("roscpp", "exception", "the arm is stuck"),
-        ("roscpp", "false", "reports a failure and does not say why"),
+        ("roscpp", "false", "reports a failure without a reason"),
     ],
 )
 def test_their_failures_are_told(request, node, name, persistent, which, fails, told):

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from rosglass.wires.tcpros.topic_subscription import Silence
+from rosglass.wires.tcpros.topic_subscription import SilenceMonitor
 
 
-def look(silence: Silence, counts: list[int], start: float = 0.0) -> list[str]:
+def look(silence: SilenceMonitor, counts: list[int], start: float = 0.0) -> list[str]:
     """Look once a second; return the problem after each look."""
     problems = []
     for number, count in enumerate(counts):
-        silence.follow("/robot", count, start + number)
+        silence.update("/robot", count, start + number)
         problems.append(silence.problem)
     return problems
 
@@ -22,9 +22,9 @@ def regular(rate: int, looks: int = 20) -> list[int]:
 
 def test_who_sends_regularly_is_missed_after_a_second():
     counts = regular(30)
-    problems = look(Silence(), [*counts, counts[-1], counts[-1]])
+    problems = look(SilenceMonitor(), [*counts, counts[-1], counts[-1]])
     assert problems[:-2] == [""] * len(counts)
-    assert "nothing has come from /robot since " in problems[-2]
+    assert "nothing was received from /robot since " in problems[-2]
     assert "(it sent 30 per second before); is it frozen, or cut off?" in problems[-2]
     assert problems[-1] == problems[-2]  # or it would be told again and again
 
@@ -33,27 +33,27 @@ def test_who_sends_regularly_is_missed_after_a_second():
 def test_who_falls_silent_between_two_looks_is_missed(last):
     counts = regular(30)
     end = counts[-1] + last
-    problems = look(Silence(), [*counts, end, end, end])
+    problems = look(SilenceMonitor(), [*counts, end, end, end])
     assert "(it sent 30 per second before)" in problems[-1]
 
 
 def test_who_sends_slowly_is_missed_after_five_of_its_intervals():
     counts = regular(1)
-    problems = look(Silence(), [*counts, *[counts[-1]] * 6])
+    problems = look(SilenceMonitor(), [*counts, *[counts[-1]] * 6])
     assert problems[len(counts) : -2] == [""] * 4
     assert "(it sent 1 per second before)" in problems[-2]
 
 
 def test_the_next_message_ends_it_at_once():
-    silence, counts = Silence(), regular(30)
+    silence, counts = SilenceMonitor(), regular(30)
     look(silence, [*counts, counts[-1], counts[-1]])
     assert silence.problem
-    silence.follow("/robot", counts[-1] + 1, len(counts) + 1.01)
+    silence.update("/robot", counts[-1] + 1, len(counts) + 1.01)
     assert not silence.problem
 
 
 def test_who_was_missed_has_to_be_regular_anew():
-    silence, counts = Silence(), regular(30)
+    silence, counts = SilenceMonitor(), regular(30)
     look(silence, [*counts, counts[-1], counts[-1]])
     assert not any(look(silence, [counts[-1] + 1] * 60, 100.0))
 
@@ -70,13 +70,13 @@ def test_who_was_missed_has_to_be_regular_anew():
     ids=["one message", "none", "every three seconds", "for some seconds", "now and then"],
 )
 def test_nobody_else_is_missed(counts):
-    assert not any(look(Silence(), counts))
+    assert not any(look(SilenceMonitor(), counts))
 
 
 def test_looks_in_quick_succession_count_as_one():
-    silence = Silence()
+    silence = SilenceMonitor()
     for number in range(200):
-        silence.follow("/robot", number, number / 100)
-    silence.follow("/robot", 200, 60.0)
-    silence.follow("/robot", 200, 120.0)
+        silence.update("/robot", number, number / 100)
+    silence.update("/robot", 200, 60.0)
+    silence.update("/robot", 200, 120.0)
     assert not silence.problem

@@ -173,7 +173,7 @@ def test_closing_the_loop_ends_every_connection():
     ends = [End(loop) for _ in range(5)]
     ends[0].peer.sendall(HEADER)
     eventually(lambda: ends[0].headers)
-    loop.call(lambda: ends[0].link.hurry(hurried=False))
+    loop.call(lambda: ends[0].link.set_urgent(urgent=False))
     loop.close()
     assert [end.ended for end in ends] == [[""]] * 5
     assert all(end.peer.recv(1) == b"" for end in ends)
@@ -182,7 +182,7 @@ def test_closing_the_loop_ends_every_connection():
 def test_what_nobody_waits_for_is_left_for_a_moment_and_can_be_had_at_once(loop, end):
     end.peer.sendall(HEADER + frame(b"first"))
     eventually(lambda: end.frames)
-    loop.call(lambda: end.link.hurry(hurried=False))
+    loop.call(lambda: end.link.set_urgent(urgent=False))
     for number in range(20):
         end.peer.sendall(frame(b"%d" % number))
     eventually(lambda: end.link.drain() or len(end.frames) == 21)
@@ -193,7 +193,7 @@ def test_what_nobody_waits_for_is_left_for_a_moment_and_can_be_had_at_once(loop,
 def test_much_that_nobody_waits_for_holds_up_nobody(loop, end):
     end.peer.sendall(HEADER)
     eventually(lambda: end.headers)
-    loop.call(lambda: end.link.hurry(hurried=False))
+    loop.call(lambda: end.link.set_urgent(urgent=False))
     began = time.monotonic()
     for _ in range(300):
         end.peer.sendall(frame(b"x" * 1_000_000))
@@ -211,7 +211,7 @@ def test_a_failing_callback_ends_its_connection_only(loop, end, caplog):
         one.peer.sendall(HEADER + frame(b"x"))
     assert "a fault" in eventually(lambda: end.ended)[0]
     assert eventually(lambda: other.frames) == [b"x"]
-    assert "a message could not be taken" in caplog.text
+    assert "handling a message failed" in caplog.text
     other.peer.close()
 
 

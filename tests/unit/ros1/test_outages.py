@@ -11,14 +11,14 @@ from types import SimpleNamespace
 import pytest
 
 from rosglass.wires.tcpros import connection
-from rosglass.wires.tcpros.connection import Connection, UnackedBytes, outlast
+from rosglass.wires.tcpros.connection import Connection, UnackedBytes, survive_outages
 from rosglass.wires.tcpros.io_loop import IoLoop
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have other options")
 def test_a_subscriber_gives_a_connection_up_before_its_publisher_does():
     with socket.socket() as sock:
-        outlast(sock)
+        survive_outages(sock)
         names = (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT)
         idle, pause, count = (sock.getsockopt(socket.IPPROTO_TCP, name) for name in names)
         given_up = sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) / 1000

@@ -196,7 +196,7 @@ def test_a_wrong_own_address_is_shown(master: FakeMaster, monkeypatch: pytest.Mo
     url = master.url.partition("?")[0]
     with rosglass.connect(url, "panel", own_services=False) as node:
         eventually(lambda: node.status().state is ConnectionState.CONNECTED)
-        told = "ROS_IP=192.0.2.7 is no address of this machine"
+        told = "ROS_IP=192.0.2.7 is not an address of this machine"
         eventually(lambda: node.status().detail.startswith(told))
         node.create_publisher("/a", "std_msgs/Empty")
         eventually(lambda: "/panel" in master.publishers.get("/a", {}))

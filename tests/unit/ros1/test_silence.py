@@ -14,20 +14,20 @@ LATCHED = QoS(depth=1, durability=Durability.TRANSIENT_LOCAL)
 
 def count_looks(monkeypatch):
     """Return a list to which each look whether somebody has fallen silent is added."""
-    looks, follow = [], topic_subscription.Silence.follow
+    looks, follow = [], topic_subscription.SilenceMonitor.update
 
     def count(self, *given):
         follow(self, *given)
         looks.append(given)
 
-    monkeypatch.setattr(topic_subscription.Silence, "follow", count)
+    monkeypatch.setattr(topic_subscription.SilenceMonitor, "update", count)
     return looks
 
 
 def test_a_publisher_that_falls_silent_is_a_problem_until_its_next_message(
     connect, eventually, monkeypatch
 ):
-    monkeypatch.setattr(topic_subscription, "_LOOKS", 2)  # takes ten seconds else
+    monkeypatch.setattr(topic_subscription, "_REGULAR_SAMPLES", 2)  # takes ten seconds else
     looks = count_looks(monkeypatch)
     robot, cockpit = connect("robot"), connect("cockpit")
     publisher = robot.create_publisher("/odom", "std_msgs/Int32")
@@ -54,7 +54,7 @@ def test_a_publisher_that_falls_silent_is_a_problem_until_its_next_message(
         return subscription.problem
 
     problem = eventually(fall_silent)
-    assert problem.startswith("nothing has come from /robot since ")
+    assert problem.startswith("nothing was received from /robot since ")
     assert subscription.publisher_count() == 1
     publisher.publish({"data": 2})
     eventually(lambda: not subscription.problem)
@@ -62,12 +62,12 @@ def test_a_publisher_that_falls_silent_is_a_problem_until_its_next_message(
 
 
 def test_a_latched_message_is_not_missed(connect, eventually, monkeypatch):
-    monkeypatch.setattr(topic_subscription, "_LOOKS", 0)
+    monkeypatch.setattr(topic_subscription, "_REGULAR_SAMPLES", 0)
     robot, cockpit = connect("robot"), connect("cockpit")
     robot.create_publisher("/map", "std_msgs/Int32", LATCHED).publish({"data": 1})
     subscription = cockpit.create_subscription("/map", "std_msgs/Int32")
     assert eventually(subscription.take_latest)
     (link,) = publisher_links(cockpit, "/map")
     for _ in range(3):
-        link.listen()
+        link.check_silence()
     assert not link.silence

@@ -198,7 +198,7 @@ class Answering:
         (encode_header({"error": "not on Sundays"}), "refuses /state: not on Sundays"),
         (encode_header({"callerid": "/odd", "type": "my_msgs/State"}), "has no md5sum"),
         (struct.pack("<I", 2**31), "bytes are more than any has"),
-        (b"\4\0\0\0\xff\xff\xff\xff", "a field is cut off"),
+        (b"\4\0\0\0\xff\xff\xff\xff", "a field is truncated"),
         (b"", "closed the connection"),
         (
             encode_header({"md5sum": "0" * 32, "type": "my_msgs/State", "message_definition": ""}),

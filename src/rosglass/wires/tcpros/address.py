@@ -1,7 +1,7 @@
-"""Under which address others reach this node.
+"""The address under which other nodes reach this one, and the URIs of nodes.
 
 Rules: ROS wiki, "ROS/EnvironmentVariables" and "ROS/NetworkSetup": ROS_HOSTNAME, else ROS_IP,
-else found out.
+else the address of the route to the master.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 __all__ = ["bracketed", "check_host", "doubt", "given_address", "is_loopback", "own_address"]
 __all__ += ["parse_uri"]
 
-#: Outside of every network here: only the route there matters, nothing is sent.
-_ELSEWHERE = "192.0.2.1"
+#: Reserved for documentation (RFC 5737): only the route there matters, nothing is sent.
+_REMOTE_ADDRESS = "192.0.2.1"
 _HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9.])?\Z|[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*\Z")
 
 
 def given_address(env: Mapping[str, str]) -> tuple[str, str]:
-    """Return the host name or address that the environment says to announce, and which variable.
+    """Return the host or address that the environment tells to announce, and the variable's name.
 
     Raises:
-        ArgumentError: The variable's value is no host.
+        ArgumentError: The variable's value is not a host.
     """
     for variable in ("ROS_HOSTNAME", "ROS_IP"):
         if value := env.get(variable, "").strip():
@@ -36,19 +36,19 @@ def given_address(env: Mapping[str, str]) -> tuple[str, str]:
 
 
 def check_host(value: str, what: str) -> str:
-    """Return a host or address; raises ArgumentError, which names `what`, for anything else."""
-    # One colon separates a port, more are an address of IPv6.
+    """Return `value`; raises ArgumentError, which names `what`, unless it is a host or address."""
+    # One colon separates a port, several are part of an IPv6 address.
     if not _HOST.match(value) or value.count(":") == 1:
         raise ArgumentError(what, value, "a host or address only, without port")
     return value
 
 
 def own_address(reached_from: str = "") -> str:
-    """Return the address to announce when nobody has said which.
+    """Return the address to announce when the user gives none.
 
     Args:
-        reached_from: This machine's address towards the master: the robot's network is the one
-            that counts on machines with several. Not known before the master answers.
+        reached_from: This machine's address towards the master, which is on the robot's network;
+            empty before the master answers.
     """
     address = reached_from.removeprefix("::ffff:")
     if not address or is_loopback(address):
@@ -57,34 +57,34 @@ def own_address(reached_from: str = "") -> str:
 
 
 def doubt(address: str, source: str, master: str) -> str:
-    """Return why others may not reach this node under an address; empty for no reason.
+    """Return why other nodes may not reach this one under an address; empty if they can.
 
     Args:
-        address: What is announced.
-        source: Who said so, such as ``ROS_IP``; empty when it was found out.
+        address: The announced address.
+        source: Where it was given, such as ``ROS_IP``; empty when it was detected.
         master: The master's host.
     """
     shown = f"{source}={address}" if source else f"the own address {address}"
     if is_loopback(address):
         if is_loopback(master) or _is_own(master):
             return ""
-        fix = f"set {source} right, or unset it" if source else "set ROS_IP"
-        return f"{shown} is known to this machine only, and the master is at {master}: {fix}"
+        fix = f"correct {source}, or unset it" if source else "set ROS_IP"
+        return f"{shown} reaches this machine only, and the master is at {master}: {fix}"
     if source and not _is_own(address):
         return (
-            f"{shown} is no address of this machine: others may not reach this node, and its "
-            "topics stay silent for them; set it right, or unset it"
+            f"{shown} is not an address of this machine: other nodes may not reach this one, and "
+            "receive nothing from it; correct or unset it"
         )
     return ""
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether a host is this machine and cannot be reached from others."""
+    """Return whether a host is the loopback interface, which other machines cannot reach."""
     return host in ("localhost", "::1") or host.startswith("127.")
 
 
 def bracketed(host: str) -> str:
-    """Return a host as URIs have it."""
+    """Return a host as it is written in URIs, IPv6 addresses in brackets."""
     return f"[{host}]" if ":" in host else host
 
 
@@ -93,7 +93,7 @@ def parse_uri(uri: str, what: str) -> tuple[str, int]:
 
     Args:
         uri: Such as ``http://robot:11311/``.
-        what: What it is, for the error.
+        what: What the URI is of, for the error.
     """
     from urllib.parse import urlsplit  # noqa: PLC0415 - takes a while to import
 
@@ -108,10 +108,10 @@ def parse_uri(uri: str, what: str) -> tuple[str, int]:
 
 
 def _route_elsewhere() -> str:
-    """Return the own address towards the rest of the world; empty if there is no way."""
+    """Return this machine's address on its default route; empty if it has none."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect((_ELSEWHERE, 9))
+            probe.connect((_REMOTE_ADDRESS, 9))
             address = str(probe.getsockname()[0])
         except OSError:
             return ""

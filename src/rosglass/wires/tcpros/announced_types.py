@@ -1,4 +1,4 @@
-"""Types as ROS 1's nodes announce them in their connection headers."""
+"""The types of ROS 1's connection headers, as publishers and services announce them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["AnnouncedTypes"]
 
 
 class AnnouncedTypes(Types):
-    """Finds types for one node: in its library, or in what publishers say of themselves.
+    """Finds types for one node: in its library, or in the headers of publishers.
 
     Args:
         library: Where definitions come from; None for the shared library.
@@ -27,15 +27,14 @@ class AnnouncedTypes(Types):
 
     def __init__(self, library: Library | None, url: str) -> None:
         super().__init__(library, url, ros=1)
-        #: By name and sum; any thread's, as every use is atomic.
+        #: By name and md5 sum. Used by any thread; every use is atomic.
         self._learned: dict[tuple[str, str], MessageType] = {}
         self._texts: dict[MessageType | ServiceType, str] = {}
 
     def action(self, wanted: str | ActionType, hash: str = "") -> ActionType:
         """Return an action type; arguments and errors as in :meth:`message`.
 
-        Its name may also be that of its message as a whole, ``pkg/TypeAction``, by which ROS 1's
-        own tools know it.
+        ROS 1's name of the whole action's message, ``pkg/TypeAction``, is accepted, too.
         """
         if isinstance(wanted, str) and wanted.endswith("Action"):
             package, kind, base = split_name(wanted)
@@ -47,19 +46,19 @@ class AnnouncedTypes(Types):
     def learn(self, name: str, md5: str, text: str) -> MessageType:
         """Return the type that a publisher's connection header describes.
 
-        It is in the library afterwards, unless that has another definition of the name: then it
-        serves for this node's subscriptions only.
+        Adds it to the library, unless that has another definition of the name: then only this
+        node's subscriptions use it.
 
         Args:
             name: As in the header, ``pkg/Type``.
-            md5: Its sum.
+            md5: Its md5 sum.
             text: Its full definition; may be empty.
 
         Raises:
-            TypeNotFoundError: The text is missing or is not what the sum is of, and nobody else
+            TypeNotFoundError: The text is missing or does not match the sum, and no other source
                 has the definition.
             DefinitionError: The text breaks a rule.
-            InvalidNameError: `name` is no type's name.
+            InvalidNameError: `name` is not a type name.
         """
         full = join_name(name)
         found = self._learned.get((full, md5))
@@ -69,22 +68,22 @@ class AnnouncedTypes(Types):
         return found
 
     def announced_service(self, name: str, md5: str) -> ServiceType:
-        """Return the service type that a server says it offers; it sends no definition.
+        """Return the service type that a server announces; servers send no definitions.
 
         Args:
-            name: Full name, ``pkg/srv/Type``; empty when the server does not tell.
-            md5: Its sum, ``*`` for any.
+            name: Full name, ``pkg/srv/Type``; empty when the server does not send it.
+            md5: Its md5 sum, ``*`` for any.
 
         Raises:
-            TypeNotFoundError: Nobody has the definition.
-            DefinitionConflictError: The definitions that are known have other sums.
+            TypeNotFoundError: The definition is not found.
+            DefinitionConflictError: The definitions that are found have other sums.
             DefinitionError: The definition breaks a rule.
-            InvalidNameError: `name` is no type's name.
+            InvalidNameError: `name` is not a type name.
         """
         from rosglass.messages import ServiceType, load  # noqa: PLC0415 - numpy
 
         if not name:
-            raise TypeNotFoundError("its server does not tell its type; name it")
+            raise TypeNotFoundError("its server does not announce its type; give the type")
         hint = "ROS 1 servers send no definitions"
         try:
             found = load(name, ros=1, library=self._library, hash="" if md5 == ANY else md5)

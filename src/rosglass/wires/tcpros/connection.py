@@ -1,11 +1,10 @@
-"""A TCPROS connection: a header each way, then frames with their length in front.
+"""A TCPROS connection: a header in each direction, then frames, each after its length.
 
-Formats: ROS wiki, "ROS/Connection Header" and "ROS/TCPROS". A header has fields ``name=value``,
-each with its length in front, all together with theirs. A frame has its length in front, and the
-first one is the header; a service's responses have one more byte in front of the length. All
-lengths are 32-bit, little-endian.
+Formats: ROS wiki, "ROS/Connection Header" and "ROS/TCPROS". A header consists of fields
+``name=value``, each after its length, all of them after theirs. The first frame is the header; a
+service's responses have one more byte before the length. All lengths are 32-bit, little-endian.
 
-Everything of a :class:`Connection` runs in the loop's thread, except what says so.
+All methods of a :class:`Connection` run in the loop's thread, except those that say so.
 """
 
 from __future__ import annotations
@@ -45,27 +44,27 @@ __all__ = [
     "Outgoing",
     "UnackedBytes",
     "encode_header",
-    "outlast",
     "parse_header",
+    "survive_outages",
 ]
 
 
-#: What stands for any type, and any md5 sum, in a connection header.
+#: Any type, or any md5 sum, in a connection header.
 ANY = "*"
-#: Longest header taken in bytes; the definition of the largest message type is far below it.
+#: Longest accepted header in bytes, far above the definition of the largest message type.
 MAX_HEADER = 10_000_000
 _length = struct.Struct("<I")
 
 
 def encode_header(fields: Mapping[str, str]) -> bytes:
-    """Return a header with its length in front."""
+    """Return a header after its length."""
     lines = [f"{name}={value}".encode() for name, value in fields.items()]
     body = b"".join(_length.pack(len(line)) + line for line in lines)
     return _length.pack(len(body)) + body
 
 
 def parse_header(data: bytes | memoryview) -> dict[str, str]:
-    """Return the fields of a header, which comes without its own length.
+    """Return the fields of a header, given without its length.
 
     Raises:
         DecodeError: A field reaches beyond the end, or has no ``=``.
@@ -77,8 +76,8 @@ def parse_header(data: bytes | memoryview) -> dict[str, str]:
         start = position + _length.size
         size = _length.unpack_from(data, position)[0] if start <= len(data) else len(data)
         if start + size > len(data):
-            raise DecodeError("connection header", "a field is cut off", offset=position)
-        # Definitions of old types are in whatever encoding their authors' editors had.
+            raise DecodeError("connection header", "a field is truncated", offset=position)
+        # Definitions of old types may have any encoding.
         line = data[start : start + size].decode("utf-8", "surrogateescape")
         name, separator, value = line.partition("=")
         if not separator:
@@ -88,24 +87,24 @@ def parse_header(data: bytes | memoryview) -> dict[str, str]:
     return fields
 
 
-#: Seconds. Only subscribers make connections: one that we gave up before its subscriber does would
-#: leave that deaf without knowing. rospy's and roscpp's own keepalive takes 60 s and 9 times 10 s.
+#: Seconds. Only subscribers make connections: if we gave one up before its subscriber does, that
+#: would not reconnect. rospy's and roscpp's own keepalive takes 60 s and 9 times 10 s.
 _SUBSCRIBER_KEEPALIVE = (("TCP_KEEPIDLE", 60), ("TCP_KEEPINTVL", 10), ("TCP_KEEPCNT", 12))
 _OUTAGE_LIMIT_S = 180
 #: TCP_RTO_MAX_MS, since Linux 6.15; Python has no name for it.
 _TCP_RTO_MAX_MS = 44
-#: SIOCOUTQ (Linux, ``man 7 tcp``): bytes in the send queue that the other end has not confirmed.
+#: SIOCOUTQ (Linux, ``man 7 tcp``): bytes in the send queue that the peer has not acknowledged.
 _SIOCOUTQ = 0x5411
 _int = struct.Struct("i")
-#: Seconds without confirmation after which a connection counts as stalled, and between two looks.
+#: Seconds without acknowledgement after which a connection counts as stalled, and between polls.
 _STALL_TIMEOUT_S, _STALL_POLL_S = 0.5, 0.05
 
 
-def outlast(sock: socket.socket) -> None:
-    """Keep a subscriber's connection for three minutes of silence, and go on soon after it.
+def survive_outages(sock: socket.socket) -> None:
+    """Set a subscriber's socket to survive outages of three minutes, and to resume soon after.
 
-    Without that, what was published in an outage, such as a stop, is sent again only after as long
-    as the outage took: TCP waits twice as long each time.
+    By default TCP doubles its retransmission timeout each time: what was published in an outage,
+    such as a stop command, would arrive only after as long again.
     """
     for name, value in _SUBSCRIBER_KEEPALIVE:
         if (option := getattr(socket, name, None)) is not None:
@@ -117,40 +116,40 @@ def outlast(sock: socket.socket) -> None:
 
 
 class UnackedBytes:
-    """Whether the other end has stopped confirming what it is sent.
+    """The sent bytes that the peer has not acknowledged: detects stalled connections.
 
-    The system takes some megabytes more all the same, and delivers them when the outage is over: a
-    robot would carry out the commands of minutes ago before the one that stops it.
+    The system buffers some megabytes more and delivers them after the outage: a robot would
+    execute commands of minutes ago before the one that stops it.
 
     Attributes:
-        written: Bytes that the system took so far; counted by the owner.
+        written: Bytes written to the socket; counted by the owner.
     """
 
     def __init__(self, sock: socket.socket) -> None:
         self._sock = sock
         self.written = 0
-        self._confirmed = -1
-        self._moved = self._looked = 0.0
+        self._acked = -1
+        self._acked_at = self._polled_at = 0.0
         self._stalled = False
 
     def stalled(self) -> bool:
-        """Return whether something was sent, and nothing confirmed for half a second."""
+        """Return whether sent bytes have not been acknowledged for half a second."""
         now = time.monotonic()
-        if now - self._looked < _STALL_POLL_S:
+        if now - self._polled_at < _STALL_POLL_S:
             return self._stalled
-        self._looked = now
-        waiting = self.unacked()
-        confirmed = self.written - waiting
-        if not waiting or confirmed != self._confirmed:
-            self._confirmed, self._moved = confirmed, now
-        self._stalled = now - self._moved > _STALL_TIMEOUT_S
+        self._polled_at = now
+        unacked = self.unacked()
+        acked = self.written - unacked
+        if not unacked or acked != self._acked:
+            self._acked, self._acked_at = acked, now
+        self._stalled = now - self._acked_at > _STALL_TIMEOUT_S
         return self._stalled
 
     def unacked(self) -> int:
-        """Return how many bytes the other end has not confirmed; 0 where nobody tells."""
+        """Return how many bytes the peer has not acknowledged; 0 where that is unknown."""
         if sys.platform != "linux":
-            return 0  # nobody tells
-        import fcntl  # noqa: PLC0415 - not everywhere
+            return 0
+        import fcntl  # noqa: PLC0415 - not on Windows
 
         try:
             (waiting,) = _int.unpack(fcntl.ioctl(self._sock, _SIOCOUTQ, bytes(_int.size)))
@@ -159,23 +158,23 @@ class UnackedBytes:
         return int(waiting)
 
 
-#: Parts of a frame that the system takes at once.
+#: Parts of a frame in one system call.
 _MAX_PARTS = 256
 
 
 class Frame:
-    """A frame on its way to any number of connections.
+    """A frame that is sent to any number of connections.
 
-    Its parts may be somebody else's memory as long as they are being handed to the system; what
-    has to wait is copied, once for all connections.
+    Its parts may be the caller's memory while they are being written; the rest that has to wait is
+    copied, once for all connections.
 
     Args:
-        parts: The bytes, length and all.
+        parts: The bytes, with their length.
 
     Attributes:
         parts: As given, as views of bytes.
         size: Bytes in all.
-        kept: Whether it must not make room for others: the last message of a latched publisher.
+        kept: Whether it is never dropped for newer ones: the last message of a latched publisher.
     """
 
     __slots__ = ("_copied", "_start", "kept", "parts", "size")
@@ -191,54 +190,54 @@ class Frame:
         self._start = 0
 
     def rest(self, sent: int) -> memoryview:
-        """Return what follows the first `sent` bytes, in memory that nobody else changes."""
+        """Return the bytes after the first `sent` ones, in memory of its own."""
         copied = self._copied
         if copied is None or sent < self._start:
-            copied = self._copied = memoryview(b"".join(after(self.parts, sent)))
+            copied = self._copied = memoryview(b"".join(_after(self.parts, sent)))
             self._start = sent
         return copied[sent - self._start :]
 
 
 class Outgoing:
-    """The frames that wait on one connection; guarded by its owner's lock.
+    """The send queue of one connection; guarded by its owner's lock.
 
     Attributes:
-        lost: Frames that made room for newer ones.
-        held: Bytes that wait.
+        lost: Frames that were dropped for newer ones.
+        held: Bytes in the queue.
     """
 
     __slots__ = ("_begun", "_frames", "held", "lost")
 
     def __init__(self) -> None:
-        #: What is left of each frame.
+        #: Each frame with its bytes that are not sent.
         self._frames: deque[tuple[Frame, memoryview]] = deque()
-        #: Whether the first frame was sent in part: it cannot be taken back.
+        #: Whether the first frame was sent in part, and cannot be dropped.
         self._begun = False
         self.lost = self.held = 0
 
     def __len__(self) -> int:
         return len(self._frames)
 
-    def add(self, frame: Frame, sent: int, most: int, most_bytes: int) -> None:
-        """Queue what is left of a frame.
+    def add(self, frame: Frame, sent: int, keep: int, keep_bytes: int) -> None:
+        """Queue the rest of a frame, and drop the oldest frames beyond the limits.
 
         Args:
             frame: The frame.
-            sent: How many of its bytes are sent already; more than none only when nothing waits.
-            most: How many frames may wait; 0 for any number.
-            most_bytes: How many bytes may wait, besides the frame; 0 for any number.
+            sent: Its bytes that are sent already; not 0 only when the queue is empty.
+            keep: Most frames in the queue; 0 for any number.
+            keep_bytes: Most bytes in the queue, besides the frame; 0 for any number.
         """
         left = frame.rest(sent)
         self._frames.append((frame, left))
         self._begun = self._begun or sent > 0
         self.held += len(left)
-        while most and len(self._frames) - self._begun > most and self._drop():
+        while keep and len(self._frames) - self._begun > keep and self._drop():
             pass
-        while most_bytes and self.held > most_bytes and self._drop():
+        while keep_bytes and self.held > keep_bytes and self._drop():
             pass
 
     def _drop(self) -> bool:
-        """Drop the oldest frame that may be dropped; return whether there was one."""
+        """Drop the oldest frame that may be dropped; return whether there is one."""
         for index in range(self._begun, len(self._frames) - 1):
             frame, left = self._frames[index]
             if not frame.kept:
@@ -249,7 +248,7 @@ class Outgoing:
         return False
 
     def send(self, write: Callable[[Sequence[memoryview]], int]) -> None:
-        """Send what `write` takes; it returns how many bytes that were."""
+        """Send frames until `write`, which returns the number of sent bytes, sends less."""
         while self._frames:
             frame, left = self._frames[0]
             sent = write((left,))
@@ -263,13 +262,13 @@ class Outgoing:
             self._begun = False
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Drop all frames."""
         self._frames.clear()
         self._begun, self.held = False, 0
 
 
-def after(parts: Sequence[memoryview], sent: int) -> list[memoryview]:
-    """Return what is left of `parts` after so many bytes."""
+def _after(parts: Sequence[memoryview], sent: int) -> list[memoryview]:
+    """Return what follows the first `sent` bytes of `parts`."""
     rest = []
     for part in parts:
         if sent >= len(part):
@@ -280,34 +279,34 @@ def after(parts: Sequence[memoryview], sent: int) -> list[memoryview]:
     return rest
 
 
-#: Longest frame taken in bytes: what a length says beyond it is garbage, as roscpp has it.
+#: Longest accepted frame in bytes: as in roscpp, a longer one is garbage.
 MAX_FRAME = 1_000_000_000
-#: Bytes to read at once as long as there is no :attr:`Incoming.room`.
+#: Bytes to read at once while there is no :attr:`Incoming.room`.
 CHUNK = 64 * 1024
-#: A frame of which only the beginning came gets a buffer of its own if it is longer.
+#: A partly received frame gets a buffer of its own if it is longer.
 _SMALL_FRAME_BYTES = 4 * 1024
-#: Bytes that a peer gets on its word alone, when it has sent nothing of that size before.
+#: Bytes allocated for a frame before a peer has sent any frame of that size.
 _TRUSTED_BYTES = 1024 * 1024
-#: Buffers that are used again once nobody looks at them: to touch new memory costs as much as to
-#: receive into it.
+#: Buffers that are reused once no view of them is left: touching new memory costs as much as
+#: receiving into it.
 _MAX_SPARE_BUFFERS = 4
-#: Frames of one size that are cut at once: most topics have messages of one size.
+#: Frames of one size that are split at once: most topics have messages of one size.
 _RUN_FRAMES = 32
 
 
 class Incoming:
-    """Cuts one connection's bytes into frames.
+    """Splits one connection's bytes into frames.
 
     Args:
         peer: For errors.
-        lead: Bytes in front of each frame's length once the header has come: 1 or 0.
-        take: Called with some frames and the byte in front of them; the header comes alone, and so
-            does each frame with a byte in front. Frames above 64 KiB are read-only views of a
-            buffer that stays as it is as long as somebody has a view of it.
+        lead: Bytes before each frame's length, after the header: 1 or 0.
+        take: Called with frames and the byte before them; with one frame if there is such a byte,
+            and for the header. Frames above 64 KiB are read-only views of a buffer that is not
+            reused while there is a view of it.
 
     Attributes:
-        room: Where to receive into, then to call :meth:`filled`; None to call :meth:`feed`.
-        stopped: Set to True to have nothing more handed on; what is there already is kept.
+        room: Buffer to receive into before calling :meth:`filled`; None to call :meth:`feed`.
+        stopped: Whether frames are kept instead of handed on.
         total: Bytes received in all.
         take: As given; may be replaced.
     """
@@ -319,7 +318,7 @@ class Incoming:
         self.take = take
         self._peer, self._lead = peer, lead
         self._headed = False
-        #: The beginning of a small frame whose end has not come.
+        #: The beginning of a partly received small frame.
         self._rest = b""
         self._big = bytearray()
         self._size = self._there = self._first = 0
@@ -328,7 +327,7 @@ class Incoming:
         self._run: struct.Struct | None = None
 
     def feed(self, data: bytes) -> None:
-        """Take what came; raises DecodeError when it is no TCPROS."""
+        """Split received bytes into frames; raises DecodeError for anything but TCPROS."""
         end = len(data)
         self.total += end
         if (
@@ -337,7 +336,7 @@ class Incoming:
             and _length.unpack_from(data)[0] == end - 4
             and not (self._rest or self._lead or self.stopped)
         ):
-            # One message, whole: what comes at a moderate rate comes like this.
+            # Exactly one message: the usual case at moderate rates.
             self.take([data[4:]], 0)
             return
         if self._rest:
@@ -353,28 +352,28 @@ class Incoming:
             return
         frames: list[Received] = []
         unpack, append = _length.unpack_from, frames.append
-        beginning, before, patience = False, -1, 0
-        # Every line of this is paid for by each message of the fastest topics.
+        beginning, before, pause = False, -1, 0
+        # Hot: each message of the fastest topics runs through all of this.
         while not self.stopped:
             body = start + 4
             if body > end:
                 break
             (size,) = unpack(data, start)
-            if size == before and not patience and start + _RUN_FRAMES * (size + 4) <= end:
+            if size == before and not pause and start + _RUN_FRAMES * (size + 4) <= end:
                 run = self._run_of(size).unpack_from(data, start)
                 if run[::2].count(size) == _RUN_FRAMES:
                     frames += run[1::2]
                     start += _RUN_FRAMES * (size + 4)
                     continue
-                patience = _RUN_FRAMES
+                pause = _RUN_FRAMES
             stop = body + size
             if stop > end:
                 beginning = True
                 break
             append(data[body:stop])
             start, before = stop, size
-            if patience:
-                patience -= 1
+            if pause:
+                pause -= 1
         if frames:
             self.take(frames, 0)
         if beginning:
@@ -383,7 +382,7 @@ class Incoming:
             self._rest = data[start:]
 
     def _run_of(self, size: int) -> struct.Struct:
-        """Return what cuts many frames of one size at once, each with its length."""
+        """Return the struct that splits many frames of one size at once, each with its length."""
         if self._run is None or self._run.size != _RUN_FRAMES * (size + 4):
             self._run = struct.Struct(f"<{f'I{size}s' * _RUN_FRAMES}")
         return self._run
@@ -400,7 +399,7 @@ class Incoming:
         self._rest = data[start:]
 
     def filled(self, count: int) -> None:
-        """Take what came into :attr:`room`."""
+        """Handle `count` bytes that were received into :attr:`room`."""
         room, self.room = self.room, None
         if room is not None:
             room.release()  # or the buffer cannot grow
@@ -409,14 +408,14 @@ class Incoming:
         if self._there < min(self._size, len(self._big)):
             self._open()
         elif self._there < self._size:
-            # It has sent as much as it was trusted with: as much again.
+            # The allocated part is complete: double it.
             self._big.extend(bytes(min(self._size - self._there, self._there)))
             self._open()
         else:
             self._complete()
 
     def _feed_header(self, data: bytes) -> int:
-        """Hand on the connection header; returns where it ends, -1 when it is not complete."""
+        """Hand on the connection header; return where it ends, -1 while it is not complete."""
         if len(data) < _length.size:
             self._rest = data
             return -1
@@ -459,11 +458,11 @@ class Incoming:
             self.take([bytes(view)], first)
 
     def _buffer(self, size: int) -> bytearray:
-        """Return a buffer of at least that size, one that nobody looks at any more if possible."""
+        """Return a buffer of at least that size, a spare one if there is no view of it."""
         for index, spare in enumerate(self._spare):
             if size <= len(spare) <= 2 * size:
                 with suppress(BufferError):
-                    # Python itself says whether somebody has a view of it: it cannot grow then.
+                    # It cannot grow while there is a view of it.
                     spare.append(0)
                     spare.pop()
                     return self._spare.pop(index)
@@ -471,21 +470,21 @@ class Incoming:
 
 
 _log = logging.getLogger("rosglass.ros1")
-#: Most reads in a row: other sockets must have their turn.
+#: Most reads in a row, so that other sockets are served, too.
 _MAX_READS = 16
-#: Seconds that the other end may take to connect and to send its header.
+#: Seconds that the peer may take to connect and to send its header.
 _HEADER_TIMEOUT_S = 10.0
-#: Seconds of silence before the other end is asked for a sign of life, between such questions, and
-#: how many: a robot without power is noticed after some 15 s.
+#: Seconds of silence before a keepalive probe, between probes, and how many: a robot without power
+#: is noticed after some 15 s.
 _KEEPALIVE = (("TCP_KEEPIDLE", 5), ("TCP_KEEPINTVL", 3), ("TCP_KEEPCNT", 3))
 #: Seconds to wait, in :meth:`Connection.drain`, for another thread that reads just now.
 _TURN_TIMEOUT_S = 0.1
-#: Bytes read at once as long as little comes.
+#: Bytes read at once on slow connections.
 _SMALL_READ_BYTES = 4096
-#: Bytes at one look after which a connection is not left to itself any more: the other end must not
-#: be held up by a full socket.
-_HURRY_BYTES = 64 * 1024
-#: Seconds between looks whether a stalled connection goes on.
+#: Bytes in one poll after which a connection is read at once again: a full socket would block its
+#: publisher.
+_URGENT_BYTES = 64 * 1024
+#: Seconds between polls whether a stalled connection has recovered.
 _STALLED_POLL_S = 0.1
 _serials = itertools.count(1)
 _PENDING = (errno.EINPROGRESS, errno.EWOULDBLOCK, errno.EAGAIN)
@@ -495,19 +494,20 @@ class Connection:
     """One TCPROS connection.
 
     Args:
-        loop: Waits for the socket.
-        sock: Connected, or about to be; belongs to the connection from now on.
-        on_header: Called with the peer's header, before anything else is handed on.
-        on_frame: Called with each frame's content, and the byte in front of its length; big
-            contents are read-only views. From another thread than the loop's in :meth:`drain`.
-        on_closed: Called once with the reason, empty when it was closed from here.
-        lead: Bytes in front of each frame's length: 1 for a service's responses, else 0.
+        loop: The node's I/O loop.
+        sock: Connected or connecting; owned by the connection from now on.
+        on_header: Called with the peer's header, before any frame.
+        on_frame: Called with each frame's content, and the byte before its length; large contents
+            are read-only views. In the calling thread of :meth:`drain`, else in the loop's.
+        on_closed: Called once with the reason, empty when this end closed it.
+        lead: Bytes before each frame's length: 1 for a service's responses, else 0.
+        peer: The peer's address, for messages.
 
     Attributes:
-        peer: The other end's name once it is known, else its address; for people.
-        header: The peer's header; empty before it came.
-        serial: Tells it from all others of this process, also those that are gone.
-        on_room: Called when everything is sent; None for nobody.
+        peer: The peer's name once it is known, else its address; for messages.
+        header: The peer's header; empty until it is received.
+        serial: Its number, unique in this process.
+        on_room: Called when the send queue is empty; or None.
     """
 
     def __init__(
@@ -535,12 +535,12 @@ class Connection:
         self._lock = threading.Lock()
         self._outgoing = Outgoing()
         self._unacked = UnackedBytes(sock)
-        #: Whether what waits is for topics, so that it is held back while the other end is silent.
+        #: Whether frames are held back while the connection is stalled, and whether they are now.
         self._holds = self._held = False
         self._connected = False
-        #: Bytes to read at once: memory that stays empty has to be had all the same.
-        self._ask = _SMALL_READ_BYTES
-        self._reading = self._hurried = True
+        #: Bytes to read at once: each read allocates as many.
+        self._read_size = _SMALL_READ_BYTES
+        self._reading = self._urgent = True
         self._closed = False
         self._limit: Later | None = None
         sock.setblocking(False)
@@ -565,7 +565,7 @@ class Connection:
         """Connect to a resolved address and send a header; from the loop's thread.
 
         Raises:
-            OSError: There can be no more sockets.
+            OSError: The system has no more sockets.
         """
         family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
         sock = socket.socket(family, socket.SOCK_STREAM)
@@ -581,7 +581,7 @@ class Connection:
         return made
 
     def accept(self) -> None:
-        """Begin with a socket that was accepted."""
+        """Begin with an accepted socket."""
         self._connected = True
         self._begin()
 
@@ -590,7 +590,7 @@ class Connection:
         self._watch()
 
     def _expire(self) -> None:
-        what = "it sent no connection header" if self._connected else "no answer"
+        what = "no connection header was received" if self._connected else "no answer"
         self.end(f"{what} within {_HEADER_TIMEOUT_S:.0f} s")
 
     @property
@@ -600,12 +600,12 @@ class Connection:
 
     @property
     def lost(self) -> int:
-        """How many frames made room for newer ones before they were sent."""
+        """How many frames were dropped for newer ones."""
         return self._outgoing.lost
 
     @property
     def info(self) -> str:
-        """The connection as ``rosnode info`` shows it; empty when it is not made, or ended."""
+        """The connection as ``rosnode info`` shows it; empty when it is not connected."""
         try:
             port, number = self._sock.getsockname()[1], self._sock.fileno()
             host, theirs = self._sock.getpeername()[:2]
@@ -615,15 +615,15 @@ class Connection:
 
     @property
     def received(self) -> int:
-        """How many bytes have come."""
+        """How many bytes were received."""
         return self._incoming.total
 
     def waiting(self) -> int:
-        """Return how many frames wait to be sent; from any thread."""
+        """Return the length of the send queue; from any thread."""
         return len(self._outgoing)
 
     def quiet(self) -> bool:
-        """Return whether nothing waits in the socket, nor its end; from any thread."""
+        """Return whether the socket has neither data nor its end to read; from any thread."""
         if not self._turn.acquire(blocking=False):
             return False
         try:
@@ -644,18 +644,18 @@ class Connection:
         self.send_frame(Frame([encode_header(fields)], kept=True))
 
     def send(self, parts: Sequence[Buffer], keep: int = 0) -> None:
-        """Send a frame, of which the parts carry length and all; see :meth:`send_frame`."""
+        """Send a frame, given with its length; see :meth:`send_frame`."""
         self.send_frame(Frame(parts), keep)
 
     def send_frame(self, frame: Frame, keep: int = 0, keep_bytes: int = 0) -> None:
-        """Send a frame; from any thread, without waiting.
+        """Send a frame without blocking; from any thread.
 
-        What the socket does not take at once is copied: the caller may reuse its buffers.
+        Queues a copy of what the socket does not take: the caller may reuse its buffers.
 
         Args:
             frame: The frame.
-            keep: How many frames may wait to be sent; the oldest makes room. 0 for any number.
-            keep_bytes: How many bytes may wait, besides the newest frame; 0 for any number.
+            keep: Most frames in the queue, the oldest are dropped; 0 for any number.
+            keep_bytes: Most bytes in the queue, besides the newest frame; 0 for any number.
         """
         with self._lock:
             if self._closed:
@@ -672,7 +672,7 @@ class Connection:
             self._loop.call(self._watch)
 
     def _write(self, parts: Sequence[memoryview]) -> int:
-        """Send what the socket takes; return how much."""
+        """Write what the socket takes; return the number of bytes."""
         try:
             sent = self._sock.sendmsg(parts)
         except (BlockingIOError, InterruptedError):
@@ -701,45 +701,45 @@ class Connection:
 
     @property
     def stalled(self) -> bool:
-        """Whether the other end has not confirmed anything for half a second; from any thread."""
+        """Whether the peer has not acknowledged sent bytes for half a second; from any thread."""
         with self._lock:
             return not self._closed and self._connected and self._unacked.stalled()
 
     def _hold(self) -> None:
-        """Send nothing for a moment: only what is newest then is of use."""
+        """Send nothing for a moment: only the newest frames are of use after an outage."""
         if self._held:
             return
         self._held = True
 
-        def look() -> None:
+        def release() -> None:
             self._held = False
             self._watch()
 
-        self._loop.after(_STALLED_POLL_S, look)
+        self._loop.after(_STALLED_POLL_S, release)
         self._loop.call(self._watch)
 
     # -- receiving -------------------------------------------------------------------------------
 
     def pause(self, reading: bool) -> None:
-        """Say whether to read and hand on; what comes meanwhile waits. In the loop's thread."""
+        """Stop or resume reading and handing on frames; in the loop's thread."""
         self._reading = reading
         self._incoming.stopped = self._closed or not reading
         self._watch()
         if reading:
-            self._loop.call(self._go_on)
+            self._loop.call(self._resume)
 
-    def _go_on(self) -> None:
+    def _resume(self) -> None:
         if self._reading and not self._closed and self._turn.acquire(blocking=False):
-            self._receive(go_on=True)
+            self._receive(resume=True)
 
-    def take_together(self, take: Callable[[list[Received], int], None]) -> None:
-        """Have frames handed on as they come, several at once; `take` must not raise anything."""
-        self._incoming.take = take
+    def set_batch_handler(self, on_frames: Callable[[list[Received], int], None]) -> None:
+        """Hand on frames as they are received, several at once; `on_frames` must not raise."""
+        self._incoming.take = on_frames
 
-    def hurry(self, hurried: bool) -> None:
-        """Say whether to read as soon as something comes, or about ten times a second."""
-        if hurried != self._hurried and not self._closed:
-            self._hurried = hurried
+    def set_urgent(self, urgent: bool) -> None:
+        """Set whether to read as soon as data arrives, or about ten times a second."""
+        if urgent != self._urgent and not self._closed:
+            self._urgent = urgent
             self._watch()
 
     def ready(self, events: int) -> None:
@@ -752,7 +752,7 @@ class Connection:
                 self.end(os.strerror(failure))
                 return
             if self._sock.getsockname() == self._sock.getpeername():
-                # Nobody listens there: TCP found the port to come from free to go to.
+                # TCP connected the socket to itself: its own port was the free one.
                 self.end(os.strerror(errno.ECONNREFUSED))
                 return
             self._connected = True
@@ -762,15 +762,15 @@ class Connection:
         if events & READ and self._turn.acquire(blocking=False):
             before = self._incoming.total
             self._receive()
-            if not self._hurried and self._incoming.total - before > _HURRY_BYTES:
-                self.hurry(True)
+            if not self._urgent and self._incoming.total - before > _URGENT_BYTES:
+                self.set_urgent(True)
 
     def drain(self) -> None:
-        """Hand on what waits in the socket; from any thread, while nobody hurries."""
+        """Hand on what the socket has, unless that is done at once; from any thread."""
         me = threading.get_ident()
-        if self._hurried or self._closed or self._turn_of == me:
+        if self._urgent or self._closed or self._turn_of == me:
             return
-        # Whoever reads just now hands on the same messages.
+        # A thread that reads just now hands on the same messages.
         if self._turn.acquire(timeout=_TURN_TIMEOUT_S):
             self._turn_of = me
             self._receive()
@@ -790,21 +790,21 @@ class Connection:
             self._sock.close()
             self._turn.release()
 
-    def _receive(self, go_on: bool = False) -> None:
+    def _receive(self, resume: bool = False) -> None:
         """Read what the socket has; with the turn, which ends here."""
         incoming, sock = self._incoming, self._sock
         try:
-            if go_on:
+            if resume:
                 incoming.feed(b"")
             for _ in range(_MAX_READS):
                 if self._closed or not self._reading:
                     return
                 room = incoming.room
                 if room is None:
-                    most = self._ask
+                    most = self._read_size
                     data = sock.recv(most)
                     count = len(data)
-                    self._ask = CHUNK if count == most else _SMALL_READ_BYTES
+                    self._read_size = CHUNK if count == most else _SMALL_READ_BYTES
                     if count:
                         incoming.feed(data)
                 else:
@@ -813,7 +813,7 @@ class Connection:
                     if count:
                         incoming.filled(count)
                 if not count:
-                    self._lose("the other end closed the connection")
+                    self._lose("the peer closed the connection")
                 if count < most:
                     return
         except (BlockingIOError, InterruptedError):
@@ -833,7 +833,7 @@ class Connection:
             for frame in frames:
                 self._on_frame(frame, first)
         except Exception as error:
-            _log.exception("%s: a message could not be taken", self.peer)
+            _log.exception("%s: handling a message failed", self.peer)
             self._lose(f"an error of ours, {error!r}")
 
     def _take_header(self, data: bytes) -> None:
@@ -845,12 +845,12 @@ class Connection:
         if self._limit is not None:
             self._limit.cancel()
         if (error := fields.get("error")) is not None:
-            self.end(f"{self.peer} refuses: {error or 'it does not say why'}")
+            self.end(f"{self.peer} refuses: {error or 'no reason given'}")
             return
         self._on_header(fields)
 
     def _lose(self, reason: str) -> None:
-        """End it, from whichever thread noticed."""
+        """End it in the loop's thread; from any thread."""
         if self._loop.is_current:
             self.end(reason)
         else:
@@ -859,25 +859,25 @@ class Connection:
     # -- the end ---------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """End it from here; from any thread."""
+        """End it; from any thread."""
         self._loop.call(lambda: self.end(""))
 
-    def finish(self, patience: float) -> None:
-        """End it once everything is sent, or after `patience` seconds; in the loop's thread."""
+    def finish(self, timeout: float) -> None:
+        """End it once the send queue is empty, or after `timeout` seconds; in the loop's thread."""
         if self._closed:
             return
         if not self._outgoing:
             self.end("")
             return
         self.on_room = lambda: self.end("")
-        # The system goes on trying to deliver what it has: the last word may be a stop.
+        # The system goes on delivering what it has: the last message may be a stop command.
         self._holds = self._held = False
         self._watch()
         self._loop.linger(self, True)
-        self._loop.after(patience, lambda: self.end(""))
+        self._loop.after(timeout, lambda: self.end(""))
 
     def end(self, reason: str) -> None:
-        """End it, and say why; in the loop's thread."""
+        """End it, with a reason; in the loop's thread."""
         with self._lock:
             if self._closed:
                 return
@@ -888,7 +888,7 @@ class Connection:
         self._loop.linger(self, False)
         self._loop.watch(self._sock, 0, self)
         with suppress(OSError):
-            # A process that was forked has the socket, too, and would keep the other end.
+            # A forked process has the socket, too, and would keep it connected.
             self._sock.shutdown(socket.SHUT_RDWR)
         self._close_socket()
         self._on_closed(reason)
@@ -898,7 +898,7 @@ class Connection:
             return
         sending = bool(self._outgoing and not self._held) or not self._connected
         events = (READ if self._reading else 0) | (WRITE if sending else 0)
-        self._loop.watch(self._sock, events, self, hurry=self._hurried)
+        self._loop.watch(self._sock, events, self, urgent=self._urgent)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} with {self.peer}>"

@@ -1,4 +1,4 @@
-"""What everything created from one ROS 1 node shares: master, connections, graph, threads."""
+"""The core of a ROS 1 node: its master, connections, graph and threads."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rosglass.comm.core import NodeCore
 from rosglass.comm.log_limits import LogOnce
 from rosglass.errors import Error, ServiceError
 from rosglass.wires.tcpros.address import bracketed, own_address
-from rosglass.wires.tcpros.connection import Connection, outlast
+from rosglass.wires.tcpros.connection import Connection, survive_outages
 from rosglass.wires.tcpros.graph import Graph
 from rosglass.wires.tcpros.io_loop import Acceptor, IoLoop, listen
 from rosglass.wires.tcpros.master import Master
@@ -37,24 +37,24 @@ if TYPE_CHECKING:
 __all__ = ["BlockingPool", "TcprosCore", "TcprosOptions", "max_connections"]
 
 _log = logging.getLogger("rosglass.ros1")
-#: Connections at a time whose other end has not sent its header. More than wait to be accepted
-#: (``_BACKLOG``): after a pause, as many honest ones come at once.
+#: Connections at a time whose peer has not sent its header. More than wait to be accepted
+#: (``_BACKLOG``): after a pause, as many honest ones arrive at once.
 _MAX_SILENT_CONNECTIONS = 300
-#: Jobs under way at once: nodes that are gone, but registered still, answer only by a time-out,
-#: and others must not wait for that.
+#: Jobs in progress at once: calls of nodes that are gone, but still registered, time out, and
+#: other calls must not wait for that.
 _MAX_THREADS = 32
-#: Seconds after which a thread without job ends.
+#: Seconds after which an idle thread ends.
 _IDLE_TIMEOUT_S = 5.0
 
 
 @dataclass(frozen=True)
 class TcprosOptions:
-    """Where a node's master is, and under which address and ports others reach the node.
+    """A node's master, and the address and ports under which other nodes reach it.
 
     Attributes:
         master: URI of the master.
-        address: Host or address under which others reach this node; empty to find it out.
-        source: Who gave the address, for messages, such as ``ROS_IP``; empty when nobody did.
+        address: Host or address under which other nodes reach this one; empty to detect it.
+        source: Where the address was given, such as ``ROS_IP``; empty if it is detected.
         tcpros_port: Where connections are accepted; 0 for any free port.
         slave_port: Where the node's API is served; 0 for any free port.
     """
@@ -67,27 +67,28 @@ class TcprosOptions:
 
 
 class TcprosCore(NodeCore):
-    """Holds what a node consists of, and keeps its members registered and informed.
+    """A node's connections, graph and threads, with the members that it keeps registered.
 
     Args:
         name: The node's name.
-        url: What it was connected with, for people to read.
-        options: Master, own address, remappings.
+        url: The URL it was connected with, for messages.
+        options: Master, own address and ports.
         types: Finds types.
 
     Attributes:
-        master: Called from threads that may wait.
-        graph: What the master knew at the last look.
+        master: The master's API; called from threads that may wait.
+        graph: The graph of the last poll of the master.
         types: Finds types.
-        loop: Waits for all sockets.
-        pool: Runs what waits for others.
-        unreachable: Told of publishers that cannot be reached.
-        lookups: Runs what calls of services wait for: they must not queue behind what topics wait
-            for.
-        uri: The node's own API.
+        loop: The node's I/O loop.
+        pool: Runs jobs that wait for other nodes.
+        unreachable: Logs publishers that cannot be reached.
+        lookups: Runs the lookups that service calls wait for: they must not queue behind those of
+            topics.
+        uri: URI of the node's own API.
+        uris: All URIs that the node's own API has had.
         address: Host and port where connections are accepted.
-        topics: What is published and subscribed to.
-        repliers: The services that are offered, by name.
+        topics: The published and subscribed topics.
+        repliers: The offered services, by name.
 
     Raises:
         ConnectionLostError: This machine cannot listen for connections.
@@ -119,12 +120,11 @@ class TcprosCore(NodeCore):
                 sock.close()
             raise
         self._tcpros, self._slave = sockets
-        #: All addresses that the node's own API has had.
         self.uris: set[str] = set()
-        self.move(options.address or own_address())
+        self.set_host(options.address or own_address())
         self.loop = IoLoop(f"{name.name} connections")
         self.unreachable = UnreachableLog(self.loop, self.pool)
-        #: Connections that others have made; those without a header, the oldest first.
+        #: Accepted connections; those without a header, the oldest first.
         self._connections: set[Connection] = set()
         self._silent: dict[Connection, None] = {}
         self._max_connections, self._log_once = max_connections(), LogOnce()
@@ -133,10 +133,10 @@ class TcprosCore(NodeCore):
         self._worker = self._start_following()
 
     def start(self, on_parameter_changed: Callable[[str], None]) -> None:
-        """Begin to listen, and to look for the master.
+        """Accept connections, and begin to poll the master.
 
         Args:
-            on_parameter_changed: Called with the name of a parameter that was subscribed to.
+            on_parameter_changed: Called with the name of a subscribed parameter that has changed.
         """
         self._api = Slave(self, on_parameter_changed)
         self._acceptors = [
@@ -145,7 +145,7 @@ class TcprosCore(NodeCore):
         ]
         for acceptor in self._acceptors:
             self.loop.call(acceptor.open)
-        # Threads that hand on messages must not meet an interpreter that is being taken down.
+        # Threads that deliver messages must not outlive the interpreter.
         atexit.register(self.close)
         self._registrations.start()
 
@@ -173,42 +173,42 @@ class TcprosCore(NodeCore):
             if self.repliers.get(replier.name) is replier:
                 del self.repliers[replier.name]
 
-    def move(self, host: str) -> bool:
-        """Let the node be reached under another host name or address; return whether it is."""
-        place = (host, self._tcpros.getsockname()[1])
-        moved = place != self.address
-        if moved:
-            self.address = place
+    def set_host(self, host: str) -> bool:
+        """Set the host or address that the node announces; return whether it has changed."""
+        address = (host, self._tcpros.getsockname()[1])
+        changed = address != self.address
+        if changed:
+            self.address = address
             self.uri = f"http://{bracketed(host)}:{self._slave.getsockname()[1]}/"
             self.uris.add(self.uri)
-        return moved
+        return changed
 
     def runs_here(self) -> bool:
         """Return whether the calling thread is one of the node's own."""
         return super().runs_here() or self._registrations.is_current or self.loop.is_current
 
     def add(self, member: Handle, follow: Callable[[bool, bool], None] | None = None) -> None:
-        """Register a member and let it follow the graph; raises NodeClosedError after closing."""
+        """Register a member, and let it follow the graph; raises NodeClosedError."""
         super().add(member, follow)
         if isinstance(member, Member):
             self._registrations.wake()
 
     def remove(self, member: Handle) -> None:
-        """Unregister a member that was closed, soon."""
+        """Unregister a closed member in the background."""
         with self._lock:
             known = self._members.pop(member, None) is not None
         if known and not self._closed and isinstance(member, Member):
             self._registrations.forget(member)
 
     def registrable(self) -> list[Member]:
-        """Return the members that the master knows, or is to know."""
+        """Return the members that are registered with the master, now or soon."""
         return [member for member in self.members() if isinstance(member, Member)]
 
     def _state(self) -> Status:
         return self._status
 
-    def tell(self, status: Status) -> None:
-        """Take a new status, and tell it; one that comes after the end is ignored."""
+    def set_status(self, status: Status) -> None:
+        """Set the status and notify its listeners; ignored once the node is closed."""
         with self._lock:
             if status == self._status or self._status.state is ConnectionState.CLOSED:
                 return
@@ -216,30 +216,30 @@ class TcprosCore(NodeCore):
         self.status_listeners.notify(status)
 
     def shut_down(self, caller: str, reason: str) -> None:
-        """Close the node soon, because somebody else says so; from any thread.
+        """Close the node in the background, as another node requests; from any thread.
 
         Args:
-            caller: Who says so.
-            reason: Why, in the caller's words.
+            caller: The requesting node.
+            reason: The caller's reason.
         """
         threading.Thread(
             target=self._shut_down, args=(caller, reason), name="shutdown", daemon=True
         ).start()
 
     def _shut_down(self, caller: str, reason: str) -> None:
-        told = f"closed by {caller}: {reason or 'no reason given'}"
+        detail = f"closed by {caller}: {reason or 'no reason given'}"
         owner = ""
         with suppress(Error):
             owner = self._registrations.owner()
         if not owner and len(self.uris) > 1 and "same name" in reason:
-            return  # who has the name now is this node, under its new address
-        if owner and owner not in told:
-            told += f"; {owner} has the name {self.name} now"
-        _log.warning("%s: %s", self.name, told)
-        self.close(told, killed=not owner and "same name" not in reason)
+            return  # the new owner of the name is this node, under its new address
+        if owner and owner not in detail:
+            detail += f"; {owner} has the name {self.name} now"
+        _log.warning("%s: %s", self.name, detail)
+        self.close(detail, killed=not owner and "same name" not in reason)
 
     def _disconnect(self) -> None:
-        """Unregister everything, which takes about two seconds if the master does not answer."""
+        """Unregister all members; takes about two seconds if the master does not answer."""
         self._registrations.close()
         self._worker.close()
         self.pool.close()
@@ -253,16 +253,16 @@ class TcprosCore(NodeCore):
             self._api.close()
 
     def _notify_closed(self, status: Status) -> None:
-        self.tell(status)
+        self.set_status(status)
 
     # -- connections, in the loop's thread -------------------------------------------------------
 
     def _accept(self, sock: socket.socket, address: str) -> None:
-        """Take a connection in; its header says what it is for."""
+        """Accept a connection; its header names the topic or service."""
         link: Connection
         if len(self._connections) >= self._max_connections:
             if self._log_once.is_first("crowded"):
-                text = "%s: refused, for this node has %d connections; others are not named"
+                text = "%s: refused, as this node has %d connections; further ones are not logged"
                 _log.warning(text, address, len(self._connections))
             sock.close()
             return
@@ -274,7 +274,7 @@ class TcprosCore(NodeCore):
         def on_header(header: dict[str, str]) -> None:
             self._silent.pop(link, None)
             if "topic" in header:
-                outlast(sock)
+                survive_outages(sock)
                 reason = self.topics.accept(link, header)
             elif "service" in header:
                 reason = self._accept_client(link, header)
@@ -287,7 +287,7 @@ class TcprosCore(NodeCore):
             self.loop,
             sock,
             on_header,
-            lambda data, _: self._on_request(link, data),  # subscribers have nothing to say
+            lambda data, _: self._on_request(link, data),  # subscribers send none
             lambda _: self._drop(link),
             peer=address,
         )
@@ -306,7 +306,7 @@ class TcprosCore(NodeCore):
             replier.on_disconnected(link)
 
     def _accept_client(self, link: Connection, header: dict[str, str]) -> str:
-        """Take the connection of a service's client; return why not, empty when it is taken."""
+        """Accept a service client's connection; return the reason if it is refused."""
         replier = self.repliers.get(header.get("service", ""))
         if replier is None:
             return f"{self.name} does not offer {header.get('service')}"
@@ -319,7 +319,7 @@ class TcprosCore(NodeCore):
 
 
 def max_connections() -> int:
-    """Return how many connections of others to hold: half of the files that may be open."""
+    """Return how many connections to accept: half of the files that may be open."""
     try:
         import resource  # noqa: PLC0415 - not on Windows
     except ImportError:
@@ -335,18 +335,20 @@ class BlockingPool:
         name: Of the threads.
     """
 
-    # Its threads may wait for what others receive, unlike all that begin in io_loop.py; see
-    # rosglass.comm.handle.check_may_wait.
+    # Not concurrent.futures: that joins its threads at exit, and a program would wait up to 5 s
+    # for a node that does not answer. The threads may wait for what other threads receive, unlike
+    # those that begin in io_loop.py; see rosglass.comm.handle.check_may_wait.
 
     def __init__(self, name: str) -> None:
         self._name = name
+        #: Guards the jobs, and wakes the threads.
         self._changed = threading.Condition()
         self._jobs: deque[Callable[[], None]] = deque()
         self._threads = self._idle = 0
         self._closed = False
 
     def run(self, job: Callable[[], None]) -> None:
-        """Run `job` as soon as a thread is free; forgotten after :meth:`close`."""
+        """Run `job` as soon as a thread is free; dropped after :meth:`close`."""
         with self._changed:
             if self._closed:
                 return
@@ -367,30 +369,23 @@ class BlockingPool:
             _log.warning("%s: a job has to wait: %s", self._name, error)
 
     def close(self) -> None:
-        """Forget the jobs that wait; those under way end by their own time-outs."""
+        """Drop the jobs that wait; those in progress end by their own timeouts."""
         with self._changed:
             self._closed = True
             self._jobs.clear()
             self._changed.notify_all()
 
     def _work(self) -> None:
-        while (job := self._next()) is not None:
-            self._run(job)
-
-    def _run(self, job: Callable[[], None]) -> None:
-        try:
-            job()
-        except Exception:
-            _log.exception("%s: a job failed", self._name)
-
-    def _next(self) -> Callable[[], None] | None:
-        with self._changed:
-            self._idle += 1
-            try:
+        while True:
+            with self._changed:
+                self._idle += 1
                 self._changed.wait_for(lambda: bool(self._jobs) or self._closed, _IDLE_TIMEOUT_S)
-                if self._jobs:
-                    return self._jobs.popleft()
-                self._threads -= 1
-                return None
-            finally:
                 self._idle -= 1
+                if not self._jobs:
+                    self._threads -= 1
+                    return
+                job = self._jobs.popleft()
+            try:
+                job()
+            except Exception:
+                _log.exception("%s: a job failed", self._name)

@@ -1,4 +1,4 @@
-"""The ROS graph as the master has it."""
+"""The ROS graph, as the master knows it."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ __all__ = ["Graph", "full_type", "split"]
 
 _FULL_NAME = re.compile(r"/[A-Za-z0-9_/]+\Z")
 _Offers = dict[str, list[str]]
-#: What the master says of a type that nobody has told it.
+#: The master's values for an unknown type.
 _UNKNOWN = ("", "*")
-#: Seconds between questions for types that nobody had told the last time.
-_LATE = 5.0
+#: Seconds between requests for types that were unknown the last time.
+_TYPE_RETRY_S = 5.0
 
 
 class _Seen(NamedTuple):
-    """The graph at one moment.
+    """A snapshot of the graph.
 
     Attributes:
         publishers: Nodes by topic.
         subscribers: Nodes by topic.
         services: The node of each service, in a list.
-        types: Type of each topic, as the master tells it.
-        invalid: What is left out because ROS's rules forbid its name.
+        types: Type of each topic, as the master knows it.
+        invalid: Names that are left out because they break ROS's rules.
     """
 
     publishers: _Offers
@@ -45,9 +45,9 @@ _NOTHING = _Seen({}, {}, {}, {})
 
 
 class Graph:
-    """Who publishes, subscribes and serves what; refreshed by asking the master.
+    """The publishers, subscribers and services of every node, polled from the master.
 
-    All methods but :meth:`refresh` answer from memory, from any thread.
+    All methods but :meth:`refresh` answer from the last snapshot, from any thread.
     """
 
     def __init__(self) -> None:
@@ -55,7 +55,7 @@ class Graph:
         self._asked = 0.0
 
     def refresh(self, master: Master) -> bool:
-        """Ask the master and return whether anything has changed; waits for its answer.
+        """Poll the master; return whether the graph has changed.
 
         Raises:
             ConnectionLostError: The master does not answer.
@@ -69,7 +69,7 @@ class Graph:
         types = known.types
         offers = (publishers, subscribers, services)
         missing = any(types.get(name, "") in _UNKNOWN for name in (*publishers, *subscribers))
-        if offers != known[:3] or (missing and time.monotonic() - self._asked > _LATE):
+        if offers != known[:3] or (missing and time.monotonic() - self._asked > _TYPE_RETRY_S):
             self._asked = time.monotonic()
             types = dict(master.call("getTopicTypes"))
         seen = _Seen(*offers, types, frozenset(invalid))
@@ -77,15 +77,15 @@ class Graph:
         return seen != known
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Empty the graph."""
         self._seen = _NOTHING
 
     def invalid_names(self) -> list[str]:
-        """Return what is left out because ROS's rules forbid its name, sorted."""
+        """Return the names that are left out because they break ROS's rules, sorted."""
         return sorted(self._seen.invalid)
 
     def topics(self) -> dict[str, list[str]]:
-        """Return every topic with its type, none where nobody has told it yet."""
+        """Return every topic with its type; no type where it is unknown."""
         seen = self._seen
         found = {}
         for name in sorted(seen.publishers.keys() | seen.subscribers.keys()):
@@ -94,20 +94,20 @@ class Graph:
         return found
 
     def type_of(self, topic: str) -> str:
-        """Return a topic's type, ``pkg/msg/Type``; empty when nobody has told it."""
+        """Return a topic's type, ``pkg/msg/Type``; empty when it is unknown."""
         return full_type(self._seen.types.get(topic, ""))
 
     def services(self) -> dict[str, list[str]]:
-        """Return every service and the nodes that offer it."""
+        """Return every service with its servers' nodes."""
         return dict(self._seen.services)
 
     def nodes(self) -> list[NodeName]:
-        """Return every node that offers or uses anything."""
+        """Return every node that has an endpoint, sorted."""
         found = {node for part in self._seen[:3] for nodes in part.values() for node in nodes}
         return sorted(NodeName(*split(node)) for node in found)
 
     def endpoints(self, kind: EndpointKind, name: str) -> list[EndpointInfo]:
-        """Return who offers or uses a topic or service; the master knows no services' clients."""
+        """Return the endpoints of a topic or service; the master knows no service clients."""
         parts = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION, EndpointKind.SERVICE_SERVER)
         if kind not in parts:
             return []
@@ -116,7 +116,7 @@ class Graph:
         return [EndpointInfo(kind, name, type_name, NodeName(*split(node))) for node in nodes]
 
     def endpoints_of(self, node: NodeName) -> list[EndpointInfo]:
-        """Return everything that a node publishes, subscribes and serves."""
+        """Return a node's publishers, subscriptions and services."""
         found = []
         kinds = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION, EndpointKind.SERVICE_SERVER)
         for kind, part in zip(kinds, self._seen[:3], strict=True):
@@ -127,7 +127,7 @@ class Graph:
 
 
 def _valid(part: list[tuple[str, list[str]]], invalid: set[str]) -> _Offers:
-    """Return those of the names that can be used, with their nodes; the others go to `invalid`."""
+    """Return the valid names with their nodes; the others are added to `invalid`."""
     found = {}
     for name, nodes in part:
         if not _FULL_NAME.match(name):
@@ -139,7 +139,7 @@ def _valid(part: list[tuple[str, list[str]]], invalid: set[str]) -> _Offers:
 
 
 def full_type(name: str) -> str:
-    """Return a message type's full name; empty for what stands for no type."""
+    """Return a message type's full name; empty for an unknown type."""
     if name in _UNKNOWN:
         return ""
     try:

@@ -1,4 +1,4 @@
-"""A node's I/O loop: the thread that waits for all its sockets, and accepts connections."""
+"""A node's I/O loop: one thread that waits for all its sockets, and accepts connections."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ _log = logging.getLogger("rosglass.ros1")
 _HANDLER_TIMEOUT_S = 2.0
 #: Seconds that sockets with something left to send keep a closed loop going.
 _LINGER_S = 1.0
-#: Seconds between looks at the sockets that nobody waits for.
+#: Seconds between polls of the sockets that are not urgent.
 _IDLE_POLL_S = 0.1
 READ, WRITE = selectors.EVENT_READ, selectors.EVENT_WRITE
 
 
 class Ready(Protocol):
-    """What belongs to a socket; called in the loop's thread, and must not wait for anything."""
+    """The handler of a socket; called in the loop's thread, and must not block."""
 
     def ready(self, events: int) -> None:
-        """Do what the socket is ready for: READ, WRITE or both."""
+        """Handle what the socket is ready for: READ, WRITE or both."""
 
     def end(self, reason: str) -> None:
-        """Close the socket: the loop ends, or :meth:`ready` failed for that reason."""
+        """Close the socket: the loop ends, or :meth:`ready` raised."""
 
 
 class Later:
-    """A job that the loop runs later; in the loop's thread only."""
+    """A scheduled job; used in the loop's thread only."""
 
     __slots__ = ("job",)
 
@@ -52,18 +52,22 @@ class Later:
         self.job: Callable[[], None] | None = job
 
     def cancel(self) -> None:
-        """Do not run it; safe after it has run."""
+        """Cancel the job; safe after it has run."""
         self.job = None
 
 
 class IoLoop:
-    """Calls handlers when their sockets are ready, and jobs when asked to, on one daemon thread."""
+    """Calls handlers when their sockets are ready, and runs jobs, on one daemon thread.
+
+    Args:
+        name: The thread's name.
+    """
 
     def __init__(self, name: str) -> None:
         self._selector = selectors.DefaultSelector()
-        #: Sockets that are looked at now and then: one look for all costs next to nothing.
-        self._unhurried = selectors.DefaultSelector()
-        self._next_look, self._leisurely = 0.0, False
+        #: Sockets that are polled: one poll for all costs next to nothing.
+        self._polled = selectors.DefaultSelector()
+        self._next_poll, self._polling = 0.0, False
         self._jobs: deque[Callable[[], None]] = deque()
         self._later: list[tuple[float, int, Later]] = []
         self._numbers = itertools.count()
@@ -85,13 +89,13 @@ class IoLoop:
 
     @property
     def closed(self) -> bool:
-        """Whether it was closed; it runs on for a moment while something is left to send."""
+        """Whether it was closed; it runs on for up to a second while data is left to send."""
         return self._closed
 
     # -- from any thread -------------------------------------------------------------------------
 
     def call(self, job: Callable[[], None]) -> None:
-        """Run `job` in the loop's thread soon; forgotten when the loop has ended."""
+        """Run `job` in the loop's thread soon; dropped when the loop has ended."""
         self._jobs.append(job)
         # Without a lock: at worst two threads wake the loop at once. See _on_wake().
         if not self._awake:
@@ -100,7 +104,7 @@ class IoLoop:
                 self._wake_in.send(b"\0")
 
     def close(self) -> None:
-        """End all handlers and the thread, once what :meth:`linger` was told of is sent.
+        """End all handlers and the thread, once the data of :meth:`linger` is sent.
 
         Safe to call twice, and from the loop's own thread, which ends soon after then.
         """
@@ -127,24 +131,24 @@ class IoLoop:
         return later
 
     def watch(
-        self, sock: socket.socket, events: int, handler: Ready, *, hurry: bool = True
+        self, sock: socket.socket, events: int, handler: Ready, *, urgent: bool = True
     ) -> None:
         """Call `handler` when `sock` is ready for `events`, 0 for none; from the loop's thread.
 
         Args:
             sock: The socket.
             events: READ, WRITE, both or 0.
-            handler: Whom to call.
-            hurry: Whether at once for READ, too; else about ten times a second.
+            handler: Its handler.
+            urgent: Whether READ is handled at once; else about ten times a second.
         """
-        soon = events if hurry else events & ~READ
-        _set(self._selector, sock, soon, handler)
-        if self._leisurely or events != soon:
-            _set(self._unhurried, sock, events & ~soon, handler)
-            self._leisurely = len(self._unhurried.get_map()) > 0
+        now = events if urgent else events & ~READ
+        _set(self._selector, sock, now, handler)
+        if self._polling or events != now:
+            _set(self._polled, sock, events & ~now, handler)
+            self._polling = len(self._polled.get_map()) > 0
 
     def linger(self, handler: Ready, lasting: bool) -> None:
-        """Say whether the loop, when it is closed, runs on until the handler is done."""
+        """Set whether closing the loop waits, up to a second, for the handler."""
         (self._lingering.add if lasting else self._lingering.discard)(handler)
 
     def _work(self) -> None:
@@ -155,8 +159,8 @@ class IoLoop:
                     self._on_wake()
                 else:
                     self._run(handler, events)
-            if self._leisurely:
-                self._look()
+            if self._polling:
+                self._poll()
             while self._later and self._later[0][0] <= time.monotonic():
                 job = heapq.heappop(self._later)[2].job
                 if job is not None:
@@ -165,19 +169,19 @@ class IoLoop:
                 self._run_job(self._jobs.popleft())
         self._finish()
 
-    def _look(self) -> None:
-        """Look at the sockets that nobody waits for, when it is time."""
+    def _poll(self) -> None:
+        """Poll the sockets that are not urgent, if it is time to."""
         now = time.monotonic()
-        if now >= self._next_look:
-            self._next_look = now + _IDLE_POLL_S
-            for key, events in self._unhurried.select(0):
+        if now >= self._next_poll:
+            self._next_poll = now + _IDLE_POLL_S
+            for key, events in self._polled.select(0):
                 self._run(key.data, events)
 
     def _pause(self) -> float | None:
         """Return how long to wait for sockets, in seconds."""
         if self._jobs:
             return 0.0
-        if not (self._later or self._leisurely or self._closed):
+        if not (self._later or self._polling or self._closed):
             return None
         pauses = []
         if self._closed:
@@ -186,15 +190,15 @@ class IoLoop:
             heapq.heappop(self._later)
         if self._later:
             pauses.append(self._later[0][0] - time.monotonic())
-        if self._leisurely:
-            pauses.append(self._next_look - time.monotonic())
+        if self._polling:
+            pauses.append(self._next_poll - time.monotonic())
         return max(0.0, min(pauses)) if pauses else None
 
     def _finish(self) -> None:
-        """End what is left: nobody else would close these sockets."""
+        """Close the sockets that are left: their owners cannot any more."""
         while self._jobs:
             self._run_job(self._jobs.popleft())
-        selectors = (self._selector, self._unhurried)
+        selectors = (self._selector, self._polled)
         left = {key.data for one in selectors for key in one.get_map().values()}
         for handler in left - {None}:
             self._run_job(lambda handler=handler: handler.end(""))  # type: ignore[misc]
@@ -238,15 +242,15 @@ def _set(
 
 
 _BACKLOG = 128
-#: Seconds without accepting anybody after the system has run out of something.
+#: Seconds without accepting connections after the system has run out of a resource.
 _ACCEPT_PAUSE_S = 0.1
 
 
 def listen(address: str, port: int, url: str) -> socket.socket:
-    """Return a socket that listens, on this machine only when that is all that `address` reaches.
+    """Return a listening socket, on the loopback interface only if `address` is on it.
 
     Args:
-        address: Under which others reach it; one of IPv6 makes it listen for both.
+        address: Announced address; an IPv6 address makes it listen for both versions.
         port: 0 for any.
         url: What the node was connected with, for the error.
 
@@ -290,8 +294,8 @@ class Acceptor:
         accept: Callable[[socket.socket, str], None],
     ) -> None:
         self._loop, self._listener, self._accept = loop, listener, accept
-        #: Whether the log says already that nobody can be accepted.
-        self._told = False
+        #: Whether the current failure is logged.
+        self._logged = False
 
     def open(self) -> None:
         """Begin to accept."""
@@ -299,7 +303,7 @@ class Acceptor:
             self._loop.watch(self._listener, READ, self)
 
     def ready(self, _: int) -> None:
-        """Take in whoever waits."""
+        """Accept the connections that wait."""
         while True:
             try:
                 sock, address = self._listener.accept()
@@ -307,19 +311,19 @@ class Acceptor:
                 return
             except OSError as error:
                 if error.errno != errno.ECONNABORTED:
-                    # It would be ready again at once, and nobody else would get a turn.
-                    if not self._told:
-                        self._told = True
+                    # Back off: the selector would report it ready immediately (EMFILE loop).
+                    if not self._logged:
+                        self._logged = True
                         _log.warning("cannot accept connections: %s", error.strerror)
                     self._loop.watch(self._listener, 0, self)
                     self._loop.after(_ACCEPT_PAUSE_S, self.open)
                     return
             else:
-                self._told = False
+                self._logged = False
                 self._accept(sock, f"{address[0]}:{address[1]}")
 
-    def end(self, reason: str = "") -> None:  # noqa: ARG002 - as all that belongs to a socket
-        """Accept nobody any more; safe to call twice."""
+    def end(self, reason: str = "") -> None:  # noqa: ARG002 - of all handlers
+        """Stop accepting connections; safe to call twice."""
         if self._listener.fileno() >= 0:
             self._loop.watch(self._listener, 0, self)
             with suppress(OSError):

@@ -1,4 +1,4 @@
-"""Calling the master and other nodes: XML-RPC with time-outs, and answers that are checked.
+"""Calls of the master and other nodes: XML-RPC with timeouts and checked answers.
 
 APIs: ROS wiki, "ROS/Master_API", "ROS/Parameter Server API", "ROS/Slave_API": each answer is
 ``[code, status message, value]``, the code 1 for success.
@@ -24,31 +24,31 @@ if TYPE_CHECKING:
 
 __all__ = ["Master", "call_node", "parse_xml", "reason_of"]
 
-#: Seconds that somebody may take to answer.
-_TIMEOUT = 5.0
-#: Longest answer in bytes; the largest robot's parameters are far below it.
-_MOST_BYTES = 64 * 2**20
-_CHUNK = 256 * 1024
+#: Seconds that a peer may take to answer.
+_TIMEOUT_S = 5.0
+#: Longest accepted answer in bytes, far above the largest robot's parameters.
+_MAX_ANSWER_BYTES = 64 * 2**20
+_READ_BYTES = 256 * 1024
 _SUCCESS = 1
-#: Levels of lists and namespaces that a parameter may have; nothing that people write has more.
-_DEEPEST = 100
-#: How the other end of a connection that was kept shows that it has closed it meanwhile.
+#: Levels of lists and namespaces that a parameter may have, far above any written by hand.
+_MAX_DEPTH = 100
+#: Errors of a kept connection that the peer has closed.
 _STALE = (http.client.RemoteDisconnected, ConnectionResetError, BrokenPipeError)
 
 
 def parse_xml(data: bytes) -> tuple[tuple[Any, ...], str | None]:
-    """Return the values of a call or answer of XML-RPC, and the method's name.
+    """Return the values of an XML-RPC call or answer, and the method's name.
 
-    Unlike :func:`xmlrpc.client.loads`, it refuses document types, in whatever encoding: their
-    entities can be made to fill the memory.
+    Unlike :func:`xmlrpc.client.loads`, it refuses document types, in any encoding: their entities
+    can be made to fill the memory.
 
     Raises:
-        ExpatError: It is no XML, or has a document type.
+        ExpatError: It is not XML, or has a document type.
         xmlrpc.client.Fault: It is a fault.
-        Exception: It is no XML-RPC; the library raises whatever that leads to.
+        Exception: It is not XML-RPC; the library raises all kinds of errors.
     """
     target = xmlrpc.client.Unmarshaller()
-    target.xml("", None)  # texts are what the parser has decoded
+    target.xml("", None)  # the parser decodes the strings
     parser = ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = target.start, target.end
     parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = target.data, _refuse_document_type
@@ -61,7 +61,7 @@ def _refuse_document_type(*_: object) -> None:
 
 
 class _Socket(socket.socket):
-    """A socket whose calls together end at a deadline, however slowly the peer drips.
+    """A socket whose calls all end at one deadline, however slowly the peer sends.
 
     Attributes:
         deadline: Monotonic time.
@@ -92,25 +92,25 @@ class _Socket(socket.socket):
 
 
 class _Connection(http.client.HTTPConnection):
-    """An HTTP connection that another thread can cut, even while it is being made.
+    """An HTTP connection that another thread can abort, even while it is connecting.
 
     Attributes:
-        cut: Whether it was cut.
-        sock: Its socket, once it is made.
+        aborted: Whether it was aborted.
+        sock: Its socket, once it is connected.
     """
 
-    cut = False
+    aborted = False
     sock: _Socket
     _deadline = 0.0
 
-    def limit(self, deadline: float) -> None:
-        """Let all that follows end at a deadline, in monotonic time."""
+    def set_deadline(self, deadline: float) -> None:
+        """Set the deadline of all calls from now on, in monotonic time."""
         self._deadline = deadline
         if self.sock is not None:
             self.sock.deadline = deadline
 
     def connect(self) -> None:
-        """Connect to the first address of the host that answers."""
+        """Connect to the first address of the host that accepts."""
         failure = OSError("the host has no address")
         for family, kind, protocol, _, place in socket.getaddrinfo(
             self.host, self.port, type=socket.SOCK_STREAM
@@ -118,7 +118,7 @@ class _Connection(http.client.HTTPConnection):
             self.sock = sock = _Socket(family, kind, protocol)
             sock.deadline = self._deadline
             try:
-                if self.cut:
+                if self.aborted:
                     raise OSError("closed")
                 sock.connect(place)
                 sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -129,21 +129,21 @@ class _Connection(http.client.HTTPConnection):
                 return
         raise failure
 
-    def end_now(self) -> None:
-        """Cut it: whoever waits for an answer gets an error; from any thread."""
-        self.cut = True
+    def abort(self) -> None:
+        """Abort the call in progress, which raises an error; from any thread."""
+        self.aborted = True
         with suppress(OSError, AttributeError):
             self.sock.shutdown(socket.SHUT_RDWR)
 
 
 class _Server:
-    """Somebody's XML-RPC API.
+    """The XML-RPC API of a node or master.
 
     Args:
-        uri: Where it is.
+        uri: Its URI.
 
     Raises:
-        ConnectionLostError: That is no address.
+        ConnectionLostError: The URI is not valid.
     """
 
     def __init__(self, uri: str) -> None:
@@ -154,29 +154,29 @@ class _Server:
         except ValueError:
             host = None
         if not host or scheme != "http":
-            raise ConnectionLostError(f"{uri} is no address of a ROS 1 node or master")
+            raise ConnectionLostError(f"{uri} is not the URI of a ROS 1 node or master")
         self._host, self._port = host, port or http.client.HTTP_PORT
         self._path = parts.path or "/RPC2"
 
     def connection(self) -> _Connection:
-        """Return a connection, which is not made yet."""
+        """Return a new connection, which connects with the first call."""
         return _Connection(self._host, self._port)
 
     def call(
         self, connection: _Connection, method: str, arguments: tuple[Any, ...], timeout: float
     ) -> Any:
-        """Call a method and return the value of the answer; errors of :func:`call_node`."""
+        """Call a method and return the answer's value; raises what :func:`call_node` does."""
         try:
             body = xmlrpc.client.dumps(arguments, method).encode()
         except (TypeError, ValueError, OverflowError, RecursionError) as error:
-            raise ConversionError(method, arguments, f"what XML-RPC carries ({error})") from error
+            raise ConversionError(method, arguments, f"values of XML-RPC ({error})") from error
         try:
             answer = self._answer(connection, body, timeout)
         except (OSError, http.client.HTTPException, UnicodeError, OverflowError) as error:
             raise ConnectionLostError(f"{self.uri} does not answer: {reason_of(error)}") from error
         except xmlrpc.client.Fault as error:
             raise MasterError(f"{self.uri} failed at {method}: {error.faultString}") from error
-        except Exception as error:  # the parser raises whatever garbage leads to
+        except Exception as error:  # garbage makes the parser raise all kinds of errors
             raise ConnectionLostError(
                 f"{self.uri} answers, but not as ROS 1 does: {error}"
             ) from error
@@ -194,18 +194,18 @@ class _Server:
                 f"{self.uri} answers {method}, but not as ROS 1 does: {expected} was expected, got "
                 f"{reprlib.repr(value)}"
             )
-            # A parameter is what some node has set: the master itself answers as it should.
+            # Some node has set that parameter: the master itself works.
             raise MasterError(text) if expected is _PARAMETER[0] else ConnectionLostError(text)
         return value
 
     def _answer(self, connection: _Connection, body: bytes, timeout: float) -> Any:
-        connection.limit(time.monotonic() + timeout)
+        connection.set_deadline(time.monotonic() + timeout)
         kept = connection.sock is not None
         try:
             data = self._exchange(connection, body)
         except _STALE:
             connection.close()
-            if not kept or connection.cut:
+            if not kept or connection.aborted:
                 raise
             data = self._exchange(connection, body)
         values, _ = parse_xml(data)
@@ -218,11 +218,13 @@ class _Server:
                 raise http.client.HTTPException(f"HTTP status {response.status}")
             parts: list[bytes] = []
             size = 0
-            while part := response.read1(_CHUNK):
+            while part := response.read1(_READ_BYTES):
                 parts.append(part)
                 size += len(part)
-                if size > _MOST_BYTES:
-                    raise http.client.HTTPException(f"an answer of more than {_MOST_BYTES} bytes")
+                if size > _MAX_ANSWER_BYTES:
+                    raise http.client.HTTPException(
+                        f"an answer of more than {_MAX_ANSWER_BYTES} bytes"
+                    )
         return b"".join(parts)
 
 
@@ -253,9 +255,9 @@ def _is_graph(value: Any) -> bool:
 
 
 def _is_shallow(value: Any) -> bool:
-    """Return whether a parameter has at most :data:`_DEEPEST` levels."""
+    """Return whether a parameter has at most :data:`_MAX_DEPTH` levels."""
     level = [value]
-    for _ in range(_DEEPEST):
+    for _ in range(_MAX_DEPTH):
         inner: list[Any] = []
         for item in level:
             if isinstance(item, dict):
@@ -268,13 +270,13 @@ def _is_shallow(value: Any) -> bool:
     return False
 
 
-#: What a method answers when it succeeds: in words, and whether a value is such.
+#: The expected value of a method's answer, in words, and the check for it.
 _Answer = tuple[str, "Callable[[Any], bool]"]
-_TEXT: _Answer = ("a text", _is_text)
-_TEXTS: _Answer = ("a list of texts", _are_texts)
-_NUMBER: _Answer = ("a whole number", lambda value: isinstance(value, int))
-_PARAMETER: _Answer = (f"a value of at most {_DEEPEST} levels", _is_shallow)
-#: For methods whose answers say nothing.
+_TEXT: _Answer = ("a string", _is_text)
+_TEXTS: _Answer = ("a list of strings", _are_texts)
+_NUMBER: _Answer = ("an integer", lambda value: isinstance(value, int))
+_PARAMETER: _Answer = (f"a value of at most {_MAX_DEPTH} levels", _is_shallow)
+#: For methods whose answers have no meaning.
 _ANYTHING: _Answer = ("anything", lambda _: True)
 ANSWERS: dict[str, _Answer] = {
     "getParam": _PARAMETER,
@@ -292,13 +294,13 @@ ANSWERS: dict[str, _Answer] = {
 }
 
 
-def call_node(uri: str, method: str, *arguments: Any, timeout: float = _TIMEOUT) -> Any:
-    """Call a method of a node or the master and return the value it answers.
+def call_node(uri: str, method: str, *arguments: Any, timeout: float = _TIMEOUT_S) -> Any:
+    """Call a method of a node or the master and return the answer's value.
 
     Raises:
-        ConnectionLostError: There is no answer, or not of the form that the method has.
-        MasterError: The answer is that it failed.
-        ConversionError: The arguments cannot be sent.
+        ConnectionLostError: There is no answer, or it is not of the method's form.
+        MasterError: The answer says that the call failed.
+        ConversionError: XML-RPC cannot carry the arguments.
     """
     server = _Server(uri)
     connection = server.connection()
@@ -309,16 +311,16 @@ def call_node(uri: str, method: str, *arguments: Any, timeout: float = _TIMEOUT)
 
 
 def reason_of(error: BaseException) -> str:
-    """Return an error of the network in a few words."""
+    """Return the reason of a network error in a few words."""
     if isinstance(error, (socket.gaierror, UnicodeError)):
-        return "its host name is not known on this machine"
+        return "its host name is unknown on this machine"
     if isinstance(error, TimeoutError):
         return "no answer in time"
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
 
 
 class Master:
-    """The master's APIs, called as one node; each call waits for its answer.
+    """The master's API, called in the name of one node; calls block until they are answered.
 
     Args:
         uri: The master's, such as ``http://robot:11311``.
@@ -338,8 +340,8 @@ class Master:
         self._busy: set[_Connection] = set()
         self._closed = False
 
-    def call(self, method: str, *arguments: Any, timeout: float = _TIMEOUT) -> Any:
-        """Call a method, the node's name in front; errors as of :func:`call_node`."""
+    def call(self, method: str, *arguments: Any, timeout: float = _TIMEOUT_S) -> Any:
+        """Call a method with the node's name first; raises what :func:`call_node` does."""
         connection = self._server.connection()
         with suppress(IndexError):
             connection = self._idle.pop()
@@ -358,10 +360,10 @@ class Master:
             self._put_back(connection, answered)
 
     def close(self) -> None:
-        """End the calls under way, and refuse others; safe to call twice, from any thread."""
+        """Abort the calls in progress, and refuse others; safe to call twice, from any thread."""
         self._closed = True
         for connection in list(self._busy):
-            connection.end_now()
+            connection.abort()
         while self._idle:
             self._idle.pop().close()
 

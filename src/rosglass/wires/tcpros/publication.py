@@ -1,4 +1,4 @@
-"""A topic that a node publishes: one registration, and the subscribers' connections."""
+"""A topic that a node publishes: one registration, and the connections of its subscribers."""
 
 from __future__ import annotations
 
@@ -35,37 +35,38 @@ __all__ = ["Publication", "PublicationWriter", "definition_text"]
 
 _log = logging.getLogger("rosglass.ros1")
 _SUBSCRIPTION = EndpointKind.SUBSCRIPTION
-#: Largest message that ROS 1 nodes accept.
+#: Largest message that ROS 1 nodes accept, in bytes.
 _MAX_MESSAGE_BYTES = 1_000_000_000
-#: How long a subscriber counts as slow after it lost messages, and between two counts.
+#: How long a subscriber is reported as slow after it lost messages, and between two counts.
 _SLOW_S = 10.0
 #: How long queued messages may still be sent after the topic's last publisher was closed.
 _FLUSH_TIMEOUT_S = 1.0
-#: Most connections that end between two looks of which listeners are informed one by one.
+#: Most connections that end between two polls and are reported one by one.
 _MAX_ENDED = 100
-#: How long the master's list may lack a subscriber that has connected.
+#: How long a connected subscriber may be missing in the master's graph.
 _LISTED_AFTER_S = 5.0
 _HEADER = "std_msgs/msg/Header"
 _uint32 = struct.Struct("<I")
 
 
 class Publication(Member):
-    """A topic that the node publishes, shared by its publishers of that topic.
+    """The node's registration of a topic, shared by its publishers of that topic.
 
     Args:
         core: The node.
         topics: The node's topics.
         topic: Absolute topic name.
-        type: What is published on it.
+        type: The message type.
 
     Attributes:
-        writers: The sending ends of its publishers.
-        numbers: The running numbers of messages that begin with a header.
+        writers: The writers of its publishers.
+        numbers: The sequence numbers of messages that begin with a header.
     """
 
     def __init__(self, core: TcprosCore, topics: Topics, topic: str, type: MessageType) -> None:
         self.topic, self.type = topic, type
         self._core, self._topics = core, topics
+        #: Guards the connections and latched messages: each subscriber gets each message once.
         self._lock = threading.Lock()
         self.numbers = itertools.count(1)
         self.writers: list[PublicationWriter] = []
@@ -75,7 +76,7 @@ class Publication(Member):
         self._closed = False
         #: Messages lost by connections that have ended.
         self._lost_before = 0
-        #: Messages that each link had lost when it was reported last, the time, and the report.
+        #: By connection, its lost messages when it was reported last, the time, and the report.
         self._slow: dict[Connection, tuple[int, float, str]] = {}
         #: Refused subscribers: the reason and the time.
         self._refused: dict[str, tuple[str, float]] = {}
@@ -87,14 +88,14 @@ class Publication(Member):
         return self._endpoints(self.links())
 
     def changes(self, writer: PublicationWriter) -> list[list[EndpointInfo]]:
-        """Return the subscribers after each change since a writer's last call."""
+        """Return the connected subscribers after each change since a writer's last call."""
         with self._lock:
             looks = [*writer.before, self._links.copy()]
             writer.before.clear()
         return [self._endpoints(links) for links in looks]
 
     def lost(self) -> int:
-        """Return how many messages made room for newer ones because a subscriber is slow."""
+        """Return how many messages were dropped because a subscriber is slow."""
         with self._lock:
             return self._lost_before + sum(link.lost for link in self._links)
 
@@ -110,24 +111,24 @@ class Publication(Member):
     # -- sending ---------------------------------------------------------------------------------
 
     def send(self, writer: PublicationWriter, parts: Sequence[Buffer]) -> None:
-        """Send a message to every subscriber; does not wait.
+        """Send a message to every subscriber, without blocking.
 
         Args:
-            writer: The sender; its profile tells how many messages may wait.
-            parts: The message, which may change afterwards.
+            writer: The writer, whose profile limits the send queues.
+            parts: The message, in parts that may change afterwards.
 
         Raises:
             ConversionError: The message is larger than ROS 1 nodes accept.
         """
         size = sum(map(len, parts))
         if size > _MAX_MESSAGE_BYTES:
-            expected = f"at most {_MAX_MESSAGE_BYTES} bytes, as ROS 1 takes no larger message"
+            expected = f"at most {_MAX_MESSAGE_BYTES} bytes, the largest message in ROS 1"
             raise ConversionError("", f"{size} bytes", expected, self.topic)
         latched = writer.latched
         if not latched and not self._links:
             return
         if size < 4096:
-            # One part is handed to the system sooner than several.
+            # One part is sent faster than several.
             frame = Frame((b"".join((_uint32.pack(size), *parts)),), latched)
         else:
             frame = Frame((_uint32.pack(size), *parts), latched)
@@ -153,9 +154,9 @@ class Publication(Member):
     # -- connections, in the loop's thread -------------------------------------------------------
 
     def accept(self, link: Connection, header: dict[str, str]) -> str:
-        """Take a subscriber's connection; return why not, empty when it is taken."""
+        """Accept a subscriber's connection; return the reason if it is refused."""
         name, md5 = ros1_name(self.type.name), self.type.md5
-        # roscpp goes by the sum alone, too: who leaves the type out is understood.
+        # A header without type is accepted: roscpp, too, compares only the sum.
         theirs, theirs_md5 = header.get("type", ANY), header.get("md5sum", "")
         if not theirs_md5:
             return self._refuse(link, "its connection header has no md5sum")
@@ -179,7 +180,7 @@ class Publication(Member):
         return ""
 
     def header(self) -> dict[str, str]:
-        """Return the connection header that subscribers get; from any thread."""
+        """Return the connection header for subscribers; from any thread."""
         return {
             "callerid": self._core.name.full,
             "latching": "1" if any(writer.latched for writer in self.writers) else "0",
@@ -190,7 +191,7 @@ class Publication(Member):
         }
 
     def drop(self, link: Connection) -> None:
-        """Forget a subscriber that has gone."""
+        """Remove a subscriber whose connection has ended."""
         with self._lock:
             if link in self._links:
                 for writer in self.writers:
@@ -212,12 +213,12 @@ class Publication(Member):
     def join(
         self, type: MessageType, qos: QoS, on_close: Callable[[PublicationWriter], None]
     ) -> PublicationWriter:
-        """Add a publisher; returns its sending end.
+        """Add a publisher; return its writer.
 
         Args:
-            type: What it publishes.
-            qos: Transient local means latched; the depth is the queue of each slow subscriber.
-            on_close: Called when the sending end is closed.
+            type: The message type.
+            qos: Transient local means latched; the depth limits each subscriber's send queue.
+            on_close: Called when the writer is closed.
 
         Raises:
             DefinitionConflictError: It publishes another type.
@@ -234,7 +235,7 @@ class Publication(Member):
         return writer
 
     def leave(self, writer: PublicationWriter) -> bool:
-        """Remove a publisher's sending end; return whether it was the last one."""
+        """Remove a writer; return whether it was the last one."""
         with self._lock:
             frame = self._latched.pop(writer, None)
             if frame is not None:
@@ -243,17 +244,17 @@ class Publication(Member):
             return not self.writers
 
     @property
-    def place(self) -> tuple[EndpointKind, str]:  # type: ignore[override]
-        """As what the master shows it."""
+    def endpoint(self) -> tuple[EndpointKind, str]:  # type: ignore[override]
+        """Its kind and name in the master's graph."""
         return EndpointKind.PUBLISHER, self.topic
 
     def register(self, master: Master) -> None:
-        """Tell the master."""
+        """Register the publisher."""
         name = ros1_name(self.type.name)
         master.call("registerPublisher", self.topic, name, self._core.uri)
 
     def unregister(self, master: Master) -> Member | None:
-        """Tell the master that it is published here no more, unless it is again."""
+        """Unregister the publisher, unless the topic is published again."""
         heir = self._topics.published().get(self.topic)
         if self._core.closed or heir is None:
             master.call("unregisterPublisher", self.topic, self._core.uri)
@@ -261,12 +262,12 @@ class Publication(Member):
         return heir
 
     def _refusals(self) -> list[str]:
-        """Return why subscribers were refused that are still listed by the master."""
+        """Return why subscribers were refused that the master still lists."""
         now = time.monotonic()
         graph = self._core.graph
-        there = {one.node.full for one in graph.endpoints(_SUBSCRIPTION, self.topic)}
+        listed = {one.node.full for one in graph.endpoints(_SUBSCRIPTION, self.topic)}
         for peer, (_, since) in self._refused.copy().items():
-            if peer not in there and now - since > _LISTED_AFTER_S:
+            if peer not in listed and now - since > _LISTED_AFTER_S:
                 self._refused.pop(peer, None)
         return [reason for reason, _ in self._refused.copy().values()]
 
@@ -282,13 +283,13 @@ class Publication(Member):
                     text = ""
                 else:
                     reported, at = lost, now
-                    text = f"{link.peer} is too slow: {lost} messages made room for newer ones"
+                    text = f"{link.peer} is too slow: {lost} messages were dropped for newer ones"
             slow[link] = (reported, at, text)
         self._slow = slow
         return [text for _, _, text in slow.values() if text]
 
     def close(self) -> None:
-        """End the connections once what waits is sent, or a second later; safe to call twice."""
+        """End the connections once their queues are sent, or after 1 s; safe to call twice."""
         with self._lock:
             if self._closed:
                 return
@@ -318,20 +319,20 @@ class Publication(Member):
 
 
 class PublicationWriter(Writer):
-    """The sending end of one publisher of a topic.
+    """The writer of one publisher of a topic.
 
     Args:
         publication: The node's registration of the topic.
-        type: What is published.
+        type: The message type.
         qos: The publisher's profile.
         on_close: Called when it is closed.
 
     Attributes:
-        latched: Whether a subscriber that connects later gets the last message.
-        keep: Most messages that wait for a slow subscriber, 0 for any number.
-        keep_bytes: Most bytes that wait for it, 0 for any number.
-        before: The connections before each that ended since the last look: a subscriber, or a
-            listener, may have come since then.
+        latched: Whether new subscribers receive the last message.
+        keep: Most messages in the send queue of a subscriber; 0 for any number.
+        keep_bytes: Most bytes in it; 0 for any number.
+        before: The connections before the end of each that ended since the last call of
+            :meth:`changes`.
     """
 
     def __init__(
@@ -354,7 +355,7 @@ class PublicationWriter(Writer):
         self.publication.send(self, (data,))
 
     def write_parts(self, parts: Sequence[Buffer]) -> None:
-        """Send a message that comes in parts."""
+        """Send a message given in parts."""
         self.publication.send(self, parts)
 
     def subscribers(self) -> list[EndpointInfo]:
@@ -362,44 +363,44 @@ class PublicationWriter(Writer):
         return self.publication.connected()
 
     def changes(self) -> list[list[EndpointInfo]]:
-        """Return the subscribers after each change since the last call, those of now last."""
+        """Return the subscribers after each change since the last call, the current ones last."""
         return self.publication.changes(self)
 
     def lost(self) -> int:
-        """Return how many messages on the topic made room for newer ones."""
+        """Return how many messages on the topic were dropped because a subscriber is slow."""
         return self.publication.lost()
 
     @property
     def problem(self) -> str:  # type: ignore[override]
-        """Why some subscribers get nothing, or not all, in words; empty when all is well."""
+        """Why some subscribers miss messages, in words; empty if none does."""
         return self.publication.problem()
 
     def assert_liveliness(self) -> None:
-        """Refuse: ROS 1 has no word for it."""
+        """Raise UnsupportedError: ROS 1 has no liveliness."""
         raise UnsupportedError(
-            f"{self.publication.topic}: a publisher cannot show that it is alive in ROS 1 but by "
-            "sending"
+            f"{self.publication.topic}: ROS 1 has no liveliness; publishers show that they live "
+            "by sending"
         )
 
     def close(self) -> None:
-        """Send no more; safe to call twice."""
+        """Stop sending; safe to call twice."""
         self._on_close(self)
 
     def _number(self, parts: Sequence[Buffer]) -> Sequence[Buffer]:
-        """Put the topic's next running number in place of ``header.seq``."""
+        """Set ``header.seq`` to the topic's next sequence number."""
         number = _uint32.pack(next(self.publication.numbers) & 0xFFFFFFFF)
         return (number, memoryview(parts[0])[_uint32.size :], *parts[1:])
 
 
 def definition_text(types: Any, kind: MessageType) -> str:
-    """Return a type's definition with all that it needs; an opaque type's as it was received."""
+    """Return a type's full definition; that of an opaque type as it was received."""
     from rosglass.messages import OpaqueType  # noqa: PLC0415 - numpy
 
     return kind.text if isinstance(kind, OpaqueType) else types.text(kind)
 
 
 def _has_header(type: MessageType) -> bool:
-    """Return whether messages begin with a header, whose number publishers set."""
+    """Return whether messages begin with a header, whose sequence number publishers set."""
     from rosglass.messages import OpaqueType  # noqa: PLC0415 - numpy
 
     if isinstance(type, OpaqueType):

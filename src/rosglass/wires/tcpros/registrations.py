@@ -1,7 +1,7 @@
-"""What the master knows of a node, kept true; and the graph, as the master tells it.
+"""A node's registrations with the master, and the polling of the graph.
 
-The master tells nobody when it was restarted and has forgotten everybody, or when its calls do not
-get through: it is asked once a second. What it could not be told when a node was closed, it is told
+The master does not notify nodes when it was restarted and has lost all registrations, nor when its
+calls fail: it is polled once a second. A node that could not unregister when it was closed does so
 in the background.
 """
 
@@ -30,50 +30,50 @@ __all__ = ["Member", "Registrations", "unregister_later"]
 
 
 _log = logging.getLogger("rosglass.ros1")
-#: Seconds between looks at the master.
+#: Seconds between polls of the master.
 _POLL_S = 1.0
-#: Seconds that closing waits for the master, and then for calls that were cut.
-_UNREGISTER_TIMEOUT_S, _CUT_TIMEOUT_S = 1.5, 0.5
-#: Looks at a publisher without connection until the master is asked about it.
-_MISSED_LOOKS = 2
-#: Seconds that the master may take to tell who has the node's name.
+#: Seconds that closing waits for the master, and then for the calls that it aborted.
+_UNREGISTER_TIMEOUT_S, _ABORT_TIMEOUT_S = 1.5, 0.5
+#: Polls with a publisher that is not connected until the subscription is registered again.
+_MAX_MISSED_POLLS = 2
+#: Seconds that the master may take to look up the node's name.
 _OWNER_TIMEOUT_S = 1.0
 
 
 class Member(NodeMember):
-    """Something created from a node: it is registered with the master, and ends with the node.
+    """A member of a node that is registered with the master.
 
     Attributes:
-        place: As what the master shows it once it is registered, and under which name: it is
-            registered again should it be missing there. None for what the master does not show.
+        endpoint: Its kind and name in the master's graph: it is registered again if it is missing
+            there. None for members that the graph does not show.
     """
 
-    place: tuple[EndpointKind, str] | None = None
+    endpoint: tuple[EndpointKind, str] | None = None
 
     def register(self, master: Master) -> None:
-        """Tell the master of it; called on a thread that may wait, again after its restart.
+        """Register it; called on a thread that may wait, again after the master's restart.
 
         Raises:
-            ConnectionLostError: The master does not answer; this is called again then.
-            MasterError: It refuses.
+            ConnectionLostError: The master does not answer; this is retried.
+            MasterError: The master refuses.
         """
 
-    def unregister(self, master: Master) -> Member | None:  # noqa: ARG002 - some are not known
-        """Tell the master that it is gone; called on a thread that may wait.
+    def unregister(self, master: Master) -> Member | None:  # noqa: ARG002 - not all are registered
+        """Unregister it; called on a thread that may wait.
 
         Returns:
-            Who has its name in this node by now, if anybody: the master was told nothing then, and
-            what it knows is the other's.
+            The member of this node that has its name by now: the registration is kept then, and
+            belongs to that one. Else None.
         """
         return None
 
-    def lacks(self, publishers: int) -> bool:  # noqa: ARG002 - most have none
-        """Return whether it is connected with fewer publishers than the master knows."""
+    def misses_publishers(self, count: int) -> bool:  # noqa: ARG002 - of subscriptions only
+        """Return whether it is connected with fewer publishers than the master lists."""
         return False
 
 
 class Registrations:
-    """Registers a node's members with the master, on a thread of its own, which may wait.
+    """Registers a node's members with the master, on a thread of its own.
 
     Args:
         core: The node.
@@ -84,17 +84,17 @@ class Registrations:
         #: Wakes the thread: there is something to register, or the node is closed.
         self._wanted = threading.Event()
         self._closing = False
-        #: Members that the master knows, and those that it may know.
+        #: Members that are registered, and those that may be.
         self._registered: set[Member] = set()
         self._tried: set[Member] = set()
         self._leaving: deque[Member] = deque()
         self._log_once = LogOnce()
         self._answered = False
-        #: The master's process, as it last said.
+        #: The master's process id, as of the last poll.
         self._process: object = None
-        #: Why others may not reach the node, for the address that was looked at.
-        self._doubt, self._doubted = "", ""
-        #: How many looks in a row missed a publisher, by topic.
+        #: Why other nodes may not reach this one, and the address that was checked.
+        self._doubt, self._checked_host = "", ""
+        #: Consecutive polls with a publisher that is not connected, by topic.
         self._missed: dict[str, int] = {}
         self._thread = threading.Thread(
             target=self._work, name=f"{core.name.name} master", daemon=True
@@ -106,22 +106,22 @@ class Registrations:
         return self._thread is threading.current_thread()
 
     def start(self) -> None:
-        """Begin to look for the master."""
+        """Start polling the master."""
         self._thread.start()
 
     def wake(self) -> None:
-        """Look at the members soon; from any thread."""
+        """Register new members soon; from any thread."""
         self._wanted.set()
 
     def forget(self, member: Member) -> None:
-        """Unregister a member that is closed, soon; from any thread."""
+        """Unregister a closed member soon; from any thread."""
         self._leaving.append(member)
         self._wanted.set()
 
     def close(self) -> None:
-        """Unregister all, and end the thread; takes up to two seconds if the master is silent.
+        """Unregister all members, and end the thread; takes up to 2 s if the master is silent.
 
-        What it could not be told then, it is told in the background when it answers again.
+        The rest is unregistered in the background once the master answers.
         """
         self._closing = True
         known = bool(self._tried)
@@ -132,12 +132,12 @@ class Registrations:
             self._thread.join(_UNREGISTER_TIMEOUT_S)
         self._core.master.close()
         if not self.is_current and self._thread.is_alive():
-            self._thread.join(_CUT_TIMEOUT_S)
+            self._thread.join(_ABORT_TIMEOUT_S)
         if left := self._tried.copy():
             unregister_later(self._core, left)
 
     def owner(self) -> str:
-        """Return the URI of the node that has this node's name; empty if it is this one, or nobody.
+        """Return the URI of another node that has this node's name; empty if there is none.
 
         Raises:
             ConnectionLostError: The master does not answer.
@@ -157,58 +157,53 @@ class Registrations:
             if self._closing:
                 break
             try:
-                self._look()
+                self._poll()
             except Exception:
                 _log.exception("%s failed", self._thread.name)
             self._wanted.wait(_POLL_S)
         self._leave()
 
-    def _look(self) -> None:
+    def _poll(self) -> None:
         core = self._core
-        moved = False
+        changed = False
         try:
-            taker = self._find()
-            if taker:
-                core.shut_down(core.master.uri, f"{taker} has the name {core.name} now")
+            successor = self._check_master()
+            if successor:
+                core.shut_down(core.master.uri, f"{successor} has the name {core.name} now")
                 return
-            self._locate()
+            if not core.options.address and core.set_host(own_address(core.master.reached_from)):
+                # The machine has changed network: the registrations carry the new address.
+                self._registered.clear()
             self._unregister()
             refused = self._register()
-            moved = core.graph.refresh(core.master)
+            changed = core.graph.refresh(core.master)
             self._compare()
-        except ConnectionLostError as error:
-            self._lose(str(error))
-        except MasterError as error:
-            self._lose(str(error))
+        except (ConnectionLostError, MasterError) as error:
+            self._on_failure(str(error))
         else:
             self._answered = True
-            self._look_at_address()
+            self._check_address()
             problems = [problem for problem in (*refused, self._doubt) if problem]
-            core.tell(Status(ConnectionState.CONNECTED, "; ".join(problems)))
-        if moved:
+            core.set_status(Status(ConnectionState.CONNECTED, "; ".join(problems)))
+        if changed:
             core.wake()
 
-    def _find(self) -> str:
-        """Notice a master that was restarted; return who has taken the node's name."""
+    def _check_master(self) -> str:
+        """Detect a restart of the master; return the URI of a node that took this one's name."""
         core = self._core
         process, uri = core.master.call("getPid"), ""
         if self._registered:
-            with suppress(MasterError):  # nobody has the name: the master has forgotten everybody
+            with suppress(
+                MasterError
+            ):  # the name is unknown: the master has lost all registrations
                 uri = core.master.call("lookupNode", core.name.full)
-            # Another call may have made the node known to a new master, without all it consists of.
+            # A new master may know the node by another call, without its registrations.
             if not uri or process != self._process:
                 self._registered.clear()
                 self._tried.clear()
                 self._leaving.clear()
         self._process = process
         return "" if not uri or uri in core.uris else str(uri)
-
-    def _locate(self) -> None:
-        """Find out under which address others reach the node: it may have changed network."""
-        core = self._core
-        if not core.options.address and core.move(own_address(core.master.reached_from)):
-            # The master gets the new address with the registrations.
-            self._registered.clear()
 
     def _unregister(self) -> None:
         while self._leaving:
@@ -225,7 +220,7 @@ class Registrations:
             self._leaving.popleft()
 
     def _register(self) -> list[str]:
-        """Tell the master of members it does not know; return what it has against some."""
+        """Register members that are not; return why the master refuses some."""
         refused = []
         for member in self._core.registrable():
             if member in self._registered:
@@ -248,53 +243,53 @@ class Registrations:
         return refused
 
     def _compare(self) -> None:
-        """Look whether the master shows the members as they are, and tell it again if not."""
+        """Compare the graph with the members, and register again what is missing in it."""
         core = self._core
         for member in list(self._registered):
-            if member.place is None:
+            if member.endpoint is None:
                 continue
-            kind, name = member.place
-            forgotten = core.name not in {end.node for end in core.graph.endpoints(kind, name)}
-            if kind is EndpointKind.SUBSCRIPTION and not forgotten:
-                forgotten = self._misses(member, name)
-            if forgotten:
+            kind, name = member.endpoint
+            missing = core.name not in {end.node for end in core.graph.endpoints(kind, name)}
+            if kind is EndpointKind.SUBSCRIPTION and not missing:
+                missing = self._has_missed_publishers(member, name)
+            if missing:
                 self._registered.discard(member)
                 self._wanted.set()
 
-    def _misses(self, member: Member, topic: str) -> bool:
-        """Return whether to ask about a topic's publishers: the master's calls may be lost."""
-        there = len(self._core.graph.endpoints(EndpointKind.PUBLISHER, topic))
-        if not member.lacks(there):
+    def _has_missed_publishers(self, member: Member, topic: str) -> bool:
+        """Return whether a subscription has missed the master's calls, and must register again."""
+        count = len(self._core.graph.endpoints(EndpointKind.PUBLISHER, topic))
+        if not member.misses_publishers(count):
             self._missed.pop(topic, None)
             return False
-        # At first it may be about to tell, or the publisher about to answer.
-        looks = self._missed[topic] = self._missed.get(topic, 0) + 1
-        return looks == _MISSED_LOOKS or looks % (10 * _MISSED_LOOKS) == 0
+        # At first, the master's call or the publisher's answer may be on its way.
+        polls = self._missed[topic] = self._missed.get(topic, 0) + 1
+        return polls == _MAX_MISSED_POLLS or polls % (10 * _MAX_MISSED_POLLS) == 0
 
-    def _look_at_address(self) -> None:
+    def _check_address(self) -> None:
         host = self._core.address[0]
-        if host != self._doubted:
-            self._doubted, self._doubt = host, ""
-            # A name server may take its time.
-            self._core.pool.run(lambda: self._doubt_address(host))
+        if host != self._checked_host:
+            self._checked_host, self._doubt = host, ""
+            self._core.pool.run(lambda: self._look_up_address(host))
 
-    def _doubt_address(self, host: str) -> None:
+    def _look_up_address(self, host: str) -> None:
+        """Check whether other nodes reach an address; may wait for a name server."""
         core = self._core
         master, _ = parse_uri(core.master.uri, "master")
         found = doubt(host, core.options.source, master)
-        if found and host == self._doubted:
+        if found and host == self._checked_host:
             self._doubt = found
             _log.warning("%s: %s", core.url, found)
             self._wanted.set()
 
-    def _lose(self, reason: str) -> None:
+    def _on_failure(self, reason: str) -> None:
         core = self._core
         if self._closing:
             return
         state = ConnectionState.LOST if self._answered else ConnectionState.CONNECTING
         if core.status().state is ConnectionState.CONNECTED:
             _log.warning("%s: %s", core.url, reason)
-        core.tell(Status(state, f"{reason}; trying again every second"))
+        core.set_status(Status(state, f"{reason}; trying again every second"))
 
     def _leave(self) -> None:
         core = self._core
@@ -333,15 +328,15 @@ def _unregister(core: TcprosCore, members: list[Member]) -> None:
             if not again or _has_forgotten(master, core):
                 break
             # A registration from before the master hung was processed after its end. Once is
-            # enough: whoever has this name and address then is another node, on the same ports.
+            # enough: after that, another node on the same ports has this name and address.
             left, again = list(members), False
         except ConnectionLostError as error:
             _log.debug("%s is closed, but its master does not know: %s", core.name, error)
         time.sleep(_RETRY_PAUSE_S)
     else:
         _log.info(
-            "%s does not answer, and may still list %s when it does: rosglass node cleanup "
-            "removes what is gone",
+            "%s does not answer, and may still list %s when it does: remove it then by "
+            "'rosglass node cleanup'",
             master.uri,
             core.name,
         )

@@ -1,7 +1,7 @@
-"""The server's end of a service over TCPROS: its clients' connections, and their requests.
+"""The server's side of a service over TCPROS: its clients' connections and requests.
 
-Protocol: ROS wiki, "ROS/TCPROS": a client's header names the service and its type's md5 sum; a
-request is a frame, and its response a frame with a byte in front that says whether all went well.
+Protocol: ROS wiki, "ROS/TCPROS": a client's header has the service and its type's md5 sum; a
+request is a frame, and its response a frame after a byte that is 1 for success.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ __all__ = ["TcprosReplier"]
 
 _log = logging.getLogger("rosglass.ros1")
 _head = struct.Struct("<BI")
-#: Seconds for which a client that was refused counts as a problem.
+#: Seconds for which a refused client is reported as a problem.
 _REFUSAL_S = 30.0
-#: Clients that were refused lately, at most.
+#: Refused clients that are remembered.
 _MAX_REFUSED = 10
-#: Seconds that closing waits until a response that is on its way is sent.
+#: Seconds that closing waits for a response that is being sent.
 _CLOSE_TIMEOUT_S = 1.0
 _TRUE = ("1", "true")
 
@@ -52,7 +52,7 @@ class TcprosReplier(Replier, Member):
         name: Absolute service name.
         type: The service type.
         on_request: Called with each request, in the loop's thread.
-        on_close: Called when the service is withdrawn.
+        on_close: Called when the replier is closed.
 
     Attributes:
         name: Absolute service name.
@@ -73,12 +73,12 @@ class TcprosReplier(Replier, Member):
         self._core, self.name, self.type = core, name, type
         self._on_request, self._on_close = on_request, on_close
         self._closed = False
-        #: Both are changed in the loop's thread only.
+        #: Changed in the loop's thread only, as is the next one.
         self._sessions: dict[Connection, _Session] = {}
-        #: Why clients were refused lately, and when, by their names.
+        #: By client, why and when it was refused.
         self._refused: dict[str, tuple[str, float]] = {}
         self._log_once = LogOnce()
-        #: Whether the master has shown the service as this node's.
+        #: Whether the graph has shown the service as this node's.
         self._seen = False
         self._warned = ""
 
@@ -86,36 +86,36 @@ class TcprosReplier(Replier, Member):
 
     @property
     def problem(self) -> str:  # type: ignore[override]
-        """Why some clients cannot be served, in words; empty when all is well."""
+        """Why some clients cannot be served, in words; empty if all can."""
         if conflict := self._conflict():
             return conflict
         now, refused = time.monotonic(), self._refused.copy().values()
         return "; ".join(dict.fromkeys(text for text, when in refused if now - when < _REFUSAL_S))
 
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:
-        """Answer a request; a client that is gone is no error."""
+        """Send a response; ignored when the client has left."""
         _session_of(request).answer(True, data)
 
     def fail(self, request: RequestId, reason: str) -> None:
-        """Tell the client that no response will come, and why."""
+        """Send the client the reason why there is no response."""
         _session_of(request).answer(False, reason.encode("utf-8", "replace"))
 
     def describe_failure(self, error: Exception) -> str:
-        """Return what rospy tells of an exception that the service's callback raised."""
+        """Return rospy's text for an exception that the service's callback raised."""
         if isinstance(error, ServiceError):
             return f"service cannot process request: {error}"
         return f"error processing request: {str(error) or type(error).__name__}"
 
     def abandoned(self, request: RequestId) -> bool:
-        """Return whether the client of a request has gone, so that its answer is of no use."""
+        """Return whether the client of a request has left."""
         return _session_of(request).gone
 
     def client_name(self, request: RequestId) -> str:
-        """Return who sent a request, for people."""
+        """Return the name of a request's client."""
         return _session_of(request).client
 
     def close(self) -> None:
-        """Withdraw the service; safe to call twice, also at once."""
+        """Unregister the service and end its connections; safe to call twice, also at once."""
         if self._closed:
             return
         self._closed = True
@@ -127,12 +127,12 @@ class TcprosReplier(Replier, Member):
     # -- connections, in the loop's thread ---------------------------------------------------------
 
     def _end(self) -> None:
-        # A client that was taken just before is among them: that runs in this thread, too.
+        # With clients that were just accepted: that runs in this thread, too.
         for session in list(self._sessions.values()):
             session.close()
 
     def accept(self, link: Connection, header: dict[str, str]) -> str:
-        """Take a client's connection; return why not, empty when it is taken."""
+        """Accept a client's connection; return the reason if it is refused."""
         if "md5sum" not in header:
             return "md5sum is missing in the connection header"
         client, md5 = header.get("callerid", "") or link.peer, header["md5sum"]
@@ -162,7 +162,7 @@ class TcprosReplier(Replier, Member):
         return ""
 
     def _refuse_type(self, client: str, theirs: str, md5: str) -> str:
-        called = "a type that it does not name" if theirs == ANY else theirs
+        called = "a type without name" if theirs == ANY else theirs
         problem = (
             f"{self.name} is {ros1_name(self.type.name)} with md5 {self.type.md5} on "
             f"{self._core.name}, but {client} calls it as {called} with md5 {md5}"
@@ -173,24 +173,24 @@ class TcprosReplier(Replier, Member):
             del self._refused[next(iter(self._refused))]
         if self._log_once.is_first((client, md5)):
             ours = self._core.types.text(self.type).strip()
-            _log.warning("%s: it is not served. Ours:\n%s", problem, ours)
+            _log.warning("%s: it is refused. Ours:\n%s", problem, ours)
         return problem
 
     def on_frame(self, link: Connection, data: bytes | memoryview) -> None:
-        """Take a request."""
+        """Hand on a request."""
         session = self._sessions.get(link)
         if session is not None:
             session.on_frame(data)
 
     def on_disconnected(self, link: Connection) -> None:
-        """Forget a client that has gone."""
+        """Remove a client that has left."""
         self._sessions.pop(link, None)
 
-    # -- as a member, which the master shows -------------------------------------------------------
+    # -- as a member ------------------------------------------------------------------------------
 
     @property
-    def place(self) -> tuple[EndpointKind, str] | None:  # type: ignore[override]
-        """As what the master shows it; None while it shows another node's, which has it now."""
+    def endpoint(self) -> tuple[EndpointKind, str] | None:  # type: ignore[override]
+        """Its kind and name in the master's graph; None while another node has the service."""
         nodes = self._core.graph.services().get(self.name, [])
         ours = not nodes or self._core.name.full in nodes
         return (EndpointKind.SERVICE_SERVER, self.name) if ours else None
@@ -209,7 +209,7 @@ class TcprosReplier(Replier, Member):
         return f"rosrpc://[{host}]:{port}" if ":" in host else f"rosrpc://{host}:{port}"
 
     def follow(self, moved: bool, idle: bool) -> None:
-        """Follow the graph: who offers the service, and whether the master has forgotten it."""
+        """Follow the graph: log when another node takes the service over."""
         if self._closed or not (moved or idle):
             return
         nodes = self._core.graph.services().get(self.name, [])
@@ -221,21 +221,21 @@ class TcprosReplier(Replier, Member):
         self._warned = conflict
 
     def _conflict(self) -> str:
-        """Say which other node has taken the service over; empty when none has."""
+        """Return which other node has taken the service over; empty if none has."""
         nodes = self._core.graph.services().get(self.name, [])
         if not self._seen or not nodes or self._core.name.full in nodes:
             return ""
         return (
             f"{' and '.join(nodes)} offers {self.name} now, and the master sends all clients "
-            "there; end one of the two"
+            "there; stop one of the two"
         )
 
 
 class _Session:
     """A client's connection; in the loop's thread, except :meth:`answer`.
 
-    Requests are handed on one at a time, so that responses go out in their order; while one
-    waits, no more is read.
+    Requests are handed on one at a time, so that responses are sent in their order; while one
+    waits, nothing is read.
 
     Args:
         loop: The connection's.
@@ -244,7 +244,7 @@ class _Session:
         on_request: Called with each request.
 
     Attributes:
-        client: Who calls, for people.
+        client: The client's name.
     """
 
     def __init__(
@@ -260,11 +260,11 @@ class _Session:
 
     @property
     def gone(self) -> bool:
-        """Whether the client cannot get a response any more."""
+        """Whether the connection has ended."""
         return self._link.closed
 
     def on_frame(self, data: bytes | memoryview) -> None:
-        """Hand a request on, or let it wait for the response to the one before."""
+        """Hand on a request, or queue it until the previous one is answered."""
         if not self._busy:
             self._busy = True
             self._on_request(RequestId(self._identity, next(self._numbers), self), data)
@@ -274,12 +274,12 @@ class _Session:
             self._link.pause(False)
 
     def answer(self, ok: bool, data: bytes | bytearray) -> None:
-        """Send the response to the request that was handed on; from any thread."""
+        """Send the response to the current request; from any thread."""
         self._link.send([_head.pack(ok, len(data)), data])
         self._loop.call(self._on_answered)
 
     def close(self) -> None:
-        """End the connection once what is on its way is sent, or a second later."""
+        """End the connection once its send queue is empty, or after 1 s."""
         self._waiting.clear()
         self._link.finish(_CLOSE_TIMEOUT_S)
 
@@ -287,7 +287,7 @@ class _Session:
         link = self._link
         if link.closed:
             return
-        # A client that does not read a response gets no more of them.
+        # Back-pressure: the next request waits until the client has read the response.
         proceed = self._next if self._persistent else lambda: link.end("")
         if link.waiting():
             link.on_room = proceed

@@ -1,9 +1,9 @@
-"""The client's end of a service over TCPROS: where its server is, connections to it, requests.
+"""The client's side of a service over TCPROS: its server's location, connections and requests.
 
 Protocol: ROS wiki, "ROS/Master_API" (lookupService) and "ROS/TCPROS": only the server knows its
-service's type, and tells it to who connects (``probe=1`` for that alone). After the headers, a
-request is a frame, and its response a frame with a byte in front that says whether all went well;
-the failure text is its content if not.
+service's type, and sends it in its header (``probe=1`` connects for that alone). After the headers,
+a request is a frame, and its response a frame after a byte that is 1 for success; else the frame
+has the error text.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import threading
 import time
 from collections import deque
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from rosglass.comm.names import similar
 from rosglass.comm.service_client import ServiceRequester
@@ -43,11 +43,10 @@ if TYPE_CHECKING:
     from rosglass.wires.tcpros.master import Master
 
 __all__ = [
-    "FinderOwner",
-    "Peer",
-    "Place",
+    "ServerInfo",
     "ServiceFinder",
     "ServiceLink",
+    "ServiceLocation",
     "TcprosRequester",
     "locate",
     "probe",
@@ -56,19 +55,19 @@ __all__ = [
 
 _log = logging.getLogger("rosglass.ros1")
 _length = struct.Struct("<I")
-#: Connections at once, each with a call; more calls wait for their turn.
+#: Connections at once, each with a call; further calls are queued.
 _MAX_LINKS = 64
 
 
 @dataclass(eq=False, slots=True)
 class _Route:
-    """How far a request has come.
+    """The progress of a request.
 
     Attributes:
         made: Monotonic time of the call.
-        began: Monotonic time at which a connection for it was begun, None while it waits.
+        began: Monotonic time at which its connection was dialled or chosen; None while queued.
         link: The connection it is sent through.
-        refused: Whether a server that was found before this call began has refused it.
+        refused: Whether a server that was found before this call has refused it.
     """
 
     made: float
@@ -78,20 +77,20 @@ class _Route:
 
 
 class TcprosRequester(ServiceRequester):
-    """Sends a service client's requests through connections to the server that the master names.
+    """Sends a service client's requests to the server that the master lists.
 
-    Except what the client calls, everything runs in the loop's thread, which owns the connections.
+    The loop's thread owns the connections, and runs everything but the methods that clients call.
 
     Args:
         core: The node it belongs to.
-        on_server: Called with the name and what a server of it said of itself.
+        on_server: Called with the name and what a server of it announced.
         name: Absolute service name.
-        wanted: The type, or its name: then the version that the server announces is taken if the
-            library has it; None takes whatever type the server announces.
-        persistent: Whether calls go one after the other through one connection that is kept,
-            instead of a connection for each.
-        on_reply: Takes what comes of the requests.
-        on_change: Called when a server has come or gone, or may have.
+        wanted: The type, or its name: then the server's version is used if the library has it;
+            None uses the type that the server announces.
+        persistent: Whether calls use one connection, one after the other, instead of a connection
+            each.
+        on_reply: Called with the result of each request.
+        on_change: Called when a server may have appeared or left.
     """
 
     max_request = MAX_FRAME
@@ -99,7 +98,7 @@ class TcprosRequester(ServiceRequester):
     def __init__(
         self,
         core: TcprosCore,
-        on_server: Callable[[str, Peer], None],
+        on_server: Callable[[str, ServerInfo], None],
         name: str,
         wanted: ServiceType | str | None,
         persistent: bool,
@@ -109,62 +108,63 @@ class TcprosRequester(ServiceRequester):
         self._core, self._name, self._persistent = core, name, persistent
         self._on_reply, self._on_change = on_reply, on_change
         self._finder = ServiceFinder(core, on_server, name, wanted, self)
+        #: Guards which request a connection is for: calling threads send through idle ones.
         self._lock = threading.Lock()
         #: Requests that wait for a connection, in the order of the calls; changed with the lock.
         self._queue: deque[PendingCall] = deque()
-        #: The connection that is kept; claimed for a request with the lock.
+        #: The persistent connection; claimed for a request with the lock.
         self._kept: ServiceLink | None = None
         #: Belongs to the loop's thread.
         self._links: set[ServiceLink] = set()
         self._closed = False
 
-    # -- who is there ------------------------------------------------------------------------------
+    # -- the server --------------------------------------------------------------------------------
 
     @property
     def type(self) -> ServiceType | None:  # type: ignore[override]
-        """The service type; None while it is not discovered yet."""
+        """The service type; None until it is discovered."""
         return self._finder.type
 
     def ready(self) -> bool:
-        """Return whether a server is there that understands the requests."""
+        """Return whether there is a server of the right type."""
         return self._finder.ready
 
     def conflicts(self) -> list[str]:
-        """Say what a person has to mend."""
+        """Return the problems that the user has to fix."""
         conflict = self._finder.conflict()
         return [conflict] if conflict else []
 
     def absence(self) -> str:
-        """Say why no server is there although nothing is wrong."""
+        """Return why there is no server, apart from conflicts."""
         return self._finder.absence()
 
     def server_name(self) -> str:
-        """Return who has the service, for people."""
+        """Return the name of the server's node."""
         return self._finder.server
 
     def delay(self, pending: PendingCall) -> str:
-        """Say why a request was not sent although all is well."""
+        """Return why a request is not sent yet, apart from conflicts."""
         if pending.route is not None and pending.route.began is not None:
-            return "its server takes long to accept a connection"
+            return "its server has not accepted the connection"
         busy = len(self._links)
         if busy:
             return f"{busy} earlier call{'s are' if busy > 1 else ' is'} not answered yet"
         return "its server appeared too late"
 
     def look(self) -> None:
-        """Look for a server now, because a thread waits for one."""
+        """Look up the server now, as a thread waits for it."""
         self._core.loop.call(self._finder.look)
 
-    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - time matters as well
-        """Follow the graph: whether a server is there, and which."""
+    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - time counts as well
+        """Follow the graph."""
         self._core.loop.call(self._finder.follow)
 
     # -- sending -----------------------------------------------------------------------------------
 
     def send(self, pending: PendingCall) -> None:
-        """Send a request at once if a kept connection is idle; else let the loop do it.
+        """Send a request at once if the persistent connection is idle, else from the loop.
 
-        The former saves a persistent client two changes of threads for each call, most of its time.
+        The former saves two thread switches per call, most of its time.
         """
         route = pending.route = _Route(time.monotonic())
         link = self._kept
@@ -181,11 +181,11 @@ class TcprosRequester(ServiceRequester):
             self._send(route.link, pending)
             return
         if pending.call.done():
-            self.forget(pending)  # it ended before it came here
+            self.forget(pending)  # it ended before this
         self._core.loop.call(self._advance)
 
     def withdraw(self, pending: PendingCall) -> bool:
-        """Do not send a request any more; return False if it is on its way already."""
+        """Remove a request from the queue; return False if it is being sent already."""
         with self._lock:
             if pending not in self._queue:
                 return False
@@ -193,7 +193,7 @@ class TcprosRequester(ServiceRequester):
         return True
 
     def forget(self, pending: PendingCall) -> None:
-        """Take note that a call has ended: do not send it, drop its response."""
+        """Drop the request of a call that has ended, or its response."""
         route = pending.route
         if route is not None and (route.link is not None or route.began is None):
             self._core.loop.call(lambda: self._release(pending))
@@ -203,8 +203,8 @@ class TcprosRequester(ServiceRequester):
     def _release(self, pending: PendingCall) -> None:
         link = pending.route.link
         if link is not None and link.request is pending:
-            # Given up: a response that still comes must not be taken for another one's, and the
-            # next call shall not go to the same place without asking.
+            # Given up: a late response must not be taken for another call's, and the next call
+            # must look up the server again.
             link.request, self._finder.asked = None, 0.0
             link.end("")
         else:
@@ -213,18 +213,18 @@ class TcprosRequester(ServiceRequester):
                     self._queue.remove(pending)
 
     def _advance(self) -> None:
-        """Send what waits, in order, if a server is there."""
+        """Send queued requests, in order, if there is a server."""
         while self._queue and not self._closed:
-            kind, place = self.type, None
+            kind, location = self.type, None
             link = self._free_link() if self._persistent else None
             if link is None:
                 if len(self._links) >= (1 if self._persistent else _MAX_LINKS):
                     return
-                place = self._finder.current()
-                if place is None:
+                location = self._finder.current()
+                if location is None:
                     return
             if kind is None:
-                return  # the server is being asked for it
+                return  # it is being requested from the server
             with self._lock:
                 if not self._queue or (link is not None and link.request is not None):
                     return
@@ -241,22 +241,22 @@ class TcprosRequester(ServiceRequester):
                     self._on_reply(pending.number, None, error)
             elif link is not None:
                 self._send(link, pending)
-            elif place is not None:
-                self._dial(kind, place, pending)
+            elif location is not None:
+                self._dial(kind, location, pending)
 
-    def _dial(self, kind: ServiceType, place: Place, pending: PendingCall) -> None:
+    def _dial(self, kind: ServiceType, location: ServiceLocation, pending: PendingCall) -> None:
         try:
-            link = ServiceLink(self._core, self._name, kind, place, self._persistent, self)
-        except OSError as error:  # no more sockets, or an address that this machine cannot use
+            link = ServiceLink(self._core, self._name, kind, location, self._persistent, self)
+        except OSError as error:  # no more sockets, or an address family without support
             self._put_back(pending)
-            self._finder.fail(place, error.strerror or str(error))
+            self._finder.fail(location, error.strerror or str(error))
         else:
             self._links.add(link)
             link.request, pending.route.link = pending, link
             self._kept = link if self._persistent else None
 
     def _free_link(self) -> ServiceLink | None:
-        """Return the kept connection, if it is idle and still the right one."""
+        """Return the persistent connection, if it is idle and still the right one."""
         for link in list(self._links):
             if link.peer is None or link.request is not None:
                 continue
@@ -267,8 +267,8 @@ class TcprosRequester(ServiceRequester):
         return None
 
     def _fits(self, link: ServiceLink, kind: ServiceType | None) -> bool:
-        """Return whether a connection is one of this type with who offers the service now."""
-        return link.kind is kind and self._finder.place in (None, link.place)
+        """Return whether a connection has this type and leads to the current server."""
+        return link.kind is kind and self._finder.location in (None, link.location)
 
     def _prepare(self, pending: PendingCall, kind: ServiceType) -> Error | None:
         try:
@@ -285,16 +285,16 @@ class TcprosRequester(ServiceRequester):
         link.send(pending.encode(link.kind))
 
     def _put_back(self, pending: PendingCall) -> None:
-        """Let a request wait again that could not be sent."""
+        """Queue a request again that could not be sent, in its order."""
         with self._lock:
             pending.route.began = None
             waiting = sorted((*self._queue, pending), key=lambda one: one.number)
             self._queue.clear()
             self._queue.extend(waiting)
 
-    # -- what connections report, in the loop's thread ---------------------------------------------
+    # -- events of connections, in the loop's thread -----------------------------------------------
 
-    def on_accepted(self, link: ServiceLink, peer: Peer) -> None:
+    def on_accepted(self, link: ServiceLink, peer: ServerInfo) -> None:
         """Send the request for which the connection was made."""
         self._finder.on_server_header(peer)
         pending = link.request
@@ -307,12 +307,12 @@ class TcprosRequester(ServiceRequester):
             self._send(link, pending)
 
     def on_response(self, link: ServiceLink, ok: bool, data: bytes | memoryview) -> None:
-        """End the call that was answered."""
+        """Complete the call that is answered."""
         with self._lock:
             link.settling = link.persistent
             pending, link.request = link.request, None
         if link.persistent:
-            # Not at once: its end may come right behind the response, or what was not asked for.
+            # Not at once: right behind the response may be the end, or an unexpected response.
             self._core.loop.call(lambda: self._settle(link))
         else:
             link.end("")
@@ -322,7 +322,7 @@ class TcprosRequester(ServiceRequester):
                 self._on_reply(pending.number, data, "")
             else:
                 text = bytes(data).decode("utf-8", "replace").strip()
-                reason = text or "its server reports a failure and does not say why"
+                reason = text or "its server reports a failure without a reason"
                 self._on_reply(pending.number, None, reason)
 
     def _settle(self, link: ServiceLink) -> None:
@@ -330,7 +330,7 @@ class TcprosRequester(ServiceRequester):
         self._advance()
 
     def on_disconnected(self, link: ServiceLink, reason: str) -> None:
-        """End the call that can get no answer any more, or try again if it was not sent."""
+        """Fail the call whose answer is lost, or queue it again if it was not sent."""
         self._links.discard(link)
         with self._lock:
             link.ended = True
@@ -343,7 +343,7 @@ class TcprosRequester(ServiceRequester):
             elif link.refusal and (route.refused or self._finder.asked >= route.made):
                 self._explain(pending, link)
             elif not pending.call.done():
-                # Refused where the server was before the call: it may be elsewhere by now.
+                # Refused at a location from before the call: the server may have moved.
                 route.refused = bool(link.refusal)
                 self._put_back(pending)
         if self._closed:
@@ -358,26 +358,26 @@ class TcprosRequester(ServiceRequester):
         return ConnectionLostError(
             f"{self._finder.server} went away before it answered the call of {self._name} sent "
             f"{since:.1f} s ago ({reason or 'the connection was closed'}), and may have carried it "
-            "out or not; look what happened, and call again"
+            "out or not; check, and call again"
         )
 
     def _explain(self, pending: PendingCall, link: ServiceLink) -> None:
-        """End a call that was refused: most likely the server has another definition."""
+        """Fail a refused call: most likely the server has another definition."""
 
-        def fail(peer: Peer | None, _: str = "") -> None:
+        def fail(peer: ServerInfo | None, _: str = "") -> None:
             if peer is not None:
                 self._finder.on_server_header(peer)
             called = f"it was called as {link.kind.name} with md5 {link.kind.md5}"
             why = self._finder.mismatch() or f"{called}: {link.refusal}"
-            refused = f"{link.place.uri} refuses the call of {self._name}: {why}"
+            refused = f"{link.location.uri} refuses the call of {self._name}: {why}"
             self._on_reply(pending.number, None, ServiceError(refused))
 
         try:
-            probe(self._core, self._name, link.place, fail)
+            probe(self._core, self._name, link.location, fail)
         except OSError:  # no more sockets
             fail(None)
 
-    # -- what the finder asks and reports, in the loop's thread ------------------------------------
+    # -- for the finder, in the loop's thread ------------------------------------------------------
 
     @property
     def waits(self) -> bool:
@@ -386,13 +386,13 @@ class TcprosRequester(ServiceRequester):
 
     @property
     def busy(self) -> bool:
-        """Whether there are connections with the server."""
+        """Whether there are connections with the server, which make a probe needless."""
         return bool(self._links)
 
-    def server_found(self, moved: bool) -> None:
-        """Send what waits to where the server is, and nothing more to where it was."""
+    def on_server_found(self, moved: bool) -> None:
+        """Send queued requests to the server, and nothing to its previous location."""
         if moved:
-            # Marked first: a call in another thread takes a link that is idle at any time.
+            # Marked first: a calling thread may claim an idle connection at any time.
             with self._lock:
                 idle = [link for link in self._links if link.request is None]
                 for link in idle:
@@ -401,14 +401,14 @@ class TcprosRequester(ServiceRequester):
                 link.end("")
         self._advance()
 
-    def server_changed(self) -> None:
-        """Report what has changed."""
+    def on_server_changed(self) -> None:
+        """Report a change of the server."""
         self._on_change()
 
     # -- the end -----------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """Close what leads to the servers; safe to call twice."""
+        """Close the connections; safe to call twice."""
         self._closed = True
         self._finder.close()
         self._core.loop.call(self._end)
@@ -427,22 +427,22 @@ class ServiceLink:
     Args:
         core: The node.
         name: Absolute service name.
-        kind: The type that is spoken.
-        place: Where the server is.
-        persistent: Whether to ask for a connection that outlives a call.
-        owner: Called with what happens.
+        kind: The service type.
+        location: The server's location.
+        persistent: Whether to request a persistent connection.
+        owner: Handles its events.
 
     Raises:
-        OSError: There can be no more sockets.
+        OSError: The system has no more sockets.
 
     Attributes:
-        kind: The type that is spoken.
-        place: Where the server is.
-        peer: What the server says of itself; None before it has.
-        refusal: Why the server refuses the connection; empty when it does not.
-        request: The call that is, or will be, answered through it; None when it is idle.
-        settling: Whether what came with the last response is still being looked at.
-        ended: Whether it is of no use any more.
+        kind: The service type.
+        location: The server's location.
+        peer: What the server announces; None until its header is received.
+        refusal: Why the server refuses the connection; empty if it does not.
+        request: The call that it is used for; None when it is idle.
+        settling: Whether data received with the last response is still being handled.
+        ended: Whether it must not be used any more.
     """
 
     def __init__(
@@ -450,12 +450,12 @@ class ServiceLink:
         core: TcprosCore,
         name: str,
         kind: ServiceType,
-        place: Place,
+        location: ServiceLocation,
         persistent: bool,
         owner: TcprosRequester,
     ) -> None:
-        self.kind, self.place, self.persistent = kind, place, persistent
-        self.peer: Peer | None = None
+        self.kind, self.location, self.persistent = kind, location, persistent
+        self.peer: ServerInfo | None = None
         self.refusal = ""
         self.request: PendingCall | None = None
         self.settling = self.ended = False
@@ -469,29 +469,35 @@ class ServiceLink:
         if persistent:
             header["persistent"] = "1"
         self._connection = Connection.dial(
-            core.loop, place.address, header, self._on_header, self._on_frame, self._on_end, lead=1
+            core.loop,
+            location.address,
+            header,
+            self._on_header,
+            self._on_frame,
+            self._on_end,
+            lead=1,
         )
 
     def send(self, data: bytes) -> None:
-        """Send a request; the server has accepted the connection."""
+        """Send a request, once the server has accepted the connection."""
         self._connection.send([_length.pack(len(data)), data])
 
     def quiet(self) -> bool:
-        """Return whether nothing has come that was not looked at; from any thread."""
+        """Return whether the socket has neither data nor its end to read; from any thread."""
         return self._connection.quiet()
 
     def lives(self) -> bool:
-        """Return whether the server has not closed it; takes in what has come until now."""
+        """Return whether the server has not closed it; reads what the socket has."""
         self._connection.ready(READ)
         return not self._connection.closed
 
     def end(self, reason: str = "") -> None:
-        """End it, and say why."""
+        """End it, with a reason."""
         self._connection.end(reason)
 
     def _on_header(self, header: dict[str, str]) -> None:
         try:
-            self.peer = Peer.of(header, self.place)
+            self.peer = ServerInfo.of(header, self.location)
         except ConnectionLostError as error:
             self.end(str(error))
             return
@@ -499,7 +505,7 @@ class ServiceLink:
 
     def _on_frame(self, data: bytes | memoryview, lead: int) -> None:
         if self.request is None:
-            self.end("it sent a response that nobody asked for")
+            self.end("it sent a response without a request")
         else:
             self._owner.on_response(self, lead != 0, data)
 
@@ -508,89 +514,71 @@ class ServiceLink:
         self._owner.on_disconnected(self, reason)
 
 
-#: Seconds for which the master's word where a server is counts, when calls come one by one.
-_TRUST_S = 1.0
-#: Seconds between looks for a server while somebody waits for it.
+#: Seconds for which a looked-up location is used for further calls.
+_CACHE_S = 1.0
+#: Seconds between lookups while calls or threads wait for the server.
 _RETRY_S = 0.2
-#: Seconds between looks whether the server lives: one that was killed stays with the master.
-_CHECK_S, _CHECK_ABSENT_S = 3.0, 1.0
-
-
-class FinderOwner(Protocol):
-    """For whom a server is looked for; called in the loop's thread."""
-
-    @property
-    def waits(self) -> bool:
-        """Whether somebody waits for the server."""
-
-    @property
-    def busy(self) -> bool:
-        """Whether there are connections with it, which tell more than a probe."""
-
-    def server_found(self, moved: bool) -> None:
-        """Take that it is known where the server is, and whether that is another place now."""
-
-    def server_changed(self) -> None:
-        """Take that something else is known of the server."""
+#: Seconds between probes of the server, and of one that is not reached: the master still lists a
+#: server that was killed.
+_PROBE_S, _PROBE_ABSENT_S = 3.0, 1.0
 
 
 class ServiceFinder:
-    """Knows what can be known of a service's server; in the loop's thread, unless said otherwise.
+    """Finds a service's server and its type; in the loop's thread, unless said otherwise.
 
     Args:
         core: The node.
-        on_server: Called with the name and what a server of it said of itself.
+        on_server: Called with the name and what a server of it announced.
         name: Absolute service name.
-        wanted: The type, its name, or None for whatever type the server announces.
-        owner: Told what is found.
+        wanted: The type, its name, or None for the type that the server announces.
+        owner: Notified of what is found.
 
     Attributes:
-        type: The service type; None while it is not known.
-        peer: What the server said of itself; None when there is none, as far as is known.
-        place: Where it is, as far as is known.
-        asked: Monotonic time at which the master was asked for the place; 0 when it has to be
-            asked again.
+        type: The service type; None while it is unknown.
+        peer: What the server announced; None when no server is known.
+        location: The server's location; None when unknown.
+        asked: Monotonic time of the last lookup; 0 when the server must be looked up again.
     """
 
     def __init__(
         self,
         core: TcprosCore,
-        on_server: Callable[[str, Peer], None],
+        on_server: Callable[[str, ServerInfo], None],
         name: str,
         wanted: ServiceType | str | None,
-        owner: FinderOwner,
+        owner: TcprosRequester,
     ) -> None:
         self.name = name
         self.type: ServiceType | None = None if wanted is None else core.types.service(wanted)
-        self.peer: Peer | None = None
-        self.place: Place | None = None
+        self.peer: ServerInfo | None = None
+        self.location: ServiceLocation | None = None
         self.asked = 0.0
         self._core, self._on_server, self._owner = core, on_server, owner
         self._discovers, self._fixed = wanted is None, not isinstance(wanted, (str, type(None)))
         self._looking = self._probing = self._retrying = self._closed = False
-        #: When to see next whether the server lives.
+        #: When to probe the server next.
         self._due = 0.0
-        #: Why the server cannot be reached, or its type is not known; empty when that is not so.
+        #: Why the server cannot be reached, and why its type is unknown; else empty.
         self._fault = self._type_fault = ""
         self._nodes: list[str] = []
-        #: Type and md5 sum for which a definition was looked for last.
+        #: Type and md5 sum of the last search for a definition.
         self._tried: tuple[str, str] | None = None
 
-    # -- what is known; from any thread ----------------------------------------------------------
+    # -- the server; from any thread -------------------------------------------------------------
 
     @property
     def ready(self) -> bool:
-        """Whether a server is there that understands the requests."""
+        """Whether there is a server of the right type."""
         return self.peer is not None and self.type is not None and not self.mismatch()
 
     @property
     def server(self) -> str:
-        """The server, for people."""
+        """The name of the server's node."""
         peer = self.peer
         return "its server" if peer is None else peer.node
 
     def mismatch(self) -> str:
-        """Say that the server has another definition; empty when it has ours."""
+        """Return how the server's type differs from ours; empty if it does not."""
         peer, ours = self.peer, self.type
         if peer is None or ours is None or peer.md5 in (ANY, ours.md5):
             return ""
@@ -602,73 +590,75 @@ class ServiceFinder:
         )
 
     def conflict(self) -> str:
-        """Say what a person has to mend; empty when nothing."""
+        """Return the problem that the user has to fix; empty if there is none."""
         if self.peer is not None and self.type is None:
             return self._type_fault
         return self.mismatch()
 
     def absence(self) -> str:
-        """Say why no server is there although nothing is wrong."""
+        """Return why there is no server, apart from conflicts."""
         if self._fault:
             return self._fault
         known = self._core.graph.services()
         if self.name in known:
-            return f"{' and '.join(known[self.name])} offers it, and is being asked for its type"
+            return f"{' and '.join(known[self.name])} offers it, and its type is being requested"
         kind = "" if self.type is None else f" [{self.type.name}]"
         return (
             f"no server offers {self.name}{kind} on {self._core.url} ({self._core.status()})"
             f"{similar(self.name, known)}"
         )
 
-    # -- where it is -----------------------------------------------------------------------------
+    # -- the location ----------------------------------------------------------------------------
 
-    def current(self) -> Place | None:
-        """Return where the server is; None, and ask the master, if that was not known lately."""
-        if self.place is None or time.monotonic() - self.asked > _TRUST_S:
+    def current(self) -> ServiceLocation | None:
+        """Return the location; if it is not known or too old, look it up and return None."""
+        if self.location is None or time.monotonic() - self.asked > _CACHE_S:
             self.look()
             return None
-        return self.place
+        return self.location
 
     def look(self) -> None:
-        """Ask the master where the server is, and the server for its type if need be."""
+        """Look up the location, and probe the server if it is new or due."""
         if self._looking or self._retrying or self._closed:
             return
         self._looking = True
         self._core.lookups.run(self._locate)
 
     def _locate(self) -> None:
-        """Ask the master; on a thread that may wait."""
-        place, fault = None, ""
+        """Look up the location; on a thread that may wait."""
+        location, fault = None, ""
         try:
-            place = locate(self._core.master, self.name)
+            location = locate(self._core.master, self.name)
         except ConnectionLostError as error:
             fault = str(error)
-        self._core.loop.call(lambda: self._located(place, fault))
+        self._core.loop.call(lambda: self._located(location, fault))
 
-    def _located(self, place: Place | None, fault: str) -> None:
+    def _located(self, location: ServiceLocation | None, fault: str) -> None:
         self._looking = False
         if self._closed:
             return
         self.asked = time.monotonic()
-        if fault and self.peer is not None and self.place is not None:
-            place = self.place  # only the master is away: the server is called where it was
+        if fault and self.peer is not None and self.location is not None:
+            location = (
+                self.location
+            )  # only the master is unreachable: keep using the known location
         else:
             self._fault = fault
-        if place is None:
-            self._due = self.asked + _CHECK_ABSENT_S
-            self.place = self.peer = None
-            self._owner.server_changed()
+        if location is None:
+            self._due = self.asked + _PROBE_ABSENT_S
+            self.location = self.peer = None
+            self._owner.on_server_changed()
             self._retry()
             return
-        moved = self.place is None or self.place.uri != place.uri
-        self.place = place
-        self._owner.server_found(moved)
+        moved = self.location is None or self.location.uri != location.uri
+        self.location = location
+        self._owner.on_server_found(moved)
         wanted = self.peer is None or moved or self.asked >= self._due
         if wanted and not self._probing and not self._owner.busy:
-            self._probe(place)
+            self._probe(location)
 
     def _retry(self) -> None:
-        """Look again soon if somebody waits."""
+        """Look up the server again soon if calls or threads wait for it."""
         if self._owner.waits and not self._retrying:
             self._retrying = True
             self._core.loop.after(_RETRY_S, self._again)
@@ -678,29 +668,31 @@ class ServiceFinder:
         if self._owner.waits:
             self.look()
 
-    # -- what it says ----------------------------------------------------------------------------
+    # -- the type --------------------------------------------------------------------------------
 
-    def _probe(self, place: Place) -> None:
+    def _probe(self, location: ServiceLocation) -> None:
         self._probing = True
         try:
-            probe(self._core, self.name, place, lambda peer, why: self._probed(place, peer, why))
+            probe(
+                self._core, self.name, location, lambda peer, why: self._probed(location, peer, why)
+            )
         except OSError as error:  # no more sockets
-            self._probed(place, None, error.strerror or str(error))
+            self._probed(location, None, error.strerror or str(error))
 
-    def _probed(self, place: Place, peer: Peer | None, why: str) -> None:
+    def _probed(self, location: ServiceLocation, peer: ServerInfo | None, why: str) -> None:
         self._probing = False
         if self._closed:
             return
         if peer is not None:
             self.on_server_header(peer)
         else:
-            self.fail(place, why)
+            self.fail(location, why)
 
-    def on_server_header(self, peer: Peer) -> None:
-        """Take what the server says of itself."""
+    def on_server_header(self, peer: ServerInfo) -> None:
+        """Handle a server's header: it is there, with this type."""
         if self._closed:
             return
-        self._due = time.monotonic() + _CHECK_S
+        self._due = time.monotonic() + _PROBE_S
         self.peer, self._fault = peer, ""
         self._on_server(self.name, peer)
         key, ours = (peer.type, peer.md5), self.type
@@ -712,10 +704,10 @@ class ServiceFinder:
         elif not self._fixed and (key != self._tried or self._type_fault):
             self._tried = key
             self._core.lookups.run(lambda: self._learn(peer))
-        self._owner.server_changed()
+        self._owner.on_server_changed()
 
-    def _learn(self, peer: Peer) -> None:
-        """Find the definition that the server has; on a thread that may wait."""
+    def _learn(self, peer: ServerInfo) -> None:
+        """Find the server's definition; on a thread that may wait."""
         kind, fault = None, ""
         try:
             kind = self._core.types.announced_service(peer.type, peer.md5)
@@ -723,38 +715,38 @@ class ServiceFinder:
             fault = f"{peer.node} offers it as {peer.type or 'an unknown type'}: {error}"
         self._core.loop.call(lambda: self._learned(peer, kind, fault))
 
-    def _learned(self, peer: Peer, kind: ServiceType | None, fault: str) -> None:
+    def _learned(self, peer: ServerInfo, kind: ServiceType | None, fault: str) -> None:
         if self._closed or self._tried != (peer.type, peer.md5):
             return
         same_name = self.type is None or kind is None or kind.name == self.type.name
         if kind is not None and (self._discovers or same_name):
             self.type = kind
         self._type_fault = fault
-        self._owner.server_changed()
-        self._owner.server_found(moved=False)
+        self._owner.on_server_changed()
+        self._owner.on_server_found(moved=False)
 
-    def fail(self, place: Place, why: str) -> None:
-        """Take that the server cannot be reached."""
-        self._due = time.monotonic() + _CHECK_ABSENT_S
-        if self.place in (None, place):
+    def fail(self, location: ServiceLocation, why: str) -> None:
+        """Note that the server cannot be reached."""
+        self._due = time.monotonic() + _PROBE_ABSENT_S
+        if self.location in (None, location):
             nodes = self._core.graph.services().get(self.name, [])
-            who = f"{' and '.join(nodes)} offers" if nodes else "somebody offers"
+            who = f"{' and '.join(nodes)} offers" if nodes else "a node offers"
             self._fault = (
-                f"{who} it at {place.uri}, says the master, but calling it there fails: {why}; if "
-                "it was killed, start it again, or let 'rosnode cleanup' remove it"
+                f"{who} it at {location.uri} according to the master, but calling it fails: {why}; "
+                "if it was killed, start it again, or remove it by 'rosnode cleanup'"
             )
-            self.peer = self.place = None
-        self._owner.server_changed()
+            self.peer = self.location = None
+        self._owner.on_server_changed()
         self._retry()
 
     def lose(self, link: ServiceLink, reason: str) -> None:
-        """Take that a connection has ended which should not have."""
+        """Handle a connection that has ended unexpectedly."""
         if link.peer is None and not link.refusal:
-            self.fail(link.place, reason)
+            self.fail(link.location, reason)
             return
-        if self.place in (None, link.place):
+        if self.location in (None, link.location):
             self.asked = self._due = 0.0
-        self._owner.server_changed()
+        self._owner.on_server_changed()
         if self._owner.waits:
             self._retry()
         else:
@@ -763,32 +755,32 @@ class ServiceFinder:
     # -- following the graph ---------------------------------------------------------------------
 
     def follow(self) -> None:
-        """Look what the master says, and now and then whether the server lives."""
+        """Follow the graph, and probe the server now and then."""
         if self._closed:
             return
         nodes = self._core.graph.services().get(self.name, [])
         if nodes != self._nodes:
             self._nodes, self._due = nodes, 0.0
             if not nodes and not self._owner.waits:
-                self.place = self.peer = None
+                self.location = self.peer = None
                 self._fault = ""
-        # The graph may lag behind: who has come and gone between two looks is in none of them.
+        # The graph lags: a server that appears and leaves between two polls is never in it.
         known = bool(nodes or self._fault) or self.peer is not None
         if (known and time.monotonic() >= self._due) or self._owner.waits:
             self.look()
-        self._owner.server_changed()
+        self._owner.on_server_changed()
 
     def close(self) -> None:
-        """Look for nobody any more; from any thread."""
+        """Stop looking for servers; from any thread."""
         self._closed = True
 
 
 @dataclass(frozen=True)
-class Place:
-    """Where a service's server is.
+class ServiceLocation:
+    """The location of a service's server.
 
     Attributes:
-        uri: As the master has it, ``rosrpc://host:port``.
+        uri: As registered with the master, ``rosrpc://host:port``.
         address: Resolved address and port.
     """
 
@@ -797,12 +789,12 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Peer:
-    """What a service's server says of itself.
+class ServerInfo:
+    """What a service's server announces in its header.
 
     Attributes:
-        node: Its node's full name; its address where it does not tell.
-        type: The service type, ``pkg/srv/Type``; empty when it does not tell.
+        node: Its node's full name; its URI if the header has none.
+        type: The service type, ``pkg/srv/Type``; empty if the header has none.
         md5: The type's md5 sum, ``*`` for any.
     """
 
@@ -811,13 +803,13 @@ class Peer:
     md5: str
 
     @classmethod
-    def of(cls, header: Mapping[str, str], place: Place) -> Peer:
-        """Return what a connection header says.
+    def of(cls, header: Mapping[str, str], location: ServiceLocation) -> ServerInfo:
+        """Read a connection header.
 
         Raises:
-            ConnectionLostError: It lacks the md5 sum, which every server tells.
+            ConnectionLostError: It lacks the md5 sum, which every server sends.
         """
-        node = header.get("callerid", "") or place.uri
+        node = header.get("callerid", "") or location.uri
         if "md5sum" not in header:
             raise ConnectionLostError(
                 f"{node} answers, but not as a service does: its connection header has no md5sum"
@@ -830,11 +822,11 @@ class Peer:
         return cls(node, full, header["md5sum"])
 
 
-def locate(master: Master, name: str) -> Place | None:
-    """Ask the master where a service is; None when nobody offers it. Waits for the answer.
+def locate(master: Master, name: str) -> ServiceLocation | None:
+    """Look up the location of a service; None when it is not offered. Waits for the master.
 
     Raises:
-        ConnectionLostError: The master does not answer, or names a host that is not known here.
+        ConnectionLostError: The master does not answer, or the server's host is unknown here.
     """
     try:
         uri = str(master.call("lookupService", name))
@@ -851,27 +843,30 @@ def locate(master: Master, name: str) -> Place | None:
             f"{name} is at {uri}, but {reason_of(error)}: set ROS_IP or ROS_HOSTNAME for the node "
             "that offers it to what this machine knows, or add the name to /etc/hosts"
         ) from error
-    return Place(uri, (str(found[0][4][0]), int(found[0][4][1])))
+    return ServiceLocation(uri, (str(found[0][4][0]), int(found[0][4][1])))
 
 
 def probe(
-    core: TcprosCore, name: str, place: Place, done: Callable[[Peer | None, str], None]
+    core: TcprosCore,
+    name: str,
+    location: ServiceLocation,
+    done: Callable[[ServerInfo | None, str], None],
 ) -> None:
-    """Ask a server for its type; in the loop's thread.
+    """Connect to a server for its type only; in the loop's thread.
 
     Args:
         core: The asking node.
         name: Absolute name of the service.
-        place: Where its server is.
-        done: Called once in the loop's thread: with what the server says, or None and why not.
+        location: Its location.
+        done: Called once in the loop's thread: with what the server announces, or None and why not.
 
     Raises:
-        OSError: There can be no more sockets.
+        OSError: The system has no more sockets.
     """
     header = {"callerid": core.name.full, "md5sum": ANY, "probe": "1", "service": name}
     answered = False
 
-    def finish(peer: Peer | None, reason: str) -> None:
+    def finish(peer: ServerInfo | None, reason: str) -> None:
         nonlocal answered
         if not answered:
             answered = True
@@ -879,17 +874,17 @@ def probe(
 
     def on_header(fields: dict[str, str]) -> None:
         try:
-            finish(Peer.of(fields, place), "")
+            finish(ServerInfo.of(fields, location), "")
         except ConnectionLostError as error:
             finish(None, str(error))
         link.end("")
 
     link = Connection.dial(
         core.loop,
-        place.address,
+        location.address,
         header,
         on_header,
-        lambda _data, _lead: None,  # it was not called
+        lambda _data, _lead: None,  # nothing was requested
         lambda reason: finish(None, reason),
         lead=1,
     )

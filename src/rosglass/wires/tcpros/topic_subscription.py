@@ -1,7 +1,7 @@
-"""A topic that a node subscribes to: one registration, and the publishers' connections.
+"""A topic that a node subscribes to: one registration, and the connections with its publishers.
 
-ROS 1 negotiates types for each connection: a publisher tells type, md5 sum, definition and whether
-it latches in the header with which it answers a subscriber's. Where it is reached, its API tells.
+ROS 1 negotiates the type on each connection: a publisher's header has its type, md5 sum, definition
+and whether it latches. The publisher's API returns the address to connect to.
 
 Protocol: ROS wiki, "ROS/Slave_API" (requestTopic) and "ROS/TCPROS".
 """
@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import logging
 import socket
-import struct
 import time
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
 from itertools import repeat
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,6 @@ from rosglass.comm.subscription import Problem, TopicMatching
 from rosglass.errors import (
     ConnectionLostError,
     ConversionError,
-    DecodeError,
     DefinitionError,
     InvalidNameError,
     MasterError,
@@ -29,13 +29,7 @@ from rosglass.errors import (
 from rosglass.interfaces import join_name, ros1_name
 from rosglass.interfaces.counterparts import RENAMED
 from rosglass.wires.base import Reader
-from rosglass.wires.tcpros.connection import (
-    ANY,
-    MAX_HEADER,
-    Connection,
-    encode_header,
-    parse_header,
-)
+from rosglass.wires.tcpros.connection import ANY, Connection
 from rosglass.wires.tcpros.graph import split
 from rosglass.wires.tcpros.master import call_node, reason_of
 from rosglass.wires.tcpros.publication import definition_text
@@ -43,7 +37,7 @@ from rosglass.wires.tcpros.registrations import Member
 
 __all__ = [
     "PublisherLink",
-    "Silence",
+    "SilenceMonitor",
     "TopicSubscription",
     "TypeNegotiation",
     "UnreachableLog",
@@ -66,23 +60,23 @@ if TYPE_CHECKING:
 
 
 _log = logging.getLogger("rosglass.ros1")
-#: How long a connection lasts that does not end although the master names its publisher no more.
+#: How long a connection is kept open whose publisher the master does not list any more.
 _LAST_MESSAGES_S = 1.0
 
 
 class TopicSubscription(Member):
-    """A topic that the node subscribes to, shared by its subscriptions of that topic.
+    """The node's registration of a topic, shared by its subscriptions of that topic.
 
     Args:
         core: The node.
         topics: The node's topics.
         topic: Absolute topic name.
-        type_name: For the master, ``pkg/Type``; ``*`` for any.
+        type_name: The registered type, ``pkg/Type``; ``*`` for any.
 
     Attributes:
-        readers: One for each subscription; replaced, never changed: the loop's thread goes through
+        readers: One for each subscription; replaced, never changed: the loop's thread iterates over
             them for each message. :meth:`join` and :meth:`leave` are called under the topics' lock.
-        eager: Whether messages are waited for.
+        eager: Whether messages are handed on as they are received.
     """
 
     def __init__(self, core: TcprosCore, topics: Topics, topic: str, type_name: str) -> None:
@@ -94,17 +88,17 @@ class TopicSubscription(Member):
         #: By URI; changed in the loop's thread only.
         self._links: dict[str, PublisherLink] = {}
         self._closed = False
-        #: Which master knows it, counted from 0, and how often one has named publishers.
+        #: The number of the master that knows it, from 0, and of its lists of publishers.
         self._epoch, self._updates = -1, 0
 
     def links(self) -> list[PublisherLink]:
-        """Return the publishers, from any thread."""
+        """Return the connections with publishers; from any thread."""
         return list(self._links.values())
 
     # -- subscriptions ---------------------------------------------------------------------------
 
     def join(self, reader: TypeNegotiation) -> None:
-        """Hand on messages to a subscription, latched ones first; from any thread."""
+        """Add a subscription, which receives latched messages first; from any thread."""
         self.readers = (*self.readers, reader)
         self.core.loop.call(lambda: self._join(reader))
 
@@ -114,42 +108,42 @@ class TopicSubscription(Member):
             if link.connected and reader not in link.readers:
                 link.readers = (*link.readers, reader)
                 reader.negotiate_type(link, lambda link=link: self._catch_up(reader, link))  # type: ignore[misc]
-        self.attend()
+        self.update_eager()
 
     def _catch_up(self, reader: TypeNegotiation, link: PublisherLink) -> None:
-        """Hand on what a connection of the subscription's own would have brought."""
+        """Hand on the latched messages that a connection of its own would have received."""
         if link.is_local:
             for data in self._topics.latched(self.topic):
-                reader.take(link, [data], time.time_ns())
+                reader.on_messages(link, [data], time.time_ns())
         elif link.latched is not None:
-            reader.take(link, [link.latched], time.time_ns())
+            reader.on_messages(link, [link.latched], time.time_ns())
         reader.feed.request_update()
 
     def leave(self, reader: TypeNegotiation) -> bool:
-        """Hand on nothing more to a subscription; return whether it was the last one."""
+        """Remove a subscription; return whether it was the last one."""
         self.readers = tuple(one for one in self.readers if one is not reader)
         return not self.readers
 
-    def attend(self) -> None:
-        """Hand on messages as they come only while they are waited for; from any thread."""
+    def update_eager(self) -> None:
+        """Be eager while one of the subscriptions is; from any thread."""
         eager = any(reader.eager for reader in self.readers)
         if eager != self.eager:
             self.eager = eager
-            self.core.loop.call(self._attend)
+            self.core.loop.call(self._update_links)
 
-    def _attend(self) -> None:
+    def _update_links(self) -> None:
         for link in self.links():
-            link.attend(self.eager)
+            link.set_eager(self.eager)
 
     def drain(self) -> None:
-        """Hand on what waits in the sockets; from any thread."""
+        """Hand on what the sockets have; from any thread."""
         for link in self.links():
             link.drain()
 
     # -- publishers, in the loop's thread --------------------------------------------------------
 
     def inform(self) -> None:
-        """Let the subscriptions' feeds look soon; from any thread."""
+        """Notify the subscriptions' feeds of a change; from any thread."""
         for reader in self.readers:
             reader.feed.request_update()
 
@@ -163,7 +157,7 @@ class TopicSubscription(Member):
             left -= 1
             if not left:
                 link.resume()
-                link.attend(self.eager)
+                link.set_eager(self.eager)
                 self.inform()
 
         for reader in readers:
@@ -171,35 +165,30 @@ class TopicSubscription(Member):
         decided()
 
     def on_publisher_disconnected(self, link: PublisherLink) -> None:
-        """Let the subscriptions forget a publisher."""
+        """Remove a publisher from the subscriptions; it is dialled again while it is listed."""
         _log.debug("%s: %s", self.topic, link.problem)
         for reader in self.readers:
             reader.on_publisher_disconnected(link)
         if link.epoch != self._epoch:
-            # No master knows it any more: it was kept as long as it sent something.
-            self._forget(link)
+            # The master does not list it: it was kept for its last messages.
+            self._remove(link)
         self.inform()
 
     def on_publishers_changed(self, uris: list[str]) -> None:
-        """Connect with new publishers, and forget those that have gone; from any thread."""
+        """Connect to new publishers, and drop those that have left; from any thread."""
         self._updates += 1
-        self.core.loop.call(lambda: self._take_publishers(uris))
+        self.core.loop.call(lambda: self._set_publishers(uris))
 
-    def _take_answer(self, uris: list[str], updates: int) -> None:
-        # What the master told meanwhile, because it knows us now, is newer than its answer.
-        if updates == self._updates:
-            self._take_publishers(uris)
-
-    def _take_publishers(self, uris: list[str]) -> None:
+    def _set_publishers(self, uris: list[str]) -> None:
         if self._closed:
             return
         for uri in self._links.keys() - set(uris):
             link = self._links[uri]
             if not link.connected:
-                self._forget(link)
+                self._remove(link)
             elif link.epoch == self._epoch:
-                self._await_end(link)
-            # A master that was restarted knows but those who told it: others go on publishing.
+                self._remove_later(link)
+            # A restarted master lists only registered publishers: others go on publishing.
         for uri in uris:
             known = self._links.get(uri)
             if known is None:
@@ -208,17 +197,17 @@ class TopicSubscription(Member):
                 known.epoch = self._epoch
         self.inform()
 
-    def _await_end(self, link: PublisherLink) -> None:
-        """Let a publisher's last messages come, and the master's newer word of it."""
-        link.epoch = left = -2 - self._updates  # until the master names it again
+    def _remove_later(self, link: PublisherLink) -> None:
+        """Remove a publisher after its last messages, unless the master lists it again."""
+        link.epoch = left = -2 - self._updates  # until the master lists it again
 
-        def forget() -> None:
+        def remove() -> None:
             if link.epoch == left and not link.ended:
-                self._forget(link)
+                self._remove(link)
 
-        self.core.loop.after(_LAST_MESSAGES_S, forget)
+        self.core.loop.after(_LAST_MESSAGES_S, remove)
 
-    def _forget(self, link: PublisherLink) -> None:
+    def _remove(self, link: PublisherLink) -> None:
         self._links.pop(link.uri, None)
         link.end()
         for reader in self.readers:
@@ -227,23 +216,29 @@ class TopicSubscription(Member):
     # -- as a member -----------------------------------------------------------------------------
 
     @property
-    def place(self) -> tuple[EndpointKind, str]:  # type: ignore[override]
-        """As what the master shows it."""
+    def endpoint(self) -> tuple[EndpointKind, str]:  # type: ignore[override]
+        """Its kind and name in the master's graph."""
         return EndpointKind.SUBSCRIPTION, self.topic
 
-    def lacks(self, publishers: int) -> bool:
+    def misses_publishers(self, count: int) -> bool:
         """Return whether fewer publishers are connected."""
-        return sum(link.connected for link in self.links()) < publishers
+        return sum(link.connected for link in self.links()) < count
 
     def register(self, master: Master) -> None:
-        """Tell the master, and connect with the publishers it names."""
+        """Register the subscription, and connect to the publishers that the master lists."""
         self._epoch += 1
         updates = self._updates
         uris = list(master.call("registerSubscriber", self.topic, self.type_name, self.core.uri))
-        self.core.loop.call(lambda: self._take_answer(uris, updates))
+
+        def set_publishers() -> None:
+            # An update that the master has sent since then is newer than this answer.
+            if updates == self._updates:
+                self._set_publishers(uris)
+
+        self.core.loop.call(set_publishers)
 
     def unregister(self, master: Master) -> Member | None:
-        """Tell the master that it is subscribed here no more, unless it is again."""
+        """Unregister the subscription, unless the topic is subscribed to again."""
         heir = self._topics.subscribed().get(self.topic)
         if self.core.closed or heir is None:
             master.call("unregisterSubscriber", self.topic, self.core.uri)
@@ -251,14 +246,14 @@ class TopicSubscription(Member):
         return heir
 
     def follow(self, moved: bool, idle: bool) -> None:
-        """Let the subscriptions tell what has changed."""
+        """Check for silent publishers, and let the subscriptions' feeds follow the graph."""
         for link in self.links():
-            link.listen()
+            link.check_silence()
         for reader in self.readers:
             reader.feed.follow(moved, idle)
         if idle:
-            # The rate of what comes may be another one now.
-            self.core.loop.call(self._attend)
+            # The rate may have changed.
+            self.core.loop.call(self._update_links)
 
     def close(self) -> None:
         """End the subscriptions and the connections; safe to call twice, also at once."""
@@ -283,22 +278,22 @@ _PUBLISHER = EndpointKind.PUBLISHER
 
 
 class TypeNegotiation(TopicMatching, Reader):
-    """Finds out which publishers of a topic a subscription understands, and hands on theirs.
+    """Matches a subscription with a topic's publishers by their types, and hands on messages.
 
     Args:
         core: The node it belongs to.
-        topic: The node's connections for the topic.
-        type_name: The type that is asked for when there is no definition of it here.
-        ignore_local: Whether to leave out what this node publishes itself.
+        topic: The node's registration of the topic.
+        type_name: The requested type if its definition is unknown here, else empty.
+        ignore_local: Whether to ignore this node's own publishers.
         on_close: Called once when the subscription is closed.
 
     Attributes:
         feed: The subscription's feed.
         topic: As given.
-        eager: Whether messages are handed on as they come.
+        eager: Whether messages are handed on as they are received.
     """
 
-    #: What comes needs no master.
+    #: Connections need no master.
     outlives_discovery = True
     feed: SubscriptionFeed
 
@@ -313,7 +308,7 @@ class TypeNegotiation(TopicMatching, Reader):
         self.topic, self.eager = topic, True
         self._core, self._on_close = core, on_close
         self._ignore_local = ignore_local
-        #: The type of each publisher that is understood, and what is wrong with the others.
+        #: The type and name of each accepted publisher, and why others are refused.
         self._accepted: dict[PublisherLink, tuple[MessageType, bytes]] = {}
         self._refused: dict[PublisherLink, str] = {}
         self._remarks: dict[PublisherLink, str] = {}
@@ -324,7 +319,7 @@ class TypeNegotiation(TopicMatching, Reader):
     # -- in the loop's thread --------------------------------------------------------------------
 
     def negotiate_type(self, link: PublisherLink, decided: Callable[[], None]) -> None:
-        """Find out whether a publisher's messages are understood, then call `decided`."""
+        """Accept or refuse a publisher by its type, then call `decided`."""
         if self._ignore_local and link.is_local:
             decided()
             return
@@ -348,16 +343,16 @@ class TypeNegotiation(TopicMatching, Reader):
             decided()
         elif self._name and full != self._name:
             self._refused[link] = (
-                f"{link.name} publishes {self.topic.topic} as {full}, asked for was "
+                f"{link.name} publishes {self.topic.topic} as {full}, requested was "
                 f"{self._name}: nothing is received from it"
             )
             decided()
         else:
-            # Definitions may be long, and files may have to be looked through for them.
+            # Definitions may be long, and have to be searched in files.
             self._core.pool.run(lambda: self._learn(link, header, decided))
 
     def _agrees(self, wanted: MessageType, full: str, md5: str) -> bool:
-        # tf's old message is tf2's under another name; roscpp, too, asks for nothing but the sum.
+        # tf's old message is tf2's under another name; roscpp, too, compares only the sum.
         same = full in ("", wanted.name) or (
             RENAMED.get(full) == wanted.name and md5 == wanted.md5 != ""
         )
@@ -366,7 +361,7 @@ class TypeNegotiation(TopicMatching, Reader):
     def _learn(
         self, link: PublisherLink, header: dict[str, str], decided: Callable[[], None]
     ) -> None:
-        """Find the type that a publisher describes; on a thread that may wait."""
+        """Find the type that a publisher announces; on a thread that may wait."""
         name, md5 = header["type"], header["md5sum"]
         text = header.get("message_definition", "")
         kind: MessageType | None = None
@@ -378,14 +373,14 @@ class TypeNegotiation(TopicMatching, Reader):
             if not self.feed.decodes:
                 kind = _opaque(name, md5, text, reason)
 
-        def take() -> None:
+        def decide() -> None:
             if link.header is header:  # still the same connection
-                self._take_type(link, kind, reason)
+                self._decide(link, kind, reason)
             decided()
 
-        self._core.loop.call(take)
+        self._core.loop.call(decide)
 
-    def _take_type(self, link: PublisherLink, kind: MessageType | None, reason: str) -> None:
+    def _decide(self, link: PublisherLink, kind: MessageType | None, reason: str) -> None:
         current = self.feed.type
         if kind is None:
             self._refused[link] = reason
@@ -404,21 +399,21 @@ class TypeNegotiation(TopicMatching, Reader):
         self._accepted[link] = (kind, link.name.encode())
 
     def on_publisher_disconnected(self, link: PublisherLink) -> None:
-        """Forget a publisher, which is not connected any more."""
+        """Remove a publisher."""
         accepted = self._accepted.pop(link, None)
         for known in (self._refused, self._remarks):
             known.pop(link, None)
         if accepted is not None:
             self.feed.on_publisher_left(self._endpoint(link, *accepted))
 
-    def take(
+    def on_messages(
         self, link: PublisherLink, frames: Sequence[bytes | memoryview], received: int
     ) -> None:
-        """Hand on messages; from the loop's thread, or one that asks for messages."""
+        """Hand on messages; in the loop's thread, or one that drains the sockets."""
         known = self._accepted.get(link)
         if known is not None:
             kind, who = known
-            # As Sample(...) does, in a third of the time.
+            # Three times as fast as Sample(...).
             make = tuple.__new__
             if len(frames) == 1:
                 sample = make(Sample, (frames[0], "ros1", kind, received, None, who, -1))
@@ -439,12 +434,12 @@ class TypeNegotiation(TopicMatching, Reader):
     # -- as a reader -----------------------------------------------------------------------------
 
     def set_eager(self, eager: bool) -> None:
-        """Say whether messages are handed on as they come; from any thread."""
+        """Set whether messages are handed on as they are received; from any thread."""
         self.eager = eager
-        self.topic.attend()
+        self.topic.update_eager()
 
     def flush(self) -> None:
-        """Hand on what waits in the sockets; from any thread."""
+        """Hand on what the sockets have; from any thread."""
         if not self.topic.eager and not self._core.forked:
             self.topic.drain()
 
@@ -454,24 +449,24 @@ class TypeNegotiation(TopicMatching, Reader):
             self._closed = True
             self._on_close(self)
 
-    # -- as the subscription's feed asks ---------------------------------------------------------
+    # -- as the matching of the subscription's feed ----------------------------------------------
 
     def open(
         self,
         feed: SubscriptionFeed,
-        publishers: Sequence[EndpointInfo],  # noqa: ARG002 - they offer no profile
+        publishers: Sequence[EndpointInfo],  # noqa: ARG002 - ROS 1 has no QoS
     ) -> None:
-        """Decide on the profile, and receive from those that are connected already."""
+        """Set the profile, and receive from the connected publishers."""
         self.feed, self.reader, self._fixed = feed, self, feed.type
         feed.set_qos(feed.qos.for_subscription([]))
         self.topic.join(self)
 
     def update(
         self,
-        publishers: Sequence[EndpointInfo],  # noqa: ARG002 - connections tell
+        publishers: Sequence[EndpointInfo],  # noqa: ARG002 - connections count
         idle: bool,  # noqa: ARG002 - links change by themselves
     ) -> list[Problem]:
-        """Return what is wrong with the connections, and with what comes over them."""
+        """Return the problems of connections and types."""
         links = self.topic.links()
         # Those that cannot be reached are logged once for all that they publish.
         lost = [Problem(link.problem, logging.INFO, link.lost) for link in links if link.problem]
@@ -487,7 +482,7 @@ class TypeNegotiation(TopicMatching, Reader):
         self,
         publishers: Sequence[EndpointInfo],  # noqa: ARG002 - the master may not know them yet
     ) -> list[EndpointInfo]:
-        """Return the publishers that are connected and understood."""
+        """Return the connected publishers whose types are accepted."""
         return [self._endpoint(link, *accepted) for link, accepted in self._accepted.copy().items()]
 
     def _endpoint(self, link: PublisherLink, kind: MessageType, gid: bytes) -> EndpointInfo:
@@ -505,7 +500,7 @@ class TypeNegotiation(TopicMatching, Reader):
         theirs = header.get("message_definition", "").strip() or "(it sends no definition)"
         return (
             f"{link.name} publishes {self.topic.topic} as {header.get('type')} with md5 "
-            f"{header.get('md5sum')}, asked for was {ros1_name(wanted.name)} with md5 "
+            f"{header.get('md5sum')}, requested was {ros1_name(wanted.name)} with md5 "
             f"{wanted.md5}: nothing is received from it; subscribe without a type to take what it "
             f"sends, or add its definition to the library. Theirs:\n{theirs}\nOurs:\n"
             f"{definition_text(self._core.types, wanted).strip()}"
@@ -513,7 +508,7 @@ class TypeNegotiation(TopicMatching, Reader):
 
 
 def _opaque(name: str, md5: str, text: str, reason: str) -> OpaqueType | None:
-    """Return a type that is only passed on; None when that is no name or no sum of a type."""
+    """Return a type without definition; None if the name or sum is not valid."""
     from rosglass.messages import OpaqueType  # noqa: PLC0415 - numpy
 
     try:
@@ -523,7 +518,7 @@ def _opaque(name: str, md5: str, text: str, reason: str) -> OpaqueType | None:
 
 
 def _full_name(name: str) -> str:
-    """Return a type's full name; empty when the header does not tell it."""
+    """Return a type's full name; empty when the header has none."""
     if name in ("", ANY):
         return ""
     try:
@@ -534,15 +529,15 @@ def _full_name(name: str) -> str:
 
 #: Seconds between attempts to reach a publisher, the first and the longest.
 _RETRY_S, _MAX_RETRY_S = 0.5, 5.0
-#: Bytes per second up to which what nobody waits for may lie in the socket for a tenth of a second.
+#: Bytes per second up to which messages may wait in the socket if the subscriptions are not eager.
 _IDLE_BYTES_PER_S = 256 * 1024
-#: Shortest time in seconds over which that is measured.
+#: Shortest time over which that rate is measured.
 _RATE_WINDOW_S = 0.5
 #: Messages that are handed on at once: their memory stays in the processor's cache, and so few
-#: objects come into being before others go that Python does not look for garbage among them.
+#: objects are alive that Python's garbage collector does not run.
 _BATCH = 128
-#: Messages of a flood that wait for callbacks when reading makes way for those, and for how many
-#: seconds. Python's threads take turns: without that, what is read piles up.
+#: Messages that wait for callbacks when reading pauses, and for how many seconds: threads share
+#: Python's lock, and the queue would grow without that.
 _MAX_BEHIND, _PAUSE_S = 4096, 0.001
 _UNKNOWN_HOST = (
     "set ROS_IP or ROS_HOSTNAME for that node to what this machine knows, or add the name to "
@@ -551,23 +546,24 @@ _UNKNOWN_HOST = (
 
 
 class PublisherLink:
-    """A publisher of the topic, as long as the master names it; all in the loop's thread.
+    """A publisher of the topic, as long as the master lists it; used in the loop's thread.
 
     Args:
         subscription: The node's subscription of the topic.
-        uri: The publisher's API.
-        epoch: Which master named it.
+        uri: URI of the publisher's API.
+        epoch: The number of the master that listed it.
 
     Attributes:
-        topic: Which it is.
-        header: What the publisher said of itself; empty before it is connected.
-        name: The publishing node's full name, or its URI as long as that is not known.
+        topic: Absolute topic name.
+        uri: As given.
+        header: The publisher's header; empty while it is not connected.
+        name: The publishing node's full name, or its URI while that is unknown.
         problem: Why it is not connected; empty when it is, or about to be.
-        lost: Whether the problem is only that the connection has ended, as when a publisher leaves,
-            of which the master tells in a moment.
+        lost: Whether the problem is only that the connection has ended, as when a publisher leaves
+            and the master has not listed the others yet.
         latched: The last message of a publisher that latches.
-        epoch: Which master, of those that were started one after the other, named it last.
-        ended: Whether it is forgotten.
+        epoch: The number of the master that listed it last; counted up by restarts.
+        ended: Whether it is removed.
         readers: The readers with which the type is negotiated on this connection.
     """
 
@@ -583,14 +579,14 @@ class PublisherLink:
         self._connection: Connection | None = None
         self._addresses: list[tuple[str, int]] = []
         self._latches = False
-        self._silence, self._count = Silence(), 0
+        self._silence, self._count = SilenceMonitor(), 0
         self._delay = _RETRY_S
         self._measured_at, self._measured, self._rate = time.monotonic(), 0, 0.0
         self._begin()
 
     @property
     def connected(self) -> bool:
-        """Whether messages can come."""
+        """Whether its header was received."""
         return bool(self.header)
 
     @property
@@ -600,14 +596,14 @@ class PublisherLink:
 
     @property
     def silence(self) -> str:
-        """What is strange about nothing coming from it; empty when nothing is."""
+        """Why its silence is suspicious; empty when it is not."""
         return self._silence.problem
 
-    def listen(self) -> None:
-        """Look whether it has fallen silent; on the node's own thread."""
-        # Latched messages come once; and what this node sends is missed by nobody.
+    def check_silence(self) -> None:
+        """Check whether it has stopped sending; on the node's own thread."""
+        # Latched messages are sent once; and this node knows what it sends itself.
         if self.connected and not self._latches and not self.is_local:
-            self._silence.follow(self.name, self._count, time.monotonic())
+            self._silence.update(self.name, self._count, time.monotonic())
 
     @property
     def info(self) -> str:
@@ -617,34 +613,34 @@ class PublisherLink:
 
     @property
     def received(self) -> int:
-        """How many bytes have come on this connection."""
+        """How many bytes were received on this connection."""
         connection = self._connection
         return 0 if connection is None else connection.received
 
     def end(self) -> None:
-        """Forget the publisher."""
+        """End the connection, and do not dial it again."""
         self.ended = True
         if self._connection is not None:
             self._connection.end("")
 
     def resume(self) -> None:
-        """Hand on messages: it is decided who understands them."""
+        """Hand on messages, once every subscription has accepted or refused the type."""
         if self._connection is not None:
             self._connection.pause(reading=True)
 
-    def attend(self, eager: bool) -> None:
-        """Read at once what comes, or leave it in the socket for a while if that is not much."""
+    def set_eager(self, eager: bool) -> None:
+        """Set whether data is read as it arrives; fast connections always are."""
         connection, now = self._connection, time.monotonic()
         if connection is None:
             return
         if now - self._measured_at >= _RATE_WINDOW_S:
-            came = connection.received - self._measured
-            self._rate = came / (now - self._measured_at)
+            count = connection.received - self._measured
+            self._rate = count / (now - self._measured_at)
             self._measured_at, self._measured = now, connection.received
-        connection.hurry(eager or not self.header or self._rate > _IDLE_BYTES_PER_S)
+        connection.set_urgent(eager or not self.header or self._rate > _IDLE_BYTES_PER_S)
 
     def drain(self) -> None:
-        """Hand on what waits in the socket; from any thread."""
+        """Hand on what the socket has; from any thread."""
         connection = self._connection
         if connection is not None:
             connection.drain()
@@ -656,7 +652,7 @@ class PublisherLink:
             self._core.pool.run(self._ask)
 
     def _ask(self) -> None:
-        """Ask the publisher where to connect; on a thread that may wait."""
+        """Request the address from the publisher; on a thread that may wait."""
         topic = self.topic
         reason, found = "", list[tuple[str, int]]()
         try:
@@ -667,7 +663,7 @@ class PublisherLink:
         self._core.loop.call(lambda: self._connect(found, reason))
 
     def _connect(self, addresses: list[tuple[str, int]], reason: str = "") -> None:
-        """Try the first of the addresses, the others when that fails."""
+        """Dial the first address, and the others if that fails."""
         if self.ended:
             return
         if not addresses:
@@ -677,7 +673,12 @@ class PublisherLink:
         header = subscriber_header(self._core.name.full, self.topic)
         try:
             self._connection = Connection.dial(
-                self._core.loop, addresses[0], header, self._on_header, _ignore, self._fail
+                self._core.loop,
+                addresses[0],
+                header,
+                self._on_header,
+                lambda _data, _lead: None,
+                self._fail,
             )
         except OSError as error:
             self._fail(reason_of(error))
@@ -685,12 +686,12 @@ class PublisherLink:
     def _on_header(self, header: dict[str, str]) -> None:
         connection = self._connection
         assert connection is not None
-        connection.take_together(self._on_frames)
-        connection.pause(reading=False)  # until it is decided who understands it
+        connection.set_batch_handler(self._on_frames)
+        connection.pause(reading=False)  # until the type is negotiated
         self.header, self.problem, self._delay, self._addresses = header, "", _RETRY_S, []
         self.name = header.get("callerid", "") or self.uri
         self._latches = header.get("latching") == "1"
-        self._silence, self._count = Silence(), 0
+        self._silence, self._count = SilenceMonitor(), 0
         self._measured_at, self._measured, self._rate = time.monotonic(), 0, 0.0
         self._core.unreachable.on_publisher_connected(self)
         self.subscription.on_publisher_connected(self)
@@ -706,14 +707,14 @@ class PublisherLink:
             for start in range(0, len(frames), _BATCH):
                 part = frames[start : start + _BATCH]
                 for reader in self.subscription.readers:
-                    reader.take(self, part, received)
+                    reader.on_messages(self, part, received)
             if len(frames) >= _BATCH and self._core.loop.is_current:
                 self._apply_backpressure()
-        except Exception:  # an executor of somebody's
-            _log.exception("%s: messages could not be handed on", self.topic)
+        except Exception:  # of a user's executor
+            _log.exception("%s: handing on messages failed", self.topic)
 
     def _apply_backpressure(self) -> None:
-        """Read nothing for a moment if callbacks are behind: reading takes time from them."""
+        """Pause reading for a moment if callbacks are behind: reading takes time from them."""
         behind = max((reader.feed.waiting for reader in self.subscription.readers), default=0)
         connection = self._connection
         if behind > _MAX_BEHIND and connection is not None:
@@ -721,7 +722,7 @@ class PublisherLink:
             self._core.loop.after(_PAUSE_S, lambda: connection.pause(reading=True))
 
     def _fail(self, reason: str) -> None:
-        """Try again later: the master names it still."""
+        """Dial again later, while the master lists it."""
         addresses, was_connected = self._addresses, self.connected
         self._connection, self.header, self.latched = None, {}, None
         self._addresses = []
@@ -743,41 +744,37 @@ class PublisherLink:
         return f"<{type(self).__name__} {self.name}>"
 
 
-def _ignore(_data: Received, _first: int) -> None:
-    """Take a message by itself: nobody is asked to, they are taken together."""
-
-
-#: Seconds in which the topics of a publisher are gathered: each has a connection of its own.
+#: Seconds in which the topics of a publisher are collected for one log line.
 _GATHER_S = 1.0
-#: Topics that a line names, and publishers' topics that are remembered as told of.
+#: Topics named in a line, and publishers' topics that are remembered as logged.
 _MAX_NAMED, _MAX_REMEMBERED = 12, 1000
 
 
 class UnreachableLog:
-    """Writes to the log which publishers cannot be reached, and when they are back.
+    """Logs each unreachable publisher once, for all its topics, and when it is back.
 
-    All but the writing happens in the loop's thread.
+    Used in the loop's thread.
 
     Args:
-        loop: Runs what happens later.
-        pool: Where the log is written: its handlers may take their time.
+        loop: The node's I/O loop.
+        pool: Writes the log, whose handlers may block.
     """
 
     def __init__(self, loop: IoLoop, pool: BlockingPool) -> None:
         self._loop, self._pool = loop, pool
         self._failed: set[PublisherLink] = set()
         self._back: set[PublisherLink] = set()
-        #: Publisher and topic -> the problem that was told.
+        #: Publisher and topic -> the logged problem.
         self._logged: dict[tuple[str, str], str] = {}
         self._gathering = False
 
     def on_publisher_failed(self, link: PublisherLink) -> None:
-        """Tell soon of a publisher that cannot be reached, unless it can be by then."""
+        """Log a publisher soon, unless it is connected by then."""
         self._failed.add(link)
         self._gather()
 
     def on_publisher_connected(self, link: PublisherLink) -> None:
-        """Tell soon of a publisher that was out of reach, and is connected now."""
+        """Log soon that an unreachable publisher is back."""
         if any((name, link.topic) in self._logged for name in (link.name, link.uri)):
             self._back.add(link)
             self._gather()
@@ -810,7 +807,7 @@ class UnreachableLog:
 
 def _write(lines: dict[str, set[str]]) -> None:
     for line, topics in lines.items():
-        # Being back is no mistake of anybody's, but who has seen the warning must see its end.
+        # A warning, too: the log level that shows the problem must show its end.
         _log.warning("%s: %s", _listed(topics), line)
 
 
@@ -820,12 +817,8 @@ def _listed(topics: Iterable[str]) -> str:
     return ", ".join(names[:_MAX_NAMED]) + (f" and {more} more topics" if more > 0 else "")
 
 
-_CHUNK_BYTES = 64 * 1024
-_length = struct.Struct("<I")
-
-
 def subscriber_header(caller: str, topic: str) -> dict[str, str]:
-    """Return the connection header of somebody who takes whatever type a topic has."""
+    """Return the connection header of a subscriber that accepts any type."""
     return {
         "callerid": caller,
         "md5sum": ANY,
@@ -839,7 +832,7 @@ def subscriber_header(caller: str, topic: str) -> dict[str, str]:
 def publisher_addresses(
     caller: str, uri: str, topic: str, timeout: float = 5.0
 ) -> list[tuple[str, int]]:
-    """Ask a publisher's API where to connect; waits for the answer and for the name service.
+    """Request the addresses of a publisher from its API; waits for it and for name servers.
 
     Args:
         caller: The asking node's full name.
@@ -851,21 +844,21 @@ def publisher_addresses(
         Resolved addresses and ports.
 
     Raises:
-        MasterError: It does not publish the topic, or offers no TCPROS.
-        ConnectionLostError: It does not answer, or names a host that is not known here.
+        MasterError: It does not publish the topic, or does not offer TCPROS.
+        ConnectionLostError: It does not answer, or its host is unknown here.
     """
     answer = call_node(uri, "requestTopic", caller, topic, [["TCPROS"]], timeout=timeout)
     place = f"{uri} for {topic}"
     if not (isinstance(answer, (list, tuple)) and len(answer) >= 3 and answer[0] == "TCPROS"):
-        raise MasterError(f"{place} offers no TCPROS, but {answer!r:.80}")
+        raise MasterError(f"{place} does not offer TCPROS, but {answer!r:.80}")
     host, port = str(answer[1]), answer[2]
     if type(port) is not int or not 0 < port < 65536:
-        raise ConnectionLostError(f"{place} says to connect to port {port!r:.80}")
+        raise ConnectionLostError(f"{place} answers with the invalid port {port!r:.80}")
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError) as error:
         raise ConnectionLostError(
-            f"{place} says to connect to {host}:{port}, but {reason_of(error)}"
+            f"{place} answers with {host}:{port}, but {reason_of(error)}"
         ) from error
     return list(dict.fromkeys((str(one[4][0]), int(one[4][1])) for one in found))
 
@@ -880,119 +873,124 @@ def ask_publisher(core: TcprosCore, topic: str, node: str, timeout: float) -> di
         timeout: Seconds that each of its answers may take.
 
     Raises:
-        MasterError: It is not known, or does not publish the topic.
+        MasterError: The node is unknown, or does not publish the topic.
         ConnectionLostError: It does not answer, or refuses.
     """
-    caller = core.name.full
     uri = str(core.master.call("lookupNode", node, timeout=timeout))
     failures = []
-    for address in publisher_addresses(caller, uri, topic, timeout):
-        header, failure = _try_address(address, subscriber_header(caller, topic), timeout)
-        if "error" in header:
-            raise ConnectionLostError(f"{node} refuses {topic}: {header['error']:.200}")
+    for address in publisher_addresses(core.name.full, uri, topic, timeout):
+        header, failure = _request_header(core, topic, address, timeout)
         if header.get("md5sum", ANY) != ANY:
             return header
         failures.append(failure or "its connection header has no md5sum")
-    told = "; ".join(failures) or "it has no address"
-    raise ConnectionLostError(f"{node} does not tell what it publishes on {topic}: {told}")
+    reason = "; ".join(failures) or "it has no address"
+    raise ConnectionLostError(f"{node} does not say what it publishes on {topic}: {reason}")
 
 
-def _try_address(
-    address: tuple[str, int], header: dict[str, str], timeout: float
+def _request_header(
+    core: TcprosCore, topic: str, address: tuple[str, int], timeout: float
 ) -> tuple[dict[str, str], str]:
-    """Return the other end's header, or none and why."""
+    """Connect to a publisher for its header only; return it, or an empty one and the reason."""
+    answer: Future[tuple[dict[str, str], str]] = Future()
+    links: list[Connection] = []
+
+    def finish(header: dict[str, str], reason: str) -> None:
+        if not answer.done():
+            answer.set_result((header, reason and f"{address[0]}:{address[1]}: {reason}"))
+        for link in links:
+            link.end("")
+
+    def dial() -> None:
+        try:
+            links.append(
+                Connection.dial(
+                    core.loop,
+                    address,
+                    subscriber_header(core.name.full, topic),
+                    lambda header: finish(header, ""),
+                    lambda _data, _lead: None,
+                    lambda reason: finish({}, reason),
+                )
+            )
+        except OSError as error:  # no more sockets
+            finish({}, reason_of(error))
+
+    core.loop.call(dial)
     try:
-        return _exchange(address, header, timeout), ""
-    except OSError as error:
-        return {}, f"{address[0]}:{address[1]}: {reason_of(error)}"
-    except DecodeError as error:
-        return {}, str(error)
+        return answer.result(timeout)
+    except FutureTimeoutError:
+        core.loop.call(lambda: finish({}, ""))
+        return {}, f"{address[0]}:{address[1]}: no answer in time"
 
 
-def _exchange(address: tuple[str, int], header: dict[str, str], timeout: float) -> dict[str, str]:
-    """Connect, send a header, and return the other end's; raises OSError and DecodeError."""
-    deadline = time.monotonic() + timeout
-    with socket.create_connection(address, timeout) as sock:
-        sock.sendall(encode_header(header))
-        (size,) = _length.unpack(_receive(sock, _length.size, deadline))
-        if size > MAX_HEADER:
-            raise DecodeError("connection header", f"{size} bytes are more than any has")
-        return parse_header(_receive(sock, size, deadline))
+#: Shortest time between two samples of the count.
+_SAMPLE_S = 0.9
+#: Consecutive samples with about the same rate that make a publisher regular.
+_REGULAR_SAMPLES = 10
+#: Silence is suspicious after so many of the usual intervals, and after so many seconds.
+_MISSED_INTERVALS, _MIN_SILENCE_S = 5, 1.0
 
 
-def _receive(sock: socket.socket, size: int, deadline: float) -> bytes:
-    data = bytearray()
-    while len(data) < size:
-        sock.settimeout(max(0.001, deadline - time.monotonic()))
-        part = sock.recv(min(size - len(data), _CHUNK_BYTES))
-        if not part:
-            raise ConnectionResetError("the other end closed the connection")
-        data += part
-    return bytes(data)
+class SilenceMonitor:
+    """Detects that a publisher with a regular rate has stopped sending; free for each message.
 
-
-#: Seconds between two looks that count.
-_LOOK = 0.9
-#: So many looks in a row at which about as much had come make somebody regular.
-_LOOKS = 10
-#: Silence is strange after so many of the usual intervals, and after so many seconds.
-_INTERVALS, _SECONDS = 5, 1.0
-
-
-class Silence:
-    """Follows how regularly somebody sends, about once a second; costs what is sent nothing.
-
-    Who sends less than once a second, or now more and now less, is never missed.
+    Publishers with less than one message per second or with a changing rate are never reported.
 
     Attributes:
-        problem: What is strange about the silence, in words; empty as long as nothing is.
+        problem: Why the silence is suspicious, in words; empty when it is not.
     """
 
     def __init__(self) -> None:
         self.problem = ""
-        self._looked = self._came = 0.0
+        self._sampled_at = self._received_at = 0.0
         self._count = self._regular = 0
         self._rate = 0.0
-        #: What had come at the last look, and in how many seconds: judged only when more comes, as
-        #: the last messages before a silence fill but a part of the time.
+        #: The messages of the last sample, and its seconds: evaluated only when more are received,
+        #: as the last messages before a silence fill only a part of that time.
         self._newest = (0, 0.0)
 
-    def follow(self, name: str, count: int, now: float) -> None:
-        """Take note of how much has come.
+    def update(self, name: str, count: int, now: float) -> None:
+        """Sample the count of received messages.
 
         Args:
-            name: Who sends it.
-            count: How many messages have come in all.
+            name: The publisher, for the problem.
+            count: Received messages in all.
             now: The time, by :func:`time.monotonic`.
         """
-        passed = now - self._looked
+        passed = now - self._sampled_at
         if count > self._count and self.problem:
             self.problem, self._regular, self._newest = "", 0, (0, 0.0)
-        elif passed < _LOOK:
+        elif passed < _SAMPLE_S:
             return
         elif count > self._count:
-            self._judge(*self._newest)
+            self._evaluate(*self._newest)
             self._newest = (count - self._count, passed)
-        elif self._regular < _LOOKS:
+        elif self._regular < _REGULAR_SAMPLES:
             self._regular, self._newest = 0, (0, 0.0)
-        elif not self.problem and now - self._came >= max(_SECONDS, _INTERVALS / self._rate):
-            # No age: the text would be another one, and told again, every second.
-            since = time.strftime("%H:%M:%S", time.localtime(time.time() - (now - self._came)))
+        elif not self.problem and self._is_overdue(now):
+            # No age: the text would change, and be reported again, every second.
+            since = time.strftime(
+                "%H:%M:%S", time.localtime(time.time() - (now - self._received_at))
+            )
             self.problem = (
-                f"nothing has come from {name} since {since} (it sent {self._rate:.0f} per second "
-                "before); is it frozen, or cut off?"
+                f"nothing was received from {name} since {since} (it sent {self._rate:.0f} per "
+                "second before); is it frozen, or cut off?"
             )
         if count > self._count:
-            self._came = now
-        self._looked, self._count = now, count
+            self._received_at = now
+        self._sampled_at, self._count = now, count
 
-    def _judge(self, came: int, passed: float) -> None:
-        """Take note of what came between two looks."""
-        if not came:
+    def _is_overdue(self, now: float) -> bool:
+        limit = max(_MIN_SILENCE_S, _MISSED_INTERVALS / self._rate)
+        return now - self._received_at >= limit
+
+    def _evaluate(self, count: int, passed: float) -> None:
+        """Update the rate by the messages of one sample."""
+        if not count:
             return
         usual = self._rate * passed
-        if self._regular and not usual / 2 - 1 <= came <= 2 * usual + 1:
+        if self._regular and not usual / 2 - 1 <= count <= 2 * usual + 1:
             self._regular = 0
-        rate = came / passed
+        rate = count / passed
         self._rate = rate if not self._regular else 0.7 * self._rate + 0.3 * rate
         self._regular += 1

@@ -1,4 +1,4 @@
-"""A node's topics: which it publishes and subscribes to, each registered once."""
+"""A node's published and subscribed topics, each registered once."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Topics"]
 
-#: How long a publisher may take for each of its answers.
+#: How long a publisher may take for each answer.
 _ANSWER_TIMEOUT_S = 5.0
 
 
 class Topics:
-    """Publications and subscriptions by topic.
+    """A node's publications and subscriptions, by topic.
 
     Args:
         core: The node.
@@ -48,13 +48,13 @@ class Topics:
         #: Guards which endpoint of a topic is the first one, and which the last.
         self._lock = threading.Lock()
         self._publications: dict[str, Publication] = {}
-        #: Who takes connections of topics that are about to be published.
+        #: Handlers for the subscribers of topics that are not published yet.
         self._stand_ins: dict[str, Callable[[Connection, dict[str, str]], str]] = {}
         self._subscribed: dict[str, TopicSubscription] = {}
         core.create_writer = self.create_writer
 
     def create_writer(self, endpoint: EndpointInfo, type: MessageType) -> PublicationWriter:
-        """Publish a topic and return the sending end of its publisher.
+        """Register a publisher and return its writer.
 
         Raises:
             DefinitionConflictError: The node publishes another type there.
@@ -64,7 +64,7 @@ class Topics:
         if not type.md5:
             raise TypeNotFoundError(
                 f"{topic} cannot be published as {type.name} without definition or md5 sum: "
-                "subscribers could not tell whether they understand it; give the type of a "
+                "subscribers compare the md5 sum; give the type of a "
                 "received sample, or OpaqueType(name, md5, ros=1)"
             )
         with self._lock:
@@ -81,12 +81,12 @@ class Topics:
     def subscribe(
         self, subscription: Subscription, ignore_local: bool, type_name: str = ""
     ) -> None:
-        """Feed a subscription from now on.
+        """Register a subscription and receive its messages.
 
         Args:
-            subscription: Whom to feed.
-            ignore_local: Whether to leave out what this node publishes itself.
-            type_name: The type that is asked for when nobody here has its definition.
+            subscription: The subscription.
+            ignore_local: Whether to ignore this node's own publishers.
+            type_name: The requested type if its definition is unknown here.
         """
         topic = subscription.topic
         with self._lock:
@@ -108,7 +108,7 @@ class Topics:
             self._core.check_open()
 
     def accept(self, link: Connection, header: dict[str, str]) -> str:
-        """Take a subscriber's connection; return why not, empty when it is taken."""
+        """Accept a subscriber's connection; return the reason if it is refused."""
         topic = header.get("topic", "")
         publication, stand_in = self._publications.get(topic), self._stand_ins.get(topic)
         if publication is not None:
@@ -120,12 +120,12 @@ class Topics:
     def stand_in(
         self, topic: str, accept: Callable[[Connection, dict[str, str]], str] | None
     ) -> None:
-        """Let somebody take the connections of a topic as long as it is not published.
+        """Set the handler for subscribers of a topic while it is not published.
 
         Args:
             topic: Absolute topic name.
-            accept: Told a connection and its header; returns why not, empty when it is taken. None
-                for nobody any more.
+            accept: Called with a connection and its header; returns the reason if it refuses. None
+                to remove the handler.
         """
         if accept is None:
             self._stand_ins.pop(topic, None)
@@ -133,28 +133,28 @@ class Topics:
             self._stand_ins[topic] = accept
 
     def serves(self, topic: str) -> bool:
-        """Return whether somebody takes the connections of a topic."""
+        """Return whether subscribers of a topic may connect."""
         return topic in self._publications or topic in self._stand_ins
 
     def drop(self, link: Connection) -> None:
-        """Forget a subscriber's connection that has ended."""
+        """Remove a subscriber's connection that has ended."""
         publication = self._publications.get(link.header.get("topic", ""))
         if publication is not None:
             publication.drop(link)
 
     def publishers(self, topic: str) -> list[EndpointInfo]:
-        """Return a topic's publishers: whom the master names, and what connections tell of them."""
+        """Return a topic's publishers in the graph, with what their connections' headers tell."""
         ends = self._core.graph.endpoints(EndpointKind.PUBLISHER, topic)
         return [_described(end, self._known(topic, end.node)) for end in ends]
 
     def ask_publishers(self, topic: str, timeout: float | None) -> list[EndpointInfo]:
-        """Return a topic's publishers with what they say of themselves when asked; waits for it.
+        """Return a topic's publishers with the headers that they send when asked; waits for them.
 
-        Those that do not answer in time are there all the same, as in :meth:`publishers`.
+        Publishers that do not answer in time are returned as by :meth:`publishers`.
 
         Args:
             topic: Absolute topic name.
-            timeout: Seconds to wait in all; None for as long as each may take.
+            timeout: Seconds to wait in all; None for the limit of each answer.
         """
         limit = _ANSWER_TIMEOUT_S if timeout is None else min(timeout, _ANSWER_TIMEOUT_S)
         ends = self._core.graph.endpoints(EndpointKind.PUBLISHER, topic)
@@ -181,13 +181,13 @@ class Topics:
         """Return the connection header with which a node publishes a topic; waits for it.
 
         Raises:
-            MasterError: It is not known, or does not publish the topic.
+            MasterError: The node is unknown, or does not publish the topic.
             ConnectionLostError: It does not answer, or refuses.
         """
         return self._known(topic, node) or ask_publisher(self._core, topic, node.full, timeout)
 
     def _known(self, topic: str, node: NodeName) -> dict[str, str]:
-        """Return what is known already of a publisher, empty for nothing."""
+        """Return the header of a connected or own publisher; empty for others."""
         publication, shared = self._publications.get(topic), self._subscribed.get(topic)
         if node == self._core.name:
             return {} if publication is None else publication.header()
@@ -202,11 +202,11 @@ class Topics:
         return [] if publication is None else publication.latched()
 
     def published(self) -> dict[str, Publication]:
-        """Return what is published, by topic."""
+        """Return the publications, by topic."""
         return dict(self._publications)
 
     def subscribed(self) -> dict[str, TopicSubscription]:
-        """Return what is subscribed to, by topic."""
+        """Return the subscriptions, by topic."""
         return dict(self._subscribed)
 
     def _end_writer(self, writer: PublicationWriter) -> None:
