@@ -221,7 +221,7 @@ def test_cancelling_that_fails_is_told(
     wait(lambda: root.told() != "[]")
     ((who, reason),) = json.loads(root.told())
     assert who == "goal"
-    assert ("did not tell within" if counter.ros1 else "refuses to cancel") in reason
+    assert ("did not acknowledge within" if counter.ros1 else "refuses to cancel") in reason
     assert root.status() in (2, 3)
 
 

@@ -3,7 +3,7 @@
 Nothing of ROS is needed on this machine. Import what you need from the modules.
 """
 
-from rosglass.ros1.action_state import CommState, TerminalState
+from rosglass.ros1.actionlib import CommState, TerminalState
 from rosglass.ros1.node import Ros1Node
 from rosglass.ros1.parameter_server import ParameterServer, ParameterSubscription
 

@@ -1,4 +1,4 @@
-"""Actions over actionlib's five topics, as their client has them.
+"""The client's side of an action over actionlib's five topics.
 
 Protocol: ROS wiki, "actionlib/DetailedDescription".
 """
@@ -33,9 +33,7 @@ from rosglass.errors import (
     NodeClosedError,
     TimeoutError,  # noqa: A004 - the field's own word
 )
-from rosglass.ros1.action_state import CommState, CommStateMachine, ServerState
-from rosglass.ros1.actionlib_discovery import ActionDiscovery
-from rosglass.ros1.actionlib_types import (
+from rosglass.ros1.actionlib import (
     CANCEL,
     FEEDBACK,
     GOAL,
@@ -43,14 +41,18 @@ from rosglass.ros1.actionlib_types import (
     RESULT,
     STATUS,
     ActionTypes,
+    CommState,
+    CommStateMachine,
+    ServerState,
+    action_topic,
     goal_id,
     new_id,
     offered,
-    part,
     stamp,
     state_of,
     time_of,
 )
+from rosglass.ros1.type_discovery import ActionDiscovery
 from rosglass.wires.tcpros.master import call_node
 from rosglass.wires.tcpros.registrations import Member
 
@@ -59,24 +61,24 @@ if TYPE_CHECKING:
 
     from rosglass.comm import Executor, Handle, Sample
     from rosglass.messages import ActionType, Message
-    from rosglass.ros1.action_state import Step, TerminalState
+    from rosglass.ros1.actionlib import Step, TerminalState
     from rosglass.wires.tcpros.core import TcprosCore
     from rosglass.wires.tcpros.topics import Topics
 
 __all__ = ["ActionlibClient", "ActionlibClientGoal"]
 
 _log = logging.getLogger("rosglass.ros1")
-#: Time without a status message, of which there are five a second usually, after which the
-#: server is asked whether it is alive; and that it may take to answer.
-_SILENCE_S, _ANSWER_S = 5.0, 5.0
-#: Seconds that do not fit into a time stamp any more, and their year.
+#: Time without a status message, of which there are usually five a second, after which the server
+#: is called to see whether it is alive; and that it may take to answer.
+_SILENCE_S, _ANSWER_TIMEOUT_S = 5.0, 5.0
+#: The first seconds that do not fit into a time stamp, and their year.
 _END_OF_TIME = 2**32, 2106
-#: Time after which a server has shown the goals that it knew when it was connected.
+#: Time after which a connected server has published the status of all goals that it knows.
 _SETTLED_S = 1.0
-#: Time that a result may take once the server keeps the goal's end in mind no longer.
+#: Time that a result may take once the server's status lacks the goal.
 _OVERDUE_S = 5.0
-#: Time after which a request to cancel is repeated that the server shows no sign of, and how
-#: often while it is connected: a lost stop command is the worst that can happen.
+#: Time after which a request to cancel is repeated that the server has not acknowledged, and how
+#: often while it is connected: a stop command must not be lost.
 _REPEAT_S, _REPEATS = 1.0, 3
 #: Time after which a server without goals to cancel has received the request.
 _RECEIVED_S = 0.5
@@ -91,11 +93,11 @@ _CANCELED = (
 
 
 class Entry(NamedTuple):
-    """What a status message says of a goal.
+    """A goal in a status message.
 
     Attributes:
         state: Its state.
-        text: Why, in the server's words.
+        text: The server's explanation.
         stamp: The goal's time stamp.
     """
 
@@ -105,102 +107,51 @@ class Entry(NamedTuple):
 
 
 class BulkCancel:
-    """A request to cancel all goals of a server, or those until a time.
+    """A request to cancel all goals of a server, or those up to a time.
 
-    No ROS 1 server answers such a request: the status of its goals shows what it does.
+    ROS 1's servers do not answer such requests: the status of their goals shows the effect.
 
     Args:
         until: The last time stamp of goals to be cancelled; None for all.
-        answer: Fulfilled when the goals that ran are cancelled, or have ended.
-        before: The server's goals when it was asked, by their ids.
+        answer: Completed when the goals that ran are cancelled, or have ended.
+
+    Attributes:
+        until: As given.
+        answer: As given.
+        sent: Whether it was sent to a server.
     """
 
-    def __init__(
-        self, until: Time | None, answer: Promise[CancelAnswer], before: dict[str, Entry]
-    ) -> None:
-        self.answer = answer
-        self._begun = time.monotonic()
-        self._canceling = {key for key, entry in before.items() if entry.state in _CANCELED}
-        self._meant = {
-            key
-            for key, entry in before.items()
-            if entry.state in _RUNNING and (until is None or entry.stamp <= until)
-        }
+    def __init__(self, until: Time | None, answer: Promise[CancelAnswer]) -> None:
+        self.until, self.answer = until, answer
+        self.sent = False
+        self._sent_at = 0.0
+        self._canceling: set[str] = set()
+        self._affected: set[str] = set()
         self._canceled: dict[str, None] = {}
 
+    def on_sent(self, before: dict[str, Entry]) -> None:
+        """Note that it is sent, and the server's last status until then."""
+        self.sent, self._sent_at = True, time.monotonic()
+        for key, entry in before.items():
+            if entry.state in _CANCELED:
+                self._canceling.add(key)
+            elif entry.state in _RUNNING and (self.until is None or entry.stamp <= self.until):
+                self._affected.add(key)
+
     def on_status(self, entries: dict[str, Entry]) -> bool:
-        """Take a status message; return whether the request is answered now."""
+        """Handle a status message; return whether it is answered now."""
         for key, entry in entries.items():
             if entry.state in _CANCELED and key not in self._canceling:
                 self._canceled[key] = None
-        if any(key in entries and entries[key].state in _RUNNING for key in self._meant):
+        if any(key in entries and entries[key].state in _RUNNING for key in self._affected):
             return False
-        if not self._canceled and time.monotonic() - self._begun < _RECEIVED_S:
-            return False  # it may have been on its way already
+        if not self._canceled and time.monotonic() - self._sent_at < _RECEIVED_S:
+            return False  # the message may have been sent before the request was received
         accepted = tuple(key.encode() for key in self._canceled)
         self.answer.set_result(
             CancelAnswer(accepted, "" if accepted else "there was no goal to cancel")
         )
         return True
-
-
-class BulkCancels:
-    """A client's requests to cancel many goals: some wait for a server, some for its status.
-
-    Args:
-        name: Of the action.
-    """
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self._waiting: list[tuple[Time | None, Promise[CancelAnswer]]] = []
-        self._asked: list[BulkCancel] = []
-
-    def add(self, until: Time | None, answer: Promise[CancelAnswer]) -> None:
-        """Take a request in; it waits for :meth:`ask`."""
-        self._waiting.append((until, answer))
-
-    def ask(self, before: dict[str, Entry], send: Callable[[Time | None], object]) -> None:
-        """Ask a server for all that waits.
-
-        Args:
-            before: What the server said last of its goals.
-            send: Sends one request.
-        """
-        waiting, self._waiting = self._waiting, []
-        for until, answer in waiting:
-            self._asked.append(BulkCancel(until, answer, before))
-            send(until)
-
-    def on_status(self, entries: dict[str, Entry]) -> None:
-        """Take a status message of the server that was asked."""
-        self._asked = [each for each in self._asked if not each.on_status(entries)]
-
-    def give_up(self, answer: Promise[CancelAnswer], timeout: float, unsent: Error) -> None:
-        """Wait no longer.
-
-        Args:
-            answer: For which request.
-            timeout: Seconds that were waited.
-            unsent: Its error if no server could be asked.
-        """
-        if any(each is answer for _, each in self._waiting):
-            answer.set_exception(unsent)
-        answer.set_exception(
-            TimeoutError(
-                f"{self._name} did not tell within {timeout:g} s that all goals are cancelled. It "
-                "may cancel them all the same: watch their status"
-            )
-        )
-        self._waiting = [entry for entry in self._waiting if entry[1] is not answer]
-        self._asked = [each for each in self._asked if each.answer is not answer]
-
-    def fail(self, error: Error) -> None:
-        """Answer all with an error."""
-        answers = [each.answer for each in self._asked] + [each for _, each in self._waiting]
-        self._asked, self._waiting = [], []
-        for answer in answers:
-            answer.set_exception(error)
 
 
 class ActionlibClientGoal(ClientGoal):
@@ -210,15 +161,15 @@ class ActionlibClientGoal(ClientGoal):
         client: Its client.
         id_text: Its id.
         created: Its time stamp.
-        goal: What is asked for: a message of the action's type, or what becomes one.
-        timeout: Seconds for the server to appear and to show that it knows the goal.
+        goal: The goal message, or values for one.
+        timeout: Seconds for the server to appear and to acknowledge the goal.
         typed: Whether the action's type is known.
 
     Attributes:
-        stamp: When it was created, by this node's clock; what :meth:`ActionClient.cancel_before`
-            compares.
-        server: Full name of the node that it was sent to; empty before.
-        text: What the server sent with the goal's status, e.g. why it failed.
+        stamp: When it was created, by this node's clock; used by
+            :meth:`ActionClient.cancel_before`.
+        server: Full name of the node that it was sent to; empty until then.
+        text: The server's text with the goal's status, e.g. why it failed.
     """
 
     _client: ActionlibClient
@@ -239,7 +190,7 @@ class ActionlibClientGoal(ClientGoal):
         self.server, self.text = "", ""
         self._machine = CommStateMachine()
         self._state_listeners: Listeners[CommState] = Listeners(where=self._label)
-        #: What was sent, and during which of the client's connections with a server.
+        #: The sent message, and the number of the client's connection with a server.
         self._sent: dict[str, Any] | None = None
         self._epoch = 0
         self._known = self._odd = False
@@ -251,7 +202,7 @@ class ActionlibClientGoal(ClientGoal):
 
     @property
     def id_text(self) -> str:
-        """The id as it goes over the wire: node, number and time."""
+        """The id on the wire: node, number and time."""
         return self._id_text
 
     @property
@@ -261,27 +212,27 @@ class ActionlibClientGoal(ClientGoal):
 
     @property
     def terminal_state(self) -> TerminalState | None:
-        """How it ended; None before it is done."""
+        """How it ended; None before it has."""
         return self._machine.terminal
 
     @property
     def accepted(self) -> Time | None:
         """Its :attr:`stamp`, once the server executes it; None before.
 
-        ROS 1 does not tell when a server accepted a goal.
+        ROS 1's servers do not report when they accepted a goal.
         """
         return self.stamp if self._machine.executed else None
 
     def on_comm_state_change(
         self, callback: Callable[[CommState], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` with each new :attr:`comm_state` from now on, none left out."""
+        """Call `callback` with every new :attr:`comm_state` from now on."""
         return self._listen(self._state_listeners, callback, executor)
 
     def resend(self) -> None:
-        """Send it once more, as it is: for servers that may have missed it.
+        """Send it again, for servers that may have missed it.
 
-        A server that knows it takes no notice.
+        A server that knows it ignores this.
 
         Raises:
             Error: It has ended: send a new one.
@@ -294,7 +245,7 @@ class ActionlibClientGoal(ClientGoal):
         self._jobs.add(self._resend)
 
     def close(self) -> None:
-        """Watch it no longer; the goal itself goes on. Safe to call twice."""
+        """Stop following the goal, which goes on; safe to call twice."""
         self._state_listeners.clear()
         super().close()
 
@@ -306,9 +257,9 @@ class ActionlibClientGoal(ClientGoal):
         return self._sent is None and not self._done.done()
 
     def _send(self, server: str, epoch: int) -> None:
-        """Send it to a server that is there."""
+        """Send it to a server."""
         kind = self._client.type
-        assert kind is not None  # there is a server that is understood
+        assert kind is not None  # it is known once there is a server
         try:
             if self.goal is None:
                 self.goal = kind.goal.create(self._given)
@@ -323,45 +274,45 @@ class ActionlibClientGoal(ClientGoal):
         else:
             self._sent, self.server, self._epoch = sent, server, epoch
 
-    def _on_status(self, server: str, said: ServerState, text: str) -> None:
-        """Take what a status message says of it."""
+    def _on_status(self, server: str, reported: ServerState, text: str) -> None:
+        """Handle its state in a status message."""
         if self._known and server != self.server:
-            return  # another server took it, too; the first one counts
+            return  # another server has it, too; the first one counts
         self.server, self._known, self._absent = server, True, None
-        self._take(said, text)
+        self._on_state(reported, text)
         waits = self._machine.state is CommState.WAITING_FOR_CANCEL_ACK
         if waits and self._repeats < _REPEATS and time.monotonic() - self._asked >= _REPEAT_S:
             self._repeats += self._ask_cancel()
 
     def _on_missing(self, server: str) -> None:
-        """Take note that a status message does not name it."""
+        """Handle a status message without it."""
         if not self._known or server != self.server or self._done.done():
             return
         if self._machine.state is not CommState.WAITING_FOR_RESULT:
             self._lose(
                 ConnectionLostError(
                     f"the server of {self._client.name} ({server}) does not know goal "
-                    f"{self._id_text} any more: it was restarted meanwhile, or it ended and "
-                    "nothing of that came through"
+                    f"{self._id_text} any more: the server was restarted, or the goal ended and "
+                    "its result was lost"
                 )
             )
             return
         now = time.monotonic()
         self._absent = self._absent or now
         if now - self._absent >= _OVERDUE_S:
-            self._lose_result(f"its result never came from {server}")
+            self._lose_result(f"its result was not received from {server}")
 
     def _on_feedback(self, feedback: Message) -> None:
-        """Take feedback for it."""
+        """Handle its feedback."""
         if not self._done.done():
             self._add_feedback(feedback)
 
-    def _on_result(self, said: ServerState, text: str, result: Message) -> None:
-        """Take its result."""
+    def _on_result(self, reported: ServerState, text: str, result: Message) -> None:
+        """Handle its result."""
         if self._done.done():
             return
         try:
-            steps = self._machine.finish(said)
+            steps = self._machine.on_result(reported)
         except ValueError as error:
             self._complain(error)
             return
@@ -370,21 +321,21 @@ class ActionlibClientGoal(ClientGoal):
         status = self._machine.status
         because = f": {text}" if text else ""
         if status is GoalStatus.REJECTED:
-            told = f"the server of {self._client.name} does not accept goal {self._id_text}"
-            self._finish(GoalRejectedError(told + because))
+            reason = f"the server of {self._client.name} does not accept goal {self._id_text}"
+            self._finish(GoalRejectedError(reason + because))
         elif status is GoalStatus.LOST:
-            told = f"the server of {self._client.name} says that goal {self._id_text} is lost"
-            self._finish(ConnectionLostError(told + because))
+            reason = f"the server of {self._client.name} reports that goal {self._id_text} is lost"
+            self._finish(ConnectionLostError(reason + because))
         else:
             self._finish(ActionResult(status, result))
 
     def _watch(self, status_publishers: dict[str, str], epoch: int, settled: bool) -> None:
-        """Look whether its server is still there.
+        """Check whether its server is still there.
 
         Args:
-            status_publishers: The nodes that are connected to send the status of goals.
-            epoch: Number of the client's connection with a server.
-            settled: Whether that connection is some time old.
+            status_publishers: The connected nodes that publish the status of goals.
+            epoch: The number of the client's connection with a server.
+            settled: Whether that connection is old enough for a complete status.
         """
         if self._sent is None or self._done.done():
             return
@@ -392,18 +343,18 @@ class ActionlibClientGoal(ClientGoal):
         if self.server in status_publishers:
             self._alone = None
             if not self._known and settled and epoch != self._epoch:
-                self._client._ask_cancel(self._id_text)  # nothing is to run unwatched
-                self._lose(self._gone("was cut off after it was sent the goal, before"))
+                self._client._ask_cancel(self._id_text)  # nothing must run unsupervised
+                self._lose(self._gone("was disconnected after it was sent the goal, before"))
             return
         self._alone = self._alone or now
         cut_off = self._client._core.status().state is not ConnectionState.CONNECTED
         if now - self._alone >= (OUTAGE_S if cut_off else GRACE_S):
-            self._lose_server("went away before")
+            self._lose_server("left before")
 
     def _lose_server(self, what: str) -> None:
-        """End it, as its server is there no more."""
+        """End it, as its server has left."""
         if self._machine.state is CommState.WAITING_FOR_RESULT:
-            self._lose_result(f"its server ({self.server}) {what} it told the result")
+            self._lose_result(f"its server ({self.server}) {what} it sent the result")
         else:
             self._lose(self._gone(what))
 
@@ -419,7 +370,7 @@ class ActionlibClientGoal(ClientGoal):
         client = self._client
         return ConnectionLostError(
             f"the server of {client.name} ({self.server}) {what} goal {self._id_text} ended; "
-            f"nobody knows what becomes of it ({client._core.url}: {client._core.status()})"
+            f"its outcome is unknown ({client._core.url}: {client._core.status()})"
         )
 
     def _lose_result(self, why: str) -> None:
@@ -427,19 +378,20 @@ class ActionlibClientGoal(ClientGoal):
         self._lose(ConnectionLostError(f"{self._label} has ended as {ended}, but {why}"))
 
     def _give_up(self) -> None:
-        """Take note that the time has run out in which the server should have answered."""
+        """Fail it: the server has not acknowledged it in time."""
         if self._done.done() or self._known:
             return
         client, seconds = self._client, self._timeout or 0.0
         if self._sent is None:
             self._lose(client._unsent(seconds))
             return
-        client._ask_cancel(self._id_text)  # nothing is to run unwatched
-        told = (
-            f"the server of {client.name} ({self.server}) did not tell that it knows goal "
-            f"{self._id_text} within {seconds:g} s; it was asked to cancel it, should it get it yet"
+        client._ask_cancel(self._id_text)  # nothing must run unsupervised
+        reason = (
+            f"the server of {client.name} ({self.server}) did not acknowledge goal "
+            f"{self._id_text} within {seconds:g} s; its cancellation was requested, in case the "
+            "server receives it later"
         )
-        self._lose(TimeoutError(told))
+        self._lose(TimeoutError(reason))
 
     def _resend(self) -> None:
         if self._sent is not None and not self._done.done():
@@ -453,8 +405,8 @@ class ActionlibClientGoal(ClientGoal):
             answer.set_result(CancelAnswer((self.id,)))
         else:
             failure = (
-                f"{self._client.name} did not tell within {timeout or 0.0:g} s that it cancels "
-                f"goal {self._id_text}. It may cancel it all the same: watch the goal's status"
+                f"{self._client.name} did not acknowledge within {timeout or 0.0:g} s that it "
+                f"cancels goal {self._id_text}. It may cancel it later: watch the goal's status"
             )
             self._add_cancel(answer, timeout, failure)
             self._repeats = 0
@@ -462,9 +414,9 @@ class ActionlibClientGoal(ClientGoal):
             self._go(self._machine.cancel())
 
     def _withdraw(self) -> None:
-        """Let it end without having been sent."""
-        self._machine.hear(ServerState.PENDING)
-        self._go(self._machine.finish(ServerState.RECALLED))
+        """End it without having sent it."""
+        self._machine.on_status(ServerState.PENDING)
+        self._go(self._machine.on_result(ServerState.RECALLED))
         kind = self._client.type
         if kind is not None:
             self._finish(ActionResult(GoalStatus.CANCELED, kind.result.create()))
@@ -475,17 +427,17 @@ class ActionlibClientGoal(ClientGoal):
         self._asked = time.monotonic()
         return self._client._ask_cancel(self._id_text)
 
-    def _take(self, said: ServerState, text: str) -> None:
+    def _on_state(self, reported: ServerState, text: str) -> None:
         try:
-            steps = self._machine.hear(said)
+            steps = self._machine.on_status(reported)
         except ValueError as error:
             self._complain(error)
             return
         self.text = text
         self._go(steps)
-        if said is ServerState.LOST:
-            told = f"the server of {self._client.name} says that goal {self._id_text} is lost"
-            self._finish(ConnectionLostError(told))
+        if reported is ServerState.LOST:
+            reason = f"the server of {self._client.name} reports that goal {self._id_text} is lost"
+            self._finish(ConnectionLostError(reason))
 
     def _complain(self, error: ValueError) -> None:
         if not self._odd:
@@ -495,30 +447,30 @@ class ActionlibClientGoal(ClientGoal):
             )
 
     def _go(self, steps: list[Step]) -> None:
-        """Show the states that it has gone through."""
+        """Report the states that it has passed."""
         for state, status in steps:
             self._state_listeners.notify(state)
             if status is not self._status:
                 self._set_status(status)
         if self._machine.executed:
             self._acceptance.set_result(True)
-        said = self._machine.heard
-        if self._cancels and (said in _CANCELED or (said is not None and said.is_terminal)):
+        last = self._machine.heard
+        if self._cancels and (last in _CANCELED or (last is not None and last.is_terminal)):
             cancels, self._cancels = self._cancels, []
             for answer, _ in cancels:
                 answer.set_result(
-                    CancelAnswer((self.id,)) if said in _CANCELED else self._too_late()
+                    CancelAnswer((self.id,)) if last in _CANCELED else self._too_late()
                 )
 
 
 class ActionlibClient(ActionClient, Member):
-    """An action client that follows which of actionlib's servers is there.
+    """An action client that follows actionlib's servers.
 
     Args:
         core: The node it belongs to.
         topics: The node's topics.
         name: Absolute action name.
-        wanted: The type; None for the one that the server's topics tell.
+        wanted: The type; None for that of the server's topics.
     """
 
     _core: TcprosCore
@@ -528,35 +480,35 @@ class ActionlibClient(ActionClient, Member):
         self, core: TcprosCore, topics: Topics, name: str, wanted: ActionType | None
     ) -> None:
         super().__init__(core, name, _END_OF_TIME)
-        #: Runs all that happens to the client and its goals, one after the other.
+        #: Runs everything that changes the client and its goals, one after the other.
         self._jobs = InOrder()
         self._topics = topics
         self._ends: _ClientTopics | None = None
         self._discovery: ActionDiscovery | None = None
         #: The server that goals are sent to; empty while none is there.
         self._server, self._since, self._epoch = "", 0.0, 0
-        #: What each server said last of its goals, and when it was last known to be alive.
+        #: By server, its last status message, and when it was last known to be alive.
         self._lists: dict[str, dict[str, Entry]] = {}
         self._heard: dict[str, float] = {}
         self._asked: set[str] = set()
-        self._bulk_cancels = BulkCancels(name)
+        self._bulk_cancels: list[BulkCancel] = []
         self._garbage = ""
         if wanted is None:
             self._discovery = ActionDiscovery(core, topics, name)
         else:
-            self._speak(ActionTypes.of(wanted, core.types))
+            self._open(ActionTypes.of(wanted, core.types))
         core.add(self)
 
     def _is_ready(self) -> bool:
-        """Return whether a server is there that understands the goals.
+        """Return whether there is a server of the right type.
 
-        As actionlib has it: it tells the status of its goals, and is connected on all five topics.
+        As in actionlib: it publishes the status of its goals, and is connected on all five topics.
         """
         return bool(self._server) and not self._closed
 
     @property
     def server(self) -> str:
-        """Full name of the node that goals are sent to; empty while none is there."""
+        """Full name of the node that goals are sent to; empty while there is none."""
         return "" if self._closed else self._server
 
     # -- sending and cancelling ------------------------------------------------------------------
@@ -573,17 +525,17 @@ class ActionlibClient(ActionClient, Member):
         executor: Executor | None = None,
         timeout: float | None = 10.0,
     ) -> ActionlibClientGoal:
-        """Send a goal, as soon as a server is there; see :meth:`comm.ActionClient.send_goal`.
+        """Send a goal, as soon as there is a server; see :meth:`comm.ActionClient.send_goal`.
 
         Args:
             goal: A message or a dict of fields; missing fields, and None, get the defaults.
-            on_feedback: Called with each feedback.
+            on_feedback: Called with each feedback message.
             on_status_change: Called with each new status.
             on_comm_state_change: Called with each new state of actionlib's own.
             on_done: Called with the goal when it has ended, one way or another.
             executor: Where callbacks run; None for the node's own dispatcher thread.
-            timeout: Seconds for the server to appear and to tell that it knows the goal; servers
-                may keep it waiting (PENDING) for as long as they like. None for ever.
+            timeout: Seconds for the server to appear and to acknowledge the goal; servers may keep
+                it PENDING for any time. None for no limit.
         """
         made: ActionlibClientGoal = self._new_goal(
             goal, timeout, executor, on_feedback, on_status_change, on_done
@@ -603,18 +555,17 @@ class ActionlibClient(ActionClient, Member):
 
     def _cancel_many(self, until: Time | None, timeout: float | None) -> Promise[CancelAnswer]:
         answer: Promise[CancelAnswer] = Promise(
-            f"{self.name} has not told that it cancels goals",
+            f"{self.name} has not cancelled the goals yet",
             self._core.dispatcher,
             cancellable=False,
         )
 
-        def give_up() -> None:
-            unsent = self._not_cancelled(timeout)
-            self._bulk_cancels.give_up(answer, timeout or 0.0, unsent)
-
+        request = BulkCancel(until, answer)
         if timeout is not None:
-            self._core.timers.after(timeout, lambda: self._jobs.add(give_up))
-        self._jobs.add(lambda: self._begin_bulk_cancel(until, answer))
+            self._core.timers.after(
+                timeout, lambda: self._jobs.add(lambda: self._expire_bulk_cancel(request, timeout))
+            )
+        self._jobs.add(lambda: self._begin_bulk_cancel(request))
         return answer
 
     # -- for its goals, in jobs ------------------------------------------------------------------
@@ -636,26 +587,41 @@ class ActionlibClient(ActionClient, Member):
             goal._lose(self._ended())
             return
         goal._wait()
-        self._look()  # a goal must not go to a server that has left
+        self._update_server()  # a goal must not be sent to a server that has left
         if self._server and goal._is_unsent:
             goal._send(self._server, self._epoch)
 
-    def _begin_bulk_cancel(self, until: Time | None, answer: Promise[CancelAnswer]) -> None:
+    def _begin_bulk_cancel(self, request: BulkCancel) -> None:
         if self.closed:
-            answer.set_exception(NodeClosedError(f"the client of {self.name} was closed"))
+            request.answer.set_exception(NodeClosedError(f"the client of {self.name} was closed"))
             return
         for goal in self._live():
-            if goal._is_unsent and (until is None or goal.stamp <= until):
+            if goal._is_unsent and (request.until is None or goal.stamp <= request.until):
                 goal.cancel()
-        self._look()  # a lost stop command is the worst that can happen
-        self._bulk_cancels.add(until, answer)
-        self._ask_bulk_cancels()
+        self._update_server()  # a stop command must not be sent to a server that has left
+        self._bulk_cancels.append(request)
+        self._send_bulk_cancels()
 
-    def _ask_bulk_cancels(self) -> None:
+    def _send_bulk_cancels(self) -> None:
         ends = self._ends
         if self._server and ends is not None:
-            before = dict(self._lists.get(self._server, {}))
-            self._bulk_cancels.ask(before, lambda until: ends.send_cancel("", until or Time()))
+            for request in self._bulk_cancels:
+                if not request.sent:
+                    request.on_sent(self._lists.get(self._server, {}))
+                    ends.send_cancel("", request.until or Time())
+
+    def _expire_bulk_cancel(self, request: BulkCancel, timeout: float) -> None:
+        if request not in self._bulk_cancels:
+            return
+        self._bulk_cancels.remove(request)
+        if request.sent:
+            reason = (
+                f"{self.name} did not show within {timeout:g} s that all goals are cancelled. It "
+                "may cancel them later: watch their status"
+            )
+            request.answer.set_exception(TimeoutError(reason))
+        else:
+            request.answer.set_exception(self._not_cancelled(timeout))
 
     def _take_status(self, server: str, message: Message) -> None:
         entries = {
@@ -663,7 +629,7 @@ class ActionlibClient(ActionClient, Member):
             for each in message.status_list
         }
         self._lists[server], self._heard[server] = entries, time.monotonic()
-        self._look()
+        self._update_server()
         for goal in self._live():
             entry = entries.get(goal.id_text)
             if entry is None:
@@ -671,7 +637,9 @@ class ActionlibClient(ActionClient, Member):
             else:
                 goal._on_status(server, entry.state, entry.text)
         if server == self._server:
-            self._bulk_cancels.on_status(entries)
+            self._bulk_cancels = [
+                each for each in self._bulk_cancels if not (each.sent and each.on_status(entries))
+            ]
 
     def _take_result(self, message: Message) -> None:
         goal = self._goals.get(message.status.goal_id.id.encode())
@@ -683,8 +651,8 @@ class ActionlibClient(ActionClient, Member):
         if goal is not None:
             goal._on_feedback(message.feedback)
 
-    def _look(self) -> None:
-        """Look which server is there, and let it have what waits for one."""
+    def _update_server(self) -> None:
+        """Choose the server, and send it what waits for one."""
         ends = self._ends
         if ends is None or self._closed:
             return
@@ -704,12 +672,12 @@ class ActionlibClient(ActionClient, Member):
         for goal in self._live():
             if goal._is_unsent:
                 goal._send(self._server, self._epoch)
-        self._ask_bulk_cancels()
+        self._send_bulk_cancels()
         self._readiness.update()
 
     def _watch(self) -> None:
-        """Look whether the servers of goals are still there."""
-        self._look()
+        """Check whether the servers of goals are still there."""
+        self._update_server()
         ends = self._ends
         if ends is None or self._closed:
             return
@@ -721,33 +689,33 @@ class ActionlibClient(ActionClient, Member):
             silent = time.monotonic() - self._heard.get(server, time.monotonic())
             if silent >= _SILENCE_S and server not in self._asked:
                 self._asked.add(server)
-                self._core.pool.run(partial(self._ask, server, status_publishers[server]))
+                self._core.pool.run(partial(self._ping, server, status_publishers[server]))
 
-    def _ask(self, server: str, uri: str) -> None:
-        """Ask a silent server whether it lives: it may be one that sends changes only."""
+    def _ping(self, server: str, uri: str) -> None:
+        """Call a silent server to see whether it is alive: some publish changes only."""
         problem = ""
         try:
-            call_node(uri, "getPid", self._core.name.full, timeout=_ANSWER_S)
+            call_node(uri, "getPid", self._core.name.full, timeout=_ANSWER_TIMEOUT_S)
         except Error as error:
             problem = str(error)
-        self._jobs.add(lambda: self._take_life(server, problem))
+        self._jobs.add(lambda: self._on_ping(server, problem))
 
-    def _take_life(self, server: str, problem: str) -> None:
+    def _on_ping(self, server: str, problem: str) -> None:
         self._asked.discard(server)
         heard = self._heard.get(server)
         if heard is None:
             return
         if not problem:
             self._heard[server] = time.monotonic()
-        elif time.monotonic() - heard >= _SILENCE_S:  # it said nothing meanwhile either
+        elif time.monotonic() - heard >= _SILENCE_S:  # no status was received until now either
             self._heard.pop(server)
             self._server = "" if self._server == server else self._server
             self._readiness.update()
             for goal in self._live():
                 if goal.server == server:
-                    goal._lose_server(f"fell silent ({problem}) before")
+                    goal._lose_server(f"stopped responding ({problem}) before")
 
-    # -- what comes, in the loop's thread --------------------------------------------------------
+    # -- received messages, in the loop's thread -------------------------------------------------
 
     def _on_status(self, sample: Sample) -> None:
         server = sample.publisher.decode()
@@ -764,18 +732,18 @@ class ActionlibClient(ActionClient, Member):
         self._jobs.add(lambda: self._decoded(lambda: self._take_feedback(sample.message())))
 
     def _decoded(self, job: Callable[[], None]) -> None:
-        """Run `job`, which decodes a message; log once what is none."""
+        """Run `job`, which decodes a message; log what cannot be decoded once."""
         try:
             job()
         except DecodeError as error:
             if str(error) != self._garbage:
                 self._garbage = str(error)
-                _log.warning("%s: what its server sends cannot be decoded: %s", self.name, error)
+                _log.warning("%s: a message of its server cannot be decoded: %s", self.name, error)
 
     # -- following the graph ---------------------------------------------------------------------
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - links change by themselves
-        """Follow the graph: the type, whether a server is there, goals whose server went."""
+        """Follow the graph: the type, the server, and goals whose server has left."""
         if self._closed:
             return
         if self._discovery is not None:
@@ -784,18 +752,18 @@ class ActionlibClient(ActionClient, Member):
         self._jobs.add(self._watch)
 
     def _discover(self, discovery: ActionDiscovery) -> None:
-        types = discovery.look()
+        types = discovery.types()
         if types is None:
             return
         try:
-            self._speak(types)
+            self._open(types)
         except DefinitionConflictError as error:
             discovery.problem = str(error)
             return
         discovery.close()
         self._discovery = None
 
-    def _speak(self, types: ActionTypes) -> None:
+    def _open(self, types: ActionTypes) -> None:
         """Open the topics."""
         callbacks = {
             STATUS: self._on_status,
@@ -839,8 +807,10 @@ class ActionlibClient(ActionClient, Member):
     def _end(self) -> None:
         for goal in self._live():
             goal._lose(self._ended())
-        told = f"the client of {self.name} was closed before the server told that it cancels goals"
-        self._bulk_cancels.fail(NodeClosedError(told))
+        reason = f"the client of {self.name} was closed before the server cancelled the goals"
+        for request in self._bulk_cancels:
+            request.answer.set_exception(NodeClosedError(reason))
+        self._bulk_cancels.clear()
 
 
 class _ClientTopics:
@@ -850,8 +820,8 @@ class _ClientTopics:
         core: The node.
         topics: Its topics.
         name: Absolute action name.
-        types: Of the topics.
-        callbacks: Take what comes on the topics, by their names, in the loop's thread.
+        types: The topics' types.
+        callbacks: Called with the topics' samples in the loop's thread, by their names.
 
     Raises:
         DefinitionConflictError: The node publishes another type on one of the topics.
@@ -867,7 +837,7 @@ class _ClientTopics:
     ) -> None:
         self._topics = topics
         self._names = {
-            word: core.resolve(part(name, word))
+            word: core.resolve(action_topic(name, word))
             for word in (GOAL, CANCEL, STATUS, RESULT, FEEDBACK)
         }
         self._publishers: dict[str, Publisher] = {}
@@ -891,7 +861,7 @@ class _ClientTopics:
         self._publishers[GOAL].publish(goal)
 
     def send_cancel(self, id: str, time: Time) -> bool:
-        """Ask for goals to be cancelled: one, those until a time, or all.
+        """Request the cancellation of one goal, those up to a time, or all.
 
         Returns:
             Whether a server is connected.
@@ -900,7 +870,7 @@ class _ClientTopics:
         return self._publishers[CANCEL].subscription_count() > 0
 
     def status_publishers(self) -> dict[str, str]:
-        """Return the nodes that are connected to send the status of goals, with their URIs."""
+        """Return the connected nodes that publish the status of goals, with their URIs."""
         shared = self._topics.subscribed().get(self._names[STATUS])
         links = [] if shared is None else shared.links()
         return {link.name: link.uri for link in links if link.connected}
@@ -910,40 +880,40 @@ class _ClientTopics:
         names = []
         for word in (GOAL, CANCEL):
             publication = self._topics.published().get(self._names[word])
-            there = [] if publication is None else publication.connected()
-            if all(end.node.full != server for end in there):
+            connected = [] if publication is None else publication.connected()
+            if all(end.node.full != server for end in connected):
                 names.append(self._names[word])
         for word in (STATUS, RESULT, FEEDBACK):
             shared = self._topics.subscribed().get(self._names[word])
             links = [] if shared is None else shared.links()
-            understood = self._subscriptions[word].publisher_count() > 0
-            if not understood or all(n.name != server or not n.connected for n in links):
+            accepted = self._subscriptions[word].publisher_count() > 0
+            if not accepted or all(n.name != server or not n.connected for n in links):
                 names.append(self._names[word])
         return names
 
     def problems(self) -> list[str]:
-        """Say what a person has to mend."""
+        """Return the problems that the user has to fix."""
         if not self.status_publishers():
-            return []  # what the topics say is that no server is there
+            return []  # the topics' problem is that there is no server
         problems = [end.problem for end in self._subscriptions.values()]
         problems += [end.problem for end in self._publishers.values()]
         return list(dict.fromkeys(problem for problem in problems if problem))
 
     def absence(self, heard: Collection[str]) -> str:
-        """Say why none of the nodes that are connected is a server yet; empty when there is none.
+        """Return why none of the connected nodes is a server yet; empty if none is connected.
 
         Args:
-            heard: Those that have sent the status of their goals.
+            heard: Those that have published the status of their goals.
         """
         for server in self.status_publishers():
             missing = ", ".join(self.missing(server))
             if missing:
                 return f"the server {server} is not connected on {missing} (yet)"
             if server not in heard:
-                return f"the server {server} does not tell the status of its goals"
+                return f"the server {server} does not publish the status of its goals"
         return ""
 
     def close(self) -> None:
-        """End them all; safe to call twice."""
+        """Close them all; safe to call twice."""
         for end in (*self._publishers.values(), *self._subscriptions.values()):
             end.close()

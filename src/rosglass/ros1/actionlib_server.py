@@ -1,4 +1,4 @@
-"""Actions over actionlib's five topics, as their server has them.
+"""The server's side of an action over actionlib's five topics.
 
 Protocol: ROS wiki, "actionlib/DetailedDescription", sections "Server-Side States" and "Cancel
 Policy"; where it is silent, actionlib's servers in C++ and Python.
@@ -17,8 +17,7 @@ from rosglass.comm.action_server import ActionServerProtocol, ServerGoal
 from rosglass.comm.executor import InOrder
 from rosglass.comm.handle import check_flag
 from rosglass.errors import ArgumentError, DecodeError, MasterError, NodeClosedError
-from rosglass.ros1.action_state import ServerState
-from rosglass.ros1.actionlib_types import (
+from rosglass.ros1.actionlib import (
     CANCEL,
     FEEDBACK,
     GOAL,
@@ -26,9 +25,10 @@ from rosglass.ros1.actionlib_types import (
     RESULT,
     STATUS,
     ActionTypes,
+    ServerState,
+    action_topic,
     goal_id,
     new_id,
-    part,
     stamp,
     time_of,
 )
@@ -47,18 +47,17 @@ if TYPE_CHECKING:
 __all__ = ["ActionlibServer", "ActionlibServerGoal", "GoalEntry", "GoalList"]
 
 _log = logging.getLogger("rosglass.ros1")
-#: Status messages per second, and seconds that ended goals stay in them, unless parameters say
-#: otherwise.
+#: Defaults: status messages per second, and seconds that ended goals stay in them.
 _FREQUENCY_HZ, _KEEP_S = 5.0, 5.0
-#: Longest pause before ended goals are forgotten where no status is published.
-_TICK_S = 1.0
-#: Goals that have ended and are kept at most: clients gone wild must not fill the memory.
+#: Seconds between removals of ended goals where no status is published.
+_EXPIRE_PERIOD_S = 1.0
+#: Most ended goals that are kept: a misbehaving client must not fill the memory.
 _MAX_ENDED = 1000
 _CANCELABLE = (ServerState.PENDING, ServerState.ACTIVE)
-_REPLACED = "Another goal was received, which takes its place"
+_REPLACED = "It was preempted by a newer goal"
 _RECALLED = "It was cancelled before it was executed"
 
-#: The states of goals that were accepted: of those that became active, and of those that wait.
+#: The states of accepted goals: of those that became active, and of those that wait.
 _ACTIVE_STATES = {
     GoalStatus.ACCEPTED: ServerState.ACTIVE,
     GoalStatus.EXECUTING: ServerState.ACTIVE,
@@ -77,15 +76,15 @@ _WAITING_STATES = {
 
 
 class GoalEntry:
-    """A goal in the list.
+    """A goal in a server's list.
 
     Attributes:
         id: Its id.
         stamp: Its time stamp.
-        text: Why it is in its state, in words for its client.
-        asked: What is asked for; None for one that is known from a request to cancel only.
-        goal: The goal once it is accepted; None before.
-        at_once: Whether it becomes active when it is accepted, and not when it is executed.
+        text: The explanation of its state for its client.
+        asked: The goal message; None for a goal known only from a request to cancel it.
+        goal: The goal once it is accepted; None until then.
+        at_once: Whether it becomes active when it is accepted, instead of when it is executed.
         until: Monotonic time until which it stays in the list; None for one that has not ended.
     """
 
@@ -105,8 +104,8 @@ class GoalEntry:
         active = self.at_once or self.goal._begun
         return (_ACTIVE_STATES if active else _WAITING_STATES)[self.goal.status]
 
-    def go(self, state: ServerState, text: str = "") -> None:
-        """Change the state of one that is not accepted."""
+    def set_state(self, state: ServerState, text: str = "") -> None:
+        """Set the state of a goal that is not accepted."""
         self._state, self.text = state, text
 
     def status(self) -> dict[str, Any]:
@@ -116,7 +115,7 @@ class GoalEntry:
 
 
 class GoalList:
-    """Goals in order of arrival; the caller sees to it that one thread uses it at a time.
+    """A server's goals in order of arrival; not thread-safe.
 
     Args:
         keep: Seconds that goals stay in it after their end.
@@ -133,18 +132,18 @@ class GoalList:
     def __iter__(self) -> Any:
         return iter(list(self._entries.values()))
 
-    def take(self, id: str, stamp: Time, asked: Any, now: float) -> GoalEntry | None:
-        """Take a goal in.
+    def add(self, id: str, stamp: Time, asked: Any, now: float) -> GoalEntry | None:
+        """Add a received goal.
 
         Args:
             id: Its id.
             stamp: Its time stamp.
-            asked: What is asked for.
+            asked: The goal message.
             now: Monotonic time.
 
         Returns:
-            Its entry, RECALLED when it was cancelled before it came; None for one that is known,
-            of which no notice need be taken.
+            Its entry, RECALLED when it was cancelled before it was received; None for a known goal,
+            which is to be ignored.
         """
         known = self._entries.get(id)
         if known is not None:
@@ -153,20 +152,20 @@ class GoalList:
             if known.state is not ServerState.RECALLING or known.asked is not None:
                 return None
             known.asked, known.stamp = asked, stamp
-            known.go(ServerState.RECALLED, "It was cancelled before it came")
+            known.set_state(ServerState.RECALLED, "It was cancelled before it was received")
             return known
         entry = self._entries[id] = GoalEntry(id, stamp, ServerState.PENDING, asked)
         if stamp <= self._last_cancel:
-            told = "Its time stamp is not after that of the last request to cancel"
-            entry.go(ServerState.RECALLED, told)
+            reason = "Its time stamp is not after that of the last request to cancel"
+            entry.set_state(ServerState.RECALLED, reason)
             self.end(entry, now)
         return entry
 
     def select(self, id: str, stamp: Time, now: float) -> Sequence[GoalEntry]:
-        """Return the goals that a request to cancel means and that can be cancelled.
+        """Return the goals that a request to cancel selects and that can be cancelled.
 
-        An id means its goal; a stamp, all goals until then; both mean both; neither, all goals. An
-        unknown goal is cancelled when it comes.
+        An id selects its goal; a stamp, all goals up to it; both select both; neither, all goals.
+        An unknown goal is cancelled when it is received.
         """
         everything = not id and stamp == Time()
         chosen = [
@@ -181,11 +180,11 @@ class GoalList:
         return [entry for entry in chosen if entry.state in _CANCELABLE]
 
     def end(self, entry: GoalEntry, now: float) -> None:
-        """Take note that a goal has ended."""
+        """Note that a goal has ended."""
         entry.until = now + self.keep
 
     def expire(self, now: float) -> None:
-        """Forget goals that ended some time ago."""
+        """Remove goals that ended some time ago."""
         ended = [entry for entry in self._entries.values() if entry.until is not None]
         surplus = len(ended) - _MAX_ENDED
         for number, entry in enumerate(sorted(ended, key=lambda entry: entry.until or 0.0)):
@@ -194,14 +193,14 @@ class GoalList:
 
 
 class ActionlibServerGoal(ServerGoal):
-    """A goal, with the text that actionlib sends with its end.
+    """A goal with actionlib's states and texts.
 
     Args:
-        protocol: How its client hears of it.
-        entry: Its place in the list.
+        protocol: Its server's topics.
+        entry: Its entry in the list.
 
     Attributes:
-        client_id: Its id in text, as its client made it.
+        client_id: Its id as a string, made by its client.
     """
 
     def __init__(self, protocol: ActionlibServer, entry: GoalEntry) -> None:
@@ -211,20 +210,20 @@ class ActionlibServerGoal(ServerGoal):
 
     @property
     def id_text(self) -> str:
-        """The id as it goes over the wire."""
+        """The id on the wire."""
         return self.client_id
 
     @property
     def state(self) -> ServerState:
-        """What the server's status topic says of it."""
+        """Its state in the server's status topic."""
         return self._entry.state
 
     def succeed(self, result: Message | dict[str, Any] | None = None, text: str = "") -> None:
-        """End it as done; `text` goes to its client with the status."""
+        """End it as succeeded; `text` is sent to its client with the status."""
         self._end(GoalStatus.SUCCEEDED, result, self._checked(text))
 
     def abort(self, result: Message | dict[str, Any] | None = None, text: str = "") -> None:
-        """End it as failed; `text` tells its client why."""
+        """End it as aborted; `text` is sent to its client as the reason."""
         self._end(GoalStatus.ABORTED, result, self._checked(text))
 
     def canceled(self, result: Message | dict[str, Any] | None = None, text: str = "") -> None:
@@ -233,14 +232,14 @@ class ActionlibServerGoal(ServerGoal):
 
     def _checked(self, text: str) -> str:
         if not isinstance(text, str):
-            raise ArgumentError("text", text, "a text", f"goal {self.id_text}")
+            raise ArgumentError("text", text, "a string", f"goal {self.id_text}")
         return text
 
 
 class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
     """The three publishers and two subscriptions of an action server.
 
-    The parameters of actionlib's servers hold for it, too: ``actionlib_status_frequency`` (searched
+    It uses the parameters of actionlib's servers: ``actionlib_status_frequency`` (searched
     from the node upwards; 0 for changes only), ``status_frequency`` and ``status_list_timeout``
     below the action's name.
 
@@ -249,7 +248,7 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
         topics: Its topics.
         name: Absolute action name.
         type: The type.
-        simple: Whether one goal is executed at a time, and a newer one takes its place, as with
+        simple: Whether one goal is executed at a time and preempted by a newer one, as by
             actionlib's SimpleActionServer.
     """
 
@@ -277,14 +276,14 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
         core, topics, name = self._core, self._topics, self.name
         try:
             for word, qos in ((STATUS, QoS.latched()), (RESULT, QUEUE), (FEEDBACK, QUEUE)):
-                topic = core.resolve(part(name, word))
+                topic = core.resolve(action_topic(name, word))
                 self._publishers[word] = Publisher(core, topic, getattr(self._types, word), qos)
         except BaseException:
             self._close_publishers()
             raise
         self._publish_status()
         for word, callback in ((CANCEL, self._on_cancel), (GOAL, self._on_goal)):
-            topic = core.resolve(part(name, word))
+            topic = core.resolve(action_topic(name, word))
             kind = getattr(self._types, word)
             subscription = Subscription(topic, kind, QUEUE, IMMEDIATE, raw_callback=callback)
             self._subscriptions.append(subscription)
@@ -293,7 +292,7 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
         self._tick()
 
     def withdraw(self) -> None:
-        """Reject the goals that are not decided on, and close the topics."""
+        """Reject the goals that are not accepted yet, and close the topics."""
         for subscription in self._subscriptions:
             subscription.close()
         with self.lock:
@@ -314,11 +313,11 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
             publisher.close()
 
     def problems(self) -> list[str]:
-        """Say why some clients cannot be served."""
+        """Return why some clients cannot be served."""
         problems = [subscription.problem for subscription in self._subscriptions]
         return problems + [publisher.problem for publisher in self._publishers.values()]
 
-    # -- what clients are sent -------------------------------------------------------------------
+    # -- publishing ------------------------------------------------------------------------------
 
     def publish_feedback(self, goal: ActionlibServerGoal, feedback: Message) -> None:
         """Publish feedback of a goal."""
@@ -333,7 +332,7 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
         self._list.end(goal._entry, time.monotonic())
 
     def publish_result(self, goal: ActionlibServerGoal, result: Message) -> None:
-        """Publish how a goal has ended, and the status of all."""
+        """Publish the result of a goal, and the status of all."""
         self._publish_end(goal._entry, result)
 
     def _publish_end(self, entry: GoalEntry, result: Message) -> None:
@@ -349,21 +348,21 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
         self.publish_status()
 
     def publish_status(self) -> None:
-        """Publish the status of all goals, as of now."""
+        """Publish the current status of all goals."""
         self._publishing.add(self._publish_status)
 
     def _publish_status(self) -> None:
         with self.lock:
             self._list.expire(time.monotonic())
             entries = [entry.status() for entry in self._list]
-        with suppress(NodeClosedError):  # clients see that the server is gone
+        with suppress(NodeClosedError):  # clients notice that the server has left
             self._publishers[STATUS].publish({"header": self._header(), "status_list": entries})
 
     def _header(self) -> dict[str, Any]:
         return {"stamp": stamp(self._core.clock.now())}
 
     def _tick(self) -> None:
-        """Publish the status again and again."""
+        """Publish the status periodically."""
         if self.closed:
             return
         if self._frequency_hz > 0:
@@ -371,18 +370,18 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
         else:
             with self.lock:
                 self._list.expire(time.monotonic())
-        pause = 1 / self._frequency_hz if self._frequency_hz > 0 else _TICK_S
+        pause = 1 / self._frequency_hz if self._frequency_hz > 0 else _EXPIRE_PERIOD_S
         self._core.timers.after(pause, self._tick)
 
     # -- parameters ------------------------------------------------------------------------------
 
     def register(self, master: Master) -> None:
-        """Read the parameters; the topics register themselves."""
-        frequency = _ask(master, "getParam", part(self.name, "status_frequency"))
+        """Read the parameters from the master; the topics register themselves."""
+        frequency = _ask(master, "getParam", action_topic(self.name, "status_frequency"))
         found = _ask(master, "searchParam", "actionlib_status_frequency")
         if frequency is None and found is not None:
             frequency = _ask(master, "getParam", str(found))
-        keep = _ask(master, "getParam", part(self.name, "status_list_timeout"))
+        keep = _ask(master, "getParam", action_topic(self.name, "status_list_timeout"))
         self._frequency_hz = self._number("status frequency", frequency, _FREQUENCY_HZ)
         self._list.keep = self._number("status_list_timeout", keep, _KEEP_S)
 
@@ -391,7 +390,7 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
             return default
         if type(value) in (int, float) and 0 <= value < 1e6:
             return float(value)
-        _log.warning("%s: the parameter for the %s is no number but %r", self.name, what, value)
+        _log.warning("%s: the parameter for the %s is not a number, but %r", self.name, what, value)
         return default
 
     # -- accepting -------------------------------------------------------------------------------
@@ -410,18 +409,18 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
         with self.lock:
             known = self.closed
             stamped = sent if sent.nanoseconds else now
-            entry = None if known else self._list.take(id_text, stamped, asked, time.monotonic())
+            entry = None if known else self._list.add(id_text, stamped, asked, time.monotonic())
         if entry is None:
             return
         if entry.state is ServerState.RECALLED:
             self._publish_end(entry, self.type.result.create())
             return
         if self._server._accept is not None:
-            self.publish_status()  # deciding may take its time
+            self.publish_status()  # accepting it may take a while
         self._server._on_goal(ActionlibServerGoal(self, entry))
 
     def accept(self, goal: ActionlibServerGoal) -> bool:
-        """Note that a goal is accepted, unless it was cancelled meanwhile."""
+        """Note that a goal is accepted, unless it was cancelled until now."""
         entry = goal._entry
         if entry.state is not ServerState.PENDING:
             return False
@@ -429,7 +428,7 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
         return True
 
     def start(self, goal: ActionlibServerGoal) -> None:
-        """Show that a goal is accepted, and have it executed in its turn."""
+        """Publish that a goal is accepted, and execute it in its turn."""
         if self._simple:
             self._queue(goal)
         else:
@@ -437,7 +436,7 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
             self._server._run(goal)
 
     def reject(self, goal: ActionlibServerGoal, reason: str) -> None:
-        """Reject a goal, or let one go that was cancelled before it was decided on."""
+        """Reject a goal, or recall one that was cancelled before it was accepted."""
         self._refuse(goal._entry, reason)
 
     def _refuse(self, entry: GoalEntry, reason: str) -> None:
@@ -445,16 +444,16 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
             if entry.state.is_terminal:
                 return
             if entry.state is ServerState.RECALLING:
-                entry.go(ServerState.RECALLED, _RECALLED)
+                entry.set_state(ServerState.RECALLED, _RECALLED)
             else:
-                entry.go(ServerState.REJECTED, reason)
+                entry.set_state(ServerState.REJECTED, reason)
             self._list.end(entry, time.monotonic())
         self._publish_end(entry, self.type.result.create())
 
     # -- one at a time ---------------------------------------------------------------------------
 
     def _queue(self, goal: ActionlibServerGoal) -> None:
-        """Let a goal take the place of the one that is executed, once that has ended."""
+        """Preempt the current goal by a newer one, which is executed once that has ended."""
         with self.lock:
             rivals = [one for one in (self._current, self._next) if one is not None]
             late = any(goal.accepted < rival.accepted for rival in rivals)
@@ -475,7 +474,7 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
             self.publish_status()
 
     def on_returned(self) -> None:
-        """Go on with the goal that waits."""
+        """Execute the goal that waits."""
         if not self._simple:
             return
         with self.lock:
@@ -508,10 +507,10 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
 
     def _cancel(self, undecided: Sequence[GoalEntry], allowed: Sequence[ServerGoal]) -> None:
         with self.lock:
-            accepted = [entry.goal for entry in undecided if entry.goal is not None]  # meanwhile
+            accepted = [entry.goal for entry in undecided if entry.goal is not None]  # just now
             for entry in undecided:
                 if entry.state is ServerState.PENDING and entry.goal is None:
-                    entry.go(ServerState.RECALLING)
+                    entry.set_state(ServerState.RECALLING)
             waiting = self._next
             if waiting is not None and waiting in (*accepted, *allowed):
                 self._next = None

@@ -1,4 +1,4 @@
-"""ROS 1's graph resource names: which are valid, and what they resolve to.
+"""ROS 1's graph resource names: validation and resolution.
 
 Rules: ROS wiki, "Names"; where it and the clients differ, roscpp's ``names.cpp``.
 """
@@ -19,12 +19,12 @@ _NODE_FORBIDDEN = re.compile(r"[^A-Za-z0-9_]")
 def validate_node_name(name: str) -> None:
     """Raise InvalidNameError unless `name` can be a node's base name."""
     if not isinstance(name, str) or not name:
-        raise InvalidNameError(f"a node name must be a non-empty text, got {name!r}")
+        raise InvalidNameError(f"a node name must be a non-empty string, got {name!r}")
     if not name[0].isalpha() and not _NODE_FORBIDDEN.match(name):
         raise InvalidNameError(f"node name {name!r} must begin with a letter")
     found = _NODE_FORBIDDEN.search(name)
     if found:
-        hint = "; give the namespace by itself" if found.group() == "/" else ""
+        hint = "; give the namespace separately" if found.group() == "/" else ""
         raise InvalidNameError(
             f"node name {name!r}: {found.group()!r} at position {found.start()}; only letters, "
             f"digits and '_' are allowed{hint}"
@@ -32,18 +32,18 @@ def validate_node_name(name: str) -> None:
 
 
 def absolute_namespace(text: str, what: str, *, relative: bool = True) -> str:
-    """Return a namespace as nodes have it: absolute, without a slash at its end.
+    """Return a normalized namespace: absolute, without a slash at its end.
 
     Args:
-        text: As written; ``arm`` means ``/arm``, as ROS has it for ROS_NAMESPACE and ``__ns``.
-        what: Where it stands, for the error.
+        text: As written; ``arm`` means ``/arm``, as in ROS_NAMESPACE and ``__ns``.
+        what: Where it was given, for the error.
         relative: Whether the first slash may be missing.
 
     Raises:
         InvalidNameError: It breaks ROS's rules.
     """
     if not isinstance(text, str) or not text:
-        raise InvalidNameError(f"a {what} must be a non-empty text, got {text!r}")
+        raise InvalidNameError(f"a {what} must be a non-empty string, got {text!r}")
     if not relative and not text.startswith("/"):
         raise InvalidNameError(f"{what} {text!r} is not absolute; write {'/' + text!r}")
     _check(what, text, text)
@@ -59,10 +59,10 @@ def expand(name: str, node: str, namespace: str) -> str:
         namespace: The node's absolute namespace.
 
     Raises:
-        InvalidNameError: `name` breaks the rules; the message says where.
+        InvalidNameError: `name` breaks ROS's rules; the message says where.
     """
     if not isinstance(name, str) or not name:
-        raise InvalidNameError(f"a name must be a non-empty text, got {name!r}")
+        raise InvalidNameError(f"a name must be a non-empty string, got {name!r}")
     rest = name[1:] if name.startswith("~") else name
     _check("name", rest, name)
     if not (name[0] in "~/" or name[0].isalpha()):

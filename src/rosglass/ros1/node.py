@@ -1,4 +1,4 @@
-"""The ROS 1 node: everything that :func:`rosglass.connect` hands out for ``ros1://``."""
+"""The ROS 1 node, as :func:`rosglass.connect` returns it for ``ros1://``."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rosglass.comm.handle import check_flag, check_may_wait
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.rclpy_names import check_order
 from rosglass.errors import InvalidNameError
-from rosglass.ros1.actionlib_types import actions
+from rosglass.ros1.actionlib import actions
 from rosglass.ros1.names import absolute_namespace, expand, validate_node_name
 from rosglass.ros1.parameter_server import ParameterServer
 from rosglass.ros1.roscpp_services import RoscppServices
@@ -52,11 +52,11 @@ _log = logging.getLogger("rosglass.ros1")
 
 
 class Core(TcprosCore):
-    """Holds what a node consists of, and resolves its names.
+    """The core of a ROS 1 node, which resolves its names.
 
     Args:
         name: The node's name.
-        url: What it was connected with, for people to read.
+        url: The URL it was connected with, for messages.
         options: Master, own address, remappings.
         library: Where definitions come from; None for the shared library.
 
@@ -89,13 +89,13 @@ class Ros1Node(Node):
 
     Args:
         options: Master, own address, remappings.
-        url: What it was connected with, for people to read.
+        url: The URL it was connected with, for messages.
         name: Base name.
         namespace: Absolute namespace.
         library: Where definitions come from; None for the shared library.
         parameters: Private parameters that the program was started with, by their names.
-        own_services: Whether other nodes find what every ROS 1 node offers: its log, and services
-            for its log levels.
+        own_services: Whether to offer what every ROS 1 node does: its log, and services for its
+            log levels.
 
     Raises:
         InvalidNameError: The name or namespace breaks ROS's rules.
@@ -140,13 +140,13 @@ class Ros1Node(Node):
     def _receive(
         self, subscription: Subscription, type: str | MessageType | None, ignore_local: bool
     ) -> None:
-        """Let a new subscription find its publishers."""
+        """Register a new subscription."""
         asked = type if subscription.type is None and isinstance(type, str) else ""
         self._topics.subscribe(subscription, ignore_local, asked)
 
     def _profile(self, qos: QoS | int, place: str) -> QoS:
         if type(qos) is int and qos == 0:
-            return QoS(history=History.KEEP_ALL)  # as roscpp and rospy have it
+            return QoS(history=History.KEEP_ALL)  # as in roscpp and rospy
         return super()._profile(qos, place)
 
     # -- services --------------------------------------------------------------------------------
@@ -164,10 +164,10 @@ class Ros1Node(Node):
         Args:
             name: Absolute, relative or private service name.
             type: Type name or type; None takes the type that the server announces.
-            qos: Kept for who asks: ROS 1 has none.
-            persistent: Whether all calls go through one connection, one after the other. It saves
-                most of a call's time, and is made anew when it is lost. Otherwise each call has a
-                connection of its own, as ROS 1 does, and calls do not wait for each other.
+            qos: Stored without effect: ROS 1 has none.
+            persistent: Whether all calls use one connection, one after the other, which saves most
+                of a call's time; it is reconnected when it is lost. Otherwise each call has a
+                connection of its own, as in rospy, and calls run in parallel.
         """
         self._core.check_open()
         check_order("create_service_client", name, type)
@@ -222,11 +222,11 @@ class Ros1Node(Node):
             name: Absolute, relative or private action name.
             type: Type name or type.
             execute: Called with each accepted goal.
-            accept: Told the goal; returns whether it is accepted.
-            cancel: Told the goal; returns whether a request to cancel it is accepted.
+            accept: Called with the goal; returns whether it is accepted.
+            cancel: Called with the goal; returns whether a request to cancel it is accepted.
             executor: Where the callbacks run.
             simple: Whether one goal is executed at a time, as by actionlib's SimpleActionServer: a
-                newer one asks it to end, and is executed after it.
+                newer goal preempts it, and is executed after it.
         """
         from rosglass.comm.action_server import ActionServer  # noqa: PLC0415
         from rosglass.ros1.actionlib_server import ActionlibServer  # noqa: PLC0415
@@ -251,13 +251,13 @@ class Ros1Node(Node):
 
     @property
     def parameter_server(self) -> ParameterServer:
-        """The master's parameter server: every parameter, under whatever name."""
+        """The master's parameter server, with all parameters of all nodes."""
         return self._parameter_server
 
     def create_parameter_client(self, node: str | NodeName) -> ParameterClient:
         """Return a client of another node's parameters; `node` is its full name.
 
-        Any other absolute namespace will do, too.
+        `node` may be any other absolute namespace, too.
 
         Raises:
             InvalidNameError: The name breaks ROS's rules.
@@ -278,7 +278,7 @@ class Ros1Node(Node):
 
     @property
     def address(self) -> str:
-        """Host or address under which others reach this node."""
+        """Host or address under which other nodes reach this one."""
         return self._core.address[0]
 
     def resolve(self, name: str) -> str:
@@ -298,7 +298,7 @@ class Ros1Node(Node):
     def services(self) -> dict[str, list[str]]:
         """Return every service in the graph with its type.
 
-        Only a service's server knows its type: the first time, the servers are asked in the
+        Only a service's server knows its type: the first call probes the servers in the
         background, and the graph changes as they answer.
         """
         return self._services.listing()
@@ -308,18 +308,18 @@ class Ros1Node(Node):
         return self._topics.publishers(self.resolve(topic))
 
     def ask_publishers(self, topic: str, timeout: float = 3.0) -> list[EndpointInfo]:
-        """Ask the publishers of a topic for its md5 sum, and whether they latch; wait for it.
+        """Request md5 sum and latching from the publishers of a topic; waits for the answers.
 
-        The master does not know that, and :meth:`publishers` has it only of those to which this
-        node is connected. Asking is connecting for a moment, without receiving anything.
+        The master does not know them, and :meth:`publishers` returns them only for connected
+        publishers. This connects for a moment, without receiving messages.
 
         Args:
             topic: Absolute, relative or private topic name.
-            timeout: Seconds to wait; who has not answered by then is returned without.
+            timeout: Seconds to wait; later answers are missing in the result.
 
         Raises:
-            ConversionError: The time is none.
-            UnsupportedError: Called in a thread that receives.
+            ConversionError: The timeout is not a number of seconds.
+            UnsupportedError: Called in a thread that receives messages.
         """
         full = self.resolve(topic)
         self._core.check_open()
@@ -335,19 +335,19 @@ class Ros1Node(Node):
         node: str | NodeName | None = None,
         timeout: float | None = 5.0,
     ) -> Promise[MessageType | ServiceType | ActionType]:
-        """Ask for a type; see :meth:`rosglass.comm.Node.fetch_type_async`."""
-        from rosglass.ros1.type_probe import fetch  # noqa: PLC0415 - for those who ask only
+        """Fetch a type from the graph; see :meth:`rosglass.comm.Node.fetch_type_async`."""
+        from rosglass.ros1.type_discovery import fetch  # noqa: PLC0415 - for those who ask only
 
         self._core.check_open()
         owner = "" if node is None else self._node_name(node)
         return fetch(self._core, self._topics, self._services, name, hash, owner, timeout)
 
     def service_servers(self, name: str) -> list[EndpointInfo]:
-        """Return the server of a service, with its type once it has told it."""
+        """Return the server of a service, with its type once that is known."""
         return self._services.described(super().service_servers(name))
 
     def endpoints(self, node: str | NodeName) -> list[EndpointInfo]:
-        """Return what a node publishes, subscribes and serves; none when it is unknown."""
+        """Return a node's publishers, subscriptions and services; empty for an unknown node."""
         return self._services.described(super().endpoints(node))
 
     def _topic_names(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""What a ``ros1://`` URL, the environment and a program's arguments say about a node."""
+"""A ROS 1 node's options, from its ``ros1://`` URL, the environment and program arguments."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ _OPTIONS = ("anonymous", "ip", "slave_port", "tcpros_port")
 
 @dataclass(frozen=True)
 class Ros1Options(TcprosOptions):
-    """How a node takes part in a ROS 1 graph.
+    """A node's options.
 
     Attributes:
-        anonymous: Whether something is to be appended to the node's name that makes it unique.
-        arguments: What the program was told.
+        anonymous: Whether to append a suffix to the node's name that makes it unique.
+        arguments: The program's ROS arguments.
     """
 
     anonymous: bool = False
@@ -45,13 +45,12 @@ class Ros1Options(TcprosOptions):
         env: Mapping[str, str] = os.environ,
         arguments: Arguments = NO_ARGUMENTS,
     ) -> Ros1Options:
-        """Return what a URL says, what the arguments say, and the environment about the rest.
+        """Read a URL, with the arguments and then the environment for what it leaves out.
 
         Args:
             url: ``ros1://host:port?ip=...``; without host, ROS_MASTER_URI, or this machine.
-            env: ROS_MASTER_URI, ROS_IP and ROS_HOSTNAME in it count.
-            arguments: They win over the environment; the URL is what somebody asked for most
-                expressly, and wins over both.
+            env: ROS_MASTER_URI, ROS_IP and ROS_HOSTNAME are used.
+            arguments: They override the environment; the URL overrides both.
 
         Raises:
             ArgumentError: A part of the URL or an environment variable is not valid.
@@ -65,7 +64,7 @@ class Ros1Options(TcprosOptions):
         if parts.path not in ("", "/") or parts.fragment or "@" in parts.netloc or port == 0:
             raise ArgumentError("url", url, _EXAMPLE)
         if " " in host or not host.isprintable():
-            raise ArgumentError("url", url, f"{_EXAMPLE} (no host is named {host!r})")
+            raise ArgumentError("url", url, f"{_EXAMPLE} ({host!r} is not a host)")
         options = _options(parts.query, url)
         if host or port:
             master = f"http://{bracketed(host or 'localhost')}:{port or _PORT}"
@@ -79,15 +78,15 @@ class Ros1Options(TcprosOptions):
         if not master.startswith("http://"):
             raise ArgumentError(source, master, "a URI such as http://robot:11311")
         if "ip" in options:
-            address, told = check_host(options["ip"], "url option ip"), "ip"
+            address, given_by = check_host(options["ip"], "url option ip"), "ip"
         elif arguments.address:
-            address, told = arguments.address, "__ip"
+            address, given_by = arguments.address, "__ip"
         else:
-            address, told = given_address(env)
+            address, given_by = given_address(env)
         return cls(
             master.rstrip("/"),
             address,
-            told,
+            given_by,
             _port(options, "tcpros_port") or arguments.tcpros_port,
             _port(options, "slave_port"),
             _flag(options, "anonymous"),
@@ -98,8 +97,8 @@ class Ros1Options(TcprosOptions):
         """Return the node's base name.
 
         Args:
-            name: The program's own choice, which ``__name`` replaces; None for a name that nobody
-                else has: in ROS, a second node of a name ends the first one.
+            name: The program's own choice, which ``__name`` replaces; None for a unique name: in
+                ROS, a second node of the same name shuts the first one down.
         """
         if self.arguments.name:
             return self.arguments.name
@@ -109,9 +108,9 @@ class Ros1Options(TcprosOptions):
         """Return the node's namespace.
 
         Args:
-            given: The program's own choice, which ``__ns`` replaces; None and ``/``, where names
-                begin anyway, for ROS_NAMESPACE.
-            env: ROS_NAMESPACE in it counts.
+            given: The program's own choice, which ``__ns`` replaces; None and ``/`` for
+                ROS_NAMESPACE.
+            env: ROS_NAMESPACE is used.
 
         Raises:
             InvalidNameError: The namespace breaks ROS's rules.

@@ -1,6 +1,6 @@
-"""The parameters in one namespace of ROS 1's parameter server: a node's private ones, as a rule.
+"""A node's parameters: those in its namespace on ROS 1's parameter server.
 
-Our own node's and other nodes' alike: every node may set each of them, to values of any type.
+Every node may set the parameters of every other one, to values of any type.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 __all__ = ["RemoteNamespace", "Ros1Parameters"]
 
-#: How long the master may take to answer, whatever longer time is given.
+#: How long the master may take to answer, even if the caller's timeout is longer.
 _TIMEOUT_S = 5.0
 _SCALARS = {
     bool: ParameterType.BOOL,
@@ -56,7 +56,7 @@ _ARRAYS = {
 
 
 class ParameterNamespace:
-    """Reads and follows the parameters in a namespace.
+    """A namespace of the parameter server.
 
     Args:
         server: The parameter server.
@@ -75,7 +75,7 @@ class ParameterNamespace:
         if name[0] in "/~":
             raise ParameterError(
                 f"{self.name}: {name!r} is not the name of a parameter in this namespace; leave "
-                f"{name[0]!r} out, or ask node.parameter_server, which knows all names"
+                f"{name[0]!r} out, or use node.parameter_server, which has all names"
             )
         if "." in name:
             raise ParameterError(
@@ -85,30 +85,21 @@ class ParameterNamespace:
         return f"{self.name.rstrip('/')}/{name}"
 
     def tree(self, timeout: float) -> dict[str, Any]:
-        """Return all as nested dicts; none when the namespace is not there."""
+        """Return its parameters as nested dicts; empty when the namespace does not exist."""
         found = self.server.get(self.name, None, timeout=timeout)
         return found if isinstance(found, dict) else {}
 
     def describe(self, name: str, value: Any) -> ParameterDescriptor:
-        """Return what is known about a parameter, which is its type."""
+        """Return a parameter's descriptor, which has only its type."""
         kind = type_of(value)
         text = ""
         if value is not None and kind is ParameterType.NOT_SET:
             text = f"A {'namespace' if isinstance(value, dict) else type(value).__name__}."
         return ParameterDescriptor(name, kind, text, dynamic_typing=True)
 
-    def watch(
-        self,
-        callback: Callable[[ParameterEvent], None],
-        executor: Executor,
-        before: dict[str, Any] | None,
-    ) -> Handle:
-        """Call `callback` with each change since the values `before`, or since they are known."""
-        return _Changes(self, callback, executor, before)
-
 
 class _Changes(Handle):
-    """Calls back with what has changed between two values of a namespace."""
+    """Calls back with each change of a namespace since `before`, or since it is known."""
 
     def __init__(
         self,
@@ -142,15 +133,15 @@ class _Changes(Handle):
 class Ros1Parameters(Parameters):
     """A node's own parameters, ``~name``; :attr:`Node.parameters`.
 
-    They live on the master's parameter server, where every node can set them, to values of any
-    type: nothing can be refused, and no parameter is read-only, has a range or keeps its type.
-    Groups are namespaces: ``camera/exposure``. Values may be what only ROS 1 has: namespaces as
-    dicts, lists of several types, dates. Each method asks the master and waits up to 5 s for it;
-    :attr:`Ros1Node.parameter_server` can do so without waiting.
+    They are on the master's parameter server, where every node can set them, to values of any type:
+    nothing can be refused, and no parameter is read-only, has a range or keeps its type. Groups are
+    namespaces: ``camera/exposure``. Values may be of types that only ROS 1 has: namespaces as
+    dicts, lists of mixed types, dates. Each method calls the master and waits up to 5 s for it;
+    :attr:`Ros1Node.parameter_server` has methods that do not wait.
 
     Raises:
         ConnectionLostError: The master does not answer; from every method.
-        InvalidNameError: A name breaks ROS's rules; from every method that takes one.
+        InvalidNameError: A name breaks ROS's rules; from every method with a name.
     """
 
     def __init__(self, core: TcprosCore, server: ParameterServer) -> None:
@@ -169,15 +160,15 @@ class Ros1Parameters(Parameters):
         default: ParameterValue = None,
         descriptor: ParameterDescriptor | None = None,
     ) -> ParameterValue:
-        """Return a parameter's value; where it has none, `default` is set, for others to see.
+        """Return a parameter's value; sets it to `default` if it has none.
 
         Args:
             name: Its name.
-            default: Its value unless the parameter server has another one.
-            descriptor: A description for :meth:`describe`; others cannot read it.
+            default: Its value unless the parameter server has one.
+            descriptor: A description for :meth:`describe`; other nodes cannot read it.
 
         Raises:
-            ParameterError: It is declared already, or can be no parameter's value.
+            ParameterError: It is declared already, or the value is not valid for a parameter.
             UnsupportedError: The descriptor has a range, or makes it read-only.
         """
         self._core.check_open()
@@ -188,7 +179,7 @@ class Ros1Parameters(Parameters):
         if descriptor.range is not None or descriptor.read_only:
             what = "a range" if descriptor.range is not None else "read-only parameters"
             raise UnsupportedError(
-                f"parameter {full}: ROS 1's parameter server knows no {what.removeprefix('a ')}: "
+                f"parameter {full}: ROS 1's parameter server has no {what.removeprefix('a ')}: "
                 "every node may set everything; check the value where it is used"
             )
         if default is not None:
@@ -206,9 +197,9 @@ class Ros1Parameters(Parameters):
         return default if value is None else value
 
     def undeclare(self, name: str) -> None:
-        """Forget and delete a parameter; raises ParameterError when it is neither there nor known.
+        """Delete a parameter; raises ParameterError when it is neither declared nor set.
 
-        It may be gone from the server already: others can delete it, too.
+        It may be deleted already: other nodes can do so, too.
         """
         self._core.check_open()
         declared = self._declared.pop(name, None)
@@ -217,7 +208,7 @@ class Ros1Parameters(Parameters):
             self._server.delete(full)
 
     def get(self, name: str) -> ParameterValue:
-        """Return its value, None for one that is declared and not set.
+        """Return a parameter's value; None for one that is declared and not set.
 
         Raises:
             ParameterError: It is neither declared nor set; the message names similar ones.
@@ -233,7 +224,7 @@ class Ros1Parameters(Parameters):
         """Set parameters one after the other, declared or not; None deletes.
 
         Raises:
-            ParameterError: A value can be no parameter's; then none is set.
+            ParameterError: A value is not valid for a parameter; then none is set.
         """
         self._core.check_open()
         check_values(values, self.node)
@@ -248,7 +239,7 @@ class Ros1Parameters(Parameters):
                 self._server.delete(full)
 
     def describe(self, name: str) -> ParameterDescriptor:
-        """Return its type, and what it was declared with; errors as of :meth:`get`."""
+        """Return a parameter's type and declaration; raises what :meth:`get` does."""
         found = self._namespace.describe(name, self.get(name))
         declared = self._declared.get(name)
         if declared is None:
@@ -259,31 +250,32 @@ class Ros1Parameters(Parameters):
     def names(self) -> list[str]:
         """Return the names that are set or declared, sorted."""
         self._core.check_open()
-        there = (name for name, _ in flat(self._namespace.tree(_TIMEOUT_S)))
-        return sorted({*there, *self._declared})
+        known = (name for name, _ in flat(self._namespace.tree(_TIMEOUT_S)))
+        return sorted({*known, *self._declared})
 
     def on_set(self, validate: Callable[[Mapping[str, ParameterValue]], str]) -> Handle:
-        """Raise UnsupportedError: a node is not asked before its parameters are set."""
+        """Raise UnsupportedError: ROS 1 cannot validate values before they are set."""
         raise UnsupportedError(
-            f"{self.node}: ROS 1's parameter server takes every value without asking "
+            f"{self.node}: ROS 1's parameter server accepts every value without calling "
             f"{getattr(validate, '__name__', validate)!r}; on_change() reports it afterwards"
         )
 
     def on_change(
         self, callback: Callable[[ParameterEvent], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` with each change, of any node's making; quick ones may be merged."""
+        """Call `callback` with each change, by any node; quick ones may be merged."""
         self._core.check_open()
         chosen = executor or self._core.dispatcher
         check_plain(callback, f"{self.node}: on_change()")
-        return self._namespace.watch(callback, chosen, dict(flat(self._namespace.tree(_TIMEOUT_S))))
+        before = dict(flat(self._namespace.tree(_TIMEOUT_S)))
+        return _Changes(self._namespace, callback, chosen, before)
 
     def load(self, path: str | PathLike[str]) -> None:
-        """Set what a file has, as ``rosparam load FILE /node`` does; declared or not.
+        """Set the parameters of a file, as ``rosparam load FILE /node`` does; declared or not.
 
         Raises:
-            ParameterError: The file cannot be read or is empty, or has a value that can be no
-                parameter's; nothing is set then.
+            ParameterError: The file cannot be read or is empty, or a value is not valid for a
+                parameter; then nothing is set.
         """
         self._core.check_open()
         if not self._server.load(path, self.node):
@@ -304,7 +296,7 @@ class RemoteNamespace(RemoteParameters):
     """Another node's parameters: those in its namespace on the parameter server.
 
     Args:
-        core: The node that asks.
+        core: The calling node.
         server: The parameter server.
         node: Full name of the other node, or any absolute namespace.
     """
@@ -321,11 +313,11 @@ class RemoteNamespace(RemoteParameters):
 
     @property
     def ready(self) -> bool:
-        """Whether the master, which keeps the parameters, is there."""
+        """Whether the master, which has the parameters, is connected."""
         return self._core.status().state is ConnectionState.CONNECTED
 
     def wait_for_server(self, timeout: float | None = None) -> bool:
-        """Wait for the master; return whether it is there."""
+        """Wait for the master; return whether it is connected."""
         return self._readiness.wait(timeout)
 
     def find(self, prefixes: list[str], depth: int, deadline: Deadline) -> list[str]:
@@ -336,7 +328,7 @@ class RemoteNamespace(RemoteParameters):
         return [name for name in names if any(_below(name, p, depth) for p in prefixes)]
 
     def values(self, names: list[str] | None, deadline: Deadline) -> dict[str, ParameterValue]:
-        """Return values by name; None for what is not set."""
+        """Return values by name; None for unset parameters."""
         if names is None:
             return dict(sorted(flat(self._namespace.tree(_seconds(deadline)))))
         wanted = {name: self._namespace.full(name) for name in names}
@@ -349,12 +341,12 @@ class RemoteNamespace(RemoteParameters):
     def descriptors(
         self, names: list[str] | None, deadline: Deadline
     ) -> dict[str, ParameterDescriptor]:
-        """Return types by name; ROS 1 knows no more."""
+        """Return descriptors by name, which have only the types."""
         found = self.values(names, deadline)
         return {name: self._namespace.describe(name, value) for name, value in found.items()}
 
     def set(self, values: Mapping[str, ParameterValue], deadline: Deadline) -> dict[str, SetResult]:
-        """Set parameters one by one, None deletes; return what the master says to each."""
+        """Set parameters one by one, None deletes; return the result of each."""
         wanted = {name: self._namespace.full(name) for name in values}
         for name, full in wanted.items():
             self._server.resolve(full, strict=True)
@@ -366,7 +358,7 @@ class RemoteNamespace(RemoteParameters):
         """Set one parameter; raises UnsupportedError for several."""
         if len(values) > 1:
             raise UnsupportedError(
-                f"{self.node}: ROS 1's parameter server sets one parameter after the other; take "
+                f"{self.node}: ROS 1's parameter server sets one parameter at a time; use "
                 "set(), or node.parameter_server.set() with a dict, which replaces a namespace"
             )
         return next(iter(self.set(values, deadline).values()), SetResult(True))
@@ -374,21 +366,21 @@ class RemoteNamespace(RemoteParameters):
     def watch(
         self, callback: Callable[[ParameterEvent], None], executor: Executor | None
     ) -> Handle:
-        """Call `callback` with each change; waits for the values that they are compared with."""
+        """Call `callback` with each change; waits for the values to compare with."""
         self._check_open()
         before = None
-        # Without them, changes count from the master's first answer: when there is no master yet,
-        # and in threads that must not wait.
+        # Without them, when there is no master yet or in threads that must not wait, changes are
+        # those since the master's first answer.
         with suppress(ConnectionLostError, UnsupportedError):
             before = dict(flat(self._namespace.tree(_TIMEOUT_S)))
-        made = self._namespace.watch(callback, executor or self._core.dispatcher, before)
+        made = _Changes(self._namespace, callback, executor or self._core.dispatcher, before)
         self._watches.append(made)
         if self._closed:  # just now, by another thread
             self.close()
         return made
 
     def load(self, path: str | PathLike[str], deadline: Deadline) -> list[str]:
-        """Set what a file has, as ``rosparam load FILE /node`` does; nothing if it is wrong."""
+        """Set the parameters of a file, as ``rosparam load FILE /node`` does; none if one fails."""
         prefix = self.node.rstrip("/") + "/"
         names = self._server.load(path, self.node, timeout=_seconds(deadline))
         if not names:
@@ -402,7 +394,7 @@ class RemoteNamespace(RemoteParameters):
         rosparam_files.write(path, self._namespace.tree(_seconds(deadline)))
 
     def close(self) -> None:
-        """Watch no more; safe to call twice."""
+        """End all subscriptions; safe to call twice."""
         self._closed = True
         while self._watches:
             self._watches.pop().close()
@@ -425,7 +417,7 @@ class RemoteNamespace(RemoteParameters):
 
 
 def type_of(value: Any) -> ParameterType:
-    """Return a value's type, NOT_SET for what only ROS 1 has: namespaces, mixed lists, dates."""
+    """Return a value's type; NOT_SET for those only in ROS 1: namespaces, mixed lists, dates."""
     if isinstance(value, list):
         kinds = {type(item) for item in value}
         return (
@@ -453,6 +445,6 @@ def _at(tree: Any, name: str) -> Any:
 
 
 def _seconds(deadline: Deadline) -> float:
-    """Return how long the master may take to answer."""
+    """Return the timeout of a call before a deadline."""
     left = deadline.left()
     return _TIMEOUT_S if left is None else min(left, _TIMEOUT_S)

@@ -1,4 +1,4 @@
-"""The parameter server, which is a part of ROS 1's master: one tree of settings for all nodes.
+"""The parameter server of ROS 1's master: one tree of settings for all nodes.
 
 API: ROS wiki, "ROS/Parameter Server API" and "ROS/Slave_API" (paramUpdate); names: "Names"; types:
 "Parameter Server", section 3: 32-bit integers, booleans, strings, doubles, ISO 8601 dates, lists,
@@ -55,20 +55,20 @@ __all__ = [
 
 _log = logging.getLogger("rosglass.ros1")
 _T = TypeVar("_T")
-#: Stands for "no default", for None is one.
+#: No default: None is a valid one.
 _REQUIRED: Any = object()
-#: How long the master may take to answer, and the shortest time that asks at all.
+#: How long the master may take to answer, and the shortest timeout of a call.
 _TIMEOUT_S, _MIN_TIMEOUT_S = 5.0, 0.001
-#: After which the master is asked again, should a change not have reached us.
+#: Time after which a followed parameter is read again, in case a notification was lost.
 _REREAD_S = 10.0
 #: Longest sleep of a thread that waits.
 _WAIT_SLICE_S = 0.1
 _CONTROL = re.compile("[^\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _LOWEST, _GREATEST = -(2**31), 2**31 - 1
-#: XML 1.0, section 2.2; a carriage return is legal there, but arrives as a line feed (2.11).
+#: XML 1.0, section 2.2; a carriage return is legal there, but is received as a line feed (2.11).
 _NOT_CARRIED = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-#: Nothing that people write is nested deeper; a list that contains itself is.
-_DEEPEST = 50
+#: Levels of a value, far above any written by hand; a list that contains itself has more.
+_MAX_DEPTH = 50
 _DATE = "%Y%m%dT%H:%M:%S"
 
 
@@ -80,13 +80,13 @@ class ParameterServer(Handle):
     ``/arm/speed``, and ``get("/arm")`` returns it and whatever else is in ``/arm``.
 
     Names are absolute, relative to the node's namespace, or private (``~gain``), and may be
-    remapped. Whatever is on the server, :meth:`names` and :meth:`get` take, even names against
-    ROS's rules; what is set keeps to them.
+    remapped. :meth:`names` and :meth:`get` accept any name that is on the server, even one that
+    breaks ROS's rules; :meth:`set` does not.
 
-    Every method that asks the master takes `timeout`, seconds to wait for each of its answers, and
-    raises ConnectionLostError when there is none, NodeClosedError, and InvalidNameError. Those
-    whose names end in ``_async`` return a :class:`rosglass.comm.Promise` at once, for user
-    interfaces, and for callbacks in threads that must not wait; the master gets them in order.
+    Every method that calls the master has `timeout`, seconds to wait for each answer, and raises
+    ConnectionLostError when there is none, NodeClosedError, and InvalidNameError. Those whose names
+    end in ``_async`` return a :class:`rosglass.comm.Promise` at once, for user interfaces, and for
+    callbacks in threads that must not wait; the master receives their calls in order.
 
     Args:
         core: The node.
@@ -136,11 +136,11 @@ class ParameterServer(Handle):
     def search(self, name: str, *, timeout: float = _TIMEOUT_S) -> str | None:
         """Return the closest parameter of that name, from the node's private namespace upwards.
 
-        As in ROS, only the first part of `name` is looked for: what is found of ``a/b`` is where
-        ``a`` is, with or without ``b``.
+        As in ROS, only the first part of `name` is searched: ``a/b`` is found where ``a`` is, with
+        or without ``b``.
 
         Args:
-            name: A relative name; an absolute or private one is only looked for where it says.
+            name: A relative name; an absolute or private one is only looked up itself.
             timeout: Seconds to wait.
 
         Returns:
@@ -166,7 +166,7 @@ class ParameterServer(Handle):
         """Set a parameter; a dict replaces the whole namespace of that name.
 
         Raises:
-            ParameterError: The value can be no parameter's; nothing is sent.
+            ParameterError: The value is not valid for a parameter; nothing is sent.
         """
         full = self.resolve(name, strict=True)
         if full == "/" and not isinstance(value, dict):
@@ -175,7 +175,7 @@ class ParameterServer(Handle):
         self._change("setParam", full, wire, timeout=timeout)
 
     def delete(self, name: str, *, timeout: float = _TIMEOUT_S) -> None:
-        """Delete a parameter, or a namespace with all that is in it.
+        """Delete a parameter, or a namespace with its parameters.
 
         Raises:
             ParameterError: It is not set, or it is the root, which cannot be deleted.
@@ -191,7 +191,7 @@ class ParameterServer(Handle):
             hint = self._similar(full, timeout)
             raise ParameterError(f"parameter {full} is not set{hint}") from None
 
-    # -- following -------------------------------------------------------------------------------
+    # -- subscribing -----------------------------------------------------------------------------
 
     def subscribe(
         self,
@@ -201,19 +201,19 @@ class ParameterServer(Handle):
     ) -> ParameterSubscription:
         """Follow a parameter, or a namespace; returns at once, before the master has answered.
 
-        The master is asked again after it was restarted, so that the value is always what it has.
+        It is read again after a restart of the master, so that the value is always the current one.
 
         Args:
             name: Its name; it need not be set yet.
-            callback: Called with the value, None when it is not set: once when it is known first,
-                and after each change. Changes in quick succession may be merged.
+            callback: Called with the value, None when it is not set: first when it is known, and
+                after each change. Changes in quick succession may be merged.
             executor: Where `callback` runs; None for the node's own dispatcher thread.
         """
         self._check_open()
         return self._watches.subscribe(self.resolve(name), callback, executor)
 
     def changed(self, name: str) -> None:
-        """Look at a name that the master says has changed; for the node."""
+        """Read a parameter that has changed; called with the master's notifications."""
         self._reread([name.rstrip("/") or "/"])
 
     # -- files -----------------------------------------------------------------------------------
@@ -221,21 +221,21 @@ class ParameterServer(Handle):
     def load(
         self, path: str | PathLike[str], namespace: str = "", *, timeout: float = _TIMEOUT_S
     ) -> list[str]:
-        """Set what a file has, as ``rosparam load`` does; what else is there stays.
+        """Set the parameters of a file, as ``rosparam load`` does; others are not changed.
 
-        The node's own subscriptions are called back once, when all is set.
+        The node's own subscriptions are called back once, when all are set.
 
         Args:
-            path: A YAML file; ``_ns``, ``!degrees``, ``!radians``, ``deg()``, ``rad()`` count.
-            namespace: Where to; the node's namespace unless given.
+            path: A YAML file, with ``_ns``, ``!degrees``, ``!radians``, ``deg()`` and ``rad()``.
+            namespace: Target namespace; the node's own unless given.
             timeout: Seconds to wait for each answer.
 
         Returns:
-            The absolute names of what was set.
+            The absolute names of the parameters.
 
         Raises:
-            ParameterError: The file cannot be read, or a value can be no parameter's; nothing is
-                set then.
+            ParameterError: The file cannot be read, or a value is not valid for a parameter; then
+                nothing is set.
         """
         from rosglass.ros1 import rosparam_files  # noqa: PLC0415 - yaml
 
@@ -259,10 +259,10 @@ class ParameterServer(Handle):
     def save(
         self, path: str | PathLike[str], namespace: str = "/", *, timeout: float = _TIMEOUT_S
     ) -> None:
-        """Write a namespace into a file that can be loaded, as ``rosparam dump`` does.
+        """Write a namespace into a file for :meth:`load`, as ``rosparam dump`` does.
 
         Raises:
-            ParameterError: It is not there, or the file cannot be written.
+            ParameterError: The namespace does not exist, or the file cannot be written.
         """
         from rosglass.ros1 import rosparam_files  # noqa: PLC0415 - yaml
 
@@ -271,12 +271,12 @@ class ParameterServer(Handle):
     # -- without waiting -------------------------------------------------------------------------
 
     def get_async(self, name: str, default: Any = _REQUIRED) -> Promise[Any]:
-        """Ask for a parameter; see :meth:`get`."""
+        """Read a parameter; see :meth:`get`."""
         self.resolve(name)
         return self.later(f"parameter {name}", lambda: self.get(name, default))
 
     def set_async(self, name: str, value: Any) -> Promise[None]:
-        """Set a parameter; see :meth:`set`. What is wrong with the value is raised at once."""
+        """Set a parameter; see :meth:`set`. Raises errors of the value at once."""
         to_wire(self.resolve(name, strict=True), value)
         return self.later(f"parameter {name}", lambda: self.set(name, value))
 
@@ -286,31 +286,31 @@ class ParameterServer(Handle):
         return self.later(f"parameter {name}", lambda: self.delete(name))
 
     def has_async(self, name: str) -> Promise[bool]:
-        """Ask whether a parameter is there; see :meth:`has`."""
+        """Check whether a parameter is set; see :meth:`has`."""
         self.resolve(name)
         return self.later(f"parameter {name}", lambda: self.has(name))
 
     def search_async(self, name: str) -> Promise[str | None]:
-        """Search a parameter; see :meth:`search`."""
+        """Search for a parameter; see :meth:`search`."""
         return self.later(f"parameter {name}", lambda: self.search(name))
 
     def names_async(self, namespace: str = "/") -> Promise[list[str]]:
-        """Ask for names; see :meth:`names`."""
+        """List names; see :meth:`names`."""
         self.resolve(namespace)
         return self.later(f"parameters in {namespace}", lambda: self.names(namespace))
 
     def later(self, what: str, job: Callable[[], _T]) -> Promise[_T]:
-        """Run `job`, which waits for the master, after what was asked before; return at once."""
+        """Run `job`, which waits for the master, after earlier ones; returns at once."""
         self._check_open()
         return self._calls.add(what, job)
 
     # -- the node's ------------------------------------------------------------------------------
 
     def begin(self) -> None:
-        """Set the parameters that the program was started with, in its private namespace.
+        """Set the program's start parameters, in its private namespace.
 
-        The first time they win over what is set, as in ROS; once the master was restarted, they
-        are set again where they are missing.
+        The first time they override existing ones, as in ROS; after a restart of the master, only
+        missing ones are set.
 
         Raises:
             ConnectionLostError: The master does not answer.
@@ -327,7 +327,7 @@ class ParameterServer(Handle):
 
         Args:
             name: Absolute, relative or private.
-            strict: Whether absolute names must keep to ROS's rules.
+            strict: Whether absolute names must follow ROS's rules.
 
         Raises:
             InvalidNameError: The name breaks ROS's rules.
@@ -341,11 +341,11 @@ class ParameterServer(Handle):
             return re.sub(r"/{2,}", "/", name).rstrip("/")
 
     def close(self) -> None:
-        """Give up what was asked without waiting; safe to call twice."""
+        """Fail the pending promises; safe to call twice."""
         self._calls.close()
 
     def _leaves(self, place: str, value: Any) -> Iterator[tuple[str, Any]]:
-        """Yield name and wire value of each single parameter that a file has for `place`."""
+        """Yield name and wire value of each parameter that a file has for `place`."""
         if not isinstance(value, dict):
             if place == "/":
                 raise ParameterError("names of parameters are missing; write 'name: value'")
@@ -363,7 +363,7 @@ class ParameterServer(Handle):
         return sorted(str(name) for name in self._call("getParamNames", timeout=timeout))
 
     def _similar(self, full: str, timeout: float) -> str:
-        """Return a hint at a parameter or namespace that may be meant."""
+        """Return a hint at parameters and namespaces with a similar name."""
         names = self._known(timeout)
         parts = [name.split("/") for name in names]
         spaces = {"/".join(p[:end]) for p in parts for end in range(2, len(p))}
@@ -380,7 +380,7 @@ class ParameterServer(Handle):
             raise ParameterError(f"parameter {full}: {error}") from error
 
     def _reread(self, names: list[str]) -> None:
-        """Read what is followed of these: the master notifies all nodes but the one that set it."""
+        """Read the watches of these names: the master notifies all nodes but the caller."""
         for watch in {watch for name in names for watch in self._watches.touched(name)}:
             watch.read_soon()
 
@@ -418,7 +418,7 @@ class MasterCallQueue:
         """Run `job`, which waits for the master; return the promise of its result.
 
         Args:
-            what: What is asked for, for messages.
+            what: What is called for, for messages.
             job: Calls the master.
         """
         made: Promise[_T] = Promise(
@@ -480,7 +480,7 @@ class MasterCallQueue:
 
 
 class StartParameters(Member):
-    """Lets the master know the parameters that a program was started with, when it is there.
+    """Sets the program's start parameters once the master is there.
 
     Args:
         server: The node's view of the parameter server.
@@ -490,21 +490,21 @@ class StartParameters(Member):
         self._server = server
 
     def __repr__(self) -> str:
-        return "the parameters that the program was started with"
+        return "the program's start parameters"
 
     def register(self, _: Master) -> None:
-        """Set them."""
+        """Set the parameters."""
         self._server.begin()
 
     def close(self) -> None:
-        """Leave them as they are: other nodes may read them."""
+        """Do nothing: the parameters stay, as other nodes may read them."""
 
 
-# -- following ---------------------------------------------------------------------------------
+# -- subscriptions -----------------------------------------------------------------------------
 
 
 class ParameterSubscription(Handle):
-    """A parameter, or a namespace of them, as the master has it; made by :meth:`subscribe`.
+    """The value of a parameter or namespace; made by :meth:`ParameterServer.subscribe`.
 
     Attributes:
         name: Its absolute name.
@@ -530,19 +530,19 @@ class ParameterSubscription(Handle):
 
     @property
     def is_set(self) -> bool:
-        """Whether it is set, as far as is known."""
+        """Whether it is known and set."""
         return self.known and self._value is not None
 
     @property
     def value(self) -> Any:
-        """What it is, a dict for a namespace; None while it is not set, or not known yet.
+        """The value, a dict for a namespace; None while it is not set or unknown.
 
-        It stays as it is while the master is away, which :meth:`Node.status` says.
+        It is kept while the master is unreachable, which :meth:`Node.status` reports.
         """
         return self._value
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait up to `timeout` seconds, None for ever, until it is known; return whether it is."""
+        """Wait up to `timeout` seconds, None for no limit; return whether it is known."""
         timeout = check_timeout(timeout, self.name)
         deadline = None if timeout is None else time.monotonic() + timeout
         while not (self.known or self._closed):
@@ -561,7 +561,7 @@ class ParameterSubscription(Handle):
         self.listeners.notify(value)
 
     def close(self) -> None:
-        """Follow it no more; safe to call twice."""
+        """Stop following it; safe to call twice."""
         if not self._closed:
             self._closed = True
             self.listeners.clear()
@@ -629,7 +629,7 @@ class ParameterWatches:
 
 
 class ParameterWatch(Member):
-    """A name that the node follows: registered with the master like a subscription."""
+    """The node's subscription to one parameter or namespace."""
 
     def __init__(self, core: TcprosCore, watches: ParameterWatches, name: str) -> None:
         self.name = name
@@ -732,7 +732,7 @@ class ParameterWatch(Member):
                 subscription._on_value(value)
 
     def close(self) -> None:
-        """Follow it no more; safe to call twice."""
+        """Unsubscribe; safe to call twice."""
         if not self._closed:
             self._closed = True
             for subscription in self._subscriptions:
@@ -748,7 +748,7 @@ def _within(name: str, namespace: str) -> bool:
 
 
 def to_wire(name: str, value: object) -> Any:
-    """Return a value as the parameter server takes it, a copy.
+    """Convert a value to one that XML-RPC carries; returns a copy.
 
     Numpy's scalars and arrays, tuples, bytearrays and the like become plain values and lists.
 
@@ -757,13 +757,13 @@ def to_wire(name: str, value: object) -> Any:
         value: A bool, int, float, str, bytes, datetime, or a list or dict of these.
 
     Raises:
-        ParameterError: The parameter server cannot hold it; the message says why, and what to do.
+        ParameterError: It is not valid for a parameter; the message says why, and what to do.
     """
     return _to_wire(name, value, 0)
 
 
 def from_wire(value: Any) -> Any:
-    """Return what the parameter server sent as plain Python values."""
+    """Convert a value of the parameter server to plain Python values."""
     if isinstance(value, dict):
         return {str(key): from_wire(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -789,7 +789,7 @@ def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]
 
 
 def pruned(value: Any) -> Any:
-    """Return a value without empty namespaces: the master says "not set" with them, too."""
+    """Return a value without empty namespaces, which the master returns for unset ones."""
     if not isinstance(value, dict):
         return value
     kept = ((key, pruned(item)) for key, item in value.items())
@@ -797,7 +797,7 @@ def pruned(value: Any) -> Any:
 
 
 def same(one: Any, other: Any) -> bool:
-    """Return whether nothing has changed; 1, 1.0 and True are not the same."""
+    """Return whether two values are equal and of the same types, unlike 1, 1.0 and True."""
     if type(one) is not type(other):
         return False
     if isinstance(one, dict):
@@ -808,8 +808,8 @@ def same(one: Any, other: Any) -> bool:
 
 
 def _to_wire(name: str, value: object, depth: int) -> Any:
-    if depth > _DEEPEST:
-        raise ParameterError(f"parameter {name}: nested more than {_DEEPEST} levels deep")
+    if depth > _MAX_DEPTH:
+        raise ParameterError(f"parameter {name}: nested more than {_MAX_DEPTH} levels deep")
     if not isinstance(value, (bool, int, float, str, bytes, bytearray, memoryview, list, tuple)):
         plain = getattr(value, "tolist", None)
         value = value if plain is None else plain()
@@ -820,7 +820,7 @@ def _to_wire(name: str, value: object, depth: int) -> Any:
             raise ParameterError(
                 f"parameter {name}: {value} is beyond the 32 bits of an integer on a ROS 1 "
                 f"parameter server ({_LOWEST} to {_GREATEST}); set it as a float "
-                f"({float(value)!r}) or as a text"
+                f"({float(value)!r}) or as a string"
                 if abs(value) < 1e300
                 else f"parameter {name}: an integer has 32 bits on a ROS 1 parameter server"
             )
@@ -854,7 +854,7 @@ def _text(what: str, text: str) -> str:
     if found.group() == "\r":
         problem = "a carriage return, which XML turns into a line feed; replace '\\r\\n' by '\\n'"
     else:
-        problem = f"{found.group()!r}, which XML cannot carry; set bytes instead, or leave it out"
+        problem = f"{found.group()!r}, which XML cannot carry; set bytes instead, or remove it"
     raise ParameterError(f"{what}: at position {found.start()} there is {problem}")
 
 
@@ -875,6 +875,6 @@ def _date(name: str, value: datetime) -> datetime:
     if value.tzinfo is not None or value.microsecond:
         raise ParameterError(
             f"parameter {name}: dates on a ROS 1 parameter server have whole seconds and no time "
-            f"zone, got {value.isoformat()}; set it as a text, or as seconds"
+            f"zone, got {value.isoformat()}; set it as a string, or as seconds"
         )
     return value

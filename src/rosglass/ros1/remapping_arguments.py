@@ -1,4 +1,4 @@
-"""What a program is told on its command line, as rospy and roscpp read it: ``old:=new``.
+"""ROS arguments of a program's command line, as in rospy and roscpp: ``old:=new``.
 
 Grammar: ROS wiki, "Remapping Arguments"; roscpp's ``init.cpp`` and ``names.cpp``, rospy's
 ``client.py``.
@@ -24,10 +24,10 @@ __all__ = ["NO_ARGUMENTS", "Arguments"]
 
 _log = logging.getLogger("rosglass.ros1")
 _SIGN = ":="
-#: How a name begins: everything else that has the sign in it is somebody else's.
+#: How a name begins: other arguments with the sign are the program's own.
 _BEGINNING = re.compile(r"[A-Za-z~/_]")
 _SPECIAL = ("__name", "__ns", "__ip", "__hostname", "__master", "__log", "__tcpros_server_port")
-#: ROS 2's way to write the same, so that one command line does for both.
+#: ROS 2's syntax, so that one command line works for both.
 _BEGIN, _END = "--ros-args", "--"
 _OPTIONS = {"-r": "", "--remap": "", "-p": "_", "--param": "_"}
 _EXAMPLE = "write e.g. chatter:=talk, _speed:=1.5 or __name:=left"
@@ -35,17 +35,17 @@ _EXAMPLE = "write e.g. chatter:=talk, _speed:=1.5 or __name:=left"
 
 @dataclass(frozen=True)
 class Arguments:
-    """What was said on the command line.
+    """The ROS arguments of a command line.
 
     Attributes:
         name: ``__name``, the node's base name; empty when not given, like all others.
         namespace: ``__ns``, absolute.
-        address: ``__hostname`` or ``__ip``: under what others reach this node.
+        address: ``__hostname`` or ``__ip``: the address to announce.
         master: ``__master``, the master's URI.
         tcpros_port: ``__tcpros_server_port``: where connections are accepted; 0 when not given.
-        rules: Pairs of a name and what to use instead, as written; the last counts.
+        rules: Pairs of a name and its replacement, as written; the last one counts.
         parameters: Values of private parameters, by their names without ``_``.
-        others: The arguments that are not ROS's, in order.
+        others: All other arguments, in order.
     """
 
     name: str = ""
@@ -73,7 +73,7 @@ class Arguments:
         return _Parser(arguments).parse()
 
     def remappings(self, name: str, namespace: str) -> dict[str, str]:
-        """Return new absolute names by absolute names, for a node.
+        """Return the replacement of each remapped absolute name, for a node.
 
         Args:
             name: Its base name.
@@ -84,18 +84,18 @@ class Arguments:
         }
 
 
-#: For a node that was told nothing.
+#: For a node without ROS arguments.
 NO_ARGUMENTS = Arguments()
 
 
 class _Parser:
-    """Goes through a command line once."""
+    """Parses one command line."""
 
     def __init__(self, arguments: Sequence[str]) -> None:
         listed = isinstance(arguments, Sequence) and not isinstance(arguments, (str, bytes))
         if not (listed and all(isinstance(argument, str) for argument in arguments)):
             raise RosArgumentError(
-                "arguments must be a list of texts such as sys.argv, or "
+                "arguments must be a list of strings such as sys.argv, or "
                 f"['chatter:=talk', '_speed:=1.5']; got {arguments!r}"
             )
         self._arguments = list(arguments)
@@ -118,7 +118,7 @@ class _Parser:
             elif _SIGN in argument and _BEGINNING.match(argument):
                 self._rule(argument)
             elif inside:
-                raise self._error(f"{argument!r} is no rule; {_EXAMPLE}")
+                raise self._error(f"{argument!r} is not a rule; {_EXAMPLE}")
             else:
                 self._others.append(argument)
             self._place += 1
@@ -145,7 +145,7 @@ class _Parser:
         rule = self._arguments[self._place] if self._place < len(self._arguments) else ""
         if _SIGN not in rule:
             self._place -= 1
-            raise self._error(f"{option} is followed by {rule!r}, which is no rule; {_EXAMPLE}")
+            raise self._error(f"{option} is followed by {rule!r}, which is not a rule; {_EXAMPLE}")
         self._rule(_OPTIONS[option] + rule)
 
     def _rule(self, text: str) -> None:
@@ -159,20 +159,20 @@ class _Parser:
         else:
             for name in (left, right):
                 try:
-                    # With the shortest names possible: the node's own come later.
+                    # Only a check: the node's own names are not known yet.
                     full = expand(name, "n", "/")
                 except InvalidNameError as error:
                     raise self._error(f"{text!r}: {error}") from None
                 if full in ("/", "/n"):
-                    raise self._error(f"{text!r}: {name!r} is no name of a topic or service")
+                    raise self._error(f"{text!r}: {name!r} is not the name of a topic or service")
             self._rules.append((left, right))
 
     def _set(self, text: str, key: str, value: str) -> None:
-        if key == "__node":  # ROS 2's word for it
+        if key == "__node":  # as in ROS 2
             key = "__name"
         if key not in _SPECIAL:
             known = ", ".join(_SPECIAL) + similar(key, _SPECIAL)
-            raise self._error(f"{text!r}: {key} is not known; known are {known}")
+            raise self._error(f"{text!r}: {key} is unknown; known are {known}")
         try:
             if key == "__name":
                 validate_node_name(value)

@@ -1,4 +1,4 @@
-"""What roscpp and rospy give every node: parameters, ``/rosout``, log levels, simulated time.
+"""What every node has in roscpp and rospy: parameters, ``/rosout``, log levels, simulated time.
 
 Behaviour: ROS wiki, "rosout", "Clock", "roscpp" and "rospy/Overview/Logging"; levels and fields are
 ``rosgraph_msgs/Log``'s. As in rospy and roscpp, ``name`` is the node's and ``topics`` are those
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 __all__ = ["LoggerServices", "RoscppServices"]
 
 _NO_TOPICS = "/rosout_disable_topics_generation"
-#: Latched, as rospy and roscpp have it.
+#: Latched, as in rospy and roscpp.
 _ROSOUT_QOS = QoS(depth=1000, durability=QoS.latched().durability)
-#: How long the first messages wait for the node ``/rosout``: latched is only the last one.
+#: How long the first messages wait for the node ``/rosout``: only the last one is latched.
 _ROSOUT_WAIT_S = 2.0
-#: Names of the levels as roscpp spells them; both call fatal what Python calls critical.
+#: The levels' names in roscpp; fatal is Python's critical.
 _LEVELS = {
     "debug": logging.DEBUG,
     "info": logging.INFO,
@@ -43,22 +43,21 @@ _LEVELS = {
     "error": logging.ERROR,
     "fatal": logging.CRITICAL,
 }
-#: ``rosgraph_msgs/Log``'s levels by the least of Python's that they stand for.
+#: ``rosgraph_msgs/Log``'s levels by the lowest of Python's that they stand for.
 _LOG_LEVELS = ((50, 16), (40, 8), (30, 4), (20, 2))
 _DEBUG = 1
 _LIBRARY = "rosglass"
 
 
 class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
-    """What every ROS 1 node has by itself.
+    """The parameters, log, clock and log level services of a ROS 1 node.
 
-    The clock follows ``/use_sim_time`` from the start. ROS 1's own nodes look at that parameter
-    once, as they start; we follow it, so that a screen which was there before the simulation keeps
-    its time all the same.
+    The clock follows ``/use_sim_time``. roscpp and rospy read that parameter once, as they start;
+    we follow it, so that a screen started before the simulation has its time, too.
 
     Args:
         node: The node.
-        core: What it consists of.
+        core: The node's core.
         server: The master's parameter server.
         topics: Returns the topics that the node publishes or subscribes to.
     """
@@ -69,7 +68,7 @@ class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
         self._node, self._core, self._server, self._topics = node, core, server, topics
 
     def open(self, services: BuiltinServices[Ros1Parameters]) -> None:
-        """Set the parameters that the program was started with, and follow the simulation's time.
+        """Set the program's start parameters, and follow simulated time.
 
         Until the master has answered, which takes some milliseconds after connecting, the clock
         shows the system's time.
@@ -78,7 +77,7 @@ class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
         self._core.add(StartParameters(self._server))
         sim_time = SimTime(self._core, self._node.create_subscription)
         services.own(sim_time)
-        # As rospy has it: 1 counts, too.
+        # As in rospy, 1 counts, too.
         services.own(
             self._server.subscribe(
                 f"/{USE_SIM_TIME}", lambda value: sim_time.follow(bool(value)), IMMEDIATE
@@ -87,7 +86,7 @@ class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
 
     def create_parameters(
         self,
-        services: BuiltinServices[Ros1Parameters],  # noqa: ARG002 - they need no closing
+        services: BuiltinServices[Ros1Parameters],  # noqa: ARG002 - they need not be closed
     ) -> Ros1Parameters:
         """Return the node's parameters on the master's server."""
         from rosglass.ros1.parameter_namespace import Ros1Parameters  # noqa: PLC0415
@@ -103,7 +102,7 @@ class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
         services.own(without_topics)
 
         def fields(record: logging.LogRecord) -> dict[str, Any]:
-            # A robot's time may be a simulation's: the record's own is only the system's.
+            # The node's time may be simulated; the record's is the system's.
             now = core.clock.now().nanoseconds
             return {
                 "header": {
@@ -124,7 +123,7 @@ class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
         return NodeLog(core, name, topic)
 
     def offer(self, services: BuiltinServices[Ros1Parameters]) -> Iterator[None]:
-        """Announce ``/rosout``, and offer the services for log levels."""
+        """Publish ``/rosout``, and offer the services for log levels."""
         services.log.open()
         yield
         loggers = LoggerServices(self._node, services.log.logger, self._core.own_dispatcher)
@@ -133,7 +132,7 @@ class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
 
 
 class LoggerServices(Handle):
-    """Offers a node's loggers, its children and the library's own to others.
+    """The services that list and set the levels of a node's and the library's loggers.
 
     Args:
         node: The node.
@@ -146,7 +145,7 @@ class LoggerServices(Handle):
         self._servers: list[ServiceServer] = []
 
     def open(self) -> None:
-        """Offer the services; raises NodeClosedError and what a service server does."""
+        """Offer the services; raises what :meth:`Node.create_service_server` does."""
         for name, kind, answer in (
             ("~get_loggers", "roscpp/GetLoggers", self._list_loggers),
             ("~set_logger_level", "roscpp/SetLoggerLevel", self._set_level),
@@ -191,10 +190,10 @@ class LoggerServices(Handle):
 
 
 def _name_of(level: int) -> str:
-    """Return the name of the level that is no more severe, the least one at least."""
+    """Return the name of the most severe level that is not above `level`."""
     return next((n for n, least in reversed(_LEVELS.items()) if level >= least), "debug")
 
 
 def _level_of(number: int) -> int:
-    """Return the level of ``rosgraph_msgs/Log`` that is no more severe, the least one at least."""
+    """Return the most severe level of ``rosgraph_msgs/Log`` that is not above `number`."""
     return next((ros for least, ros in _LOG_LEVELS if number >= least), _DEBUG)

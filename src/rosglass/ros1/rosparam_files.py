@@ -1,4 +1,4 @@
-"""Parameter files of ROS 1: YAML as ``rosparam load`` and ``rosparam dump`` have it.
+"""Parameter files of ROS 1: YAML as in ``rosparam load`` and ``rosparam dump``.
 
 Rules: ROS wiki, "rosparam" and "YAML Overview": several documents, ``_ns`` for a document's
 namespace, ``!degrees``, ``!radians``, ``deg(90)``, ``rad(pi/2)`` for angles.
@@ -42,7 +42,7 @@ def read(path: str | os.PathLike[str]) -> list[tuple[str, Any]]:
     """Read a parameter file; return pairs of a namespace, often empty, and what to set there.
 
     Raises:
-        ParameterError: It is no parameter file; the message has file, line and column.
+        ParameterError: It is not a parameter file; the message has file, line and column.
     """
     return parse(*read_text(path, _MAX_SIZE))
 
@@ -52,7 +52,7 @@ def parse(text: str, label: str = "<text>") -> list[tuple[str, Any]]:
 
     Args:
         text: The text.
-        label: Where it came from, for messages.
+        label: Its source, for messages.
     """
     found = []
     for document in _documents(text, label):
@@ -68,7 +68,7 @@ def parse(text: str, label: str = "<text>") -> list[tuple[str, Any]]:
 
 
 def parse_value(text: str, label: str) -> Any:
-    """Return the value that `text` has as YAML; None for none.
+    """Return the value of a YAML text; None for an empty one.
 
     Raises:
         ParameterError: It is not YAML.
@@ -80,13 +80,13 @@ def parse_value(text: str, label: str) -> Any:
 
 
 def dump(value: Any) -> str:
-    """Return a value, or a whole namespace, as YAML, laid out as ``rosparam dump`` does."""
+    """Return a value or namespace as YAML, in the layout of ``rosparam dump``."""
     text = yaml.dump(value, Dumper=_Dumper, default_flow_style=False, allow_unicode=True)
     return text.removesuffix("...\n")
 
 
 def write(path: str | os.PathLike[str], value: Any) -> None:
-    """Write a parameter file, in one go; raises ParameterError when that is not possible."""
+    """Write a parameter file atomically; raises ParameterError if that fails."""
     write_text(path, dump(value))
 
 
@@ -98,7 +98,7 @@ def _documents(text: str, label: str, fault: str = "no parameter file") -> list[
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML with angles; what is said twice is an error, where others keep the last."""
+    """YAML with angles, in which duplicate keys are errors."""
 
     def mapping(self, node: yaml.MappingNode) -> dict[Any, Any]:
         seen: set[Any] = set()
@@ -128,7 +128,7 @@ class _Loader(yaml.SafeLoader):
 
 class _Dumper(yaml.SafeDumper):
     def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - PyYAML's
-        """Write equal values anew: people read it."""
+        """Write equal values in full, for readers."""
         return True
 
 

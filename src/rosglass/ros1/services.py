@@ -1,4 +1,4 @@
-"""A node's services: which it offers, and the types of those that others offer."""
+"""A node's service clients and servers, and the types of other nodes' services."""
 
 from __future__ import annotations
 
@@ -30,27 +30,25 @@ __all__ = ["ServiceTypes", "Services"]
 
 
 class Services:
-    """Makes clients and servers, and knows the types of others' services.
+    """Creates service clients and servers, and caches the types of other nodes' services.
 
     Args:
         core: The node.
 
     Attributes:
-        types: What others' servers say of themselves.
+        types: What other nodes' servers announce.
     """
 
     def __init__(self, core: TcprosCore) -> None:
         self._core = core
         self.types = ServiceTypes(core)
 
-    # -- making ----------------------------------------------------------------------------------
-
     def client(
         self, name: str, type: ServiceType | str | None, qos: QoS | None, persistent: bool
     ) -> ServiceClient:
         """Return a new client of a service."""
 
-        # The client keeps the calls; a connection knows the one that it was made for.
+        # The client owns the pending calls; a connection knows the one it is for.
         def create(
             _pending: Mapping[int, PendingCall], on_reply: OnReply, on_change: Callable[[], None]
         ) -> TcprosRequester:
@@ -75,34 +73,34 @@ class Services:
         """
         core, kind, profile = self._core, self._core.types.service(type), _profile(qos, name)
 
-        # A request is only put aside for the callback, or it is taken at once: both are quick.
+        # `quick` makes no difference: requests are received in the loop's thread anyway.
         def create(on_request: OnRequest, _quick: bool) -> TcprosReplier:
             return core.create_replier(name, kind, on_request)
 
         return ServiceServer(core, name, kind, callback, profile, executor, create)
 
-    # -- what there is ---------------------------------------------------------------------------
+    # -- the graph -------------------------------------------------------------------------------
 
     def listing(self) -> dict[str, list[str]]:
-        """Return every service with its type, none as long as its server has not told it."""
+        """Return every service with its type; no type until its server has announced it."""
         names = sorted(self._core.graph.services())
         return {name: [kind] if (kind := self._type_of(name)[0]) else [] for name in names}
 
     def described(self, found: list[EndpointInfo]) -> list[EndpointInfo]:
-        """Return endpoints, those of services with their types."""
+        """Return endpoints, with the types of services."""
         return [
-            replace(one, type=told[0], type_hash=told[1])
-            if one.kind is EndpointKind.SERVICE_SERVER and (told := self._type_of(one.name))[0]
+            replace(one, type=known[0], type_hash=known[1])
+            if one.kind is EndpointKind.SERVICE_SERVER and (known := self._type_of(one.name))[0]
             else one
             for one in found
         ]
 
     def md5_of(self, name: str) -> str:
-        """Return the md5 sum of a service's type, empty as long as it is not known."""
+        """Return the md5 sum of a service's type; empty while it is unknown."""
         return self._type_of(name)[1]
 
     def _type_of(self, name: str) -> tuple[str, str]:
-        """Return a service's type and md5 sum, empty as long as they are not known."""
+        """Return a service's type and md5 sum; empty while they are unknown."""
         own = self._core.repliers.get(name)
         nodes = self._core.graph.services().get(name, [])
         if own is not None and nodes == [self._core.name.full]:
@@ -113,7 +111,7 @@ class Services:
 
 def _profile(qos: QoS | None, name: str) -> QoS:
     if qos is not None and not isinstance(qos, QoS):
-        raise ConversionError("qos", qos, "a rosglass.QoS, or None for the usual one", name)
+        raise ConversionError("qos", qos, "a rosglass.QoS, or None for the default", name)
     return qos or QoS.services()
 
 

@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from rosglass.comm import Time
-from rosglass.ros1.action_state import ServerState
+from rosglass.ros1.actionlib import ServerState
 from rosglass.ros1.actionlib_server import _MAX_ENDED, GoalList
 
 NOW = 100.0
@@ -17,7 +17,7 @@ def filled():
     """Return goals a to d, stamped 1 to 4."""
     goals = GoalList(5.0)
     for number, name in enumerate("abcd", 1):
-        goals.take(name, Time(number), name, NOW)
+        goals.add(name, Time(number), name, NOW)
     return goals
 
 
@@ -38,8 +38,8 @@ def test_goals_are_pending_in_order_of_arrival():
 def test_a_goal_that_is_known_is_not_taken_twice():
     goals = filled()
     (entry, *_) = goals
-    entry.go(ServerState.ACTIVE)
-    assert goals.take("a", Time(9), "other", NOW) is None
+    entry.set_state(ServerState.ACTIVE)
+    assert goals.add("a", Time(9), "other", NOW) is None
     assert (entry.asked, entry.stamp, entry.state) == ("a", Time(1), ServerState.ACTIVE)
 
 
@@ -64,7 +64,7 @@ def test_which_goals_a_request_means(goal, until, chosen):
 def test_only_goals_that_wait_or_run_can_be_cancelled(state):
     goals = filled()
     for entry in goals:
-        entry.go(state)
+        entry.set_state(state)
     chosen = goals.select("", Time(), NOW)
     assert bool(chosen) is (state in (ServerState.PENDING, ServerState.ACTIVE))
 
@@ -73,10 +73,10 @@ def test_a_request_that_comes_before_its_goal_recalls_it():
     goals = GoalList()
     assert goals.select("late", Time(), NOW) == []
     assert states(goals) == {"late": ServerState.RECALLING}
-    entry = goals.take("late", Time(7), "asked", NOW + 1)
+    entry = goals.add("late", Time(7), "asked", NOW + 1)
     assert entry is not None
     assert (entry.state, entry.asked, entry.stamp) == (ServerState.RECALLED, "asked", Time(7))
-    assert goals.take("late", Time(7), "asked", NOW + 2) is None
+    assert goals.add("late", Time(7), "asked", NOW + 2) is None
 
 
 def test_such_a_request_is_forgotten_after_a_while():
@@ -86,7 +86,7 @@ def test_such_a_request_is_forgotten_after_a_while():
     assert states(goals)
     goals.expire(NOW + 5.1)
     assert not states(goals)
-    entry = goals.take("late", Time(7), "asked", NOW + 6)
+    entry = goals.add("late", Time(7), "asked", NOW + 6)
     assert entry is not None
     assert entry.state is ServerState.PENDING
 
@@ -95,7 +95,7 @@ def test_goals_up_to_the_time_of_an_earlier_request_are_recalled():
     goals = GoalList()
     goals.select("", Time(5), NOW)
     goals.select("", Time(3), NOW)
-    taken = [goals.take(f"g{stamp}", Time(stamp), "asked", NOW) for stamp in (4, 5, 6)]
+    taken = [goals.add(f"g{stamp}", Time(stamp), "asked", NOW) for stamp in (4, 5, 6)]
     assert [entry.state for entry in taken if entry] == [
         ServerState.RECALLED,
         ServerState.RECALLED,
@@ -106,7 +106,7 @@ def test_goals_up_to_the_time_of_an_earlier_request_are_recalled():
 def test_cancelling_everything_does_not_touch_later_goals():
     goals = filled()
     assert len(goals.select("", Time(), NOW)) == 4
-    entry = goals.take("e", Time(5), "asked", NOW)
+    entry = goals.add("e", Time(5), "asked", NOW)
     assert entry is not None
     assert entry.state is ServerState.PENDING
 
@@ -115,9 +115,9 @@ def test_goals_stay_for_a_while_after_their_end():
     goals = filled()
     first, second, *_ = goals
     for entry in (first, second):
-        entry.go(ServerState.SUCCEEDED)
+        entry.set_state(ServerState.SUCCEEDED)
         goals.end(entry, NOW)
-    goals.take("b", Time(2), "b", NOW + 3)  # sent again: it stays longer
+    goals.add("b", Time(2), "b", NOW + 3)  # sent again: it stays longer
     goals.expire(NOW + 6)
     assert list(states(goals)) == ["b", "c", "d"]
     goals.expire(NOW + 9)

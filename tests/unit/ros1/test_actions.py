@@ -18,7 +18,7 @@ from rosglass.errors import (
     TimeoutError,  # noqa: A004
 )
 from rosglass.interfaces import Library
-from rosglass.ros1.action_state import CommState, ServerState, TerminalState
+from rosglass.ros1.actionlib import CommState, ServerState, TerminalState
 
 TYPE = "actionlib/TestAction"
 NAME = "/work"
@@ -155,7 +155,7 @@ def test_a_goal_whose_result_never_comes_is_lost(sent, puppet, eventually, monke
         return sent.done.done()
 
     eventually(lost)
-    with pytest.raises(ConnectionLostError, match="has ended as succeeded, but its result never"):
+    with pytest.raises(ConnectionLostError, match="has ended as succeeded, but its result was not"):
         sent.result(0)
 
 
@@ -178,10 +178,12 @@ def test_a_silent_server_that_does_not_answer_loses_its_goals(sent, client, monk
 
     monkeypatch.setattr("rosglass.ros1.actionlib_client._SILENCE_S", 0.1)
     monkeypatch.setattr("rosglass.ros1.actionlib_client.call_node", fail)
-    with pytest.raises(ConnectionLostError, match=r"fell silent .*no answer in time.* before goal"):
+    with pytest.raises(
+        ConnectionLostError, match=r"stopped responding .*no answer in time.* before goal"
+    ):
         sent.result(30)
     assert not client.ready
-    assert "does not tell the status of its goals" in client.problem
+    assert "does not publish the status of its goals" in client.problem
 
 
 def test_a_request_to_cancel_is_repeated_until_the_server_shows_a_sign(
@@ -233,13 +235,15 @@ def test_a_server_that_was_cut_off_may_have_missed_a_goal(client, puppet, eventu
     puppet.listening.close()
     eventually(lambda: not client.ready)
     puppet.listen()
-    with pytest.raises(ConnectionLostError, match=r"was cut off after it was sent the goal"):
+    with pytest.raises(ConnectionLostError, match=r"was disconnected after it was sent the goal"):
         goal.result(30)
     eventually(lambda: puppet.cancels == [(goal.id_text, 0)])
 
 
 def test_a_request_to_cancel_that_nobody_heeds_times_out(sent):
-    with pytest.raises(TimeoutError, match=r"did not tell within 0.2 s that it cancels goal"):
+    with pytest.raises(
+        TimeoutError, match=r"did not acknowledge within 0.2 s that it cancels goal"
+    ):
         sent.cancel(timeout=0.2).result(5)
     assert sent.status is GoalStatus.EXECUTING
 
@@ -294,7 +298,7 @@ def test_cancelling_all_waits_for_a_server_and_keeps_goals_back(connect):
 
 def test_a_server_that_does_not_know_a_goal_in_time(client, puppet, eventually):
     goal = client.send_goal({"goal": 1}, timeout=0.3)
-    with pytest.raises(TimeoutError, match=r"did not tell that it knows goal .* within 0.3 s"):
+    with pytest.raises(TimeoutError, match=r"did not acknowledge goal .* within 0.3 s"):
         goal.result(5)
     eventually(lambda: puppet.cancels == [(goal.id_text, 0)])
     with pytest.raises(TimeoutError):
@@ -336,7 +340,7 @@ def test_a_status_that_does_not_exist_is_told_of_once(sent, puppet, caplog, even
 @pytest.mark.parametrize(
     ("state", "error", "text"),
     [
-        ("LOST", ConnectionLostError, "says that goal .* is lost: why"),
+        ("LOST", ConnectionLostError, "reports that goal .* is lost: why"),
         ("REJECTED", GoalRejectedError, "does not accept goal .*: why"),
     ],
 )
@@ -480,7 +484,7 @@ def test_a_request_to_cancel_before_the_goal(offer, eventually):
     eventually(lambda: hand.listed == {"a": "RECALLING"})
     hand.send("a")
     eventually(lambda: hand.results)
-    assert hand.results == {"a": [("RECALLED", "It was cancelled before it came", 0)]}
+    assert hand.results == {"a": [("RECALLED", "It was cancelled before it was received", 0)]}
     assert executed == []
 
 

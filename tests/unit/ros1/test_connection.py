@@ -85,7 +85,7 @@ def test_frames_come_byte_by_byte(end):
     [
         (b"\xff\xff\xff\xff", "connection header claims to have 4294967295"),
         (b"GET / HTTP/1.1\r\n\r\n", "connection header claims"),
-        (frame(b"\xff\xff\xff\xff"), "cut off"),
+        (frame(b"\xff\xff\xff\xff"), "truncated"),
         (frame(frame(b"no equals sign")), "has no '='"),
         (frame(b""), "is empty"),
         (HEADER + b"\xff\xff\xff\xff", "a message claims"),
@@ -102,7 +102,7 @@ def test_garbage_ends_the_connection_and_says_why(end, data, told):
 def test_whoever_sends_no_header_is_not_waited_for(loop, monkeypatch):
     monkeypatch.setattr(module, "_HEADER_TIMEOUT_S", 0.1)
     end = End(loop)
-    assert "sent no connection header" in eventually(lambda: end.ended)[0]
+    assert "no connection header was received" in eventually(lambda: end.ended)[0]
 
 
 def test_a_header_in_time_lasts(loop, monkeypatch):

@@ -381,7 +381,7 @@ def test_what_ros_1_cannot_do_is_said(node):
         own.declare("camera.exposure", 1)
     with pytest.raises(ParameterError, match="leave '~' out"):
         own.get("~a")
-    with pytest.raises(UnsupportedError, match="one parameter after the other"):
+    with pytest.raises(UnsupportedError, match="one parameter at a time"):
         node.create_parameter_client("/x").set_atomically({"a": 1, "b": 2})
     assert own.names() == []
 

@@ -95,7 +95,7 @@ def test_one_command_line_for_both_worlds() -> None:
         (["/:=b"], "'/' is no name of a topic or service"),
         (["a:=~"], "'~' is no name of a topic or service"),
         (["a:=b:=c"], "':' at position 1"),
-        (["__nmae:=x"], "__nmae is not known; known are __name, .*did you mean __name"),
+        (["__nmae:=x"], "__nmae is unknown; known are __name, .*did you mean __name"),
         (["__name:=a/b"], "node name 'a/b': '/' at position 1"),
         (["__name:=1a"], "must begin with a letter"),
         (["__ns:=a b"], "__ns 'a b': ' ' at position 1"),
@@ -108,8 +108,8 @@ def test_one_command_line_for_both_worlds() -> None:
         (["_a-b:=1"], "'-' at position"),
         (["--ros-args", "--params-file", "x"], "no option '--params-file'; known are -r"),
         (["--ros-args", "-r"], "-r is followed by ''"),
-        (["--ros-args", "-r", "a"], "argument 3: -r is followed by 'a', which is no rule"),
-        (["--ros-args", "a"], "argument 3: 'a' is no rule"),
+        (["--ros-args", "-r", "a"], "argument 3: -r is followed by 'a', which is not a rule"),
+        (["--ros-args", "a"], "argument 3: 'a' is not a rule"),
     ],
 )
 def test_bad_arguments_are_named(arguments: list[str], message: str) -> None:
@@ -119,7 +119,7 @@ def test_bad_arguments_are_named(arguments: list[str], message: str) -> None:
 
 @pytest.mark.parametrize("arguments", ["a:=b", b"a:=b", None, [1], 5])
 def test_arguments_are_a_list_of_texts(arguments: Any) -> None:
-    with pytest.raises(RosArgumentError, match="must be a list of texts such as sys"):
+    with pytest.raises(RosArgumentError, match="must be a list of strings such as sys"):
         rosglass.connect("ros1://127.0.0.1:1", arguments=arguments)
 
 

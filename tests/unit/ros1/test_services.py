@@ -267,7 +267,7 @@ def test_a_server_of_any_type_is_called(node, start_robot):
     assert node.create_service_client("/add", ADD).call().sum == 3
     unknown = node.create_service_client("/add")
     assert not unknown.wait_for_server(0.5)
-    assert "does not tell its type" in unknown.problem
+    assert "does not announce its type" in unknown.problem
 
 
 def test_types_of_services_are_told_once_their_servers_have(node, start_robot, connect, eventually):

@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from rosglass.comm import GoalStatus
-from rosglass.ros1.action_state import CommState, CommStateMachine, ServerState, TerminalState
+from rosglass.ros1.actionlib import CommState, CommStateMachine, ServerState, TerminalState
 
 LETTERS = {
     "G": CommState.WAITING_FOR_GOAL_ACK,
@@ -66,9 +66,9 @@ def machine(state):
         if step == "cancel":
             made.cancel()
         elif step == "finish":
-            made.finish(ServerState.SUCCEEDED)
+            made.on_result(ServerState.SUCCEEDED)
         else:
-            made.hear(step)
+            made.on_status(step)
     assert made.state is state
     return made
 
@@ -84,10 +84,10 @@ def test_each_status_in_each_state(state, said, cell):
     heard = made.heard
     if cell == "!":
         with pytest.raises(ValueError, match=f"{said.name} does not follow {state.name}"):
-            made.hear(said)
+            made.on_status(said)
         assert (made.state, made.heard) == (state, heard)
         return
-    steps = made.hear(said)
+    steps = made.on_status(said)
     expected = [] if cell == "." else [LETTERS[letter] for letter in cell]
     assert [step.state for step in steps] == expected
     assert made.state is (expected[-1] if expected else state)
@@ -97,12 +97,12 @@ def test_each_status_in_each_state(state, said, cell):
 @pytest.mark.parametrize(("state", "said"), list(itertools.product(NOT_DONE, ENDS)))
 def test_a_result_ends_a_goal_in_each_state(state, said):
     made = machine(state)
-    steps = made.finish(said)
+    steps = made.on_result(said)
     assert steps[-1] == (CommState.DONE, ENDS[said][1])
     assert made.state is CommState.DONE
     assert (made.terminal, made.status) == ENDS[said]
     # A second result, and whatever else comes, changes nothing.
-    assert made.finish(ServerState.ABORTED) == []
+    assert made.on_result(ServerState.ABORTED) == []
     assert made.lose() == []
     assert made.cancel() == []
     assert made.terminal is ENDS[said][0]
@@ -111,13 +111,13 @@ def test_a_result_ends_a_goal_in_each_state(state, said):
 @pytest.mark.parametrize("said", [said for said in ServerState if said not in ENDS])
 def test_a_result_without_an_end_is_refused(said):
     made = machine(CommState.ACTIVE)
-    with pytest.raises(ValueError, match="a result cannot come with"):
-        made.finish(said)
+    with pytest.raises(ValueError, match="a result with the state"):
+        made.on_result(said)
     assert made.state is CommState.ACTIVE
 
 
 @pytest.mark.parametrize("state", NOT_DONE)
-@pytest.mark.parametrize("lose", [CommStateMachine.lose, lambda m: m.hear(ServerState.LOST)])
+@pytest.mark.parametrize("lose", [CommStateMachine.lose, lambda m: m.on_status(ServerState.LOST)])
 def test_a_goal_is_lost_in_each_state(state, lose):
     made = machine(state)
     assert lose(made) == [(CommState.DONE, GoalStatus.LOST)]
@@ -153,7 +153,7 @@ def test_what_states_are_in_all_worlds(state, status):
 
 def test_the_states_on_the_way_are_told_with_what_they_are():
     made = CommStateMachine()
-    assert made.hear(ServerState.PREEMPTED) == [
+    assert made.on_status(ServerState.PREEMPTED) == [
         (CommState.ACTIVE, GoalStatus.EXECUTING),
         (CommState.PREEMPTING, GoalStatus.CANCELING),
         (CommState.WAITING_FOR_RESULT, GoalStatus.CANCELED),

@@ -1,7 +1,8 @@
-"""Getting definitions that nobody here has from the nodes that use the types.
+"""Types from the nodes that use them: definitions that are unknown here.
 
-In ROS 1, publishers tell the definition to who connects with them; services' servers tell name and
-md5 sum only; of actions, see :mod:`rosglass.ros1.actionlib_discovery`.
+In ROS 1, publishers send the definition to their subscribers, and services' servers only name and
+md5 sum. An action's server sends the definitions of results and feedback to its subscribers; that
+of goals comes from the library, other clients, or servers in Python, which send it as subscribers.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from rosglass.comm import ConnectionState, EndpointKind, NodeName, Promise
+from rosglass.comm import ConnectionState, EndpointKind, NodeName, Promise, QoS, Subscription
 from rosglass.comm.promise import check_timeout
 from rosglass.errors import (
     DefinitionConflictError,
@@ -21,8 +22,16 @@ from rosglass.errors import (
     TypeNotFoundError,
 )
 from rosglass.interfaces import adding_definitions, ros1_name, split_name
-from rosglass.ros1.actionlib_discovery import ActionDiscovery
-from rosglass.ros1.actionlib_types import actions
+from rosglass.ros1.actionlib import (
+    FEEDBACK,
+    GOAL,
+    RESULT,
+    ActionTypes,
+    action_topic,
+    actions,
+    announced,
+    assemble,
+)
 from rosglass.ros1.names import split
 from rosglass.wires.tcpros.connection import ANY
 from rosglass.wires.tcpros.registrations import Member
@@ -33,21 +42,23 @@ if TYPE_CHECKING:
 
     from rosglass.messages import ActionType, MessageType, ServiceType
     from rosglass.ros1.services import Services
+    from rosglass.wires.tcpros.connection import Connection
     from rosglass.wires.tcpros.core import TcprosCore
+    from rosglass.wires.tcpros.master import Master
     from rosglass.wires.tcpros.topics import Topics
 
     AnyType: TypeAlias = MessageType | ServiceType | ActionType
 
-__all__ = ["fetch"]
+__all__ = ["ActionDiscovery", "fetch"]
 
 _PUBLISHER = EndpointKind.PUBLISHER
 _MD5 = re.compile("[0-9a-f]{32}")
-#: Seconds that a publisher may take to answer, and for which others are waited for once one has.
-_TIMEOUT, _GRACE = 5.0, 1.0
+#: Seconds that a publisher may take to answer, and that others may take after the first one.
+_TIMEOUT_S, _GRACE_S = 5.0, 1.0
 #: Seconds until a publisher that did not answer is asked again.
-_AGAIN = 5.0
-#: Seconds that services may take to tell their types, where none is known to have this one.
-_SETTLED = 2.0
+_RETRY_S = 5.0
+#: Seconds that services may take to announce their types, while none is known to have this one.
+_SETTLED_S = 2.0
 
 
 def fetch(
@@ -66,17 +77,19 @@ def fetch(
         topics: Its topics.
         services: Its services.
         name: The type's name.
-        hash: Md5 sum of the version; empty for the one that is in use.
-        node: Full name of the node whose version it shall be; empty for any.
-        timeout: Seconds to wait in all; None for ever.
+        hash: Md5 sum of the version; empty for the version in use.
+        node: Full name of the node whose version to fetch; empty for any.
+        timeout: Seconds to wait in all; None for no limit.
     """
     split_name(name)
     timeout = check_timeout(timeout, f"fetching {name}")
     if hash and not (isinstance(hash, str) and _MD5.fullmatch(hash)):
         raise InvalidNameError(
-            f"{hash!r:.90} is no md5 sum of {name}; write 32 hexadecimal digits in lower case"
+            f"{hash!r:.90} is not an md5 sum of {name}; write 32 hexadecimal digits in lower case"
         )
-    promise: Promise[AnyType] = Promise(f"{name} has not come", core.dispatcher, cancellable=True)
+    promise: Promise[AnyType] = Promise(
+        f"{name} was not received", core.dispatcher, cancellable=True
+    )
     if hash:
         from rosglass.messages import load  # noqa: PLC0415 - numpy
 
@@ -93,16 +106,16 @@ def fetch(
 
 
 class _Fetch(Member):
-    """One type that is being fetched, from what the graph has at each moment.
+    """A type that is being fetched, from the endpoints in the graph.
 
     Args:
         core: The node that asks.
         topics: Its topics.
         services: Its services.
         name: The type's name.
-        hash: Md5 sum of the version; empty for the one that is in use.
-        node: Full name of the node whose version it shall be; empty for any.
-        promise: Where it goes.
+        hash: Md5 sum of the version; empty for the version in use.
+        node: Full name of the node whose version to fetch; empty for any.
+        promise: Completed with the type.
     """
 
     def __init__(
@@ -125,15 +138,15 @@ class _Fetch(Member):
         self._asked: set[str] = set()
         self._began, self._first = time.monotonic(), 0.0
         self._discoveries: dict[str, ActionDiscovery] = {}
-        #: Why it has not come, as far as is known.
+        #: Why it is not there yet, as far as is known.
         self._problem = ""
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - answers count, too
-        """See whether what is known by now is enough."""
+        """Complete the promise if enough is known."""
         if self._promise.done():
             return
         try:
-            found = self._look()
+            found = self._find()
         except Error as error:
             self._promise.set_exception(error)
             return
@@ -141,8 +154,8 @@ class _Fetch(Member):
             self._promise.set_result(found)
 
     def expire(self, timeout: float) -> None:
-        """Give up: the time is over."""
-        who = f"{self._node} does not use it" if self._node else "nobody in the graph uses it"
+        """Fail: the time is over."""
+        who = f"{self._node} does not use it" if self._node else "no node in the graph uses it"
         if self._core.status().state is not ConnectionState.CONNECTED:
             who = str(self._core.status())
         self._promise.set_exception(
@@ -152,18 +165,18 @@ class _Fetch(Member):
         )
 
     def finish(self, _: Future[AnyType]) -> None:
-        """Leave the node: it has come, failed or was given up."""
+        """Leave the node: the promise is done."""
         self._core.remove(self)
         for discovery in list(self._discoveries.values()):
             discovery.close()
 
     def close(self) -> None:
-        """Give up: the node is closed."""
+        """Fail: the node is closed."""
         self._promise.set_exception(NodeClosedError(f"node {self._core.name} was closed"))
 
     # -- on the node's own thread ----------------------------------------------------------------
 
-    def _look(self) -> AnyType | None:
+    def _find(self) -> AnyType | None:
         """Return the type once it is known; raises Error when it cannot be."""
         if self._core.status().state is not ConnectionState.CONNECTED:
             return None
@@ -177,10 +190,10 @@ class _Fetch(Member):
         offers, open_ = self._offers()
         if offers:
             return self._service(offers)
-        if open_ and time.monotonic() - self._began < _SETTLED:
-            self._problem = "services are still being asked for their types"
+        if open_ and time.monotonic() - self._began < _SETTLED_S:
+            self._problem = "services have not announced their types yet"
             return None
-        # Nobody tells of another version: what the library has is right.
+        # No node has another version: the library's is right.
         return None if self._node or self._hash else self._in_library()
 
     def _in_library(self) -> AnyType | None:
@@ -207,7 +220,7 @@ class _Fetch(Member):
                 found.update((e.node.full, topic) for e in ends if self._is_meant(e.node.full))
                 if not ends:
                     self._problem = (
-                        f"{topic} is subscribed to only, and only publishers tell definitions; "
+                        f"{topic} has only subscribers, and only publishers send definitions; "
                         f"{adding_definitions(full, 1)}"
                     )
         return found
@@ -221,11 +234,11 @@ class _Fetch(Member):
         failed = "; ".join(reason for reason, _ in self._failed.copy().values())
         if not headers:
             self._problem = failed or f"{', '.join(sorted(users))} did not answer yet"
-            if not waited and now - self._began > _GRACE:
+            if not waited and now - self._began > _GRACE_S:
                 raise TypeNotFoundError(f"no definition of {self._name}: {failed}")
             return None
         self._first = self._first or now
-        if waited and now - self._first < _GRACE:
+        if waited and now - self._first < _GRACE_S:
             return None
         return self._choose(headers)
 
@@ -234,8 +247,8 @@ class _Fetch(Member):
         for node, header in headers.items():
             versions.setdefault(header["md5sum"], []).append(node)
         if self._hash and self._hash not in versions:
-            told = _told(versions)
-            self._problem = f"nobody publishes this version of it, but there are others ({told})"
+            others = _listed(versions)
+            self._problem = f"no node publishes this version, but there are others ({others})"
             return None
         if len(versions) > 1 and not self._hash:
             raise _conflict(self._name, versions)
@@ -246,15 +259,15 @@ class _Fetch(Member):
 
     def _ask(self, node: str, topic: str, now: float) -> None:
         """Ask a publisher for its definition, unless it was."""
-        _, failed = self._failed.get(node, ("", -_AGAIN))
-        if node in self._asked or node in self._headers or now - failed < _AGAIN:
+        _, failed = self._failed.get(node, ("", -_RETRY_S))
+        if node in self._asked or node in self._headers or now - failed < _RETRY_S:
             return
         self._asked.add(node)
-        self._core.pool.run(lambda: self._question(node, topic))
+        self._core.pool.run(lambda: self._request(node, topic))
 
-    def _question(self, node: str, topic: str) -> None:
+    def _request(self, node: str, topic: str) -> None:
         try:
-            self._headers[node] = self._topics.header(topic, NodeName(*split(node)), _TIMEOUT)
+            self._headers[node] = self._topics.header(topic, NodeName(*split(node)), _TIMEOUT_S)
             self._failed.pop(node, None)
         except Error as error:
             self._failed[node] = str(error), time.monotonic()
@@ -286,12 +299,12 @@ class _Fetch(Member):
             if self._promise.done():  # by another thread, which may not have seen this one
                 discovery.close()
                 return None
-            types = discovery.look()
+            types = discovery.types()
             self._problem = self._problem or discovery.problem
             if types is not None and self._hash in ("", types.action.md5):
                 found.setdefault(types.action.md5, (name, types.action))
         if not found:
-            self._problem = self._problem or f"{', '.join(names)} did not tell it yet"
+            self._problem = self._problem or f"{', '.join(names)} did not announce it yet"
             return None
         if len(found) > 1:
             raise _conflict(self._name, {md5: [name] for md5, (name, _) in found.items()})
@@ -303,7 +316,7 @@ class _Fetch(Member):
     # -- services --------------------------------------------------------------------------------
 
     def _offers(self) -> tuple[dict[str, list[str]], bool]:
-        """Return the md5 sums of services with the type, with their nodes; and whether to wait."""
+        """Return the md5 sums of services with the type, and their nodes; and whether to wait."""
         if self._kind not in ("", "srv"):
             return {}, False
         full = f"{self._package}/srv/{self._base}"
@@ -319,8 +332,8 @@ class _Fetch(Member):
     def _service(self, offers: dict[str, list[str]]) -> ServiceType | None:
         known = {md5: sorted(set(nodes)) for md5, nodes in offers.items()}
         if self._hash and self._hash not in known:
-            told = _told(known)
-            self._problem = f"nobody offers this version of it, but there are others ({told})"
+            others = _listed(known)
+            self._problem = f"no node offers this version, but there are others ({others})"
             return None
         sums = [md5 for md5 in known if md5 != ANY] or [ANY]
         if len(sums) > 1 and not self._hash:
@@ -329,12 +342,160 @@ class _Fetch(Member):
         return self._core.types.announced_service(full, self._hash or sums[0])
 
 
-def _told(versions: dict[str, list[str]]) -> str:
+def _listed(versions: dict[str, list[str]]) -> str:
     return "; ".join(f"{md5} of {', '.join(nodes)}" for md5, nodes in versions.items())
 
 
 def _conflict(name: str, versions: dict[str, list[str]]) -> DefinitionConflictError:
     return DefinitionConflictError(
-        f"{ros1_name(name)}: the graph has several versions ({_told(versions)}); choose one by its "
-        "hash or node"
+        f"{ros1_name(name)}: the graph has several versions ({_listed(versions)}); choose one by "
+        "its hash or node"
     )
+
+
+# -- actions -----------------------------------------------------------------------------------
+
+#: Most subscribers that are kept waiting for a header.
+_MAX_WAITING = 100
+_LABELS = {GOAL: "ActionGoal", RESULT: "ActionResult", FEEDBACK: "ActionFeedback"}
+
+
+class ActionDiscovery:
+    """Subscribes to an action's topics until its type is known.
+
+    Args:
+        core: The node.
+        topics: Its topics.
+        name: Absolute action name.
+
+    Attributes:
+        problem: What the user has to fix, in words; empty while the type may still be announced.
+    """
+
+    def __init__(self, core: TcprosCore, topics: Topics, name: str) -> None:
+        self._core, self._name = core, name
+        self.problem = ""
+        self._topics = topics
+        self._goal_probe: GoalProbe | None = None
+        self._probes: dict[str, Subscription] = {}
+        for word in _LABELS:
+            topic = core.resolve(action_topic(name, word))
+            self._probes[word] = Subscription(topic, None, QoS(depth=1), core.dispatcher)
+            topics.subscribe(self._probes[word], True)
+
+    def types(self) -> ActionTypes | None:
+        """Return the types of the action; None while they are unknown."""
+        kind = announced(self._core.graph, self._name)
+        if not kind:
+            self.problem = ""
+            return None
+        known = {word: self._announced(word, kind) for word in _LABELS}
+        result, feedback = known[RESULT], known[FEEDBACK]
+        if result is None or feedback is None:
+            self.problem = ""
+            return None
+        with suppress(Error):
+            types = ActionTypes.of(self._core.types.action(kind), self._core.types)
+            if (types.result.md5, types.feedback.md5) == (result.md5, feedback.md5):
+                return types
+        goal = known[GOAL] or self._goal(kind.replace("/action/", "/msg/") + "ActionGoal")
+        if goal is None:
+            short = ros1_name(kind.replace("/action/", "/msg/"))
+            self.problem = (
+                f"no definition of {short}Goal is known, and the server of {self._name} does not "
+                f"send it: {adding_definitions(kind, 1)}"
+            )
+            return None
+        action = assemble(kind, goal, result, feedback)
+        self.problem = ""
+        return ActionTypes.of(action, self._core.types)
+
+    def close(self) -> None:
+        """Close the subscriptions; safe to call twice."""
+        for probe in self._probes.values():
+            probe.close()
+        if self._goal_probe is not None:
+            self._goal_probe.close()
+
+    def _announced(self, word: str, kind: str) -> MessageType | None:
+        """Return the type that the topic's publisher announces, if it is one of this action."""
+        found = self._probes[word].type
+        name = kind.replace("/action/", "/msg/") + _LABELS[word]
+        return found if found is not None and found.name == name else None
+
+    def _goal(self, name: str) -> MessageType | None:
+        """Return the type of goals, from the library or the server."""
+        with suppress(Error):
+            return self._core.types.message(name)
+        if self._goal_probe is None:
+            topic = self._core.resolve(action_topic(self._name, GOAL))
+            self._goal_probe = GoalProbe(self._core, self._topics, topic, name)
+        return self._goal_probe.type()
+
+
+class GoalProbe(Member):
+    """Registers as a publisher of goals until their type is known.
+
+    Servers in Python send the definition when they connect to a publisher; those in C++ send the
+    md5 sum only. A subscriber that connects gets its header from the next publisher.
+
+    Args:
+        core: The node.
+        topics: Its topics.
+        topic: The topic of the goals.
+        name: Full name of their type.
+    """
+
+    def __init__(self, core: TcprosCore, topics: Topics, topic: str, name: str) -> None:
+        self._core, self._topics, self._topic, self._name = core, topics, topic, name
+        #: Replaced, never changed, and in the loop's thread only.
+        self._waiting: list[tuple[Connection, dict[str, str]]] = []
+        self._closed = False
+        topics.stand_in(topic, self._accept)
+        core.add(self)
+
+    def type(self) -> MessageType | None:
+        """Return the type; None while it is unknown."""
+        for _, header in self._waiting:
+            text = header.get("message_definition", "")
+            if header.get("type") == ros1_name(self._name) and text.strip():
+                with suppress(Error):
+                    return self._core.types.learn(self._name, header.get("md5sum", ""), text)
+        return None
+
+    def _accept(self, link: Connection, header: dict[str, str]) -> str:
+        waiting = [each for each in self._waiting[-_MAX_WAITING:] if not each[0].closed]
+        self._waiting = [*waiting, (link, header)]
+        self._core.wake()
+        return ""
+
+    def register(self, master: Master) -> None:
+        """Register as a publisher of goals."""
+        if self._topic not in self._topics.published():
+            name = ros1_name(self._name)
+            master.call("registerPublisher", self._topic, name, self._core.uri)
+
+    def unregister(self, master: Master) -> Member | None:
+        """Unregister, unless goals are published by now."""
+        heir = self._topics.published().get(self._topic)
+        if self._core.closed or heir is None:
+            master.call("unregisterPublisher", self._topic, self._core.uri)
+            return None
+        return heir
+
+    def close(self) -> None:
+        """Hand the waiting subscribers over; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self._topics.stand_in(self._topic, None)
+        self._core.loop.call(self._hand_over)
+        self._core.remove(self)
+
+    def _hand_over(self) -> None:
+        waiting, self._waiting = self._waiting, []
+        for link, header in waiting:
+            reason = "" if link.closed else self._topics.accept(link, header)
+            if reason:
+                link.send_header({"error": reason})
+                link.finish(1.0)
