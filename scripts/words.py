@@ -21,8 +21,10 @@ SEARCHED = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "src", "docs", "exam
 NOT_CLEAN = (
     *("src/rosglass/cli", "src/rosglass/comm"),
     *("src/rosglass/demo", "src/rosglass/interfaces"),
-    *("src/rosglass/messages", "src/rosglass/qml", "src/rosglass/qt", "src/rosglass/ros1"),
-    *("src/rosglass/ros2", "src/rosglass/rviz", "src/rosglass/wires"),
+    *("src/rosglass/messages", "src/rosglass/qml", "src/rosglass/qt"),
+    *("src/rosglass/ros2", "src/rosglass/rviz"),
+    *("src/rosglass/wires/base.py", "src/rosglass/wires/dds", "src/rosglass/wires/local.py"),
+    "src/rosglass/wires/zenoh",
     *("src/rosglass/errors.py", "docs", "examples"),
     *("README.md", "CHANGELOG.md"),
 )

@@ -287,7 +287,7 @@ def test_a_type_that_only_the_robot_has_is_shown(run, connect):
     assert f"secret_msgs/Bank, md5 {kind.md5}" in out
     assert "Vault[] inner" in out
     code, _, err = run("interface", "show", "secret_msgs/Nothing")
-    assert (code, "nobody in the graph uses it" in err) == (1, True)
+    assert (code, "no node in the graph uses it" in err) == (1, True)
 
 
 def test_doctor_finds_nothing_wrong(run, master):

@@ -83,7 +83,7 @@ def test_an_action_comes_from_its_topics(join: Callable[..., Any]) -> None:
     robot = join("robot", robot_library())
     robot.create_action_server("/go", GO, lambda goal: None)
     user = join("cockpit")
-    with pytest.raises(TypeNotFoundError, match="the server of /go does not tell it"):
+    with pytest.raises(TypeNotFoundError, match="the server of /go does not send it"):
         user.fetch_type(GO, timeout=5)
     join("desk", robot_library()).create_action_client("/go", GO)
     found = user.fetch_type(GO, timeout=30)
@@ -140,7 +140,7 @@ def test_nobody_uses_it(
 ) -> None:
     user = join("cockpit")
     eventually(lambda: user.status().state.value == "connected", timeout=30)
-    with pytest.raises(TypeNotFoundError, match=r"within 0\.2 s: nobody in the graph uses it"):
+    with pytest.raises(TypeNotFoundError, match=r"within 0\.2 s: no node in the graph uses it"):
         user.fetch_type(STATE, timeout=0.2)
     with pytest.raises(TypeNotFoundError, match="/arm does not use it"):
         user.fetch_type("std_msgs/String", node="/arm", timeout=0.2)
@@ -260,9 +260,9 @@ def test_publishers_are_asked_for_sum_and_latching(
     [
         ({"name": "state"}, "not a type name"),
         ({"name": 3}, "not a type name"),
-        ({"name": STATE, "hash": "abc"}, "no md5 sum"),
-        ({"name": STATE, "hash": "RIHS01_" + "0" * 64}, "no md5 sum"),
-        ({"name": STATE, "hash": 3}, "no md5 sum"),
+        ({"name": STATE, "hash": "abc"}, "not an md5 sum"),
+        ({"name": STATE, "hash": "RIHS01_" + "0" * 64}, "not an md5 sum"),
+        ({"name": STATE, "hash": 3}, "not an md5 sum"),
         ({"name": STATE, "timeout": -1}, "timeout"),
         ({"name": STATE, "timeout": "5"}, "timeout"),
         ({"name": STATE, "node": "a b"}, "a b"),
