@@ -21,9 +21,7 @@ if TYPE_CHECKING:
         LivelinessChanged,
         LivelinessLost,
         Matched,
-        PublisherEvents,
         SamplesLost,
-        SubscriptionEvents,
     )
     from rosglass.comm.executor import IMMEDIATE, Dispatcher, LoopExecutor, executor_for
     from rosglass.comm.graph import ConnectionState, EndpointInfo, EndpointKind, NodeName, Status
@@ -96,7 +94,6 @@ __all__ = [
     "Parameters",
     "Promise",
     "Publisher",
-    "PublisherEvents",
     "QoS",
     "Range",
     "Reliability",
@@ -110,7 +107,6 @@ __all__ = [
     "Statistics",
     "Status",
     "Subscription",
-    "SubscriptionEvents",
     "Time",
     "Timer",
     "Timers",
@@ -146,9 +142,7 @@ _HOMES = {
         "LivelinessChanged",
         "LivelinessLost",
         "Matched",
-        "PublisherEvents",
         "SamplesLost",
-        "SubscriptionEvents",
     ),
     "executor": (
         "Dispatcher",

@@ -6,17 +6,20 @@ The kinds of events are rmw's (``rmw/events_statuses``), and DDS's behind them (
 
 from __future__ import annotations
 
+import logging
+from abc import abstractmethod
 from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+from rosglass.comm.handle import Handle
 from rosglass.comm.listeners import Listener, Listeners
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 
     from rosglass.comm.graph import EndpointInfo
-    from rosglass.comm.handle import Executor, Handle
+    from rosglass.comm.handle import Executor
     from rosglass.comm.qos import QoS
     from rosglass.wires.base import Middleware
 
@@ -27,9 +30,8 @@ __all__ = [
     "LivelinessChanged",
     "LivelinessLost",
     "Matched",
-    "PublisherEvents",
     "SamplesLost",
-    "SubscriptionEvents",
+    "TopicEndpoint",
     "conflict_events",
     "conflicts",
     "words",
@@ -213,56 +215,118 @@ class Appearances(Generic[_E]):
         self._known.clear()
 
 
-class SubscriptionEvents:
-    """The event listeners of one subscription."""
-
-    def __init__(self, topic: str) -> None:
-        self.matched: Appearances[Matched] = Appearances(topic)
-        self.incompatible: Appearances[IncompatibleQoS] = Appearances(topic)
-        self.liveliness: Appearances[LivelinessChanged] = Appearances(topic)
-        self.deadline: Listeners[DeadlineMissed] = Listeners(where=topic)
-        self.lost: Listeners[SamplesLost] = Listeners(where=topic)
-        self.problem: Listeners[str] = Listeners(where=topic)
-
-    def clear(self) -> None:
-        """Remove all listeners."""
-        self.matched.clear()
-        self.incompatible.clear()
-        self.liveliness.clear()
-        self.deadline.clear()
-        self.lost.clear()
-        self.problem.clear()
-
-
-class PublisherEvents:
-    """The event listeners of one publisher.
+class TopicEndpoint(Handle):
+    """A publisher or a subscription: its problem, and the listeners of its events.
 
     Args:
-        executor: Runs callbacks that have no executor of their own.
-        added: Called after a listener was added, so that it is notified soon.
-        topic: The publisher's topic, for errors.
+        topic: Absolute topic name.
+        executor: Runs event callbacks that have no executor of their own.
+        log: Where problems are logged.
+
+    Attributes:
+        topic: Absolute topic name.
     """
 
-    def __init__(self, executor: Executor, added: Callable[[], None], topic: str = "") -> None:
-        self.executor, self._added = executor, added
-        self.matched: Appearances[Matched] = Appearances(topic)
-        self.incompatible: Appearances[IncompatibleQoS] = Appearances(topic)
-        self.deadline: Listeners[DeadlineMissed] = Listeners(where=topic)
-        self.liveliness: Listeners[LivelinessLost] = Listeners(where=topic)
-        self.problem: Listeners[str] = Listeners(where=topic)
+    topic: str
 
-    def added(self, handle: Handle) -> Handle:
-        """Return the handle of a new listener, which is notified soon."""
-        self._added()
-        return handle
+    def __init__(self, topic: str, executor: Executor, log: logging.Logger) -> None:
+        self.topic = topic
+        self._event_executor, self._log = executor, log
+        self._problem = self._logged_problem = ""
+        self._matched_listeners: Appearances[Matched] = Appearances(topic)
+        self._incompatible_listeners: Appearances[IncompatibleQoS] = Appearances(topic)
+        self._deadline_listeners: Listeners[DeadlineMissed] = Listeners(where=topic)
+        self._problem_listeners: Listeners[str] = Listeners(where=topic)
 
-    def clear(self) -> None:
-        """Remove all listeners."""
-        self.matched.clear()
-        self.incompatible.clear()
-        self.deadline.clear()
-        self.liveliness.clear()
-        self.problem.clear()
+    @property
+    def problem(self) -> str:
+        """Why messages are not exchanged, in words; empty if there is no problem."""
+        return self._problem
+
+    def on_matched(
+        self, callback: Callable[[Matched], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` when a matching endpoint of the topic appears or leaves.
+
+        Those are publishers for a subscription, and subscriptions for a publisher. The ones that
+        exist already are reported first.
+
+        Args:
+            callback: Called with the endpoint, and how many match now.
+            executor: Where it runs; None for where the subscription's own callbacks run, or for the
+                dispatcher thread of the publisher's node.
+
+        Raises:
+            ArgumentError: The callback is not callable, or the executor is not an Executor.
+        """
+        return self._listen(self._matched_listeners, callback, executor)
+
+    def on_incompatible_qos(
+        self, callback: Callable[[IncompatibleQoS], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` when an endpoint appears that requests more than the other side offers.
+
+        The ones that exist already are reported first; arguments as for :meth:`on_matched`.
+        """
+        return self._listen(self._incompatible_listeners, callback, executor)
+
+    def on_deadline_missed(
+        self, callback: Callable[[DeadlineMissed], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` each time that no message was received, or sent, within the deadline.
+
+        Time runs while a publisher matches the subscription, and from the first message of a
+        publisher. Arguments as for :meth:`on_matched`.
+        """
+        return self._listen(self._deadline_listeners, callback, executor)
+
+    def on_problem_change(
+        self, callback: Callable[[str], None], executor: Executor | None = None
+    ) -> Handle:
+        """Call `callback` with :attr:`problem` whenever that changes.
+
+        Arguments as for :meth:`on_matched`.
+        """
+        return self._listen(self._problem_listeners, callback, executor)
+
+    @abstractmethod
+    def _request_update(self) -> None:
+        """Request an update soon, which notifies new listeners of what exists already."""
+
+    def _listen(
+        self,
+        listeners: Appearances[_E] | Listeners[_E],
+        callback: Callable[[_E], None],
+        executor: Executor | None,
+    ) -> Handle:
+        listener = listeners.add(callback, executor or self._event_executor)
+        self._request_update()
+        return listener
+
+    def _set_problem(
+        self, problem: str, level: int = logging.WARNING, logged: str | None = None
+    ) -> None:
+        """Set :attr:`problem`, and log it once.
+
+        Args:
+            problem: The problem in words; empty if there is none.
+            level: Level of the log line.
+            logged: The part of it to log, if the rest is logged elsewhere; None for all.
+        """
+        logged = problem if logged is None else logged
+        if logged != self._logged_problem:
+            self._logged_problem = logged
+            if logged:
+                self._log.log(level, "%s: %s", self.topic, logged)
+        if problem != self._problem:
+            self._problem = problem
+            self._problem_listeners.notify(problem)
+
+    def _remove_listeners(self) -> None:
+        self._matched_listeners.clear()
+        self._incompatible_listeners.clear()
+        self._deadline_listeners.clear()
+        self._problem_listeners.clear()
 
 
 def conflicts(

@@ -12,14 +12,14 @@ from rosglass.comm.events import (
     DeadlineMissed,
     LivelinessLost,
     Matched,
-    PublisherEvents,
+    TopicEndpoint,
     conflict_events,
     conflicts,
     words,
 )
 from rosglass.comm.graph import EndpointInfo, EndpointKind, Graph
-from rosglass.comm.handle import Handle
 from rosglass.comm.inbox import Sample
+from rosglass.comm.listeners import Listeners
 from rosglass.comm.names import similar
 from rosglass.comm.qos import Liveliness
 from rosglass.comm.rclpy_names import hint_at_members
@@ -36,8 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm.core import NodeCore
-    from rosglass.comm.events import IncompatibleQoS
-    from rosglass.comm.handle import Executor
+    from rosglass.comm.handle import Executor, Handle
     from rosglass.comm.qos import QoS
     from rosglass.messages import Message, MessageType
 
@@ -53,7 +52,7 @@ _NO_MESSAGE: Any = object()
 
 
 @hint_at_members
-class Publisher(Handle):
+class Publisher(TopicEndpoint):
     """Sends messages of one type on one topic; made by :meth:`Node.create_publisher`.
 
     Args:
@@ -69,17 +68,17 @@ class Publisher(Handle):
     """
 
     def __init__(self, core: NodeCore, topic: str, type: MessageType, qos: QoS) -> None:
-        self.topic, self.type = topic, type
+        super().__init__(topic, core.dispatcher, core.log)
+        self.type = type
         self._core, self._wire = core, core.wire
         self._hash = type.type_hash
         self._closed = False
         self._process = os.getpid()
-        self._problem = ""
         #: The subscriptions in the graph at the last update; None requests another one.
         self._known: list[EndpointInfo] | None = None
         self._left: deque[EndpointInfo] = deque(maxlen=_MAX_LEFT)
         self._big = False
-        self._events = PublisherEvents(core.dispatcher, self._request_update, topic)
+        self._liveliness_listeners: Listeners[LivelinessLost] = Listeners(where=topic)
         #: Guards the watchdogs, and that none is added after closing.
         self._lock = threading.Lock()
         self._watchdogs: dict[str, Watchdog] = {}
@@ -253,7 +252,8 @@ class Publisher(Handle):
             watchdogs = list(self._watchdogs.values())
         for watchdog in watchdogs:
             watchdog.close()
-        self._events.clear()
+        self._remove_listeners()
+        self._liveliness_listeners.clear()
         if self._process != os.getpid():
             return
         if isinstance(self._graph, Graph):
@@ -283,11 +283,6 @@ class Publisher(Handle):
         return self._writer.lost()
 
     @property
-    def problem(self) -> str:
-        """Why subscriptions miss messages, in words; empty if there is no problem."""
-        return self._problem
-
-    @property
     def hint(self) -> str:
         """A hint why the topic has no subscriber, e.g. a similar topic name."""
         if self._closed or self._writer.subscribers() or self._subscriptions():
@@ -313,7 +308,7 @@ class Publisher(Handle):
             return
         if self._writer.subscribers() is not None:
             for connected in self._writer.changes():
-                self._events.matched.update(connected, Matched)
+                self._matched_listeners.update(connected, Matched)
             self._set_problem(self._writer.problem)
         elif moved:
             self._follow_graph()
@@ -329,8 +324,8 @@ class Publisher(Handle):
         self._writer.match(matching)
         self._set_problem("; ".join(self._problems(subscriptions, conflicting)))
         left = [self._left.popleft() for _ in range(len(self._left))]
-        self._events.matched.update(matching, Matched, left)
-        self._events.incompatible.update(conflicting, conflict_events(conflicting))
+        self._matched_listeners.update(matching, Matched, left)
+        self._incompatible_listeners.update(conflicting, conflict_events(conflicting))
 
     def _subscriptions(self) -> list[EndpointInfo]:
         found: list[EndpointInfo] = self._core.graph.endpoints(_SUBSCRIPTION, self.topic)
@@ -398,52 +393,7 @@ class Publisher(Handle):
             ] = None
         return list(problems)
 
-    def _set_problem(self, problem: str) -> None:
-        if problem == self._problem:
-            return
-        self._problem = problem
-        if problem:
-            self._core.log.warning("%s: %s", self.topic, problem)
-        self._events.problem.notify(problem)
-
     # -- events ----------------------------------------------------------------------------------
-
-    def on_matched(
-        self, callback: Callable[[Matched], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` when a matching subscription appears or leaves.
-
-        The subscriptions that exist already are reported first.
-
-        Args:
-            callback: Called with the subscription, and how many match now.
-            executor: Where it runs; None for the node's own dispatcher thread.
-
-        Raises:
-            ArgumentError: The callback is not callable, or the executor is not an Executor.
-        """
-        events = self._events
-        return events.added(events.matched.add(callback, executor or events.executor))
-
-    def on_incompatible_qos(
-        self, callback: Callable[[IncompatibleQoS], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` when a subscription appears that requests more than is offered.
-
-        The ones that exist already are reported first; arguments as for :meth:`on_matched`.
-        """
-        events = self._events
-        return events.added(events.incompatible.add(callback, executor or events.executor))
-
-    def on_deadline_missed(
-        self, callback: Callable[[DeadlineMissed], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` each time that no message was sent within the profile's deadline.
-
-        Time runs from the first message on. Arguments as for :meth:`on_matched`.
-        """
-        events = self._events
-        return events.added(events.deadline.add(callback, executor or events.executor))
 
     def on_liveliness_lost(
         self, callback: Callable[[LivelinessLost], None], executor: Executor | None = None
@@ -452,18 +402,7 @@ class Publisher(Handle):
 
         Arguments as for :meth:`on_matched`.
         """
-        events = self._events
-        return events.added(events.liveliness.add(callback, executor or events.executor))
-
-    def on_problem_change(
-        self, callback: Callable[[str], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` with :attr:`problem` whenever that changes.
-
-        Arguments as for :meth:`on_matched`.
-        """
-        events = self._events
-        return events.added(events.problem.add(callback, executor or events.executor))
+        return self._listen(self._liveliness_listeners, callback, executor)
 
     def _start_watchdogs(self) -> None:
         """Watch the limits that have a listener, from the first message on."""
@@ -473,10 +412,10 @@ class Publisher(Handle):
         with self._lock:
             if self._closed:
                 return
-            sent = self._sent_at and self._events.deadline
+            sent = self._sent_at and self._deadline_listeners
             if limit is not None and sent and "deadline" not in known:
                 known["deadline"] = Watchdog(timers, limit, lambda: self._sent_at, self._on_missed)
-            asserted = manual and self._asserted_at and self._events.liveliness
+            asserted = manual and self._asserted_at and self._liveliness_listeners
             if lease is not None and asserted and "lease" not in known:
                 known["lease"] = Watchdog(
                     timers, lease, lambda: self._asserted_at, self._on_liveliness_lost
@@ -484,13 +423,13 @@ class Publisher(Handle):
 
     def _on_missed(self, count: int) -> None:
         self._missed += count
-        self._events.deadline.notify(DeadlineMissed(count, self._missed))
+        self._deadline_listeners.notify(DeadlineMissed(count, self._missed))
 
     def _on_liveliness_lost(self, count: int) -> None:  # noqa: ARG002 - lost once, not per period
         if self._asserted_at != self._lost_since:
             self._lost_since = self._asserted_at
             self._lost += 1
-            self._events.liveliness.notify(LivelinessLost(self._lost))
+            self._liveliness_listeners.notify(LivelinessLost(self._lost))
 
 
 def _byte_view(data: bytes | bytearray | memoryview) -> bytes | memoryview:

@@ -15,17 +15,19 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm.core import NodeMember
 from rosglass.comm.events import (
+    Appearances,
     DeadlineMissed,
     LivelinessChanged,
     Matched,
     SamplesLost,
-    SubscriptionEvents,
+    TopicEndpoint,
     conflict_events,
 )
 from rosglass.comm.executor import IMMEDIATE, check_plain
 from rosglass.comm.graph import ConnectionState, EndpointKind
 from rosglass.comm.handle import Executor, Handle, check_flag, check_may_wait
 from rosglass.comm.inbox import ImmediateInbox, Inbox, Sample
+from rosglass.comm.listeners import Listeners
 from rosglass.comm.names import similar
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.rclpy_names import hint_at_members
@@ -38,7 +40,6 @@ if TYPE_CHECKING:
     from collections.abc import Set as AbstractSet
 
     from rosglass.comm.core import NodeCore
-    from rosglass.comm.events import IncompatibleQoS
     from rosglass.comm.graph import EndpointInfo, NodeName, Status
     from rosglass.comm.qos import QoS
     from rosglass.comm.statistics import Statistics
@@ -65,7 +66,7 @@ _MAX_LEFT = 1000
 
 
 @hint_at_members
-class Subscription(Handle):
+class Subscription(TopicEndpoint):
     """Receives the messages of one topic; made by :meth:`Node.create_subscription`.
 
     ``for sample in subscription`` and ``async for sample in subscription`` wait for each sample and
@@ -93,9 +94,10 @@ class Subscription(Handle):
             raise ArgumentError("raw_callback", raw_callback, expected, topic)
         if not isinstance(executor, Executor):
             raise ArgumentError("executor", executor, "a rosglass.comm.Executor", topic)
-        self.topic = topic
-        self._events = SubscriptionEvents(topic)
-        self._qos, self._type, self._executor = qos, message_type, executor
+        super().__init__(topic, executor, _log)
+        self._liveliness_listeners: Appearances[LivelinessChanged] = Appearances(topic)
+        self._lost_listeners: Listeners[SamplesLost] = Listeners(where=topic)
+        self._qos, self._type = qos, message_type
         self._decodes = callback is not None
         #: Set by the feed, which also fills the inbox and reads the members below.
         self._feed: SubscriptionFeed | None = None
@@ -103,7 +105,6 @@ class Subscription(Handle):
         self._waits: list[None] = []
         self._last_wait = -math.inf
         self._batching = False
-        self._problem = self._logged_problem = ""
         call = raw_callback if callback is None else _decoding(callback)
         self._has_callback = call is not None
         if call is not None and executor is IMMEDIATE:
@@ -285,40 +286,6 @@ class Subscription(Handle):
 
     # -- events ----------------------------------------------------------------------------------
 
-    def on_matched(
-        self, callback: Callable[[Matched], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` when a matching publisher appears or leaves.
-
-        The publishers that exist already are reported first.
-
-        Args:
-            callback: Called with the publisher, and how many match now.
-            executor: Where it runs; None for where the subscription's own callbacks run.
-
-        Raises:
-            ArgumentError: The callback is not callable, or the executor is not an Executor.
-        """
-        return self._added(self._events.matched.add(callback, executor or self._executor))
-
-    def on_incompatible_qos(
-        self, callback: Callable[[IncompatibleQoS], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` when a publisher appears that offers less than requested.
-
-        The publishers that exist already are reported first; arguments as for :meth:`on_matched`.
-        """
-        return self._added(self._events.incompatible.add(callback, executor or self._executor))
-
-    def on_deadline_missed(
-        self, callback: Callable[[DeadlineMissed], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` each time that no sample arrived within the profile's deadline.
-
-        Time runs while a publisher matches. Arguments as for :meth:`on_matched`.
-        """
-        return self._added(self._events.deadline.add(callback, executor or self._executor))
-
     def on_liveliness_change(
         self, callback: Callable[[LivelinessChanged], None], executor: Executor | None = None
     ) -> Handle:
@@ -327,7 +294,7 @@ class Subscription(Handle):
         A publisher is alive while it is in the graph; one with manual liveliness (by topic), while
         it asserts that in time. Arguments as for :meth:`on_matched`.
         """
-        return self._added(self._events.liveliness.add(callback, executor or self._executor))
+        return self._listen(self._liveliness_listeners, callback, executor)
 
     def on_samples_lost(
         self, callback: Callable[[SamplesLost], None], executor: Executor | None = None
@@ -336,16 +303,7 @@ class Subscription(Handle):
 
         Samples that a full inbox drops are not lost in this sense; :meth:`statistics` counts them.
         """
-        return self._added(self._events.lost.add(callback, executor or self._executor))
-
-    def on_problem_change(
-        self, callback: Callable[[str], None], executor: Executor | None = None
-    ) -> Handle:
-        """Call `callback` with :attr:`problem` whenever that changes.
-
-        Arguments as for :meth:`on_matched`.
-        """
-        return self._added(self._events.problem.add(callback, executor or self._executor))
+        return self._listen(self._lost_listeners, callback, executor)
 
     # -- the end ---------------------------------------------------------------------------------
 
@@ -356,7 +314,9 @@ class Subscription(Handle):
         """
         if not self._inbox.close():
             return
-        self._events.clear()
+        self._remove_listeners()
+        self._liveliness_listeners.clear()
+        self._lost_listeners.clear()
         if self._feed is not None:
             self._feed.end()
 
@@ -368,25 +328,6 @@ class Subscription(Handle):
         recent = time.monotonic() - self._last_wait < _AWAITED_S
         return (self._has_callback and not self._batching) or bool(self._waits) or recent
 
-    def _set_problem(
-        self, problem: str, level: int = logging.WARNING, logged: str | None = None
-    ) -> None:
-        """Set :attr:`problem`, and log it once.
-
-        Args:
-            problem: Why messages cannot be received, in words; empty if there is no problem.
-            level: Level of the log line.
-            logged: The part of it to log, if the rest is logged elsewhere; None for all.
-        """
-        logged = problem if logged is None else logged
-        if logged != self._logged_problem:
-            self._logged_problem = logged
-            if logged:
-                _log.log(level, "%s: %s", self.topic, logged)
-        if problem != self._problem:
-            self._problem = problem
-            self._events.problem.notify(problem)
-
     def _flush(self) -> None:
         if self._feed is not None:
             self._feed.flush()
@@ -394,10 +335,6 @@ class Subscription(Handle):
     def _request_update(self) -> None:
         if self._feed is not None:
             self._feed.request_update()
-
-    def _added(self, listener: Handle) -> Handle:
-        self._request_update()
-        return listener
 
     def _begin_wait(self) -> None:
         self._waits.append(None)
@@ -539,7 +476,7 @@ class SubscriptionFeed(NodeMember):
     ) -> None:
         self.subscription, self.topic = subscription, subscription.topic
         self.decodes = subscription._decodes
-        self._inbox, self._events = subscription._inbox, subscription._events
+        self._inbox = subscription._inbox
         self.deliver, self.deliver_many = self._inbox.put, self._inbox.put_many
         self._core, self._matching, self._ignored = core, matching, ignored
         self._loss_monitor = PublisherLossMonitor(core.name, core.status)
@@ -704,24 +641,25 @@ class SubscriptionFeed(NodeMember):
         matching: list[EndpointInfo],
         left: Sequence[EndpointInfo],
     ) -> None:
-        events = self._events
-        events.matched.update(matching, Matched, left)
-        if events.incompatible:
+        endpoint = self.subscription
+        endpoint._matched_listeners.update(matching, Matched, left)
+        if endpoint._incompatible_listeners:
             found = self._matching.find_conflicts(publishers)
-            events.incompatible.update(found, conflict_events(found))
-        if events.liveliness:
+            endpoint._incompatible_listeners.update(found, conflict_events(found))
+        if endpoint._liveliness_listeners:
 
             def changed(
-                endpoint: EndpointInfo, change: int, count: int, _total: int
+                publisher: EndpointInfo, change: int, count: int, _total: int
             ) -> LivelinessChanged:
-                return LivelinessChanged(endpoint, change, count, len(matching) - count)
+                return LivelinessChanged(publisher, change, count, len(matching) - count)
 
-            events.liveliness.update(self._matching.find_alive(matching), changed)
+            alive = self._matching.find_alive(matching)
+            endpoint._liveliness_listeners.update(alive, changed)
         self._watch_deadline(bool(matching))
 
     def _watch_deadline(self, published: bool) -> None:
         limit = self.qos.deadline
-        listened = published and bool(self._events.deadline)
+        listened = published and bool(self.subscription._deadline_listeners)
         wanted = limit is not None and listened and not self._closed
         if self._deadline is not None and not (wanted and self._deadline.limit == limit):
             self._deadline.close()
@@ -737,16 +675,16 @@ class SubscriptionFeed(NodeMember):
 
     def _on_deadline_missed(self, count: int) -> None:
         self._missed += count
-        self._events.deadline.notify(DeadlineMissed(count, self._missed))
+        self.subscription._deadline_listeners.notify(DeadlineMissed(count, self._missed))
 
     def _report_losses(self) -> None:
-        events = self._events
-        if not events.lost:
+        listeners = self.subscription._lost_listeners
+        if not listeners:
             return
         total = self.lost()
         change, self._reported_losses = total - self._reported_losses, total
         if change > 0:
-            events.lost.notify(SamplesLost(change, total))
+            listeners.notify(SamplesLost(change, total))
 
 
 class PublisherLossMonitor:
