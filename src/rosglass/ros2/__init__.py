@@ -1,4 +1,4 @@
-"""ROS 2 on the wire: names, the graph, topics, over one small middleware seam.
+"""ROS 2's protocols above a wire: topics, services, actions, parameters, types.
 
 Import what you need from the modules: those of :mod:`rosglass.wires.zenoh` bring in the
 ``eclipse-zenoh`` package, those of :mod:`rosglass.wires.dds` ``cyclonedds``, the others neither.
@@ -25,7 +25,7 @@ _HOME_OF = {
 
 
 def __getattr__(name: str) -> object:
-    # Imported on first use: whoever only asks which names are valid waits for no node.
+    # Imported on first use: checking a name must not wait for the node's imports.
     if name not in _HOME_OF:
         raise AttributeError(f"module 'rosglass.ros2' has no attribute {name!r}")
     value: object = getattr(import_module(_HOME_OF[name]), name)

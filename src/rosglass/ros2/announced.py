@@ -1,4 +1,4 @@
-"""Taking the type, and the version of it, that the other side of a service or action announces."""
+"""The type of a service or action, in the version that its peers announce."""
 
 from __future__ import annotations
 
@@ -36,23 +36,23 @@ _T = TypeVar("_T", bound=_Type)
 
 
 class Announced(Generic[_T]):
-    """One type, in the version that peers announce by its hash, if the library has it.
+    """A type in the version that peers announce by its hash.
 
-    A version that the library does not have is fetched from the robot.
+    A version that the library does not have is fetched from the peers.
 
     Args:
         core: The node.
         load: Returns the type of a name and hash; raises an Error when there is none.
-        given: The type that was given; None when only peers can tell it.
+        given: The type that was given; None to take what peers announce.
         fixed: Whether it stays as given whatever peers announce.
 
     Attributes:
-        type: The type; None while nobody has told it.
+        type: The type; None while it is unknown.
         hash: Its own hash, empty without type.
         hashes: The hashes that peers announce it by; see
             :func:`rosglass.interfaces.hashes.announced_hashes`.
-        failure: Why the announced version cannot be had, in words; empty when all is well.
-        pending: Whether it is being fetched from the robot.
+        failure: Why the announced version is not available; empty if it is.
+        pending: Whether it is being fetched.
     """
 
     def __init__(
@@ -66,18 +66,18 @@ class Announced(Generic[_T]):
         self.failure = ""
         self.pending = False
         if given is not None:
-            self._take(given)
+            self._set(given)
 
     def follow(self, name: str, peers: Sequence[EndpointInfo], retry: bool) -> bool:
         """Take the version of the type `name` that `peers` announce.
 
         Args:
             name: The type's name, as peers spell it.
-            peers: Those with another type are ignored.
-            retry: Whether to look again for a definition that was not found before.
+            peers: Peers; those with another type are ignored.
+            retry: Whether to search again for a definition that was not found before.
 
         Returns:
-            Whether the type is another one now.
+            Whether the type has changed.
         """
         if self._fixed:
             return False
@@ -97,17 +97,17 @@ class Announced(Generic[_T]):
             self._failed = None if self.pending else wanted
             return False
         self._clear()
-        self._take(found)
+        self._set(found)
         return True
 
-    def told(self, peer: EndpointInfo) -> str:
-        """Say how a peer's version differs from ours, in hashes."""
+    def difference(self, peer: EndpointInfo) -> str:
+        """Return how a peer's version differs from ours, in hashes."""
         if peer.type_hash in self.hashes and peer.response_hash:
             return f"of its response: {peer.response_hash}, ours is {self._response_hash}"
         return f"{peer.type_hash}, ours is {self.hash}"
 
     def fits(self, peer: EndpointInfo) -> bool:
-        """Return whether a peer has this type in this version, as far as it says."""
+        """Return whether a peer has this type in this version, as far as it announces that."""
         return (
             self.type is not None
             and peer.type == self.type.name
@@ -115,13 +115,13 @@ class Announced(Generic[_T]):
         )
 
     def _version(self, peer: EndpointInfo) -> str:
-        """Return the hash that tells a peer's version from ours, or that it has the same."""
+        """Return the hash by which a peer's version differs from ours, or equals it."""
         if peer.type_hash in self.hashes and peer.response_hash not in self.hashes:
             return peer.response_hash or peer.type_hash
         return peer.type_hash
 
     def _check(self, found: _T, peers: Sequence[EndpointInfo]) -> None:
-        """Raise DefinitionConflictError for a version with the peers' response, but no request."""
+        """Raise DefinitionConflictError for a version with the peers' response alone."""
         hashes = announced_hashes(found.definition)
         for peer in peers:
             if peer.response_hash in hashes and peer.type_hash not in hashes:
@@ -133,7 +133,7 @@ class Announced(Generic[_T]):
     def _clear(self) -> None:
         self._failed, self.failure, self.pending = None, "", False
 
-    def _take(self, found: _T) -> None:
+    def _set(self, found: _T) -> None:
         hashes = announced_hashes(found.definition)
         self.type, self.hash, self.hashes = found, hashes[0], frozenset(hashes)
         self._response_hash = hashes[-1]
@@ -142,35 +142,35 @@ class Announced(Generic[_T]):
 def missing(
     core: Core, name: str, hash: str, peers: Sequence[EndpointInfo], error: Error
 ) -> tuple[str, bool]:
-    """Ask the robot for a definition that cannot be had here.
+    """Request a definition that the library does not have from peers.
 
     Args:
-        core: The node; its members follow when there is an answer.
+        core: The node; its members follow when the definition is received.
         name: The type's name.
-        hash: The hash that peers announce it by, empty when they do not.
-        peers: Who has it.
-        error: Why it cannot be had here.
+        hash: The hash that peers announce it by, empty if they do not.
+        peers: The peers that use it.
+        error: Why the library does not have it.
 
     Returns:
-        What to tell people, and whether the answer is awaited.
+        The problem in words, and whether a response is pending.
     """
     having = [peer for peer in peers if peer.type.startswith(name)]
-    who = nodes_of(having) or "the robot"
+    nodes = nodes_of(having) or "the robot"
     reason = core.types.request(name, hash, having, core.wake)
     if not reason:
-        return f"{who} has {name}, whose definition is being fetched from the robot", True
+        return f"{nodes} has {name}, whose definition is being fetched from the robot", True
     return (
-        f"{who} has {name}, which cannot be used: {error}; {reason}; this is tried again until a "
+        f"{nodes} has {name}, which cannot be used: {error}; {reason}; this is tried again until a "
         "definition is found"
     ), False
 
 
 def choose(names: Iterable[str], current: str, example: str) -> tuple[str, str]:
-    """Return the type's name to go with, and what is wrong when there are several.
+    """Return the name of the type to use, and the problem if there are several.
 
     Args:
-        names: What peers announce.
-        current: The name in use, empty when there is none.
+        names: The names that peers announce.
+        current: The name in use, empty if there is none.
         example: A call that gives the type, with ``{}`` for its name.
     """
     found = sorted(set(names))
@@ -178,20 +178,20 @@ def choose(names: Iterable[str], current: str, example: str) -> tuple[str, str]:
         return current, ""
     if len(found) == 1:
         return found[0], ""
-    told = example.format(repr(found[0]))
-    return current, f"offered with several types ({', '.join(found)}); choose one, e.g. {told}"
+    call = example.format(repr(found[0]))
+    return current, f"offered with several types ({', '.join(found)}); choose one, e.g. {call}"
 
 
 def mismatches(
     announced: Announced[Any], peers: Sequence[EndpointInfo], verb: str, effect: str
 ) -> list[str]:
-    """Say which peers do not fit the type, and what follows.
+    """Return the mismatches of peers with a type, and their effect, one sentence each.
 
     Args:
         announced: Our type.
         peers: Servers or clients.
-        verb: What they do: ``offers`` or ``calls``.
-        effect: What follows, e.g. ``it cannot be called``.
+        verb: ``offers`` or ``calls``.
+        effect: The effect, e.g. ``it cannot be called``.
     """
     problems: dict[str, None] = {}
     if announced.type is None:
@@ -202,25 +202,25 @@ def mismatches(
             problems[f"{peer.node} {verb} {peer.type} here, not {name}: {effect}"] = None
         elif not announced.fits(peer):
             problems[
-                f"{peer.node} has another definition of {name} ({announced.told(peer)}): {effect}; "
-                "add the robot's definition to the library"
+                f"{peer.node} has another definition of {name} ({announced.difference(peer)}): "
+                f"{effect}; add the robot's definition to the library"
             ] = None
     return list(problems)
 
 
 def rivals(servers: Sequence[EndpointInfo], name: str) -> list[str]:
-    """Say that several nodes offer the same, which does not stop anybody but ends badly."""
+    """Return the problem that several nodes offer the same service or action, if they do."""
     if len({server.node for server in servers}) < 2:
         return []
-    told = "each carries out what it is asked, and the first answer is taken; end all but one"
-    return [f"{nodes_of(servers)} all offer {name}: {told}"]
+    effect = "each executes every request, and the first response is taken; stop all but one"
+    return [f"{nodes_of(servers)} all offer {name}: {effect}"]
 
 
 def identity(peer: EndpointInfo) -> bytes | str:
-    """Return what tells a peer from another one that takes its place."""
+    """Return the identity of a peer, which differs from that of a successor."""
     return peer.gid or peer.node.full
 
 
 def nodes_of(peers: Iterable[EndpointInfo]) -> str:
-    """Return the names of the nodes that peers belong to, for people."""
+    """Return the names of the nodes that peers belong to, for messages."""
     return ", ".join(sorted({peer.node.full for peer in peers}))

@@ -228,8 +228,8 @@ class Ros2Requester(ServiceRequester):
             problems = mismatches(self._announced, servers, "offers", "it cannot be called")
             # Where several servers conflict, the middleware knows more about it.
             others = rivals(self._fitting(servers), self._name)
-            told = self.middleware_problem
-            problems += [told] if told and not problems else others
+            problem = self.middleware_problem
+            problems += [problem] if problem and not problems else others
         return problems
 
     def absence(self) -> str:

@@ -1,4 +1,4 @@
-"""What a program is told with ``--ros-args``: names, parameters, log levels.
+"""The command line arguments after ``--ros-args``: names, parameters, log levels.
 
 Grammar and precedence: design articles "ROS Command Line Arguments" and "Remapping Names", and
 ``rcl``'s argument parser. Where the two differ, rcl counts: wildcards in remapping rules are in
@@ -83,7 +83,7 @@ class _Assignment(NamedTuple):
 
 @dataclass(frozen=True)
 class Arguments:
-    """What was said with ``--ros-args``.
+    """The arguments after ``--ros-args``.
 
     Attributes:
         rules: Remapping rules, in order; the first that matches counts.
@@ -91,7 +91,7 @@ class Arguments:
         logger_levels: The same for single loggers, by name.
         rosout: Whether log messages go to ``/rosout``.
         stdout: Whether log messages go to Python's log handlers, and so to the terminal.
-        others: The arguments that are not ROS's, in order.
+        others: The remaining arguments, in order.
     """
 
     rules: tuple[RemapRule, ...] = ()
@@ -117,15 +117,15 @@ class Arguments:
         return _Parser(arguments).parse()
 
     def node_name(self, name: str) -> str:
-        """Return the base name that the node called `name` shall have."""
+        """Return the remapped base name of the node called `name`."""
         return self._renamed("__node", name) or name
 
     def namespace(self, name: str, namespace: str) -> str:
-        """Return the namespace that the node with the (new) base name `name` shall have."""
+        """Return the remapped namespace of the node with the (new) base name `name`."""
         return self._renamed("__ns", name) or namespace
 
     def remappings(self, kind: str, name: str, namespace: str) -> dict[str, str]:
-        """Return what topics or services are to be called, by absolute name.
+        """Return the new names of topics or services, by absolute name.
 
         Args:
             kind: ``topic`` or ``service``.
@@ -153,7 +153,7 @@ class Arguments:
     def parameters(self, node: str) -> dict[str, ParameterValue]:
         """Return the parameters given for the node with the full name `node`.
 
-        What names the node wins over what is for all; otherwise the last wins.
+        Rules that name the node win over those for all nodes; otherwise the last wins.
         """
         from rosglass.ros2.parameter_files import matches  # noqa: PLC0415 - yaml
 
@@ -174,12 +174,12 @@ class Arguments:
         return ""
 
 
-#: For a node that was told nothing.
+#: The arguments of a node without any.
 NO_ARGUMENTS = Arguments()
 
 
 class _Parser:
-    """Goes through a command line once."""
+    """Parses a command line."""
 
     def __init__(self, arguments: Sequence[str]) -> None:
         listed = isinstance(arguments, Sequence) and not isinstance(arguments, (str, bytes))
@@ -379,5 +379,5 @@ class _Parser:
             validate_namespace(text)
         except InvalidNameError as error:
             raise self._error(f"--enclave {text!r}: {error}") from None
-        # Whoever names one expects encryption.
+        # A user who names one expects encryption.
         _log.warning("--enclave %s has no effect: this node's traffic is not secured", text)

@@ -5,7 +5,6 @@ Beside the matching itself: which publishers are alive, and which samples came t
 
 from __future__ import annotations
 
-import threading
 import time
 from typing import TYPE_CHECKING
 
@@ -33,16 +32,17 @@ _PUBLISHER = EndpointKind.PUBLISHER
 _MAX_PUBLISHERS = 1024
 #: Gaps in the numbering that are remembered per publisher, in samples.
 _MAX_MISSING = 64
-_NOBODY = (-3, 0)
+#: Number and time stamp of the last sample of an unknown publisher.
+_NO_SAMPLE = (-3, 0)
 
 
 class GraphMatching(TopicMatching):
-    """Finds the type and the profile that match a topic's publishers, and reads with them.
+    """Matches a subscription with publishers by type and profile, and reads from them.
 
     Args:
         core: The node it belongs to.
-        wanted: Type or type name it was created with; None to take what is published.
-        ignored: Identities of publishers that are left out.
+        wanted: Type or type name that was given; None to take what is published.
+        ignored: GIDs of publishers that are ignored.
     """
 
     def __init__(
@@ -53,15 +53,14 @@ class GraphMatching(TopicMatching):
     ) -> None:
         self._core, self._type, self._ignored = core, wanted, ignored
         self._repeats = Repeats()
-        self._lock = threading.Lock()
         self._closed = False
-        self._alone = True
+        self._without_publisher = True
         self._lost_before = 0
         self._feed: SubscriptionFeed
         self._types: TopicTypes
 
     def open(self, feed: SubscriptionFeed, publishers: Sequence[EndpointInfo]) -> None:
-        """Decide on the profile, and read as soon as the type is known."""
+        """Choose the profile, and read as soon as the type is known."""
         self._feed, self._topic, self._wanted = feed, feed.topic, feed.qos
         self._liveness = Liveness(self._core.timers, self._repeats, feed.request_update)
         self._types = TopicTypes(
@@ -78,7 +77,7 @@ class GraphMatching(TopicMatching):
             self._read(self._types.type)
 
     def update(self, publishers: Sequence[EndpointInfo], idle: bool) -> list[Problem]:
-        """Follow what the publishers announce; return what keeps their samples away."""
+        """Follow the publishers; return the problems that keep samples from being received."""
         changed = self._types.follow(publishers, idle)
         ours = self._types.type
         problems = self._types.problems
@@ -93,7 +92,7 @@ class GraphMatching(TopicMatching):
         return [Problem(text) for text in problems]
 
     def find_matching(self, publishers: Sequence[EndpointInfo]) -> list[EndpointInfo]:
-        """Return the publishers whose type is understood, and whose profile matches."""
+        """Return the publishers of a known type with a compatible profile."""
         understood = [p for p in publishers if self._types.accepts(p)]
         qos, middleware = self._feed.qos, self._core.middleware
         if not middleware.matches_qos:
@@ -103,7 +102,7 @@ class GraphMatching(TopicMatching):
     def find_conflicts(
         self, publishers: Sequence[EndpointInfo]
     ) -> dict[EndpointInfo, dict[str, str]]:
-        """Return what those publishers offer too little of whose type is understood."""
+        """Return the incompatible policies of publishers of a known type."""
         qos, middleware = self._feed.qos, self._core.middleware
         found = {
             p: conflicts(middleware, p, qos, p.qos) for p in publishers if self._types.accepts(p)
@@ -111,20 +110,19 @@ class GraphMatching(TopicMatching):
         return {publisher: policies for publisher, policies in found.items() if policies}
 
     def find_alive(self, matching: Sequence[EndpointInfo]) -> list[EndpointInfo]:
-        """Return those of the matching publishers that show their liveliness in time."""
+        """Return the matching publishers that assert their liveliness in time."""
         return self._liveness.follow(matching, self.reader)
 
     def lost(self) -> int:
-        """Return how many samples were sent and have not arrived."""
+        """Return how many samples were sent but not received."""
         reader = self.reader
         by_reader = 0 if reader is None else reader.lost()
         return self._repeats.lost + self._lost_before + by_reader
 
     def close(self) -> None:
         """Stop reading; safe to call twice."""
-        with self._lock:
-            self._closed = True
-            reader, self.reader = self.reader, None
+        self._closed = True
+        reader, self.reader = self.reader, None
         if reader is not None:
             reader.close()
         self._liveness.close()
@@ -139,13 +137,14 @@ class GraphMatching(TopicMatching):
     # -- quality of service ----------------------------------------------------------------------
 
     def _profile(self, publishers: Sequence[EndpointInfo]) -> QoS:
-        """Return the profile to ask for: the one in use, unless a publisher does not match it."""
+        """Return the profile to request: the one in use, unless a publisher conflicts with it."""
         current = self._feed.qos
         if self._wanted.is_decided:
             return current
         offers = self._offers(publishers)
-        first, self._alone = self._alone and bool(offers), not offers
-        # Without any publisher left, the next one may be met with a stronger profile.
+        first = self._without_publisher and bool(offers)
+        self._without_publisher = not offers
+        # The first publisher after a time without any may offer a stronger profile.
         if offers and (first or any(current.conflicts(offered) for offered in offers)):
             return self._wanted.for_subscription(offers)
         return current
@@ -173,7 +172,7 @@ class GraphMatching(TopicMatching):
     # -- reading ---------------------------------------------------------------------------------
 
     def _read(self, message_type: MessageType) -> None:
-        """Receive samples of `message_type` from now on, instead of any before."""
+        """Create a reader for `message_type`, in place of the one before."""
         self._feed.set_type(message_type)
         self._repeats.guarded = self.reader is not None
         endpoint = EndpointInfo(
@@ -185,19 +184,19 @@ class GraphMatching(TopicMatching):
             message_type.type_hash,
         )
         reader = self._core.middleware.create_reader(endpoint, self._receiver())
-        with self._lock:
-            old: Reader | None = self.reader
-            self.reader = None if self._closed else reader
+        old: Reader | None
+        old, self.reader = self.reader, reader
         if old is not None:
             self._lost_before += old.lost()
             old.close()
-        if self.reader is None:
+        if self._closed:  # by another thread, which may have missed the new reader
+            self.reader = None
             reader.close()
         else:
             self._feed.update_eagerness()
 
     def _receiver(self) -> OnSample:
-        """Return what takes the samples; every line of it is paid for by each sample."""
+        """Return the function that takes samples: the hot path, each line runs per sample."""
         accepted, find_type = self._types.accepted, self._types.find_type
         ignored = self._ignored
         seen, deliver = self._repeats.seen, self._feed.deliver
@@ -222,15 +221,15 @@ class GraphMatching(TopicMatching):
 
 
 class Liveness:
-    """Tells the publishers that are alive from those that are only there.
+    """Monitors the liveliness of publishers.
 
-    A publisher with automatic liveliness is alive while it is seen. One that promised to show its
-    liveliness itself (manual by topic) is alive while it does so within its lease duration: by
-    sending something, or by a word of its own, which only DDS carries and only as a count.
+    A publisher with automatic liveliness is alive while it is in the graph. One with manual
+    liveliness is alive while it asserts it within its lease duration: by publishing, or
+    explicitly, which only DDS carries, and only as a count.
 
     Args:
-        timers: Run the next look.
-        repeats: Knows the last sample of each publisher.
+        timers: Schedule the next check.
+        repeats: Has the last sample of each publisher.
         look: Called when it is time to :meth:`follow` again.
     """
 
@@ -240,7 +239,7 @@ class Liveness:
         self._timer: Handle | None = None
 
     def follow(self, there: Sequence[EndpointInfo], reader: Reader | None) -> list[EndpointInfo]:
-        """Return those of the publishers that are `there` who are alive now."""
+        """Return those of the publishers in the graph that are alive."""
         manual = [
             (endpoint, endpoint.qos.lease_duration.seconds)
             for endpoint in there
@@ -256,7 +255,7 @@ class Liveness:
         silent = [endpoint for endpoint, lease in manual if now - signs[endpoint.gid] > lease]
         alive = None if reader is None else reader.alive()
         if alive is not None:
-            # The middleware knows better how many, but not which: those who sent last.
+            # The middleware knows how many, but not which: assume those that sent last.
             manual.sort(key=lambda one: signs[one[0].gid])
             silent = [endpoint for endpoint, _ in manual[: max(0, len(there) - alive)]]
         self.close()
@@ -265,13 +264,13 @@ class Liveness:
         return [endpoint for endpoint in there if endpoint not in silent]
 
     def close(self) -> None:
-        """Look no more; safe to call twice."""
+        """Stop monitoring; safe to call twice."""
         timer, self._timer = self._timer, None
         if timer is not None:
             timer.close()
 
     def _sign(self, gid: bytes, now: float) -> float:
-        """Return when a publisher showed last that it is alive; when it was seen first, that."""
+        """Return the monotonic time of a publisher's last sample, or of its discovery."""
         known = self._signs.get(gid)
         if known is None or known[0] != self._repeats.latest(gid):
             return now
@@ -279,18 +278,18 @@ class Liveness:
 
 
 class Repeats:
-    """Tells whether a sample was seen before, by its publisher's identity, number and time stamp.
+    """Detects samples that were received before, by publisher, sequence number and time stamp.
 
-    A sample can come twice: over an old and a new route while links change, from a publisher's
-    memory after a reconnection, or under two keys when a publisher serves two distributions. Late
-    samples that were not seen are not repeats. Safe from several threads: the worst that a race
-    does is let a repeat pass.
+    A sample can be received twice: over an old and a new route while links change, from a
+    publisher's history after a reconnection, or under two keys if a publisher serves two
+    distributions. Late samples that were not received before are no repeats. Several threads may
+    use it: the worst effect of a race is that a repeat passes.
 
     Attributes:
-        lost: Numbers that were left out, so far.
-        guarded: Whether samples without number are told apart by their time stamps: while one
-            reader takes the place of another, whose last samples may come again. Not longer, as a
-            publisher's clock may be set back.
+        lost: How many numbers were skipped so far.
+        guarded: Whether samples without number are compared by their time stamps: while a reader
+            is replaced, whose last samples may be received again. Not longer, as a publisher's
+            clock may be set back.
     """
 
     def __init__(self) -> None:
@@ -300,24 +299,24 @@ class Repeats:
         self._missing: dict[bytes, set[int]] = {}
 
     def seen(self, gid: bytes, sequence: int, sent: int | None) -> bool:
-        """Return whether the sample is a repeat, and remember it.
+        """Return whether a sample is a repeat, and record it.
 
         Samples without identity, number or time stamp are never repeats.
         """
         if sent is None or not gid:
             return False
-        last = self._last.get(gid, _NOBODY)
+        last = self._last.get(gid, _NO_SAMPLE)
         if sequence == last[0] + 1:
             self._last[gid] = (sequence, sent)
             return False
         return self._judge(gid, sequence, sent, last)
 
     def latest(self, gid: bytes) -> tuple[int, int]:
-        """Return number and time stamp of a publisher's last sample, to see whether more came."""
-        return self._last.get(gid, _NOBODY)
+        """Return number and time stamp of a publisher's last sample."""
+        return self._last.get(gid, _NO_SAMPLE)
 
     def _judge(self, gid: bytes, sequence: int, sent: int, last: tuple[int, int]) -> bool:
-        """Decide on a sample that is not simply the next one."""
+        """Return whether a sample that is not simply the next one is a repeat."""
         if sequence < 0:
             repeated = self.guarded and sent <= last[1]
             if not repeated:
@@ -327,7 +326,7 @@ class Repeats:
             self._remember(gid, sequence, sent)
             return False
         if sequence > last[0]:
-            self._leave_out(gid, last[0] + 1, sequence)
+            self._record_gap(gid, last[0] + 1, sequence)
         elif sent <= last[1]:
             missing = self._missing.get(gid, set())
             if sequence not in missing:
@@ -344,7 +343,7 @@ class Repeats:
             self._missing.clear()
         self._last[gid] = (sequence, sent)
 
-    def _leave_out(self, gid: bytes, first: int, end: int) -> None:
+    def _record_gap(self, gid: bytes, first: int, end: int) -> None:
         self.lost += end - first
         missing = self._missing.setdefault(gid, set())
         missing.update(range(max(first, end - _MAX_MISSING), end))
@@ -352,29 +351,29 @@ class Repeats:
             self._missing[gid] = set(sorted(missing)[-_MAX_MISSING:])
 
 
-#: Unknown definitions that are named, of publishers that announce nothing.
-_MAX_STRANGERS = 16
+#: Unannounced hashes that are remembered and reported.
+_MAX_UNANNOUNCED = 16
 
 
 class TopicTypes:
-    """The type of one topic, as it was asked for and as publishers announce it.
+    """The type of a topic, as it was given and as publishers announce it.
 
-    Asked for by name, or not at all, every version is understood that the library has or the robot
-    sends. What nobody can define becomes opaque, where bytes are welcome.
+    Given by name, or not at all, every version is accepted that the library has or the publishers'
+    nodes send. Without a definition, the type becomes opaque if the subscription takes bytes.
 
     Args:
-        topic: For messages.
+        topic: The topic, for messages.
         types: Finds definitions.
         wanted: A type, which stays; a type's name; or None to take what is published.
         known: The type of that name, if the library has it.
-        opaque: Whether bytes are welcome that cannot be decoded.
-        changed: Called, from any thread, when it is worth calling :meth:`follow` again.
+        opaque: Whether the subscription takes bytes that cannot be decoded.
+        changed: Called, from any thread, when :meth:`follow` should be called again.
 
     Attributes:
-        type: The type to receive; None while it is open.
-        accepted: The type for each hash that samples may have; the empty one stands for samples
-            of publishers that have none.
-        problems: What :meth:`follow` found to be wrong, in words.
+        type: The type to receive; None while it is unknown.
+        accepted: The type for each hash that samples may have; the empty hash is that of
+            publishers that announce none.
+        problems: The problems that :meth:`follow` found, in words.
     """
 
     def __init__(
@@ -391,12 +390,12 @@ class TopicTypes:
         self._fixed = wanted is not None and not isinstance(wanted, str)
         self._given = _full_name(wanted) if isinstance(wanted, str) else ""
         self._hash = ""
-        #: Whether the type is opaque only for want of a definition.
-        self._makeshift = False
+        #: Whether the type is opaque because a definition is missing.
+        self._provisional = False
         self._failures: dict[tuple[str, str], _Failure] = {}
-        #: Hashes that samples came with and nobody announced.
-        self._strangers: set[str] = set()
-        #: Hashes that are accepted as opaque, for want of a definition.
+        #: Hashes of received samples that no publisher announced.
+        self._unannounced: set[str] = set()
+        #: Hashes that are accepted as opaque, as their definition is missing.
         self._undefined: set[str] = set()
         self.type: MessageType | None = None
         self.accepted: dict[str, MessageType] = {}
@@ -405,7 +404,7 @@ class TopicTypes:
             self._take(known)
 
     def accepts(self, endpoint: EndpointInfo) -> bool:
-        """Return whether the samples of a publisher can be handed on, as far as it says."""
+        """Return whether the samples of a publisher are accepted, as far as it is announced."""
         ours = self.type
         if ours is None or endpoint.type != ours.name:
             return False
@@ -415,26 +414,26 @@ class TopicTypes:
         """Return the type for samples with an unknown hash; from any thread, at once."""
         ours = self.type
         if ours is not None and not self._hash:
-            # Opaque without hash: any will do, and is kept for passing the samples on.
-            if len(self.accepted) <= _MAX_STRANGERS:
+            # Opaque without hash: any is accepted, and kept for republishing the samples.
+            if len(self.accepted) <= _MAX_UNANNOUNCED:
                 self.accepted[type_hash] = self._types.opaque(
                     ours.name, type_hash, getattr(ours, "reason", "")
                 )
             return self.accepted.get(type_hash, ours)
-        if type_hash not in self._strangers and len(self._strangers) < _MAX_STRANGERS:
-            self._strangers.add(type_hash)
+        if type_hash not in self._unannounced and len(self._unannounced) < _MAX_UNANNOUNCED:
+            self._unannounced.add(type_hash)
             self._changed()
         return None
 
     def follow(self, publishers: Sequence[EndpointInfo], retry: bool) -> bool:
-        """Follow what is published now.
+        """Follow a change of the publishers.
 
         Args:
             publishers: The topic's publishers.
-            retry: Whether to look again for definitions that were not found before.
+            retry: Whether to search again for definitions that were not found before.
 
         Returns:
-            Whether :attr:`type` is another one now.
+            Whether :attr:`type` has changed.
         """
         self.problems = []
         before = self.type
@@ -447,7 +446,7 @@ class TopicTypes:
         return self.type is not before
 
     def _name(self, publishers: Sequence[EndpointInfo]) -> str:
-        """Return the name of the type to receive, empty while that is open."""
+        """Return the name of the type to receive, empty while it is unknown."""
         if self._given:
             return self._given
         ours = "" if self.type is None else self.type.name
@@ -456,16 +455,20 @@ class TopicTypes:
             return ours
         if len(types) == 1:
             return types[0]
-        told = ", ".join(f"{t} by {nodes_of(p for p in publishers if p.type == t)}" for t in types)
+        text = ", ".join(f"{t} by {nodes_of(p for p in publishers if p.type == t)}" for t in types)
         example = f"create_subscription({self._topic!r}, {types[0]!r})"
-        self.problems.append(f"published with several types ({told}); choose one, e.g. {example}")
+        self.problems.append(f"published with several types ({text}); choose one, e.g. {example}")
         return ours
 
     def _choose(self, name: str, publishers: Sequence[EndpointInfo], retry: bool) -> None:
-        """Take the version that is published; the library's own when there are several."""
+        """Choose the version that is published; the library's own if there are several."""
         hashes = sorted({p.type_hash for p in publishers if p.type_hash})
         ours = self.type if self.type is not None and self.type.name == name else None
-        if ours is not None and not self._makeshift and (len(hashes) != 1 or self._hash in hashes):
+        if (
+            ours is not None
+            and not self._provisional
+            and (len(hashes) != 1 or self._hash in hashes)
+        ):
             return
         if ours is None and not publishers:
             return
@@ -476,25 +479,25 @@ class TopicTypes:
                 self._take(found)
                 return
         failure = self._failures[name, versions[0]]
-        if ours is not None and not self._makeshift:
-            return  # what cannot be had is named below
+        if ours is not None and not self._provisional:
+            return  # _compare() reports what is missing
         as_bytes = self._opaque and not failure.pending
-        self.problems.append(failure.told(nodes_of(publishers), name, as_bytes))
+        self.problems.append(failure.describe(nodes_of(publishers), name, as_bytes))
         if as_bytes:
             self._take_opaque(name, versions[0] if len(versions) == 1 else "", failure.reason)
 
     def _add_versions(self, name: str, publishers: Sequence[EndpointInfo], retry: bool) -> None:
-        """Accept every other version that can be had."""
-        if self.type is None or self.type.name != name or self._makeshift:
+        """Accept every other version whose definition is available."""
+        if self.type is None or self.type.name != name or self._provisional:
             return
         announced = {p.type_hash for p in publishers if p.type_hash}
-        for version in sorted(announced | self._strangers):
+        for version in sorted(announced | self._unannounced):
             if version in self.accepted and version not in self._undefined:
                 continue
             found = self._load(name, version, publishers, retry)
             if found is not None:
                 self.accepted[version] = found
-                self._strangers.discard(version)
+                self._unannounced.discard(version)
                 self._undefined.discard(version)
             elif self._opaque and not self._given:
                 failure = self._failures[name, version]
@@ -518,8 +521,8 @@ class TopicTypes:
         return found
 
     def _take(self, found: MessageType) -> None:
-        self._makeshift = False
-        self._strangers.clear()
+        self._provisional = False
+        self._unannounced.clear()
         self._undefined.clear()
         self.type, self._hash = found, found.type_hash
         self.accepted = {"": found, self._hash: found}
@@ -528,10 +531,10 @@ class TopicTypes:
         made = self._types.opaque(name, type_hash, reason)
         if self.type != made:
             self._take(made)
-        self._makeshift = True
+        self._provisional = True
 
     def _compare(self, publishers: Sequence[EndpointInfo]) -> None:
-        """Say whose samples are not understood."""
+        """Report the publishers whose samples are not accepted."""
         ours = self.type
         if ours is None:
             return
@@ -541,14 +544,14 @@ class TopicTypes:
             self.problems.append(f"{nodes_of(others)} publishes {types} here, not {ours.name}")
         if not self._hash:
             return
-        strangers = dict.fromkeys(self._strangers - self.accepted.keys(), "")
+        unknown_hashes = dict.fromkeys(self._unannounced - self.accepted.keys(), "")
         for publisher in publishers:
             unknown = publisher.type_hash not in self.accepted or (
                 publisher.type_hash in self._undefined
             )
             if publisher.type == ours.name and unknown:
-                strangers[publisher.type_hash] = f" of {publisher.node}"
-        for version, who in sorted(strangers.items()):
+                unknown_hashes[publisher.type_hash] = f" of {publisher.node}"
+        for version, who in sorted(unknown_hashes.items()):
             failure = self._failures.get((ours.name, version))
             if version in self._undefined:
                 effect = "its samples are handed on as bytes"
@@ -563,18 +566,18 @@ class TopicTypes:
 
 
 class _Failure:
-    """Why a definition could not be had."""
+    """Why a definition is missing."""
 
     def __init__(self, error: str, reason: str) -> None:
         self.pending = not reason
         self.reason = f"{error}; {reason}"
 
-    def told(self, who: str, name: str, as_bytes: bool) -> str:
+    def describe(self, nodes: str, name: str, as_bytes: bool) -> str:
         if self.pending:
-            return f"{who} publishes {name}, whose definition is being fetched from the robot"
+            return f"{nodes} publishes {name}, whose definition is being fetched from the robot"
         effect = "it is handed on as bytes, and " if as_bytes else ""
         return (
-            f"{who} publishes {name}, which cannot be decoded: {self.reason}; {effect}this is "
+            f"{nodes} publishes {name}, which cannot be decoded: {self.reason}; {effect}this is "
             "tried again until a definition is found"
         )
 

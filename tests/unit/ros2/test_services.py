@@ -453,7 +453,7 @@ def test_the_version_that_the_server_announces_is_taken(middleware, tmp_path, ev
 def test_several_servers_are_named_and_called(client, connect, eventually, caplog):
     for name in ("one", "two"):
         connect(name).create_service_server("/add", ADD, add)
-    told = "/one, /two all offer /add: each carries out what it is asked"
+    told = "/one, /two all offer /add: each executes every request"
     eventually(lambda: told in client.problem)
     assert client.call({"a": 1}).sum == 1
     eventually(lambda: caplog.text.count(told) == 1)
