@@ -139,7 +139,7 @@ class _News:
     def __init__(self, on_terminal: bool) -> None:
         self._before = CLEAR_LINE if on_terminal else ""
         self._seen: dict[str, tuple[str, float]] = {}
-        self._told: dict[str, str] = {}
+        self._reported: dict[str, str] = {}
 
     def report(self, node: Node, status: RecordingStatus, *, last: bool = False) -> None:
         now = time.monotonic()
@@ -152,14 +152,14 @@ class _News:
         for topic, problem in problems.items():
             since = self._seen.get(topic, ("", now))
             self._seen[topic] = (problem, since[1] if since[0] == problem else now)
-            if self._told.get(topic) == problem:
+            if self._reported.get(topic) == problem:
                 continue
             # What is being looked for, or about to be replaced, is no news.
             if last or now - self._seen[topic][1] > _PATIENCE:
-                self._told[topic] = problem
+                self._reported[topic] = problem
                 print(f"{self._before}rosglass: {topic}: {problem}", file=sys.stderr, flush=True)
-        for topic in self._told.keys() - problems.keys():
-            del self._told[topic]
+        for topic in self._reported.keys() - problems.keys():
+            del self._reported[topic]
             if not last:
                 print(f"{self._before}rosglass: {topic}: well again", file=sys.stderr, flush=True)
         for topic in self._seen.keys() - problems.keys():
