@@ -11,7 +11,7 @@ import rosglass
 
 
 def show(feedback) -> None:
-    """Show how far it is; runs on the node's own thread."""
+    """Print the progress; runs on the node's own thread."""
     print(f"so far: {feedback.sequence.tolist()}")
 
 

@@ -1,4 +1,4 @@
-// Sends goals to the robot's action /turn, shows what comes of them, and cancels them.
+// Sends goals to the robot's action /turn, shows their status and result, and cancels them.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0
@@ -19,7 +19,7 @@ Column {
             onFeedback: function (handle, feedback) {
                 outcome = (feedback.remaining * 180 / Math.PI).toFixed(0) + "° to go"
             },
-            // Called once for every goal, however it ends.
+            // Called exactly once per goal.
             onResult: function (end) {
                 switch (end.code) {
                 case ActionGoalStatus.Succeeded: outcome = "done"; break
@@ -30,7 +30,7 @@ Column {
         })
     }
 
-    Label { textFormat: Text.PlainText; text: client.name + (client.ready ? " is there" : " is awaited") }
+    Label { textFormat: Text.PlainText; text: client.name + (client.ready ? " is available" : " is not available yet") }
     Row {
         spacing: 8
         Button { text: "Face north"; enabled: client.ready; onClicked: turn(90) }

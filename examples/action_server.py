@@ -12,16 +12,16 @@ import rosglass
 
 
 def accept(goal) -> bool:
-    """Refuse what would take too long."""
+    """Reject goals that would take too long."""
     return goal.order <= 40
 
 
 def fibonacci(goal):
-    """Run on a thread of the goal's own; what is returned is the result."""
+    """Runs on the goal's own thread; the return value is the result."""
     sequence = [0, 1]
     while len(sequence) < goal.goal.order:
         if goal.wait_for_cancel(0.2):
-            break  # the result of a goal that was cancelled, then
+            break  # return the result of a cancelled goal
         sequence.append(sequence[-1] + sequence[-2])
         goal.publish_feedback(sequence=sequence)
     return {"sequence": sequence}

@@ -1,4 +1,4 @@
-// An action that a person executes: robots ask for things to be fetched, and can change their mind.
+// An action server whose goals the operator executes: robots request items, and can cancel.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0
@@ -15,9 +15,9 @@ Column {
         id: server
         name: "/fetch"
         actionType: "example_interfaces/action/Fibonacci"
-        // One at a time, and no more than can be carried.
+        // One goal at a time, with a limited number of items.
         accept: function (goal) { return root.job === null && goal.order > 0 && goal.order <= 10 }
-        // Nothing is returned: the goal goes on until its handle ends it.
+        // No return value: the goal continues until its handle ends it.
         execute: function (goal, handle) {
             root.done = 0
             root.job = handle

@@ -1,4 +1,4 @@
-// A camera, whatever it is sent as, and how it does.
+// A camera with any transport, and its statistics.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0

@@ -1,4 +1,4 @@
-// What there is: topics, services and actions, as they come and go.
+// The ROS graph: topics, services and actions, updated as they change.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0

@@ -1,4 +1,4 @@
-// Publishes what an item shows as camera pictures, and shows them as any robot would receive them.
+// Publishes a QML item as a camera, and shows the images as a robot receives them.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0
@@ -37,7 +37,7 @@ Row {
         topic: "/panel/gauge"
         rate: 5
         frameId: "panel"
-        cameraInfo: ({})          // an uncalibrated camera: sent on /panel/camera_info
+        cameraInfo: ({})          // an uncalibrated camera, published on /panel/camera_info
     }
 
     Column {

@@ -1,4 +1,4 @@
-// What an interface logs goes to the terminal with file and line, and to the robot's /rosout.
+// Log messages of an interface go to the terminal with file and line, and to /rosout.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0

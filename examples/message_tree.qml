@@ -1,4 +1,4 @@
-// Any topic's message as a tree, whatever its type.
+// The messages of any topic as a tree.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0

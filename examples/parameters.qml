@@ -1,4 +1,4 @@
-// A robot's setting on a slider: the range and the text come from the robot.
+// A robot's parameter on a slider: the range and the description come from the robot.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0

@@ -1,4 +1,4 @@
-// Many cameras on one screen: previews are fetched one by one, and cost the robot next to nothing.
+// Many cameras on one screen: previews take turns, so they cost the robot very little.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0

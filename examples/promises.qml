@@ -1,4 +1,4 @@
-// One after the other, without waiting: a message, then a service, then the robot's new state.
+// Promises, one after the other without blocking: a message, a service, the robot's new state.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0
@@ -13,7 +13,7 @@ Column {
     function tell(text) { steps = steps.concat([text]) }
     function run() {
         steps = []
-        // 5000: reject, or give undefined, when nothing has come after so many ms.
+        // 5000: time limit in ms; undefined without a message until then.
         Ros2.waitForMessageAsync("/battery_state", 5000).then(function (battery) {
             tell("the battery has " + (battery.percentage * 100).toFixed(0) + " %")
             return client.call({data: true})
@@ -23,7 +23,7 @@ Column {
         }).then(function (odom) {
             tell("and stands at x = " + odom.pose.pose.position.x.toFixed(2) + " m")
         }).catch(function (error) {
-            tell("failed: " + error.message)       // of whichever step
+            tell("failed: " + error.message)       // of any step
         })
     }
 

@@ -1,4 +1,4 @@
-// Sends a message on a click; fields that are left out have their defaults.
+// Publishes a message on a click; missing fields get their defaults.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0
@@ -13,9 +13,9 @@ Column {
 
     Switch {
         text: "Flashlight"
-        // What the robot says, not what was clicked.
+        // The state the robot reports, not the click.
         checked: state.message ? state.message.data : false
         onClicked: pub.publish({data: checked})
     }
-    Label { textFormat: Text.PlainText; text: "heard by " + (state.message ? "the robot, which says " + state.message.data : "nobody yet") }
+    Label { textFormat: Text.PlainText; text: "state of the robot: " + (state.message ? state.message.data : "not received yet") }
 }

@@ -1,4 +1,4 @@
-// Profiles: what a topic offers, what is asked for, and whether they match.
+// QoS profiles: what a topic offers, what is requested, and whether they match.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0
@@ -8,9 +8,9 @@ Column {
     property string title: "Profiles (QoS)"
     Component.onCompleted: Ros2.init("qos_example")
 
-    // Latched: who comes late gets the last message, too.
+    // Latched: late subscribers receive the last message, too.
     Subscription { id: map; topic: "/map"; qos: Ros2.QoS().reliable().transient_local() }
-    // The laser offers best effort only: to ask for reliable() would be told in scan.problem.
+    // The laser offers best effort only: scan.problem would report a request for reliable().
     Subscription { id: scan; topic: "/scan"; qos: Ros2.SensorDataQoS() }
 
     property string mapOffer: ""

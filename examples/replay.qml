@@ -1,4 +1,4 @@
-// A recording in the robot's place: the same elements, and a slider for the time.
+// A recording instead of a robot: the same elements, and a time slider.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0
@@ -9,10 +9,10 @@ Column {
     property string title: "Replay"
     Component.onCompleted: Ros2.init("replay_example")
 
-    // Emptied, the interface is back with the robot.
+    // Set to empty, the interface connects to the robot again.
     Replay { id: replay; file: Qt.resolvedUrl("drive.mcap"); loop: true }
 
-    // What was drawn before is of another place.
+    // The track drawn so far is of another time.
     Connections { target: Ros2; function onUrlChanged() { trail.points = [] } }
     Subscription {
         topic: "/odom"

@@ -12,13 +12,13 @@ import rosglass
 
 
 async def many(client) -> list[int]:
-    """Have many calls on their way at once."""
+    """Make many calls at once."""
     calls = [client.call_async({"a": number, "b": number}) for number in range(5)]
     return [response.sum for response in await asyncio.gather(*calls)]
 
 
 with rosglass.connect(sys.argv[1] if len(sys.argv) > 1 else None, "student") as node:
-    # Without a type, the client takes the one that the server announces.
+    # Without a type, the client uses the one that the server announces.
     client = node.create_service_client("/add")
     try:
         print("1 + 2 =", client.call({"a": 1, "b": 2}, timeout=5).sum)

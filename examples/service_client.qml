@@ -1,4 +1,4 @@
-// Calls a service and shows what comes of it; the interface never waits.
+// Calls a service and shows the response, without blocking the interface.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0
@@ -16,7 +16,7 @@ Column {
             function (error) { answer = error.message })
     }
 
-    Label { textFormat: Text.PlainText; text: client.name + (client.ready ? " is there" : " is awaited") }
+    Label { textFormat: Text.PlainText; text: client.name + (client.ready ? " is available" : " is not available yet") }
     Row {
         spacing: 8
         Button { text: "On"; enabled: client.ready; onClicked: call(true) }

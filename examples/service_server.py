@@ -1,4 +1,4 @@
-"""Offers the service /add, and /count_down, which answers when it has counted to zero.
+"""Offers the service /add, and /count_down, which responds when it has counted to zero.
 
 Run it with ``python examples/service_server.py [URL]``.
 
@@ -16,12 +16,12 @@ import rosglass
 
 
 def add(request):
-    """Answer at once: a message, a dict, or nothing for an empty response."""
+    """Respond at once: a message, a dict, or None for an empty response."""
     return {"sum": request.a + request.b}
 
 
 def count_down(request):
-    """Answer later, without holding up other callbacks meanwhile."""
+    """Respond later, without blocking other callbacks."""
     answer = Future()
     done = {"success": True, "message": "zero"}
     threading.Timer(1.0, answer.set_result, [done]).start()

@@ -1,4 +1,4 @@
-// A service that the operator answers: robots ask, a person decides.
+// A service that the operator answers: robots ask, the operator decides.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0
@@ -14,7 +14,7 @@ Column {
         id: server
         name: "/ask_operator"
         serviceType: "std_srvs/srv/Trigger"
-        // Two parameters: the answer comes later.
+        // Two parameters: respond later.
         handler: function (request, respond) { root.answer = respond }
     }
 

@@ -1,4 +1,4 @@
-// A topic's messages as they come, and whether they still do.
+// The messages of a topic, and whether they are live.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0

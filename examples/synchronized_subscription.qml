@@ -1,4 +1,4 @@
-// Two topics whose messages belong together, paired by their stamps: where was the robot when it saw this?
+// Synchronizes two topics by their time stamps: where was the robot at the time of the scan?
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0
@@ -14,7 +14,7 @@ Column {
     SynchronizedSubscription {
         id: pair
         topics: ["/scan", "/odom"]
-        slop: 50                            // ms that the stamps of a pair may be apart
+        slop: 50                            // maximum distance of the stamps in ms
         onNewMessages: function (messages) {
             const scan = messages[0], odom = messages[1]
             nearest = Math.min.apply(null, scan.ranges.toArray())

@@ -1,4 +1,4 @@
-// Tells everybody where something is: drag the goal, and every node knows the frame "goal".
+// Broadcasts a transform: drag the goal to move the frame "goal".
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0
@@ -14,7 +14,7 @@ Column {
         // 50 pixels per metre; x to the right, y upwards.
         translation: Qt.vector3d((goal.x - 210) / 50, (110 - goal.y) / 50, 0)
     }
-    // What comes back, seen from the robot.
+    // The same frame as received, relative to the robot.
     TfTransform { id: seen; targetFrame: "base_link"; sourceFrame: "goal"; rate: 10 }
 
     Rectangle {

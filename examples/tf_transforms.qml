@@ -1,4 +1,4 @@
-// Where the robot is, and the tree of its frames.
+// The position of the robot, and the tree of its frames.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0

@@ -1,4 +1,4 @@
-// Points in time and spans of time, exact to the nanosecond.
+// Times and durations, exact to the nanosecond.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0

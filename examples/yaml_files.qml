@@ -1,4 +1,4 @@
-// Remembers what the operator chose: a YAML file is read at the start and written at the end.
+// Saves the operator's settings: a YAML file is read at the start and written at the end.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0
@@ -10,7 +10,7 @@ Column {
     property var settings: ({speed: 0.5, seen: 0})
     Component.onCompleted: {
         Ros2.init("yaml_example")
-        save()                                      // false when it cannot be written
+        save()                                      // false if it cannot be written
         settings = Ros2.io.readYaml(file) || settings
     }
     function save() { return Ros2.io.writeYaml(file, {speed: slider.value, opened: Ros2.now()}) }

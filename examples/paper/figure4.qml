@@ -1,5 +1,5 @@
-// The paper's Figure 4: picks an iteration of a pose prediction and shows what went in and came out.
-// Beside it: python examples/paper/pose_prediction.py
+// The paper's Figure 4: selects an iteration of a pose prediction and shows its input and output.
+// Start first: python examples/paper/pose_prediction.py
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros2 1.0
@@ -7,12 +7,12 @@ import Ros2 1.0
 Rectangle {
     id: root
     implicitWidth: 560; implicitHeight: 380
-    // As an overlay over a 3D view, only the panels are to be seen.
+    // As an overlay over a 3D view, only the panels are visible.
     property bool overlay: false
     property string title: "Pose prediction"
     property var step: null
     property string problem: client.ready ? "" : "waiting for " + client.name
-    // The type is nowhere on this machine: the node that offers the service tells it.
+    // The type is not on this machine: it is fetched from the node with the service.
     property var client: Ros2.createServiceClient("/pose_prediction/get_iteration",
                                                   "pose_prediction_msgs/srv/GetIteration")
     color: overlay ? "transparent" : "#20262e"
@@ -25,7 +25,7 @@ Rectangle {
     }
     Connections { target: client; function onServiceReadyChanged() { if (client.ready) show(slider.value) } }
 
-    // A horizon, as in an aeroplane: turned by roll, moved by pitch.
+    // An artificial horizon: rotated by roll, shifted by pitch.
     component Horizon: Column {
         property string name
         property var q: null

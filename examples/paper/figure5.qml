@@ -1,5 +1,5 @@
 // The paper's Figure 5: a demonstrator for a humanoid robot.
-// Beside it: python examples/paper/humanoid.py
+// Start first: python examples/paper/humanoid.py
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import QtQuick.Layouts 1.15

@@ -1,4 +1,4 @@
-"""A made-up humanoid, for figure5.qml: state, gestures, speech, sensors and motors.
+"""A simulated humanoid, for figure5.qml: state, gestures, speech, sensors and motors.
 
 python humanoid.py [URL]
 """
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rosglass.comm import Node
 
 JOINTS = ["head_yaw", "head_pitch", "l_shoulder", "l_elbow", "r_shoulder", "r_elbow"]
-#: Where a gesture moves the joints, in radians.
+#: Joint positions of the gestures, in radians.
 GESTURES = {
     "wave": {"r_shoulder": 1.8, "r_elbow": 0.9},
     "nod": {"head_pitch": 0.5},
@@ -28,7 +28,7 @@ GESTURES = {
 
 
 class Humanoid:
-    """Moves when it stands, speaks when it is told to."""
+    """Moves while it stands, and speaks on request."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -61,7 +61,7 @@ class Humanoid:
             self._tell()
 
     def live(self) -> None:
-        """Tell how it is, 20 times per second, until Ctrl-C."""
+        """Publish its state 20 times per second, until Ctrl-C."""
         while True:
             now = time.monotonic()
             if self._gesture and now - self._since > 3:
@@ -81,7 +81,7 @@ class Humanoid:
 
 
 def main() -> None:
-    """Live until Ctrl-C."""
+    """Run until Ctrl-C."""
     url = sys.argv[1] if len(sys.argv) > 1 else None
     with rosglass.connect(url, "humanoid") as node:
         humanoid = Humanoid(node)

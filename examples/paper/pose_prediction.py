@@ -1,4 +1,4 @@
-"""A made-up iterative pose prediction, for figure4.qml: offers its iterations as a service.
+"""A simulated iterative pose prediction, for figure4.qml: offers its iterations as a service.
 
 python pose_prediction.py [URL]
 """
@@ -17,7 +17,7 @@ COUNT = 20
 
 
 def orientation(step: int) -> tuple[float, float]:
-    """Return roll and pitch in radians after some steps, which settle on a slope."""
+    """Return roll and pitch in radians after some steps, which converge on a slope."""
     rest = math.exp(-step / 5)
     return 0.25 + 0.6 * rest * math.cos(step), -0.15 + 0.5 * rest * math.sin(0.8 * step)
 

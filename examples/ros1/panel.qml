@@ -1,4 +1,4 @@
-// Ros 1.0: for those who know ROS 1. The same file serves ROS 1 and ROS 2 robots.
+// The module Ros 1.0, with the names of ROS 1. The same file works with ROS 1 and ROS 2 robots.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros 1.0

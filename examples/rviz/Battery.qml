@@ -1,4 +1,4 @@
-// How much is left in the battery.
+// The state of the battery.
 import QtQuick 2.15
 import Ros 1.0
 

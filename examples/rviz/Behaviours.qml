@@ -1,4 +1,4 @@
-// Behaviours of FlexBE: a button sends the action's goal, and what the robot says of it is below.
+// FlexBE behaviours: a button sends the action's goal; the robot's status is below.
 import QtQuick 2.15
 import Ros 1.0
 
@@ -45,7 +45,7 @@ Column {
         maximumLineCount: 2
         elide: Text.ElideRight
         textFormat: Text.PlainText
-        text: !behaviours.live ? "ROBOT SILENT" + (behaviours.active ? ": " + behaviours.name + " may go on" : "")
+        text: !behaviours.live ? "ROBOT SILENT" + (behaviours.active ? ": " + behaviours.name + " may still be running" : "")
             : !behaviours.client.connected ? "NO BEHAVIOUR SERVER" : behaviours.active
             ? behaviours.name + ": " + (behaviours.goal.feedback ? behaviours.goal.feedback.current_state : "on its way")
             : behaviours.name ? behaviours.name + ": " + behaviours.outcome : ""

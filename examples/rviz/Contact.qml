@@ -1,5 +1,5 @@
-// Whether the robot is heard, and what of it is shown though it is old: RViz itself goes on showing
-// what came last.
+// Whether the robot is connected, and which of the shown data is old: RViz itself keeps showing
+// the last data.
 import QtQuick 2.15
 import Ros 1.0
 

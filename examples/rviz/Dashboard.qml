@@ -19,7 +19,7 @@ Item {
     Rectangle {
         anchors { left: parent.left; right: parent.right; bottom: parent.bottom }
         height: Math.max(Math.min(250, parent.height * 0.45), Math.min(parent.height / 3, 420))
-        // Opaque: what is blended takes long where no graphics card does it.
+        // Opaque: blending is slow without a graphics card.
         color: Theme.bar
 
         RowLayout {

@@ -1,6 +1,6 @@
-// The emergency stop. It shows what the robot confirms, not what was clicked; a wish that is not
-// confirmed is sent again and again. It stops when pressed, and releases only after a long press.
-// With the keyboard's focus, which Tab moves and a white frame shows: Space stops, Enter held releases.
+// The emergency stop. It shows what the robot confirms, not the click; a request is repeated until
+// it is confirmed. A press stops at once; only a long press releases.
+// With the keyboard focus (Tab, shown by a white frame), Space stops, and Enter held releases.
 import QtQuick 2.15
 import Ros 1.0
 
@@ -8,7 +8,7 @@ Rectangle {
     id: stop
     objectName: "emergency stop"
     property var publisher: Ros.advertise("std_msgs/Bool", "/emergency_stop", 1)
-    // What the operator wants: true, false, or null for whatever it is.
+    // The operator's request: true, false, or null for none.
     property var wanted: null
     readonly property bool known: state_.message !== undefined && !state_.stale
     readonly property bool stopped: known && state_.message.data
@@ -32,7 +32,7 @@ Rectangle {
         if (!event.isAutoRepeat && (event.key === Qt.Key_Return || event.key === Qt.Key_Enter))
             lifted.restart()
     }
-    // X11 repeats a key that is held as releases and presses: a release counts if no press follows.
+    // X11 repeats a held key as releases and presses: a release counts if no press follows.
     Timer { id: lifted; interval: 50; onTriggered: stop.cancelHold() }
 
     function cancelHold() {
@@ -57,7 +57,7 @@ Rectangle {
         running: stop.pending
         onTriggered: stop.want(stop.wanted)
     }
-    // A stop is never given up; a release must not undo, much later, somebody else's stop.
+    // A stop never times out; a release must not undo another operator's stop much later.
     Timer {
         interval: 3000
         running: stop.wanted === false

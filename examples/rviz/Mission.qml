@@ -1,4 +1,4 @@
-// What the robot is about, how far it is, and how to hold it.
+// The mission: its state and progress, and how to pause it.
 import QtQuick 2.15
 import Ros 1.0
 
@@ -52,7 +52,7 @@ Column {
     Row {
         spacing: 5
         enabled: mission.live && !state_.stale
-        Push { text: "Go on"; onClicked: request.ask("Go on", "/mission/pause", "std_srvs/SetBool", {data: false}) }
+        Push { text: "Continue"; onClicked: request.ask("Continue", "/mission/pause", "std_srvs/SetBool", {data: false}) }
         Push { objectName: "pause"; text: "Pause"; onClicked: request.ask("Pause", "/mission/pause", "std_srvs/SetBool", {data: true}) }
         Push { text: "Restart"; onClicked: request.ask("Restart", "/mission/restart", "std_srvs/Trigger", {}) }
     }

@@ -1,4 +1,4 @@
-// One of several cameras, whichever is chosen. A picture that is not live says so.
+// One of several cameras. An image that is not live is marked.
 import QtQuick 2.15
 import Ros 1.0
 
@@ -35,7 +35,7 @@ Panel {
     Flow {
         id: choice
         anchors { bottom: parent.bottom; horizontalCenter: parent.horizontalCenter }
-        // In one row where there is room.
+        // In one row if there is room.
         width: Math.min(parent.width, 243)
         spacing: 3
         Repeater {

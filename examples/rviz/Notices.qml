@@ -1,4 +1,4 @@
-// What the operator must know of the 3D view, in its middle: what is old, and what became of a goal.
+// Notices in the middle of the 3D view: which data is old, and the outcome of a goal.
 import QtQuick 2.15
 import Ros 1.0
 
@@ -27,7 +27,7 @@ Column {
         Notice { text: modelData }
     }
 
-    // A goal of RViz's tool 2D Nav Goal, as move_base tells of it.
+    // A goal of RViz's tool 2D Nav Goal, from the status of move_base.
     Subscriber {
         id: status
         topic: "/move_base/status"; messageType: "actionlib_msgs/GoalStatusArray"; timeout: 2000
@@ -35,24 +35,24 @@ Column {
         onNewMessage: {
             var goals = message.status_list, goal = goals.length ? goals.at(goals.length - 1) : null
             var now = goal ? goal.goal_id.id + " " + goal.status : "none"
-            // What is over was told before this interface came.
+            // A goal that had ended before this interface started is not shown.
             if (goal && now !== last && (last || goal.status === 1))
-                told.show(goal.status, goal.text)
+                notice.show(goal.status, goal.text)
             last = now
         }
     }
     Notice {
-        id: told
+        id: notice
         objectName: "goal"
         readonly property var words: ({4: "GOAL GIVEN UP: ", 5: "GOAL REFUSED: "})
         visible: false
         tint: Theme.accent
         function show(status, reason) {
-            told.text = (words[status] || "Goal: ") + reason
-            told.tint = words[status] ? Theme.bad : status === 2 ? Theme.warn : Theme.accent
-            told.visible = true
+            notice.text = (words[status] || "Goal: ") + reason
+            notice.tint = words[status] ? Theme.bad : status === 2 ? Theme.warn : Theme.accent
+            notice.visible = true
             hide.restart()
         }
-        Timer { id: hide; interval: 8000; onTriggered: told.visible = false }
+        Timer { id: hide; interval: 8000; onTriggered: notice.visible = false }
     }
 }

@@ -1,4 +1,4 @@
-// The robot's mode, as it tells it; a click asks for another.
+// The mode that the robot reports; a click requests another.
 import QtQuick 2.15
 import Ros 1.0
 

@@ -1,4 +1,4 @@
-// A titled card. What it shows is said to be old when `stale`, and dimmed if it `dims`.
+// A titled card, marked as old if `stale`, and dimmed if it `dims`.
 import QtQuick 2.15
 
 Rectangle {
@@ -6,10 +6,10 @@ Rectangle {
     property string title
     property string note
     property bool stale: false
-    // Whether the note is a bad one.
+    // Whether the note is a warning.
     property bool alarming: false
     property bool dims: true
-    // Too little room beside the title: it is said below.
+    // Too little room beside the title: shown below.
     readonly property bool narrow: width < 110
     default property alias content: body.data
 

@@ -1,4 +1,4 @@
-// How the robot leans, from behind and from the side, with its flippers as they are.
+// The robot's attitude, from behind and from the side, with the positions of its flippers.
 import QtQuick 2.15
 import Ros 1.0
 

@@ -1,4 +1,4 @@
-// A button, as all of this interface look.
+// A button in the style of this interface.
 import QtQuick 2.15
 
 Rectangle {
@@ -25,7 +25,7 @@ Rectangle {
             clicked()
     }
     Keys.onReleased: lifted.restart()
-    // X11 repeats a key that is held as releases and presses.
+    // X11 repeats a held key as releases and presses.
     Timer { id: lifted; interval: 50 }
     Row {
         id: label

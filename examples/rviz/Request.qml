@@ -1,4 +1,4 @@
-// A call of a service, and what the operator must know of it: that it is on its way, or has failed.
+// A service call with its state for the operator: pending, or failed.
 import QtQuick 2.15
 import Ros 1.0
 

@@ -1,4 +1,4 @@
-// Settings of the robot, as it has them.
+// Settings of the robot, as it reports them.
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 import Ros 1.0
@@ -7,7 +7,7 @@ Column {
     id: settings
     spacing: 10
     property bool live
-    // ROS keeps parameters on the master: they are there when the robot is not.
+    // ROS 1 keeps parameters on the master: they exist without the robot.
     readonly property bool known: speed.ready && live
 
     Parameter {

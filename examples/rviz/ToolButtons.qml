@@ -1,4 +1,4 @@
-// RViz's tools: the button that is lit has the mouse in the 3D view.
+// RViz's tools: the highlighted one receives the mouse in the 3D view.
 import QtQuick 2.15
 
 Column {

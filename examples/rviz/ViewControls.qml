@@ -1,4 +1,4 @@
-// Where RViz's camera stands, and whether it follows the robot.
+// The position of RViz's camera, and whether it follows the robot.
 import QtQuick 2.15
 import QtQuick.Layouts 1.15
 
@@ -7,7 +7,7 @@ Panel {
     title: "View"
     property bool live
     property string failure
-    // A robot that is silent is not followed: RViz keeps showing where it was.
+    // A silent robot is not followed: RViz keeps showing its last position.
     stale: !live
     dims: false
     alarming: note === "NO ROBOT"
@@ -23,7 +23,7 @@ Panel {
         }
     }
 
-    // At first behind the robot, as soon as it is there.
+    // Behind the robot, as soon as it appears.
     Timer {
         interval: 500; repeat: true; running: true
         onTriggered: {

@@ -71,7 +71,7 @@ def connect(
             ``peers`` (further machines, as in ``peers=192.168.1.5,robot``; short:
             ``dds://192.168.1.5``; ROS_STATIC_PEERS adds some), ``interface`` (network
             interfaces, by name or address), ``distro=humble`` (announce nodes as in Humble;
-            default: as in later distributions). ROS_LOCALHOST_ONLY and CYCLONEDDS_URI apply.
+            default: as the domain's other nodes). ROS_LOCALHOST_ONLY and CYCLONEDDS_URI apply.
 
             ``zenoh://host:port`` of a Zenoh router (rmw_zenoh), by default port 7447. Options
             follow as in ``zenoh://robot:7447?domain=5&mode=client``: ``domain`` (default:

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 
 __all__ = ["configure", "run"]
 
-#: Seconds that a cancelled goal may take to end.
-_PATIENCE = 5.0
+#: Seconds to wait for the end of a cancelled goal.
+_CANCEL_TIMEOUT_S = 5.0
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -188,7 +188,7 @@ def _send(args: argparse.Namespace) -> int:
 def _cancel(goal: ClientGoal) -> None:
     note("cancelling the goal")
     answer = goal.cancel()
-    deadline = time.monotonic() + _PATIENCE
+    deadline = time.monotonic() + _CANCEL_TIMEOUT_S
     while time.monotonic() < deadline and not goal.done.done():
         if answer.done() and answer.exception() is not None:
             note(f"the goal cannot be cancelled: {answer.exception()}")

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["configure", "run"]
 
-#: Seconds that a problem may pass by itself.
-_PATIENCE = 3.0
+#: Seconds that a problem must last before it is printed.
+_REPORT_DELAY_S = 3.0
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -303,7 +303,10 @@ class _News:
         for name, problem in problems.items():
             since = self._since.get(name, ("", now))
             self._since[name] = (problem, since[1] if since[0] == problem else now)
-            if self._reported.get(name) != problem and now - self._since[name][1] >= _PATIENCE:
+            if (
+                self._reported.get(name) != problem
+                and now - self._since[name][1] >= _REPORT_DELAY_S
+            ):
                 self._reported[name] = problem
                 self._note(f"{name}: {problem}")
         for name in self._since.keys() - problems.keys():

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 __all__ = ["SHELLS", "complete", "complete_files", "is_completing", "offer", "script"]
 
 SHELLS = ("bash", "zsh", "fish", "tcsh")
-#: Seconds that Tab may take to look around in the graph.
-_PATIENCE = 1.5
+#: Seconds that completion may take to discover the graph.
+_DISCOVERY_TIMEOUT_S = 1.5
 
 
 def complete(argument: argparse.Action, what: str) -> None:
@@ -100,7 +100,7 @@ class _Completer:
                 me = node.resolve(node.name)
                 return [name for name in _look(node, self._what) if name != me]
 
-            wait(node, others, _PATIENCE)
+            wait(node, others, _DISCOVERY_TIMEOUT_S)
             return others()
 
 

@@ -45,7 +45,7 @@ TIMEOUT = 10.0
 #: Seconds that an existing entity may take to appear in the graph, or to announce its type.
 _DISCOVERY = 3.0
 #: Seconds after which a command reports what it waits for, and probes an address without answer.
-_PATIENCE, _KNOCK = 2.0, 0.5
+_REPORT_DELAY_S, _PROBE_DELAY_S = 2.0, 0.5
 #: The same once the robot has answered.
 _SOON = 1.0
 #: Seconds that programs have to name their nodes: Fast DDS takes 1 to 4; a Zenoh router that
@@ -102,8 +102,8 @@ def add_definitions_option(parser: argparse._ActionsContainer) -> None:
 def connect(args: argparse.Namespace, *, patient: bool = False) -> Node:
     """Join the graph that the options name, and wait for an answer.
 
-    Reports on standard error what it waits for, if that takes a while. Over DDS, where nobody has
-    to answer, it returns after a moment.
+    Reports on standard error what it waits for, if that takes a while. Over DDS, where there may be
+    no other node, it returns after a moment.
 
     Args:
         args: The command's options.
@@ -340,7 +340,7 @@ def _wait_for_connection(node: Node, timeout: float, patient: bool) -> None:
 
     with node.on_status_change(look):
         look(node.status())
-        if connected.wait(min(_KNOCK, timeout)):
+        if connected.wait(min(_PROBE_DELAY_S, timeout)):
             return
         refusal = refused(node.url)
         if refusal is not None:
@@ -348,9 +348,9 @@ def _wait_for_connection(node: Node, timeout: float, patient: bool) -> None:
             if not patient:
                 raise ConnectionLostError(problem)
             note(f"{problem}. Waiting for it")
-        elif connected.wait(min(_PATIENCE, timeout)):
+        elif connected.wait(min(_REPORT_DELAY_S, timeout)):
             return
-        elif timeout > _PATIENCE:
+        elif timeout > _REPORT_DELAY_S:
             note(f"{node.url}: {node.status().detail}")
         if connected.wait(max(0.0, deadline - time.monotonic())):
             return

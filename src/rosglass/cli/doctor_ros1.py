@@ -152,7 +152,7 @@ def _echo(node: Ros1Node, options: Ros1Options, own: list[Finding]) -> Iterator[
     try:
         with node.parameter_server.subscribe(name, hear):
             ready.wait(_ECHO)
-            # Somebody else has to set it: what the node sets itself, it knows.
+            # Another caller has to set it: the node is not notified of its own changes.
             call_node(master, "setParam", _CALLER, name, 1)
             try:
                 arrived = called.wait(_ECHO)

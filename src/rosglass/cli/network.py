@@ -16,7 +16,7 @@ from rosglass.errors import Error
 __all__ = ["Interface", "ask", "interfaces", "is_loopback", "nearby_url", "refused", "roscore"]
 
 #: Seconds to wait for a refused connection.
-_KNOCK = 1.0
+_CONNECT_TIMEOUT_S = 1.0
 #: The request for an interface's flags, and some of these (Linux, netdevice(7)).
 _GET_FLAGS = 0x8913
 _UP, _LOOPBACK, _MULTICAST = 0x1, 0x8, 0x1000
@@ -73,7 +73,7 @@ def nearby_url() -> str:
         if url.startswith("zenoh:") and find_spec("zenoh") is None:
             continue
         with suppress(OSError):
-            socket.create_connection(("127.0.0.1", port), _KNOCK).close()
+            socket.create_connection(("127.0.0.1", port), _CONNECT_TIMEOUT_S).close()
             return url
     return ""
 
@@ -103,7 +103,7 @@ def refused(url: str) -> tuple[str, str] | None:
     else:
         return None
     try:
-        socket.create_connection((host, port), _KNOCK).close()
+        socket.create_connection((host, port), _CONNECT_TIMEOUT_S).close()
     except ConnectionRefusedError:
         pass
     except OSError:
@@ -111,7 +111,7 @@ def refused(url: str) -> tuple[str, str] | None:
     else:
         return None
     if url.startswith("zenoh:"):
-        return ask(url, _KNOCK)
+        return ask(url, _CONNECT_TIMEOUT_S)
     text = f"no master runs: {host} is there, but nothing listens on its port {port}"
     return text, roscore(host, port)
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["configure", "run"]
 
-#: Seconds that a problem may pass by itself.
-_PATIENCE = 2.0
+#: Seconds that a problem must last before it is printed.
+_REPORT_DELAY_S = 2.0
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -155,7 +155,7 @@ class _News:
             if self._reported.get(topic) == problem:
                 continue
             # What is being looked for, or about to be replaced, is no news.
-            if last or now - self._seen[topic][1] > _PATIENCE:
+            if last or now - self._seen[topic][1] > _REPORT_DELAY_S:
                 self._reported[topic] = problem
                 print(f"{self._before}rosglass: {topic}: {problem}", file=sys.stderr, flush=True)
         for topic in self._reported.keys() - problems.keys():

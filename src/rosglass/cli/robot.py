@@ -167,7 +167,7 @@ def _tell(status: Status) -> None:
 
 
 def _follow_leash(end: threading.Event) -> None:
-    # Whoever started us holds the other end; it closes however that program ends, SIGKILL included.
+    # The parent process holds the other end, which closes however it ends, SIGKILL included.
     # Not by sys.stdin, whose lock would have Python abort if the robot ends by itself.
     while os.read(sys.stdin.fileno(), 4096):
         pass

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["configure", "run"]
 
 #: Seconds after a signal until the program ends, whatever RViz is doing.
-_PATIENCE = 1.7
+_QUIT_TIMEOUT_S = 1.7
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -120,7 +120,7 @@ def run(args: argparse.Namespace) -> int:
     with _noting_signals(received):
         from rosglass.qml.interrupt import QuitOnSignal
 
-        with QuitOnSignal(received.append, _PATIENCE):
+        with QuitOnSignal(received.append, _QUIT_TIMEOUT_S):
             try:
                 return _show(args, configs[0] if configs else "", remappings, received)
             except QmlError as error:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["AUTOPILOT", "Cockpit"]
 
 _QML = Path(__file__).with_name("cockpit") / "main.qml"
-#: What the stick does when nobody is there to hold it: from which second on, right, down.
+#: Movements of the stick without an operator: start in seconds, right, down.
 AUTOPILOT = (
     (2.5, -0.32, -0.45),
     (5.0, 0.0, -0.62),

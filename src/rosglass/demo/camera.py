@@ -2,7 +2,7 @@
 
 Every surface is flat, so each is one perspective warp of its texture into the polygon it covers on
 the screen, from far to near (painter's algorithm). OpenCV does the pixels and releases the
-interpreter meanwhile, so the robot's other threads run on.
+GIL, so the robot's other threads continue.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ __all__ = ["Cloud"]
 _SPACING, _GROUND_SPACING = 0.11, 0.12
 #: Bare concrete is left to the map: what is drawn of it would cost the most, and tell the least.
 _COLOURED, _RAISED = 30, 0.02
-#: How much is told of the yard's walls, metres: who looks at the robot from behind sees over them.
+#: Height of the yard's walls in the cloud, metres: a camera behind the robot sees over them.
 _PARAPET = 0.85
 #: How far the robot can tell colours, metres.
 _REACH = 5.5
@@ -38,7 +38,7 @@ _FLOAT32 = 7
 
 
 class Cloud:
-    """Points on everything that stands in a world, told once the robot's laser has met them.
+    """Points on all objects of a world, published once the robot's laser has hit them.
 
     Args:
         world: The world to look at.
@@ -59,8 +59,8 @@ class Cloud:
         places = np.concatenate([part[0] for part in parts])
         colours = np.concatenate([part[1] for part in parts])
         outer = (np.abs(places[:, :2]) > (world.half_length - 0.05, world.half_width - 0.05)).any(1)
-        told = ~outer | (places[:, 2] < _PARAPET)
-        places, colours = places[told], colours[told]
+        included = ~outer | (places[:, 2] < _PARAPET)
+        places, colours = places[included], colours[included]
         self._places = places[:, :2]
         self._seen = np.zeros(len(places), bool)
         self._rows = np.empty((len(places), 4), np.float32)

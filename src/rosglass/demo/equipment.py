@@ -30,7 +30,7 @@ _WIDTH, _HEIGHT = 320, 240
 
 
 class Equipment:
-    """More than the robot itself needs; costs little unless somebody listens.
+    """Additional sensors and cameras of the robot; they cost little without subscribers.
 
     Args:
         node: Where it is offered.
@@ -98,7 +98,7 @@ class Equipment:
                 sent, changed = now, False
 
     def film(self, ending: Callable[[float], bool]) -> None:
-        """Send the pictures that somebody wants, until `ending` says so."""
+        """Publish the subscribed images until `ending` returns true."""
         while not ending(_CAMERA_PERIOD):
             for name, publisher in self._pictures.items():
                 if publisher.subscription_count():

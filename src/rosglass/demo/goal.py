@@ -20,7 +20,7 @@ __all__ = ["ABORTED", "ACTIVE", "PREEMPTED", "REJECTED", "SUCCEEDED", "DriveGoal
 
 #: Of ``actionlib_msgs/msg/GoalStatus``.
 ACTIVE, PREEMPTED, SUCCEEDED, ABORTED, REJECTED = 1, 2, 3, 4, 5
-#: Frames in which a goal may be told: where the robot thinks it is never drifts.
+#: Frames in which a goal is accepted: the robot's localization does not drift.
 _FRAMES = ("map", "odom", "")
 #: Seconds between two confirmations of what has not changed.
 _CONFIRM = 0.5
@@ -38,7 +38,7 @@ class DriveGoal:
         self._refusal = refusal
         self._lock = threading.Lock()
         self._place: tuple[float, float] | None = None
-        self._count, self._told_at = 0, -math.inf
+        self._count, self._published_at = 0, -math.inf
         self._status: list[dict[str, Any]] = []
         kind = "actionlib_msgs/msg/GoalStatusArray"
         self._publisher = node.create_publisher("/move_base/status", kind, QoS.latched())
@@ -67,7 +67,7 @@ class DriveGoal:
 
     def confirm(self) -> None:
         """Tell its state again, now and then."""
-        if time.monotonic() - self._told_at >= _CONFIRM:
+        if time.monotonic() - self._published_at >= _CONFIRM:
             self._tell()
 
     def close(self) -> None:
@@ -97,7 +97,7 @@ class DriveGoal:
         self._tell()
 
     def _tell(self) -> None:
-        self._told_at = time.monotonic()
+        self._published_at = time.monotonic()
         with self._lock:
             status = [dict(entry) for entry in self._status]
         self._publisher.publish({"header": header(Time.now(), ""), "status_list": status})

@@ -23,7 +23,7 @@ class HeldKeys(QtCore.QObject):
     Not a Timer of QML's, which ticks with the frames and would tell of a release late.
     """
 
-    #: A key was let go, told 16 to 32 ms after it happened.
+    #: A key was released, 16 to 32 ms ago.
     lifted = QtCore.Signal(int)
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:

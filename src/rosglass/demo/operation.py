@@ -39,8 +39,8 @@ _FLIPPER_TIME = 2.0
 class Operation:
     """Modes, mission, goals and behaviours.
 
-    ``/mode`` tells one of :data:`MODES`; the services ``/mode/autonomous`` and so on choose it.
-    The mission is driven in mode autonomous, and told in ``/mission/state``, ``/mission/path``
+    ``/mode`` is one of :data:`MODES`; the services ``/mode/autonomous`` and so on select it.
+    The mission is driven in mode autonomous, and published on ``/mission/state``, ``/mission/path``
     and ``/mission/waypoint``; ``/mission/pause`` holds it. A :class:`~rosglass.demo.goal.DriveGoal`
     is driven to in mode supervised. Behaviours, ``/flexbe/execute_behavior``, are executed one at
     a time, in all modes but safe.
@@ -81,7 +81,7 @@ class Operation:
         self._behaviour, self._lock = "", threading.Lock()
         #: Why a behaviour is to end.
         self._interruption = ""
-        self._told: dict[str, tuple[Any, float]] = {}
+        self._published: dict[str, tuple[Any, float]] = {}
         latched = QoS.latched()
         self._send = {
             topic: node.create_publisher(topic, kind, latched)
@@ -168,10 +168,10 @@ class Operation:
         return False
 
     def _tell(self, topic: str, data: Any) -> None:
-        value, told = self._told.get(topic, (None, -math.inf))
+        value, published_at = self._published.get(topic, (None, -math.inf))
         now = time.monotonic()
-        if data != value or now - told >= _CONFIRM:
-            self._told[topic] = (data, now)
+        if data != value or now - published_at >= _CONFIRM:
+            self._published[topic] = (data, now)
             self._send[topic].publish(data=data)
 
     def _chooser(self, name: str) -> Callable[[Message], dict[str, Any]]:
@@ -207,7 +207,7 @@ class Operation:
         return ""
 
     def _behave(self, goal: Any) -> dict[str, str] | None:
-        """Execute a behaviour; the goal's client is told why it was not, or not to its end."""
+        """Execute a behaviour; the status text says why it failed or was cancelled."""
         try:
             return self._execute(goal)
         except Error as error:

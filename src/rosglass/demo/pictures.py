@@ -131,7 +131,7 @@ class _Picture(TopicElement):
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
-        self._patience, self._age = 0.0, -1.0
+        self._stale_after_s, self._age = 0.0, -1.0
         self._name, self._version = f"rosglass-picture-{next(_numbers)}", 0
         self._stamp = 0.0
         self._provider: _Provider | None = None
@@ -219,7 +219,7 @@ class _Picture(TopicElement):
     def _is_old(self) -> bool:
         if not self._version:
             return True
-        return 0 < self._patience < time.monotonic() - self._stamp
+        return 0 < self._stale_after_s < time.monotonic() - self._stamp
 
     def _stale_changed(self) -> None:
         self.staleChanged.emit()
@@ -234,8 +234,8 @@ class _Picture(TopicElement):
             self._schedule()
 
     def _set_limit(self, limit: float) -> None:
-        if limit != self._patience:
-            self._patience = limit
+        if limit != self._stale_after_s:
+            self._stale_after_s = limit
             self.limitChanged.emit()
             self._judge()
 
@@ -247,7 +247,7 @@ class _Picture(TopicElement):
 
     topic = Property(str, lambda self: self._topic, _set_topic, notify=topicChanged)
     #: Seconds without a message after which the picture is not true any more; 0 for never.
-    limit = Property(float, lambda self: self._patience, _set_limit, notify=limitChanged)
+    limit = Property(float, lambda self: self._stale_after_s, _set_limit, notify=limitChanged)
     source = Property(QtCore.QUrl, _source, notify=changed)
     received = Property(bool, lambda self: self._version > 0, notify=changed)
     #: Seconds since the newest message, -1 before the first.

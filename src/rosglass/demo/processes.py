@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LEASH", "Child", "VirtualScreen", "start_robot"]
 
-_PATIENCE = 3.0
+_EXIT_TIMEOUT_S = 3.0
 #: Before a command: the system ends it when this program ends, even when it is killed.
 LEASH = ("setpriv", "--pdeathsig", "TERM") if shutil.which("setpriv") else ()
 
@@ -63,7 +63,7 @@ class Child(Handle):
             return
         self._process.terminate()
         try:
-            self._process.wait(_PATIENCE)
+            self._process.wait(_EXIT_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
@@ -133,7 +133,7 @@ class VirtualScreen(Handle):
         if self.process.poll() is None:
             self.process.terminate()
             try:
-                self.process.wait(_PATIENCE)
+                self.process.wait(_EXIT_TIMEOUT_S)
             except subprocess.TimeoutExpired:
                 self.process.kill()
                 self.process.wait()

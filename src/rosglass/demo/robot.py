@@ -47,7 +47,7 @@ class RobotOptions:
     Attributes:
         fps: Pictures per second, more than 0 and at most 120.
         raw: Whether to send ``/camera/image_raw``.
-        compressed: Whether to send ``/camera/image_raw/compressed`` (while somebody listens).
+        compressed: Whether to send ``/camera/image_raw/compressed`` (while it has subscribers).
         jpeg_quality: 1 to 100.
         equipped: Whether it has :class:`~rosglass.demo.equipment.Equipment` as well.
         mode: The first one of :data:`~rosglass.demo.operation.MODES`, if it is equipped.

@@ -20,7 +20,7 @@ __all__ = ["main"]
 
 _FOLDER = Path(__file__).parents[3] / "examples/rviz"
 _SIZE = (1280, 800)
-_PATIENCE = 20.0
+_MASTER_TIMEOUT_S = 20.0
 
 
 def main(seconds: float | None = None, picture: Path | None = None) -> int:
@@ -56,7 +56,7 @@ def main(seconds: float | None = None, picture: Path | None = None) -> int:
             ending = ["--screenshot", str(picture or "rviz-demo.png"), "--after", str(seconds)]
         command = ["-m", "rosglass", "rviz", *files, "--bare", "--url", url, *ending]
         rviz = Child([*LEASH, sys.executable, *command], "RViz")
-        # Both at a time: whoever has ended RViz waits.
+        # Both at once: the user who closed RViz is waiting.
         stack.callback(_close, rviz, robot)
         code = _wait(rviz, received)
         if ending and code == 0:  # RViz fails where it took none
@@ -93,13 +93,13 @@ def _start_master(stack: ExitStack) -> str:
         start_new_session=True,
     )
     stack.callback(_end, master)
-    until = time.monotonic() + _PATIENCE
+    until = time.monotonic() + _MASTER_TIMEOUT_S
     while time.monotonic() < until and master.poll() is None:
         with suppress(OSError), socket.create_connection(("127.0.0.1", port), 1.0):
             print(f"started ROS's master on port {port}", flush=True)
             return f"ros1://127.0.0.1:{port}"
         time.sleep(0.05)
-    raise Error(f"ROS's master ({program}) did not start within {_PATIENCE:g} s")
+    raise Error(f"ROS's master ({program}) did not start within {_MASTER_TIMEOUT_S:g} s")
 
 
 def _close(*children: Child) -> None:

@@ -83,8 +83,8 @@ class RobotState:
         acceleration: Forwards, m/s².
         roll_rate: rad/s.
         pitch_rate: rad/s.
-        commanded_speed: What the motors are told to reach, m/s.
-        commanded_turn: What the motors are told to reach, rad/s.
+        commanded_speed: Commanded speed of the motors, m/s.
+        commanded_turn: Commanded turn rate of the motors, rad/s.
         commands_alive: Whether a command came within the watchdog's time.
         emergency_stop: Whether the stop is latched.
         flashlight: Whether the lamp is on.

@@ -138,7 +138,7 @@ def address(item: QtCore.QObject) -> int:
 
 
 def run_event_loop(loop: QtCore.QCoreApplication | QtCore.QEventLoop) -> int:
-    """Run an event loop until it is told to exit; returns the exit code."""
+    """Run an event loop until it exits; returns the exit code."""
     return int(loop.exec() if QT6 else loop.exec_())
 
 

@@ -17,7 +17,7 @@ Item {
     property double stamp: 0
     property real age: -1
     // Milliseconds from the robot's stamp to here. More than a second is a picture of the past, or
-    // clocks that differ so much that nobody can tell: neither may be shown as live.
+    // clocks too far apart to distinguish the two: neither may be shown as live.
     readonly property real latency: camera.latency
     readonly property bool late: received && !camera.stale && Math.abs(latency) > 1000
     readonly property bool live: received && age <= limit && !camera.stale && !late
@@ -111,7 +111,7 @@ Item {
         }
     }
 
-    // Nobody must take what is below this for the robot's present.
+    // The image below this is not live and must not look live.
     Rectangle {
         objectName: "noSignal"
         anchors.fill: parent

@@ -40,7 +40,7 @@ QtObject {
         }
     }
 
-    // Let go: the robot is told to stop, more than once in case a message gets lost.
+    // Released: send the stop more than once, in case a message is lost.
     function release() {
         const was = active
         held = armed = false

@@ -14,7 +14,7 @@ Item {
     readonly property bool stopped: known && state_.message.data
     readonly property bool pending: wanted !== null && (!known || stopped !== wanted)
     property bool overdue: false
-    // Released here, and at once stopped again: somebody else holds it.
+    // Released here, and stopped again at once: another operator holds it.
     property bool contested: false
     property int sent: 0
     property string problem
@@ -109,7 +109,7 @@ Item {
         // A held stop is repeated ten times a second.
         interval: 1000
     }
-    // A stop is never given up. A release is: it must not undo, much later, somebody else's stop.
+    // A stop never times out. A release does: it must not undo another operator's stop much later.
     Timer {
         interval: 3000
         running: stop.wanted === false
@@ -176,7 +176,7 @@ Item {
         ColorAnimation { target: collar; property: "color"; to: "#ff1028"; duration: 160 }
         ColorAnimation { target: collar; property: "color"; to: "#fff04a"; duration: 160 }
     }
-    // Acts on touch-down, with any finger: nobody lifts a finger gracefully in an emergency.
+    // Acts on touch-down, with any finger: a release may come late in an emergency.
     MultiPointTouchArea {
         anchors.fill: parent
         onPressed: stop.press()

@@ -20,7 +20,7 @@ Panel {
     Component.onCompleted: publisher = Ros2.createPublisher("/flipper_controller/commands",
                                                             "std_msgs/msg/Float64MultiArray", 1)
 
-    // A robot that was away has forgotten what it was told.
+    // A restarted robot does not have the last command.
     onFreshChanged: if (!fresh) wantedFront = wantedRear = NaN
 
     function degrees(angle) { return (angle * 180 / Math.PI).toFixed(0) + "°" }
