@@ -7,6 +7,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from concurrent.futures import Future, wait
+from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
 from rosglass.comm.action_client import GoalStatus
@@ -405,12 +406,14 @@ class ActionServer(Handle):
 
     def _on_goal(self, goal: ServerGoal) -> None:
         """Decide on a received goal."""
-        if self._accept is None:
+        accept = self._accept
+        if accept is None:
             self._on_decision(goal, "")
             return
 
         def decide() -> None:
-            refusal = "" if self._accepts(goal) else "It is not accepted"
+            accepted = self._ask_user(goal, "accept", lambda: accept(goal.goal), False, "rejecting")
+            refusal = "" if accepted else "It is not accepted"
             self._protocol.post(lambda: self._on_decision(goal, refusal))
 
         if not self._decide_later(decide):
@@ -437,12 +440,18 @@ class ActionServer(Handle):
         self, goals: Sequence[ServerGoal], then: Callable[[Sequence[ServerGoal]], None]
     ) -> None:
         """Decide which goals may be cancelled, and pass them to `then`."""
-        if self._cancel is None or not goals:
+        cancel = self._cancel
+        if cancel is None or not goals:
             then(goals)
             return
 
         def decide() -> None:
-            allowed = [goal for goal in goals if self._allows(goal)]
+            # A callback that fails must not prevent a stop.
+            allowed = [
+                goal
+                for goal in goals
+                if self._ask_user(goal, "cancel", partial(cancel, goal), True, "cancelling")
+            ]
             self._protocol.post(lambda: then(allowed))
 
         # A broken executor must not prevent a stop.
@@ -461,39 +470,35 @@ class ActionServer(Handle):
             return False
         return True
 
-    def _accepts(self, goal: ServerGoal) -> bool:
-        """Return whether the user's callback accepts a goal; False if it fails."""
-        assert self._accept is not None
-        decision: Any = False
-        try:
-            decision = self._accept(goal.goal)
-        except Exception:
-            self._log.exception("%s: accept failed; rejecting goal %s", self.name, goal.id_text)
-        if decision is not True and decision is not False:
-            self._log.error(
-                "%s: accept returned %.80r instead of True or False; rejecting goal %s",
-                self.name,
-                decision,
-                goal.id_text,
-            )
-        return decision is True
+    def _ask_user(
+        self, goal: ServerGoal, name: str, decide: Callable[[], bool], default: bool, effect: str
+    ) -> bool:
+        """Return the decision of a user's callback.
 
-    def _allows(self, goal: ServerGoal) -> bool:
-        """Return whether a goal may be cancelled; True if the callback fails, to permit a stop."""
-        assert self._cancel is not None
+        Args:
+            goal: The goal to decide on.
+            name: Name of the callback, for log lines.
+            decide: Calls it.
+            default: The decision if it fails.
+            effect: The consequence of that, for log lines.
+        """
+        decision: Any
         try:
-            decision: Any = self._cancel(goal)
+            decision = decide()
         except Exception:
-            self._log.exception("%s: cancel failed; cancelling goal %s", self.name, goal.id_text)
-            return True
+            self._log.exception("%s: %s failed; %s goal %s", self.name, name, effect, goal.id_text)
+            return default
         if decision is not True and decision is not False:
             self._log.error(
-                "%s: cancel returned %.80r instead of True or False; cancelling goal %s",
+                "%s: %s returned %.80r instead of True or False; %s goal %s",
                 self.name,
+                name,
                 decision,
+                effect,
                 goal.id_text,
             )
-        return decision is not False
+            return default
+        return bool(decision)
 
     # -- execution -------------------------------------------------------------------------------
 

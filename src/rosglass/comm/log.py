@@ -163,7 +163,7 @@ class NodeLogger(logging.Logger):
         return level >= self.getEffectiveLevel()
 
 
-class RosoutHandler(logging.Handler):
+class RosoutHandler(logging.Handler, NodeMember):
     """Publishes log records; never waits, never raises.
 
     Messages beyond 1000 per second, or faster than they can be sent, are dropped and counted; long
@@ -199,7 +199,7 @@ class RosoutHandler(logging.Handler):
                 message_type = core.types.message(topic.type)
                 self._publisher = Publisher(core, core.resolve(_TOPIC), message_type, topic.qos)
                 # Members close in reverse order: this one before its publisher.
-                self._core.add(_Flush(self, self._core))
+                self._core.add(self)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Publish a record soon."""
@@ -217,6 +217,7 @@ class RosoutHandler(logging.Handler):
             worker, self._worker = self._worker, None
         if closed or self._core.forked:
             return
+        self._core.remove(self)
         if worker is not None:
             worker.close()
         self._publish()
@@ -273,17 +274,6 @@ class RosoutHandler(logging.Handler):
         )
         record.created = time.time()
         return record
-
-
-class _Flush(NodeMember):
-    """Closes a handler as its node closes."""
-
-    def __init__(self, handler: RosoutHandler, core: NodeCore) -> None:
-        self._handler, self._core = handler, core
-
-    def close(self) -> None:
-        self._handler.close()
-        self._core.remove(self)
 
 
 class LibraryLog(logging.Handler):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from rosglass.comm.time import Duration
 from rosglass.errors import ArgumentError
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["BEST_AVAILABLE", "Durability", "History", "Liveliness", "QoS", "Reliability"]
 
+_Policy = TypeVar("_Policy", bound=Enum)
 #: Limit of rmw's profile (a signed 32-bit integer in every middleware).
 _MAX_DEPTH = 2**31 - 1
 #: A deadline or lease duration as strict as all peers allow (rmw's ``..._BEST_AVAILABLE``).
@@ -229,17 +230,17 @@ class QoS:
         """
         if self.is_decided:
             return self
+        latched = (Durability.TRANSIENT_LOCAL, Durability.BEST_AVAILABLE)
+        best_effort = any(o.reliability is Reliability.BEST_EFFORT for o in offered)
+        volatile = any(o.durability not in latched for o in offered)
+        manual = offered and all(o.liveliness is Liveliness.MANUAL_BY_TOPIC for o in offered)
         return self._decided(
-            reliable=all(o.reliability is not Reliability.BEST_EFFORT for o in offered),
-            latched=all(
-                o.durability in (Durability.TRANSIENT_LOCAL, Durability.BEST_AVAILABLE)
-                for o in offered
-            ),
-            manual=bool(offered)
-            and all(o.liveliness is Liveliness.MANUAL_BY_TOPIC for o in offered),
+            Reliability.BEST_EFFORT if best_effort else Reliability.RELIABLE,
+            Durability.VOLATILE if volatile else Durability.TRANSIENT_LOCAL,
+            Liveliness.MANUAL_BY_TOPIC if manual else Liveliness.AUTOMATIC,
             # A publisher without a limit matches no limit.
-            deadline=_limit([o.deadline for o in offered], max, weakest=True),
-            lease_duration=_limit([o.lease_duration for o in offered], max, weakest=True),
+            _limit([o.deadline for o in offered], max, weakest=True),
+            _limit([o.lease_duration for o in offered], max, weakest=True),
         )
 
     def for_publisher(self, requested: Collection[QoS] = ()) -> QoS:
@@ -251,45 +252,30 @@ class QoS:
         """
         if self.is_decided:
             return self
+        manual = any(r.liveliness is Liveliness.MANUAL_BY_TOPIC for r in requested)
         return self._decided(
-            reliable=True,
-            latched=True,
-            manual=any(r.liveliness is Liveliness.MANUAL_BY_TOPIC for r in requested),
-            deadline=_limit([r.deadline for r in requested], min),
-            lease_duration=_limit([r.lease_duration for r in requested], min),
+            Reliability.RELIABLE,
+            Durability.TRANSIENT_LOCAL,
+            Liveliness.MANUAL_BY_TOPIC if manual else Liveliness.AUTOMATIC,
+            _limit([r.deadline for r in requested], min),
+            _limit([r.lease_duration for r in requested], min),
         )
 
     def _decided(
         self,
-        reliable: bool,
-        latched: bool,
-        manual: bool,
+        reliability: Reliability,
+        durability: Durability,
+        liveliness: Liveliness,
         deadline: Duration | None,
         lease_duration: Duration | None,
     ) -> QoS:
         """Replace default policies, and best-available ones by the given values."""
-        reliability, durability = self.reliability, self.durability
-        history, liveliness = self.history, self.liveliness
-        if reliability is Reliability.BEST_AVAILABLE:
-            reliability = Reliability.RELIABLE if reliable else Reliability.BEST_EFFORT
-        elif reliability is Reliability.SYSTEM_DEFAULT:
-            reliability = Reliability.RELIABLE
-        if durability is Durability.BEST_AVAILABLE:
-            durability = Durability.TRANSIENT_LOCAL if latched else Durability.VOLATILE
-        elif durability is Durability.SYSTEM_DEFAULT:
-            durability = Durability.VOLATILE
-        if history is History.SYSTEM_DEFAULT:
-            history = History.KEEP_LAST
-        if liveliness is Liveliness.BEST_AVAILABLE:
-            liveliness = Liveliness.MANUAL_BY_TOPIC if manual else Liveliness.AUTOMATIC
-        elif liveliness is Liveliness.SYSTEM_DEFAULT:
-            liveliness = Liveliness.AUTOMATIC
         return replace(
             self,
-            reliability=reliability,
-            durability=durability,
-            history=history,
-            liveliness=liveliness,
+            reliability=_decide(self.reliability, Reliability.RELIABLE, reliability),
+            durability=_decide(self.durability, Durability.VOLATILE, durability),
+            history=_decide(self.history, History.KEEP_LAST, History.KEEP_LAST),
+            liveliness=_decide(self.liveliness, Liveliness.AUTOMATIC, liveliness),
             deadline=deadline if self.deadline == BEST_AVAILABLE else self.deadline,
             lease_duration=(
                 lease_duration if self.lease_duration == BEST_AVAILABLE else self.lease_duration
@@ -360,6 +346,11 @@ def check_profile(qos: QoS | int, place: str) -> QoS:
         return QoS(depth=qos)
     except ArgumentError as error:
         raise ArgumentError("qos", error.value, error.expected, place) from None
+
+
+def _decide(policy: _Policy, default: _Policy, best_available: _Policy) -> _Policy:
+    open_policies = {"SYSTEM_DEFAULT": default, "BEST_AVAILABLE": best_available}
+    return open_policies.get(policy.name, policy)
 
 
 def _limit(
