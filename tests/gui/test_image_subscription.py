@@ -339,17 +339,17 @@ def test_pictures_that_a_silent_link_kept_back_are_not_live(
 def test_a_camera_that_nobody_publishes_is_told(
     running: Any, camera: Any, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.element.LONELY_MS", 20)
+    monkeypatch.setattr("rosglass.qml.element.NO_PEER_MS", 20)
     caplog.set_level("INFO", "rosglass.qml")
     root = load(running, 'topic: "/camm"')
-    wait(lambda: "/camm: nobody publishes this topic; did you mean /cam?" in caplog.text)
+    wait(lambda: "/camm: this topic has no publisher; did you mean /cam?" in caplog.text)
     caplog.clear()
     root.property("sub").setProperty("topic", "/cam")
     wait(lambda: root.property("sub").property("subscribed") and camera.subscription_count())
     load(running, 'topic: "/camera"')
     # It would have been told of the other one before.
-    wait(lambda: "/camera: nobody publishes this topic" in caplog.text)
-    assert caplog.text.count("nobody publishes") == 1
+    wait(lambda: "/camera: this topic has no publisher" in caplog.text)
+    assert caplog.text.count("this topic has no publisher") == 1
 
 
 def test_a_picture_that_comes_while_its_stream_is_made(

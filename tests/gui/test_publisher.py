@@ -315,7 +315,7 @@ def test_what_keep_all_could_not_send_is_told(running: Any, wait: Any, caplog: A
 def test_a_topic_without_subscribers_is_named_with_the_near_name(
     running: Any, received: list, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.publisher.LONELY_MS", 20)
+    monkeypatch.setattr("rosglass.qml.publisher.NO_PEER_MS", 20)
     caplog.set_level("INFO", "rosglass.qml")
     running.robot.create_publisher("/cmd_vel", TWIST)  # topics() of this graph shows published ones
     code = 'QtObject { property var pub: Ros2.createPublisher("TOPIC", "geometry_msgs/Twist") }'
@@ -323,10 +323,10 @@ def test_a_topic_without_subscribers_is_named_with_the_near_name(
         root = running.load(code.replace("TOPIC", topic))
         wait(lambda root=root: root.property("pub").property("isAdvertised"))
     # It would have been told of the other one before.
-    wait(lambda: "/cmd_vell: nobody subscribes to this topic" in caplog.text)
-    (told,) = [one for one in caplog.records if "nobody subscribes" in one.message]
+    wait(lambda: "/cmd_vell: this topic has no subscription" in caplog.text)
+    (told,) = [one for one in caplog.records if "this topic has no subscription" in one.message]
     assert told.levelno == logging.WARNING
-    assert "/cmd_vell: nobody subscribes to this topic; did you mean /cmd_vel?" in told.message
+    assert "/cmd_vell: this topic has no subscription; did you mean /cmd_vel?" in told.message
 
 
 def test_publishing_at_the_end_of_the_program_is_no_mistake(

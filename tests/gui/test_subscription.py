@@ -67,7 +67,7 @@ def test_a_topic_set_to_its_absolute_name_stays_there(
     sub.setProperty("topic", "/right/chat")
     bench.run("Ros2.shutdown()")
     bench.session.init("ui", "/left")
-    wait(lambda: "chat: nobody publishes this topic" in caplog.text)
+    wait(lambda: "chat: this topic has no publisher" in caplog.text)
     assert sub.property("topic") == "/right/chat"
 
 
@@ -481,10 +481,18 @@ def test_what_a_silent_link_kept_back_is_shown_but_not_as_live(
     wait(lambda: root.property("shown") == "live again" and not sub.property("stale"))
 
 
+def test_it_is_subscribed_once_the_type_is_known(running: Any, wait: Any) -> None:
+    sub = load(running).property("sub")
+    wait(lambda: running.world.subscriptions)
+    wait.nothing_happens(0.3)
+    assert not sub.property("subscribed")  # nothing can be received without a type
+    running.robot.create_publisher("/chat", TEXT)
+    wait(lambda: sub.property("subscribed"))
+
+
 def test_what_nobody_can_decode_is_not_shown(running: Any, wait: Any, caplog: Any) -> None:
     root = load(running)
     sub = root.property("sub")
-    wait(lambda: sub.property("subscribed"))
     robot = running.robot.create_publisher("/chat", OpaqueType("p/msg/Secret"))
     wait(robot.subscription_count)
     robot.publish_serialized(b"\0\1\0\0....")
@@ -534,15 +542,15 @@ def test_a_successor_that_has_said_nothing_is_not_trusted(live: Any, wait: Any) 
 def test_a_topic_that_nobody_publishes_is_told(
     running: Any, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.element.LONELY_MS", 20)
+    monkeypatch.setattr("rosglass.qml.element.NO_PEER_MS", 20)
     caplog.set_level("INFO", "rosglass.qml")
     running.robot.create_publisher("/odom", "std_msgs/msg/String")
     published = running.load('Subscription { topic: "/odom" }')
     wait(lambda: published.property("subscribed"))
     running.load('Subscription { topic: "/odomm" }')
     # It would have been told of the other one before.
-    wait(lambda: "/odomm: nobody publishes this topic; did you mean /odom?" in caplog.text)
-    assert caplog.text.count("nobody publishes") == 1
+    wait(lambda: "/odomm: this topic has no publisher; did you mean /odom?" in caplog.text)
+    assert caplog.text.count("this topic has no publisher") == 1
 
 
 def test_a_name_that_is_none_is_told_with_its_file(running: Any, wait: Any, caplog: Any) -> None:

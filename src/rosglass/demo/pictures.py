@@ -22,6 +22,8 @@ from rosglass.qml.element import TopicElement
 from rosglass.qt import Property, QtCore, QtGui, QtQml, QtQuick, Signal, Slot
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy.typing as npt
 
     from rosglass.comm import Node, Subscription
@@ -124,10 +126,10 @@ class _Picture(TopicElement):
 
     topicChanged, limitChanged = Signal(), Signal()  # noqa: N815 - Qt's
     changed, ageChanged = Signal(), Signal()  # noqa: N815 - Qt's
-    staleChanged, problemChanged = Signal(), Signal()  # noqa: N815 - Qt's
     _painted = Signal(object)
 
-    _HOLDS = ("_provider", "_subscription", "_have")
+    _HOLDS = ("_provider",)
+    _endpoint: Subscription | None
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
@@ -136,8 +138,6 @@ class _Picture(TopicElement):
         self._stamp = 0.0
         self._provider: _Provider | None = None
         self._painter = Dispatcher(self._name)
-        self._have: tuple[Node, str] | None = None
-        self._subscription: Subscription | None = None
         self._painted.connect(self._show, QtCore.Qt.ConnectionType.QueuedConnection)
         self.destroyed.connect(self._painter.close)
 
@@ -149,34 +149,21 @@ class _Picture(TopicElement):
     def take(self, numbers: tuple[float, ...]) -> None:
         """Take what belongs to the picture that is shown from now on, on the GUI thread."""
 
-    def _update(self) -> None:
+    def _wanted(self) -> tuple[Node, str] | None:
         node, topic = self.node, self._resolve(self._topic)
-        want = (node, topic) if node is not None and topic else None
-        if want == self._have:
-            return
-        self._have = want
-        if self._subscription is not None:
-            self._at_end.pop("picture", None)
-            self._subscription.close()
-            self._subscription = None
-        if want is None:
-            self._suspect = True
-            self._judge()
-            return
+        return (node, topic) if node is not None and topic else None
+
+    def _factory(self, node: Node, topic: str) -> Callable[[], Subscription]:
         engine = QtQml.qjsEngine(self)
         if self._provider is None and isinstance(engine, QtQml.QQmlEngine):
             self._provider = _Provider()
             engine.addImageProvider(self._name, self._provider)
-        try:
-            subscription = self._subscription = want[0].create_subscription(
-                topic, self.kind, self._on_message, self.qos, executor=self._painter
-            )
-            session = self._session
-            assert session is not None
-            self._at_end["picture"] = lambda: session.background(subscription.close)
-            self._say("")
-        except Error as error:
-            self._say(str(error))
+        return lambda: node.create_subscription(
+            topic, self.kind, self._on_message, self.qos, executor=self._painter
+        )
+
+    def _on_created(self, endpoint: Subscription) -> None:  # noqa: ARG002 - the base's signature
+        self._set_problem("")
 
     def _on_message(self, message: Message) -> None:
         try:
@@ -193,7 +180,7 @@ class _Picture(TopicElement):
     @Slot(object)
     def _show(self, result: object) -> None:
         if isinstance(result, Error):
-            self._say(f"{self._topic}: {result}")
+            self._set_problem(f"{self._topic}: {result}")
             return
         assert isinstance(result, tuple)
         picture, numbers = result
@@ -202,12 +189,12 @@ class _Picture(TopicElement):
         self._provider.picture = picture
         self._version += 1
         self._stamp, self._age = time.monotonic(), 0.0
-        self._suspect = False
+        self._outdated = False
         self.take(numbers)
-        self._say("")
+        self._set_problem("")
         self.changed.emit()
         self.ageChanged.emit()
-        self._judge()
+        self._update_stale()
 
     @Slot()
     def _on_tick(self) -> None:
@@ -221,12 +208,6 @@ class _Picture(TopicElement):
             return True
         return 0 < self._stale_after_s < time.monotonic() - self._stamp
 
-    def _stale_changed(self) -> None:
-        self.staleChanged.emit()
-
-    def _problem_changed(self) -> None:
-        self.problemChanged.emit()
-
     def _set_topic(self, topic: str) -> None:
         if topic != self._topic:
             self._topic = topic
@@ -237,10 +218,10 @@ class _Picture(TopicElement):
         if limit != self._stale_after_s:
             self._stale_after_s = limit
             self.limitChanged.emit()
-            self._judge()
+            self._update_stale()
 
     def _frequency(self) -> float:
-        return 0.0 if self._subscription is None else self._subscription.statistics().frequency
+        return 0.0 if self._endpoint is None else self._endpoint.statistics().frequency
 
     def _source(self) -> QtCore.QUrl:
         return QtCore.QUrl(f"image://{self._name}/{self._version}" if self._version else "")
@@ -252,8 +233,6 @@ class _Picture(TopicElement):
     received = Property(bool, lambda self: self._version > 0, notify=changed)
     #: Seconds since the newest message, -1 before the first.
     age = Property(float, lambda self: self._age, notify=ageChanged)
-    stale = Property(bool, lambda self: self._stale, notify=staleChanged)
-    problem = Property(str, lambda self: self._problem, notify=problemChanged)
     #: Messages per second.
     frequency = Property(float, _frequency, notify=ageChanged)
     messageType = Property(str, lambda self: self.kind, constant=True)  # noqa: N815

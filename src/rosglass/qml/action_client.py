@@ -4,15 +4,16 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rosglass.comm.action_client import GoalStatus
 from rosglass.errors import Error, NodeClosedError
 from rosglass.qml.callbacks import Deferred, call_back
-from rosglass.qml.client_element import ClientElement
+from rosglass.qml.client_element import CONNECTION_TIMEOUT_MS, ClientElement
 from rosglass.qml.goal_handle import GoalCallbacks, GoalHandle, tell_cancelling
 from rosglass.qml.js_values import null, properties_of
 from rosglass.qml.log import log_from_qml
+from rosglass.qml.properties import ReadOnly, Writable, at_least
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
@@ -43,7 +44,9 @@ class GoalSender(ClientElement):
     cancelFailed = Signal(str)
 
     _HANDLE: ClassVar[type[GoalHandle]] = GoalHandle
-    _client: Sender | None
+    _endpoint: Sender | None
+    #: Time that goals wait for a server.
+    _timeout_ms = CONNECTION_TIMEOUT_MS
 
     def __init__(self, runtime: Runtime, name: str, type_name: str) -> None:
         super().__init__(runtime, name, type_name, self.DIALECT)
@@ -51,7 +54,7 @@ class GoalSender(ClientElement):
         #: Keeps JavaScript from collecting it while goals run.
         self._held = QJSValue()
         goals, executor = self._goals, runtime.session.executor
-        self._at_end["goals"] = lambda: executor.post(lambda: _end_all(goals, _CLOSED))
+        self._cleanup["goals"] = lambda: executor.post(lambda: _end_all(goals, _CLOSED))
 
     @Slot()
     def cancelAllGoals(self) -> None:
@@ -72,7 +75,7 @@ class GoalSender(ClientElement):
             self._throw(error)
 
     def _ask_cancel(self, ask: Callable[[Sender], Promise[CancelAnswer]]) -> None:
-        runtime, client, session = self._runtime, self._client, self._session
+        runtime, client, session = self._runtime, self._endpoint, self._session
         assert runtime is not None
         caller, what = runtime.caller(), f"what {self._name} does"
 
@@ -106,21 +109,21 @@ class GoalSender(ClientElement):
             QJSValue() if goal is None else goal,
             told,
             self._dialect,
-            self._patience,
+            self._timeout_ms,
             self._forget,
         )
         js = handle.js
         self._goals.append(handle)
-        if self._client is not None and self._client.type is not None:
+        if self._endpoint is not None and self._endpoint.type is not None:
             try:
-                self._start(handle, self._client)
+                self._start(handle, self._endpoint)
             except Error as error:
                 self._forget(handle)
                 handle.js = QJSValue()
                 self._throw(error)
                 return QJSValue()
-        elif self._patience:
-            QtCore.QTimer.singleShot(self._patience, lambda: self._give_up(handle))
+        elif self._timeout_ms:
+            QtCore.QTimer.singleShot(self._timeout_ms, lambda: self._give_up(handle))
         if self._held.isUndefined() and runtime.engine is not None:
             self._held = runtime.engine.newQObject(self)
         return js
@@ -130,7 +133,7 @@ class GoalSender(ClientElement):
         handle.start(client, self._session.executor)
 
     def _submit_waiting(self) -> None:
-        client = self._client
+        client = self._endpoint
         if client is None or client.type is None:
             return
         for handle in list(self._goals):
@@ -144,12 +147,12 @@ class GoalSender(ClientElement):
         """End a goal for which there is no client, or no type, yet."""
         if is_alive(self) and handle in self._goals and not handle.sent:
             why = self._problem or self._missing()
-            seconds = (self._patience or 0) / 1000
+            seconds = (self._timeout_ms or 0) / 1000
             told = f"no goal could be sent to {self._name} within {seconds:g} s: {why}"
             handle.end(GoalStatus.LOST, None, told)
 
     def _missing(self) -> str:
-        client = self._client
+        client = self._endpoint
         if client is None:
             return "there is no connection with the robot"
         return client.problem or "is its server running, and its name right?"
@@ -176,8 +179,8 @@ class GoalSender(ClientElement):
 
     # The client.
 
-    def _create(self, node: Node, type_name: str | None) -> Any:
-        return node.create_action_client(self._name, type_name)
+    def _factory(self, node: Node) -> Callable[[], Sender]:
+        return lambda: node.create_action_client(self._name, self._type or None)
 
     def _fail_all(self, error: Error) -> None:
         _end_all(self._goals, str(error))
@@ -192,30 +195,26 @@ def _end_all(goals: list[GoalHandle], reason: str) -> None:
 class ActionClient(GoalSender):
     """What ``Ros2.createActionClient`` returns."""
 
-    serverReadyChanged = Signal()
-    connectionTimeoutChanged = Signal()
-    problemChanged = Signal()
-
-    def _set_patience(self, milliseconds: int) -> None:
-        if milliseconds < 0:
-            self._refuse(f"action {self._name}: connectionTimeout {milliseconds} ms is negative")
-        elif milliseconds != self._patience:
-            self._patience = milliseconds
-            self.connectionTimeoutChanged.emit()
-
-    ready = Property(bool, lambda self: self._ready, notify=serverReadyChanged)
+    ready = ReadOnly(bool, False, notify="serverReadyChanged")
     name = Property(str, lambda self: self._name, constant=True)
     type = Property(str, lambda self: self._type, constant=True)
     actionType = Property(str, lambda self: self._type, constant=True)
-    connectionTimeout = Property(
-        int, lambda self: self._patience, _set_patience, notify=connectionTimeoutChanged
+    connectionTimeout = Writable(
+        int, CONNECTION_TIMEOUT_MS, at_least(0), then="_on_timeout_changed", unit="ms"
     )
-    problem = Property(str, lambda self: self._problem, notify=problemChanged)
+
+    @property
+    def label(self) -> str:
+        """What error messages call this element."""
+        return f"action {self._name}"
+
+    def _on_timeout_changed(self) -> None:
+        self._timeout_ms = self.connectionTimeout
 
     @Slot(result=bool)
     def isServerReady(self) -> bool:
         """Return whether a server is there."""
-        return self._ready
+        return self.ready
 
     @Slot(QJSValue, result=QJSValue)
     @Slot(QJSValue, QJSValue, result=QJSValue)
@@ -282,9 +281,3 @@ class ActionClient(GoalSender):
     def cancelGoalsBefore(self, time: QJSValue) -> None:
         """Ask the server to cancel the goals that it accepted at or before a time, or Date."""
         self._cancel_until(time)
-
-    def _ready_changed(self) -> None:
-        self.serverReadyChanged.emit()
-
-    def _problem_changed(self) -> None:
-        self.problemChanged.emit()

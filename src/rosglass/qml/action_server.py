@@ -4,16 +4,19 @@
 from __future__ import annotations
 
 import logging
+import re
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any
 
-from rosglass.errors import Error, TypeNotFoundError
+from rosglass.errors import Error
 from rosglass.qml.answering import Answers
 from rosglass.qml.callbacks import call_back
-from rosglass.qml.element import RETRY, Element
+from rosglass.qml.dialect import Dialect
+from rosglass.qml.element import Element
 from rosglass.qml.js_values import properties_of
+from rosglass.qml.properties import ReadOnly, Writable, function, report
 from rosglass.qml.singleton import full_type
-from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+from rosglass.qt import QJSValue, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,32 +25,31 @@ if TYPE_CHECKING:
     from rosglass.comm.action_server import ServerGoal
     from rosglass.comm.node import Node
     from rosglass.messages import Message
-    from rosglass.qml.runtime import Runtime
     from rosglass.qml.server_goal import ServerGoalHandle
 
-__all__ = ["ActionServer", "server_functions"]
+__all__ = ["ActionServer", "RosActionServer", "action_type", "server_functions"]
 
 _log = logging.getLogger("rosglass.qml")
+#: How ROS 1 calls an action type.
+_ROS1_TYPE = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)Action\Z")
 _GONE = "the interface that offered this action is gone"
 
 
-class _Offer:
-    """What is offered under one name while there is one node.
+class _Goals:
+    """The goals of one server while it exists.
 
     Args:
-        want: Node, name and full type.
-        answers: Asks the functions.
+        answers: Calls the JavaScript functions.
     """
 
-    def __init__(self, want: tuple[Node, str, str], answers: Answers) -> None:
-        self.want, self.answers = want, answers
-        self.server: Server | None = None
-        #: What came before the server was there.
-        self.early: list[Callable[[], None]] = []
+    def __init__(self, answers: Answers) -> None:
+        self.answers = answers
+        #: Goals received before the server was created here.
+        self.early: list[Callable[[Server], object]] = []
         self.handles: dict[bytes, ServerGoalHandle] = {}
 
     def close(self) -> None:
-        """End the waiting for answers; the server itself is closed elsewhere."""
+        """Stop waiting for JavaScript's answers."""
         for handle in self.handles.values():
             handle.abandon()
         self.answers.give_up()
@@ -56,200 +58,102 @@ class _Offer:
 class ActionServer(Element):
     """Offers an action while it is enabled. See its page in ``docs/elements``."""
 
-    nameChanged = Signal()
-    actionTypeChanged = Signal()
-    acceptChanged = Signal()
-    executeChanged = Signal()
-    cancelChanged = Signal()
-    enabledChanged = Signal()
-    readyChanged = Signal()
-    activeGoalsChanged = Signal()
-    problemChanged = Signal()
+    name = Writable(str, "")
+    actionType = Writable(str, "")
+    accept = Writable(QJSValue, accept=function, then="")
+    execute = Writable(QJSValue, accept=function)
+    cancel = Writable(QJSValue, accept=function, then="")
+    enabled = Writable(bool, True)
+    ready = ReadOnly(bool, False)
+    activeGoals = ReadOnly(int, 0)
 
-    _HOLDS = ("_accept", "_execute", "_cancel", "_offer")
-
-    def __init__(
-        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
-    ) -> None:
-        super().__init__(parent, runtime)
-        self._name, self._type = "", ""
-        self._accept, self._execute, self._cancel = QJSValue(), QJSValue(), QJSValue()
-        self._enabled = True
-        self._offer: _Offer | None = None
-        self._retry = QtCore.QTimer(self)
-        self._retry.setSingleShot(True)
-        self._retry.timeout.connect(self._serve)
+    _HOLDS = ("_accept", "_execute", "_cancel", "_goals")
+    _endpoint: Server | None
+    _goals: _Goals | None = None
 
     def configure(self, name: str, type_name: str, functions: dict[str, QJSValue]) -> None:
-        """Set what ``Ros2.createActionServer`` was given."""
-        self._name, self._type = name, type_name
-        self._accept = functions.get("accept", QJSValue())
-        self._execute = functions["execute"]
-        self._cancel = functions.get("cancel", QJSValue())
+        """Set the arguments of ``Ros2.createActionServer``."""
+        self.name, self.actionType = name, type_name
+        for what, given in functions.items():
+            setattr(self, what, given)
 
-    # Properties.
-
-    def _set_name(self, name: str) -> None:
-        if name != self._name:
-            self._name = name
-            self.nameChanged.emit()
-            self._schedule()
-
-    def _set_type(self, name: str) -> None:
-        if name != self._type:
-            self._type = name
-            self.actionTypeChanged.emit()
-            self._schedule()
-
-    def _set_enabled(self, enabled: bool) -> None:
-        if enabled != self._enabled:
-            self._enabled = enabled
-            self.enabledChanged.emit()
-            self._schedule()
-
-    def _set_accept(self, function: QJSValue) -> None:
-        if self._is_function("accept", function):
-            self._accept = function
-            self.acceptChanged.emit()
-
-    def _set_execute(self, function: QJSValue) -> None:
-        if self._is_function("execute", function):
-            self._execute = function
-            self.executeChanged.emit()
-            self._schedule()
-
-    def _set_cancel(self, function: QJSValue) -> None:
-        if self._is_function("cancel", function):
-            self._cancel = function
-            self.cancelChanged.emit()
-
-    def _is_function(self, what: str, value: QJSValue) -> bool:
-        if value.isCallable() or value.isNull() or value.isUndefined():
-            return True
-        self._refuse(f"ActionServer {self._name!r}: {what} is not a function")
-        return False
-
-    def _count(self) -> int:
-        return len(self._offer.handles) if self._offer is not None else 0
-
-    name = Property(str, lambda self: self._name, _set_name, notify=nameChanged)
-    actionType = Property(str, lambda self: self._type, _set_type, notify=actionTypeChanged)
-    accept = Property(QJSValue, lambda self: self._accept, _set_accept, notify=acceptChanged)
-    execute = Property(QJSValue, lambda self: self._execute, _set_execute, notify=executeChanged)
-    cancel = Property(QJSValue, lambda self: self._cancel, _set_cancel, notify=cancelChanged)
-    enabled = Property(bool, lambda self: self._enabled, _set_enabled, notify=enabledChanged)
-    ready = Property(bool, lambda self: self._is_ready(), notify=readyChanged)
-    activeGoals = Property(int, _count, notify=activeGoalsChanged)
-    problem = Property(str, lambda self: self._problem, notify=problemChanged)
-
-    def _is_ready(self) -> bool:
-        return self._offer is not None and self._offer.server is not None
-
-    # Serving.
+    @property
+    def label(self) -> str:
+        """What error messages call this element."""
+        return f"action {self.name}"
 
     def _full_type(self) -> str:
-        return full_type(self._type, "action")
+        return full_type(self.actionType, "action")
 
-    def _update(self) -> None:
+    def _wanted(self) -> tuple[Node, str, str] | None:
         node = self.node
-        want = None
-        complete = self._name and self._type and self._execute.isCallable()
-        if node is not None and self._enabled and complete:
-            want = (node, self._name, self._full_type())
-        if want != (self._offer.want if self._offer is not None else None):
-            self._withdraw()
-            runtime = self._runtime
-            if want is not None and runtime is not None:
-                answers = Answers(runtime, f"execute of action {self._name}")
-                self._offer = _Offer(want, answers)
-                self._at_end["offer"] = self._offer.close
-            self._serve()
+        complete = self.name and self.actionType and self.execute.isCallable()
+        if node is None or not (self.enabled and complete):
+            return None
+        return node, self.name, self._full_type()
 
-    @Slot()
-    def _serve(self) -> None:
-        session, offer = self._session, self._offer
-        if session is None or offer is None or offer.server is not None:
-            return
-        node, name, type_name = offer.want
-
-        def done(result: Server | Error) -> None:
-            if isinstance(result, Error):
-                self._say(f"action {name}: {result}")
-                if isinstance(result, TypeNotFoundError):
-                    self._retry.start(RETRY)
-            else:
-                offer.server = result
-                self._at_end["server"] = lambda: session.background(result.close)
-                self._say(result.problem)
-                self.readyChanged.emit()
-                early, offer.early = offer.early, []
-                for job in early:
-                    job()
-
-        self._make(
-            lambda: node.create_action_server(
-                name,
-                type_name,
-                lambda goal: self._on_goal(offer, goal),
-                accept=lambda goal: self._accepts(offer, goal),
-                cancel=lambda goal: self._allows(offer, goal),
-                executor=session.executor,
-            ),
-            lambda: self._offer is offer,
-            done,
+    def _factory(self, node: Node, name: str, type_name: str) -> Callable[[], Server]:
+        runtime, executor = self._find_runtime(), self._executor
+        assert runtime is not None
+        goals = self._goals = _Goals(Answers(runtime, f"execute of {self.label}"))
+        self._cleanup["goals"] = goals.close
+        return lambda: node.create_action_server(
+            name,
+            type_name,
+            lambda goal: self._on_goal(goals, goal),
+            accept=lambda goal: self._accepts(goals, goal),
+            cancel=lambda goal: self._allows(goals, goal),
+            executor=executor,
         )
 
-    def _withdraw(self) -> None:
-        self._retry.stop()
-        offer, self._offer = self._offer, None
-        self._at_end.pop("server", None)
-        self._at_end.pop("offer", None)
-        if offer is None:
-            return
-        offer.close()
-        if offer.server is not None and self._session is not None:
-            self._session.background(offer.server.close)
-            self.readyChanged.emit()
-        self.activeGoalsChanged.emit()
+    def _on_created(self, endpoint: Server) -> None:
+        self._set_problem(endpoint.problem)
+        goals = self._goals
+        if report(self, ready=True) and goals is not None:
+            early, goals.early = goals.early, []
+            for begin in early:
+                begin(endpoint)
+
+    def _on_closed(self, endpoint: Server | None) -> None:  # noqa: ARG002 - the base's signature
+        goals, self._goals = self._goals, None
+        self._cleanup.pop("goals", None)
+        if goals is not None:
+            goals.close()
+        report(self, ready=False, activeGoals=0)
 
     # What the node asks, on the GUI thread.
 
-    def _accepts(self, offer: _Offer, goal: Message) -> bool:
+    def _accepts(self, goals: _Goals, goal: Message) -> bool:
         runtime = self._runtime
-        if not is_alive(self) or self._offer is not offer or runtime is None:
+        if not is_alive(self) or self._goals is not goals or runtime is None:
             return False
-        if not self._accept.isCallable():
+        if not self.accept.isCallable():
             return True
-        answer = call_back(runtime, self._accept, runtime.message(goal, self.DIALECT))
+        answer = call_back(runtime, self.accept, runtime.message(goal, self.DIALECT))
         if not answer.isBool():
-            _log.error("accept of action %s did not say true or false: rejecting", self._name)
+            _log.error("accept of %s returned neither true nor false: rejecting", self.label)
         return answer.isBool() and answer.toBool()
 
-    def _allows(self, offer: _Offer, goal: ServerGoal) -> bool:
+    def _allows(self, goals: _Goals, goal: ServerGoal) -> bool:
         runtime = self._runtime
-        handle = offer.handles.get(goal.id)
+        handle = goals.handles.get(goal.id)
         if not is_alive(self) or runtime is None or handle is None:
             return True
-        answer = call_back(runtime, self._cancel, handle.js)
+        answer = call_back(runtime, self.cancel, handle.js)
         return not answer.isBool() or answer.toBool()
 
-    def _on_goal(self, offer: _Offer, goal: ServerGoal) -> Any:
-        if not is_alive(self) or self._offer is not offer:
+    def _on_goal(self, goals: _Goals, goal: ServerGoal) -> Any:
+        if not is_alive(self) or self._goals is not goals:
             raise Error(_GONE)
-        if offer.server is not None:
-            return self._begin(offer, offer.server, goal)
-        # Somebody waited for the action, and was quicker than the news that it is offered.
+        if self._endpoint is not None:
+            return self._begin(goals, self._endpoint, goal)
+        # A client waited for the action, and sent a goal before the worker thread had returned it.
         ended: Future[Any] = Future()
-
-        def begin() -> None:
-            assert offer.server is not None
-            self._begin(offer, offer.server, goal, ended)
-
-        offer.early.append(begin)
+        goals.early.append(lambda server: self._begin(goals, server, goal, ended))
         return ended
 
     def _begin(
-        self, offer: _Offer, server: Server, goal: ServerGoal, ended: Future[Any] | None = None
+        self, goals: _Goals, server: Server, goal: ServerGoal, ended: Future[Any] | None = None
     ) -> Future[Any]:
         runtime = self._runtime
         assert runtime is not None
@@ -257,18 +161,18 @@ class ActionServer(Element):
         from rosglass.qml.server_goal import ServerGoalHandle  # noqa: PLC0415 - few have actions
 
         def forget(handle: ServerGoalHandle) -> None:
-            if offer.handles.pop(goal.id, None) is handle and is_alive(self):
-                self.activeGoalsChanged.emit()
+            if goals.handles.pop(goal.id, None) is handle and is_alive(self):
+                report(self, activeGoals=len(goals.handles))
 
         handle = ServerGoalHandle(runtime, goal, server.type, self.DIALECT, forget)
         if ended is not None:
             handle.ended = ended
-        offer.handles[goal.id] = handle
-        self.activeGoalsChanged.emit()
+        goals.handles[goal.id] = handle
+        report(self, activeGoals=len(goals.handles))
         arguments = [runtime.message(goal.goal, self.DIALECT), handle.js]
         waiting = handle.ended
         try:
-            answer = offer.answers.ask(self._execute, arguments, handle.take)
+            answer = goals.answers.ask(self.execute, arguments, handle.take)
         except Error as error:
             handle.fail(error)
             return waiting
@@ -277,9 +181,6 @@ class ActionServer(Element):
         elif answer is not None:
             handle.finish(answer)
         return waiting
-
-    def _problem_changed(self) -> None:
-        self.problemChanged.emit()
 
 
 def server_functions(given: QJSValue) -> dict[str, QJSValue]:
@@ -300,7 +201,22 @@ def server_functions(given: QJSValue) -> dict[str, QJSValue]:
         raise Error(f"there is no function {unknown[0]}; there are accept, execute, cancel")
     if "execute" not in functions:
         raise Error("give a function that executes goals, or an object with execute")
-    for name, function in functions.items():
-        if not function.isCallable():
+    for name, value in functions.items():
+        if not value.isCallable():
             raise Error(f"{name} is not a function")
     return functions
+
+
+def action_type(name: str) -> str:
+    """Return ``pkg/action/Do`` for ``pkg/DoAction``, as ROS 1 calls it, and for ``pkg/Do``."""
+    match = _ROS1_TYPE.match(name)
+    return full_type(f"{match[1]}/{match[2]}" if match else name, "action")
+
+
+class RosActionServer(ActionServer):
+    """Offers an action; goals follow the habits of ``Ros 1.0``, types are ``pkg/DoAction``."""
+
+    DIALECT = Dialect.ROS1
+
+    def _full_type(self) -> str:
+        return action_type(self.actionType)

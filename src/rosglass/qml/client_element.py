@@ -1,4 +1,4 @@
-"""What clients of services and of actions have in common: being there again and again."""
+"""The base of service and action clients: created, connected, and created again by each node."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from abc import abstractmethod
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error, TypeNotFoundError
-from rosglass.qml.element import RETRY, Element
+from rosglass.qml.element import RETRY_MS, Element
+from rosglass.qml.properties import report
 from rosglass.qt import QtCore, is_alive
 
 if TYPE_CHECKING:
@@ -20,79 +21,58 @@ if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QJSValue
 
-__all__ = ["PATIENCE", "ClientElement", "given_fields", "named"]
+__all__ = ["CONNECTION_TIMEOUT_MS", "ClientElement", "given_fields", "named"]
 
-#: Milliseconds that is waited for a server.
-PATIENCE = 10_000
-#: Milliseconds in which looking for a server is not worth a warning.
-_LOOKING = 2000
+#: Time that requests wait for a server.
+CONNECTION_TIMEOUT_MS = 10_000
+#: Time in which a server that is not found is not worth a warning.
+_SEARCH_MS = 2000
 
 
 class ClientElement(Element):
-    """Has a client of something while there is a node, and a new one after the next init.
+    """Has a client of a service or an action while there is a node.
 
     Args:
         runtime: The engine's runtime.
-        name: Name of what it is a client of, as in QML.
+        name: Name of the service or action, as in QML.
         type_name: Full type name; empty takes the one that the server announces.
-        dialect: Whose habits values follow.
+        dialect: How values are written in QML.
     """
 
     def __init__(self, runtime: Runtime, name: str, type_name: str, dialect: Dialect) -> None:
         super().__init__(None, runtime)
         self._name, self._type, self._dialect = name, type_name, dialect
-        self._patience = PATIENCE
-        self._client: Any = None
         self._watch: Handle | None = None
-        self._have: Node | None = None
-        self._ready = False
 
-    @abstractmethod
-    def _create(self, node: Node, type_name: str | None) -> Any:
-        """Return a new client; runs on the worker thread."""
+    @property
+    def label(self) -> str:
+        """What error messages call this element."""
+        return self._name
 
     @abstractmethod
     def _submit_waiting(self) -> None:
-        """Send what waits for a client that knows its type."""
+        """Send the requests that waited until the client knows its type."""
 
     @abstractmethod
     def _fail_all(self, error: Error) -> None:
-        """End everything that has no answer yet."""
+        """End every request that has no answer yet."""
 
-    @abstractmethod
-    def _ready_changed(self) -> None:
-        """Tell QML that :attr:`_ready` changed."""
+    def _wanted(self) -> tuple[Node] | None:
+        return None if self.node is None else (self.node,)
 
-    def _update(self) -> None:
-        node = self.node
-        if node is self._have:
-            return
-        self._withdraw()
-        self._have = node
-        if node is not None:
-            self._connect(node, self._type or None)
+    def _on_create_failed(self, error: Error) -> None:
+        self._set_problem(f"{self._name}: {error}")
+        if isinstance(error, TypeNotFoundError) and self.node is not None:
+            self._fetch_type(self.node)
+        else:
+            self._fail_all(error)
 
-    def _connect(self, node: Node, type_name: str | None) -> None:
-        def done(result: Any) -> None:
-            if isinstance(result, TypeNotFoundError):
-                self._say(f"{self._name}: {result}")
-                self._fetch(node)
-            elif isinstance(result, Error):
-                self._say(f"{self._name}: {result}")
-                self._fail_all(result)
-            else:
-                self._made(result)
-
-        self._make(lambda: self._create(node, type_name), lambda: self._have is node, done)
-
-    def _fetch(self, node: Node) -> None:
-        """Ask the robot for a type that nobody here knows."""
-        session = self._session
-        assert session is not None
+    def _fetch_type(self, node: Node) -> None:
+        """Request a type that is unknown here from the robot."""
 
         def again() -> None:
-            if is_alive(self) and self._have is node and self._client is None:
-                self._connect(node, self._type)
+            if is_alive(self) and self.node is node:
+                self._create_again()
 
         try:
             promise = node.fetch_type_async(self._type)
@@ -100,47 +80,40 @@ class ClientElement(Element):
             _later(again)
         else:
             promise.on_done(
-                lambda got: again() if got.exception() is None else _later(again), session.executor
+                lambda got: again() if got.exception() is None else _later(again), self._executor
             )
 
-    def _made(self, client: Any) -> None:
-        session = self._session
-        assert session is not None
-        self._client = client
-        self._watch = client.on_ready_change(self._on_ready, session.executor)
-        self._at_end["client"] = lambda: session.background(client.close)
-        # What has just begun to look for its server need not have found it.
-        self._say(client.problem, logging.DEBUG)
-        QtCore.QTimer.singleShot(_LOOKING, lambda: self._insist(client))
-        self._on_ready(client.ready)
+    def _on_created(self, endpoint: Any) -> None:
+        self._watch = endpoint.on_ready_change(self._on_ready, self._executor)
+        # A client that has just started to look for its server has not found it yet.
+        self._set_problem(endpoint.problem, logging.DEBUG)
+        QtCore.QTimer.singleShot(_SEARCH_MS, lambda: self._warn(endpoint))
+        self._on_ready(endpoint.ready)
         self._submit_waiting()
 
-    def _insist(self, client: Any) -> None:
-        """Log what keeps it from its server, unless that was found soon."""
-        if is_alive(self) and self._client is client:
-            self._tell(self._problem, logging.WARNING)
+    def _warn(self, client: Any) -> None:
+        """Log why there is no server, unless it was found soon."""
+        if is_alive(self) and self._endpoint is client:
+            self._log(self._problem, logging.WARNING)
 
     def _on_ready(self, ready: bool) -> None:
-        if not is_alive(self) or self._client is None:
+        if not is_alive(self) or self._endpoint is None:
             return
-        self._say(self._client.problem)
+        self._set_problem(self._endpoint.problem)
         self._submit_waiting()
-        if ready != self._ready:
-            self._ready = ready
-            self._ready_changed()
+        self._set_ready(ready)
 
-    def _withdraw(self) -> None:
-        client, self._client = self._client, None
+    def _set_ready(self, ready: bool) -> None:
+        """Announce whether a server is connected."""
+        report(self, ready=ready)
+
+    def _on_closed(self, endpoint: Any) -> None:
         watch, self._watch = self._watch, None
-        self._at_end.pop("client", None)
         if watch is not None:
             watch.close()
-        if client is not None and self._session is not None:
-            self._session.background(client.close)
+        if endpoint is not None:
             self._fail_all(Error(f"{self._name}: the node was shut down"))
-        if self._ready:
-            self._ready = False
-            self._ready_changed()
+        self._set_ready(False)
 
 
 def named(name: str, error: BaseException) -> str:
@@ -160,4 +133,4 @@ def given_fields(value: QJSValue, type: MessageType, dialect: Dialect) -> dict[s
 
 
 def _later(job: Callable[[], None]) -> None:
-    QtCore.QTimer.singleShot(RETRY, job)
+    QtCore.QTimer.singleShot(RETRY_MS, job)

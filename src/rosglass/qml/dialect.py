@@ -1,14 +1,17 @@
-"""Whose habits a value or an element follows: those of ``Ros 1.0`` or of ``Ros2 1.0``."""
+"""The differences between ``Ros 1.0`` and ``Ros2 1.0``: times, types, fields, namespaces."""
 
 from __future__ import annotations
 
 from enum import Enum
 from typing import TYPE_CHECKING
 
+from rosglass.errors import Error
+
 if TYPE_CHECKING:
+    from rosglass.comm.node import Node
     from rosglass.messages.schema import Schema
 
-__all__ = ["Dialect"]
+__all__ = ["Dialect", "resolve_namespace", "within_namespace"]
 
 #: ROS 1's primitives that are messages in ROS 2.
 _PRIMITIVE_TIMES = {
@@ -69,3 +72,27 @@ class Dialect(Enum):
             return {}
         upper = _CAPITALS.get(schema.name, "")
         return {n.lower(): n for n in upper} if schema.ros == 2 else {n: n.lower() for n in upper}
+
+
+def resolve_namespace(node: Node | None, namespace: str) -> str:
+    """Return a namespace as a node resolves it; as it is without a node, or when it is wrong.
+
+    An empty one is the node's own.
+    """
+    if node is None:
+        return namespace
+    try:
+        return node.resolve(namespace) if namespace else node.namespace
+    except Error:
+        return namespace
+
+
+def within_namespace(namespace: str, name: str) -> str:
+    """Return `name` within `namespace`, as a NodeHandle of that namespace resolves it.
+
+    Absolute (``/x``) and private (``~x``) names, and an empty namespace, leave it as it is. See
+    http://wiki.ros.org/Names, section 1.2.
+    """
+    if not namespace or not name or name.startswith(("/", "~")):
+        return name
+    return f"{namespace.rstrip('/')}/{name}"

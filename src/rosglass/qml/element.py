@@ -1,92 +1,194 @@
-"""What all elements have in common: finding their session, and settling down after changes."""
+"""Bases of all QML elements: session, properties, and the endpoint on the node behind them."""
 
 from __future__ import annotations
 
 import logging
 import time
 from contextlib import suppress
-from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.names import similar
-from rosglass.errors import Error
-from rosglass.qml.dialect import Dialect
+from rosglass.errors import Error, TypeNotFoundError
+from rosglass.qml.dialect import Dialect, resolve_namespace, within_namespace
 from rosglass.qml.log import Caller, RateLimit, log_from_qml, plain_path
+from rosglass.qml.properties import ReadOnly, report
 from rosglass.qml.runtime import UNPREPARED, runtime_of
-from rosglass.qt import QtCore, QtQml, Slot, is_alive
+from rosglass.qt import QtCore, QtQml, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm.node import Node
+    from rosglass.qml.executor import GuiExecutor
     from rosglass.qml.runtime import Runtime
     from rosglass.qml.session import Session
 
-__all__ = ["DEFAULT_TIMEOUT", "RETRY", "Element", "TopicElement", "changed_enough"]
+__all__ = ["DEFAULT_TIMEOUT_MS", "RETRY_MS", "Element", "TopicElement", "single_shot"]
+
+#: Time without a peer after which the name of a topic may be a mistake.
+NO_PEER_MS = 5000
+#: Time until a missing type is looked up again.
+RETRY_MS = 1000
+#: Time without data after which it counts as stale.
+DEFAULT_TIMEOUT_MS = 3000
 
 
-class _Closable(Protocol):
-    def close(self) -> None: ...
-
-
-_T = TypeVar("_T", bound=_Closable)
-#: Milliseconds without anyone at the other end after which a topic's name may be a mistake.
-LONELY_MS = 5000
-#: Milliseconds until something that is missing is looked for again.
-RETRY = 1000
-#: Milliseconds without data after which it counts as stale.
-DEFAULT_TIMEOUT = 3000
-
-
-def changed_enough(before: float, after: float) -> bool:
-    """Return whether a rate changed by more than 1 %, which is when the screen is told."""
-    return abs(after - before) > 0.01 * abs(before) or (after == 0) != (before == 0)
+def single_shot(parent: QtCore.QObject, on_timeout: Callable[[], None]) -> QtCore.QTimer:
+    """Return a timer that fires once per start."""
+    timer = QtCore.QTimer(parent)
+    timer.setSingleShot(True)
+    timer.timeout.connect(on_timeout)
+    return timer
 
 
 class Element(QtCore.QObject):
-    """A QML object that uses the session's node.
+    """A QML object that uses the session's node, usually through one endpoint on it.
 
     Properties may be set in any order and before there is a node: every change only schedules
-    :meth:`_update`, which runs once the event loop is reached and brings about what is wanted.
+    :meth:`_update`, which runs from the event loop. It compares what :meth:`_wanted` returns with
+    what the present endpoint was created with; where they differ, it closes that endpoint, and
+    has the worker thread call what :meth:`_factory` returns.
 
     Args:
         parent: The parent object.
-        runtime: For objects made by a function of QML; elements find their own.
+        runtime: The engine's runtime, for objects that a function of QML returns.
     """
 
-    #: Whose habits its values follow.
+    #: How values and types are written in QML.
     DIALECT: ClassVar[Dialect] = Dialect.ROS2
-    #: Attributes with messages and pictures, let go when QML destroys the object: PySide 6.11 never
-    #: frees the Python half of what QML has made.
+    #: Attributes with messages and pictures, deleted when QML destroys the object: PySide 6.11
+    #: never frees the Python half of what QML has made.
     _HOLDS: tuple[str, ...] = ()
+    #: What the endpoint was, or is being, created with; None for nothing.
+    _config: tuple[Any, ...] | None = None
+    #: The endpoint; None until it is created.
+    _endpoint: Any = None
+
+    problemChanged = Signal()  # noqa: N815 - QML's name
+    #: What is wrong; empty when nothing is.
+    problem = ReadOnly(str, read="_get_problem")
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         super().__init__(parent)
         self._runtime = runtime
-        #: Where a function made it.
+        #: The place in QML that called the function that returned it.
         self._origin = runtime.caller() if runtime is not None else None
         self._session: Session | None = None
         self._scheduled = False
-        self._problem = ""
+        self._problem = self._announced_problem = ""
         self._limit = RateLimit()
-        #: What is left to do when QML destroys the object, by name.
-        self._at_end: dict[str, Callable[[], None]] = {}
+        self._retry: QtCore.QTimer | None = None
+        #: What remains to be done when QML destroys the object, by name.
+        self._cleanup: dict[str, Callable[[], None]] = {}
         self._schedule()
+
+    @property
+    def label(self) -> str:
+        """What error messages call this element."""
+        return type(self).__name__.removeprefix("Ros")
 
     @property
     def node(self) -> Node | None:
         """The node; None while there is none."""
         return self._session.node if self._session is not None else None
 
+    @property
+    def _executor(self) -> GuiExecutor:
+        """The GUI thread; only once there is a node."""
+        assert self._session is not None
+        return self._session.executor
+
+    # -- the endpoint ----------------------------------------------------------------------------
+
+    def _wanted(self) -> tuple[Any, ...] | None:
+        """Return the arguments for :meth:`_factory`; None while no endpoint is wanted."""
+        return None
+
+    def _factory(self, *wanted: Any) -> Callable[[], Any]:
+        """Return a function for the worker thread, which returns a new endpoint.
+
+        An endpoint is what has a ``close`` method, or what :meth:`_dispose` closes otherwise.
+        """
+        raise NotImplementedError
+
+    def _on_created(self, endpoint: Any) -> None:
+        """Use an endpoint that was created."""
+
+    def _on_create_failed(self, error: Error) -> None:
+        """Show why there is no endpoint; look for an unknown type again after a while."""
+        self._set_problem(f"{self.label}: {error}")
+        if isinstance(error, TypeNotFoundError):
+            if self._retry is None:
+                self._retry = single_shot(self, self._create_again)
+            self._retry.start(RETRY_MS)
+
+    def _on_closed(self, endpoint: Any) -> None:
+        """Stop using an endpoint that is being closed; None if it was still being created."""
+
+    def _dispose(self, session: Session, endpoint: Any) -> None:
+        """Close an endpoint."""
+        session.background(endpoint.close)
+
+    def _update(self) -> None:
+        """Create, replace or close the endpoint as the properties ask for."""
+        wanted = self._wanted()
+        if wanted == self._config:
+            return
+        self._close_endpoint()
+        self._config = wanted
+        if wanted is not None:
+            self._create_endpoint(wanted)
+
+    def _create_endpoint(self, wanted: tuple[Any, ...]) -> None:
+        session = self._session
+        assert session is not None
+
+        def done(result: Any) -> None:
+            if not is_alive(self) or self._config is not wanted:
+                if not isinstance(result, Error):
+                    self._dispose(session, result)
+            elif isinstance(result, Error):
+                self._on_create_failed(result)
+            else:
+                self._set_endpoint(result)
+
+        session.background(self._factory(*wanted), done)
+
+    def _set_endpoint(self, endpoint: Any) -> None:
+        session = self._session
+        assert session is not None
+        self._endpoint = endpoint
+        self._cleanup["endpoint"] = lambda: self._dispose(session, endpoint)
+        self._on_created(endpoint)
+
+    @Slot()
+    def _create_again(self) -> None:
+        if self._config is not None and self._endpoint is None:
+            self._create_endpoint(self._config)
+
+    def _close_endpoint(self) -> None:
+        if self._retry is not None:
+            self._retry.stop()
+        if self._config is None:
+            return
+        endpoint, self._endpoint, self._config = self._endpoint, None, None
+        dispose = self._cleanup.pop("endpoint", None)
+        if dispose is not None:
+            dispose()
+        self._on_closed(endpoint)
+
+    # -- the session -----------------------------------------------------------------------------
+
     @Slot()
     def _schedule(self) -> None:
         if not self._scheduled:
             self._scheduled = True
-            QtCore.QTimer.singleShot(0, self._settle)
+            QtCore.QTimer.singleShot(0, self._run_update)
 
     @Slot()
-    def _settle(self) -> None:
+    def _run_update(self) -> None:
         if not is_alive(self):
             return
         self._scheduled = False
@@ -95,18 +197,18 @@ class Element(QtCore.QObject):
         self._update()
 
     def _steady(self) -> float:
-        """Return the time by which ages are told, in seconds."""
+        """Return the time by which ages are measured, in seconds."""
         session = self._session
         return session.steady() if session is not None else time.monotonic()
 
     def _find_session(self) -> bool:
         runtime = self._find_runtime()
         if runtime is None:
-            self._say(f"{type(self).__name__} cannot be used yet: {UNPREPARED}")
+            self._set_problem(f"{type(self).__name__} cannot be used yet: {UNPREPARED}")
             return False
         session = self._session = runtime.session
-        at_end = self._at_end
-        at_end["signals"] = session.attach(
+        cleanup = self._cleanup
+        cleanup["signals"] = session.attach(
             self,
             node_changed=self._on_node,
             connection_changed=self._on_connection,
@@ -114,16 +216,16 @@ class Element(QtCore.QObject):
             tick=self._on_tick,
         )
         session.use_ticks(True)
-        at_end["ticks"] = lambda: session.use_ticks(False)
+        cleanup["ticks"] = lambda: session.use_ticks(False)
 
         state, held = self.__dict__, self._HOLDS
 
         def end() -> None:
             # At the end of the program the session may be gone before the last element.
-            for job in list(at_end.values()) if is_alive(session) else ():
+            for job in list(cleanup.values()) if is_alive(session) else ():
                 job()
-            at_end.clear()
-            for name in held:
+            cleanup.clear()
+            for name in ("_endpoint", "_config", *held):
                 state.pop(name, None)
 
         self.destroyed.connect(end)
@@ -134,68 +236,49 @@ class Element(QtCore.QObject):
             self._runtime = runtime_of(self)
         return self._runtime
 
-    def _make(
-        self,
-        work: Callable[[], _T],
-        is_wanted: Callable[[], bool],
-        done: Callable[[_T | Error], None],
-    ) -> None:
-        """Make something that can be closed, on the worker.
-
-        Args:
-            work: Makes it.
-            is_wanted: Whether it is wanted still; it is closed otherwise.
-            done: Told what was made, or why it was not, on the GUI thread.
-        """
-        session = self._session
-        assert session is not None
-
-        def made(result: _T | Error) -> None:
-            if is_alive(self) and is_wanted():
-                done(result)
-            elif not isinstance(result, Error):
-                session.background(result.close)
-
-        session.background(work, made)
-
-    def _update(self) -> None:
-        """Bring about what the properties ask for."""
-        raise AssertionError("every element has its own")
-
     @Slot()
     def _on_node(self) -> None:
-        """There is a node now, or none any more, which must not be used a moment longer."""
+        """Update at once when the node is gone, which must not be used any longer."""
         if self._session is None or self._session.node is None:
-            self._settle()
+            self._run_update()
         else:
             self._schedule()
 
     @Slot()
     def _on_connection(self) -> None:
-        """The session's connection state changed."""
+        """Handle a change of the session's connection state."""
 
     @Slot()
     def _on_graph(self) -> None:
-        """Nodes or endpoints appeared or went."""
+        """Handle a change of the ROS graph."""
 
     @Slot()
     def _on_tick(self) -> None:
-        """A tenth of a second has passed."""
+        """Handle the session's tick, ten times per second."""
 
-    def _problem_changed(self) -> None:
-        """Tell QML that the problem changed."""
+    # -- problems --------------------------------------------------------------------------------
 
-    def _say(self, problem: str, level: int = logging.WARNING) -> None:
-        """Set the problem; a new one is logged, the same one not more often than every 5 s."""
+    def _get_problem(self) -> str:
+        return self._problem
+
+    def _set_problem(self, problem: str, level: int = logging.WARNING) -> None:
+        """Set the problem; log a new one, the same one at most every 5 s."""
         problem = self.DIALECT.spelled(problem)
         if problem == self._problem:
             return
         self._problem = problem
-        self._tell(problem, level)
-        self._problem_changed()
+        self._log(problem, level)
+        self._announce_problem()
 
-    def _tell(self, text: str, level: int) -> None:
-        """Log something that comes from no line of QML, with the file that the object is in."""
+    def _announce_problem(self) -> None:
+        """Emit problemChanged if :meth:`_get_problem` returns another one than before."""
+        problem = self._get_problem()
+        if problem != self._announced_problem:
+            self._announced_problem = problem
+            self.problemChanged.emit()
+
+    def _log(self, text: str, level: int) -> None:
+        """Log what has no line of QML as its cause, with the file that declares the object."""
         if not text or not self._limit.allows((text, level)):
             return
         origin = self._origin
@@ -206,7 +289,7 @@ class Element(QtCore.QObject):
         log_from_qml("", level, text, origin)
 
     def _refuse(self, message: str) -> None:
-        """Log that a property was given an impossible value, with the QML place if there is one."""
+        """Log that a property was set to an impossible value, with the place in QML."""
         runtime = self._find_runtime()
         caller = runtime.caller() if runtime is not None else Caller("<unknown>", 0, "")
         log_from_qml("", logging.ERROR, message, caller)
@@ -215,28 +298,30 @@ class Element(QtCore.QObject):
 class TopicElement(Element):
     """An element that receives a topic and knows whether what it shows is live."""
 
+    staleChanged = Signal()  # noqa: N815 - QML's name
+    #: Whether there is nothing to show, or nothing that still holds.
+    stale = ReadOnly(bool, True)
+
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         super().__init__(parent, runtime)
         self._topic, self._resolved = "", ""
-        self._enabled = True
-        self._stale = True
-        self._suspect = False
+        #: Where relative topic names begin, for elements with a property for it; and as resolved.
+        self._namespace = self._shown_namespace = ""
+        #: Whether what is shown is of a publisher or a connection that is gone.
+        self._outdated = False
         self._publishers = 0
-        #: Which publishers of the topic cannot be told apart; empty for none.
-        self._mixed = ""
-        self._lonely = QtCore.QTimer(self)
-        self._lonely.setSingleShot(True)
-        self._lonely.timeout.connect(self._wonder)
+        #: Which publishers of the topic cannot be distinguished; empty for none.
+        self._mixing = ""
+        self._no_publisher = single_shot(self, self._log_no_publisher)
 
     def _expect_publishers(self) -> None:
-        """Tell it after a while if nobody publishes the topic."""
-        self._lonely.start(LONELY_MS)
+        """Log a topic that has no publisher after a while."""
+        self._no_publisher.start(NO_PEER_MS)
 
     @Slot()
-    def _wonder(self) -> None:
-        """Log that nobody publishes the topic, for who looks for a mistake in its name."""
+    def _log_no_publisher(self) -> None:
         node, session = self.node, self._session
         connected = session is not None and session.state == "connected"
         if node is None or not connected or self._count_publishers():
@@ -245,18 +330,32 @@ class TopicElement(Element):
         with suppress(Error):
             hint = similar(self._resolved, node.topics())
             level = logging.WARNING if hint else logging.INFO
-            self._tell(f"{self._resolved}: nobody publishes this topic{hint}", level)
+            self._log(f"{self._resolved}: this topic has no publisher{hint}", level)
 
     def _resolve(self, topic: str) -> str:
-        """Return the absolute name of a topic; empty, with a problem said, when it is invalid."""
+        """Return the absolute name of a topic; empty, with a problem set, for an invalid name."""
         node = self.node
         if node is None or not topic:
             return ""
         try:
-            return node.resolve(topic)
+            return node.resolve(within_namespace(self._namespace, topic))
         except Error as error:
-            self._say(str(error))
+            self._set_problem(str(error))
             return ""
+
+    def _get_namespace(self) -> str:
+        return resolve_namespace(self.node, self._namespace)
+
+    def _set_namespace(self, namespace: str) -> None:
+        if namespace != self._namespace:
+            self._namespace, self._resolved = namespace, ""
+            self._shown_namespace = self._get_namespace()
+            self._clear_shown()
+            self.nsChanged.emit()  # type: ignore[attr-defined]
+            self._schedule()
+
+    def _clear_shown(self) -> None:
+        """Clear what is shown: it belongs to another topic."""
 
     def _count_publishers(self) -> int:
         node = self.node
@@ -267,45 +366,47 @@ class TopicElement(Element):
         except Error:
             return 0
 
+    def _update(self) -> None:
+        before, self._shown_namespace = self._shown_namespace, self._get_namespace()
+        if before != self._shown_namespace and hasattr(self, "nsChanged"):
+            self.nsChanged.emit()
+        super()._update()
+        if self._config is None and is_alive(self):
+            self._outdated = True
+            self._update_stale()
+
     @Slot()
     def _on_connection(self) -> None:
         if self._session is not None and self._session.state != "connected":
-            self._suspect = True
+            self._outdated = True
         else:
-            self._trust_again()
-        self._judge()
+            self._recheck_outdated()
+        self._update_stale()
 
     @Slot()
     def _on_graph(self) -> None:
         before, self._publishers = self._publishers, self._count_publishers()
         if before and not self._publishers:
             # The robot is gone: what is on the screen is the past, however recent.
-            self._suspect = True
+            self._outdated = True
         else:
-            self._trust_again()
-        self._judge()
+            self._recheck_outdated()
+        self._update_stale()
 
-    def _trust_again(self) -> None:
-        """Take back a suspicion that the graph has disproved."""
+    def _recheck_outdated(self) -> None:
+        """Clear :attr:`_outdated` if the graph shows that what is shown still holds."""
 
     @Slot()
     def _on_tick(self) -> None:
-        mixed = self._session.mixing(self._resolved) if self._session is not None else ""
-        if mixed != self._mixed:
-            self._mixed = mixed
-            self._problem_changed()
-        self._judge()
+        mixing = self._session.mixing(self._resolved) if self._session is not None else ""
+        if mixing != self._mixing:
+            self._mixing = mixing
+            self._announce_problem()
+        self._update_stale()
 
-    def _judge(self) -> None:
-        """Find out whether what is shown is live, and tell when that changed."""
-        stale = self._suspect or self._is_old()
-        if stale != self._stale:
-            self._stale = stale
-            self._stale_changed()
+    def _update_stale(self) -> None:
+        report(self, stale=self._outdated or self._is_old())
 
     def _is_old(self) -> bool:
-        """Return whether there is nothing to show, or nothing new for too long."""
-        raise AssertionError("every element has its own")
-
-    def _stale_changed(self) -> None:
-        """Tell QML that :attr:`_stale` changed."""
+        """Return whether there is nothing to show, or nothing new within the timeout."""
+        raise NotImplementedError

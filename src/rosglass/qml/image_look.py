@@ -1,4 +1,4 @@
-"""How a camera is looked at: turned, enlarged, in colours, how often."""
+"""The view of a camera: rotation, region, zoom, colours and rate."""
 # ruff: noqa: N815 - the names of signals are QML's
 
 from __future__ import annotations
@@ -7,44 +7,69 @@ import math
 from typing import TYPE_CHECKING
 
 from rosglass.qml.element import TopicElement
-from rosglass.qt import Property, QtCore, Signal
+from rosglass.qml.properties import Writable
+from rosglass.qt import QtCore
 
 if TYPE_CHECKING:
     from rosglass.qml.image_rendering import Look
-    from rosglass.qml.runtime import Runtime
 
 __all__ = ["LookElement"]
+
+
+def _quarter_turns(degrees: int) -> int:
+    if degrees % 90:
+        raise ValueError("is no multiple of 90 degrees")
+    return degrees % 360
+
+
+def _zoom(zoom: float) -> float:
+    if not 1 <= zoom < math.inf:
+        raise ValueError("is below 1, where the whole picture is shown")
+    return zoom
+
+
+def _region(region: QtCore.QRectF) -> QtCore.QRectF:
+    edges = (region.x(), region.y(), region.width(), region.height())
+    if not all(0 <= edge < 1e6 for edge in edges):
+        raise ValueError(
+            "is no part of a picture: give x, y, width and height in pixels from its top "
+            "left corner"
+        )
+    return QtCore.QRectF(region)
+
+
+def _depth(depth: float) -> float:
+    if not math.isfinite(depth):
+        raise ValueError("is no depth; metres, or -1 to follow the camera")
+    return depth
+
+
+def _rate(rate: float) -> float:
+    if not 0 <= rate < math.inf:
+        raise ValueError("is no number of pictures per second")
+    return rate
 
 
 class LookElement(TopicElement):
     """The properties of a camera that say how its pictures are shown."""
 
-    rotationChanged = Signal()
-    mirroredChanged = Signal()
-    flippedChanged = Signal()
-    zoomChanged = Signal()
-    regionOfInterestChanged = Signal()
-    colorMapChanged = Signal()
-    minimumDepthChanged = Signal()
-    maximumDepthChanged = Signal()
-    throttleRateChanged = Signal()
-    fullResolutionChanged = Signal()
-
-    def __init__(
-        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
-    ) -> None:
-        super().__init__(parent, runtime)
-        self._rotation = 0
-        self._mirrored = self._flipped = False
-        self._zoom = 1.0
-        self._region = QtCore.QRectF()
-        self._colors = ""
-        self._near = self._far = -1.0
-        self._rate = 0.0
-        self._full = False
+    #: Degrees clockwise, a multiple of 90.
+    rotation = Writable(int, 0, _quarter_turns)
+    mirrored = Writable(bool, False)
+    flipped = Writable(bool, False)
+    zoom = Writable(float, 1.0, _zoom)
+    #: Pixels from the top left corner; an empty rectangle is the whole picture.
+    regionOfInterest = Writable(QtCore.QRectF, QtCore.QRectF(), _region)
+    colorMap = Writable(str, "")
+    #: Metres; -1 follows the camera.
+    minimumDepth = Writable(float, -1.0, _depth)
+    maximumDepth = Writable(float, -1.0, _depth)
+    #: Pictures per second at most; 0 shows all.
+    throttleRate = Writable(float, 0.0, _rate)
+    fullResolution = Writable(bool, False)
 
     def _look(self, video: bool, room: tuple[int, int] | None, painted: bool) -> Look:
-        """Return what the properties ask for.
+        """Return the view that the properties describe.
 
         Args:
             video: Whether video frames are wanted; otherwise images.
@@ -58,119 +83,30 @@ class LookElement(TopicElement):
         from rosglass.images import DepthColors, View  # noqa: PLC0415
         from rosglass.qml.image_rendering import Look  # noqa: PLC0415
 
-        box = self._region
+        box = self.regionOfInterest
         region = None
         if box.width() or box.height():
             region = (round(box.x()), round(box.y()), round(box.width()), round(box.height()))
-        view = View(self._rotation, self._mirrored, self._flipped, region, self._zoom)
+        view = View(self.rotation, self.mirrored, self.flipped, region, self.zoom)
         colors = None
-        if self._colors:
-            near, far = (None if depth < 0 else depth for depth in (self._near, self._far))
-            colors = (self._colors, near, far)
+        if self.colorMap:
+            near, far = (
+                None if depth < 0 else depth for depth in (self.minimumDepth, self.maximumDepth)
+            )
+            colors = (self.colorMap, near, far)
             DepthColors(*colors)
-        if room is not None and self._rotation % 180:
+        if room is not None and self.rotation % 180:
             room = (room[1], room[0])
-        return Look(video, view, colors, self._interval, None if self._full else room, painted)
+        return Look(
+            video, view, colors, self._interval, None if self.fullResolution else room, painted
+        )
 
     @property
     def _interval(self) -> float:
         """Seconds between two pictures at least."""
-        return 1 / self._rate if self._rate else 0.0
-
-    def _set_rotation(self, degrees: int) -> None:
-        if degrees % 90:
-            self._refuse(f"{self._who}: rotation {degrees} is no multiple of 90 degrees")
-        elif degrees % 360 != self._rotation:
-            self._rotation = degrees % 360
-            self.rotationChanged.emit()
-            self._schedule()
-
-    def _set_mirrored(self, mirrored: bool) -> None:
-        if mirrored != self._mirrored:
-            self._mirrored = mirrored
-            self.mirroredChanged.emit()
-            self._schedule()
-
-    def _set_flipped(self, flipped: bool) -> None:
-        if flipped != self._flipped:
-            self._flipped = flipped
-            self.flippedChanged.emit()
-            self._schedule()
-
-    def _set_zoom(self, zoom: float) -> None:
-        if not 1 <= zoom < math.inf:
-            self._refuse(f"{self._who}: zoom {zoom} is below 1, where the whole picture is shown")
-        elif zoom != self._zoom:
-            self._zoom = zoom
-            self.zoomChanged.emit()
-            self._schedule()
-
-    def _set_region(self, region: QtCore.QRectF) -> None:
-        edges = (region.x(), region.y(), region.width(), region.height())
-        if not all(0 <= edge < 1e6 for edge in edges):
-            self._refuse(
-                f"{self._who}: regionOfInterest {edges} is no part of a picture: give x, y, width "
-                "and height in pixels from its top left corner"
-            )
-        elif region != self._region:
-            self._region = QtCore.QRectF(region)
-            self.regionOfInterestChanged.emit()
-            self._schedule()
-
-    def _set_colors(self, name: str) -> None:
-        if name != self._colors:
-            self._colors = name
-            self.colorMapChanged.emit()
-            self._schedule()
-
-    def _set_near(self, depth: float) -> None:
-        if self._is_depth("minimumDepth", depth) and depth != self._near:
-            self._near = depth
-            self.minimumDepthChanged.emit()
-            self._schedule()
-
-    def _set_far(self, depth: float) -> None:
-        if self._is_depth("maximumDepth", depth) and depth != self._far:
-            self._far = depth
-            self.maximumDepthChanged.emit()
-            self._schedule()
-
-    def _is_depth(self, name: str, depth: float) -> bool:
-        if math.isfinite(depth):
-            return True
-        self._refuse(f"{self._who}: {name} {depth} is no depth; metres, or -1 to follow the camera")
-        return False
-
-    def _set_rate(self, rate: float) -> None:
-        if not 0 <= rate < math.inf:
-            self._refuse(f"{self._who}: throttleRate {rate} is no number of pictures per second")
-        elif rate != self._rate:
-            self._rate = rate
-            self.throttleRateChanged.emit()
-            self._schedule()
-
-    def _set_full(self, full: bool) -> None:
-        if full != self._full:
-            self._full = full
-            self.fullResolutionChanged.emit()
-            self._schedule()
+        return 1 / self.throttleRate if self.throttleRate else 0.0
 
     @property
-    def _who(self) -> str:
-        """What errors call this element."""
+    def label(self) -> str:
+        """What error messages call this element."""
         return f"{type(self).__name__} {self._topic!r}"
-
-    rotation = Property(int, lambda self: self._rotation, _set_rotation, notify=rotationChanged)
-    mirrored = Property(bool, lambda self: self._mirrored, _set_mirrored, notify=mirroredChanged)
-    flipped = Property(bool, lambda self: self._flipped, _set_flipped, notify=flippedChanged)
-    zoom = Property(float, lambda self: self._zoom, _set_zoom, notify=zoomChanged)
-    regionOfInterest = Property(
-        QtCore.QRectF, lambda self: self._region, _set_region, notify=regionOfInterestChanged
-    )
-    colorMap = Property(str, lambda self: self._colors, _set_colors, notify=colorMapChanged)
-    minimumDepth = Property(float, lambda self: self._near, _set_near, notify=minimumDepthChanged)
-    maximumDepth = Property(float, lambda self: self._far, _set_far, notify=maximumDepthChanged)
-    fullResolution = Property(
-        bool, lambda self: self._full, _set_full, notify=fullResolutionChanged
-    )
-    throttleRate = Property(float, lambda self: self._rate, _set_rate, notify=throttleRateChanged)

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
 from rosglass.qml.callbacks import Deferred
-from rosglass.qml.element import DEFAULT_TIMEOUT, changed_enough
+from rosglass.qml.dialect import Dialect
+from rosglass.qml.element import DEFAULT_TIMEOUT_MS
 from rosglass.qml.image_look import LookElement
 from rosglass.qml.image_sinks import Sink
 from rosglass.qml.log import plain_path
-from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive, optional
+from rosglass.qml.properties import ReadOnly, Writable, at_least, report
+from rosglass.qt import QJSValue, QtCore, Signal, Slot, is_alive, optional
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,23 +23,12 @@ if TYPE_CHECKING:
     from rosglass.qml.image_rendering import Look, Picture
     from rosglass.qml.image_stream import SharedStream
     from rosglass.qml.runtime import Runtime
+    from rosglass.qml.session import Session
 
-__all__ = ["ImageTransportSubscription"]
+__all__ = ["ImageTransportSubscriber", "ImageTransportSubscription"]
 
 #: Importing it on the GUI thread would stop the screen for a tenth of a second: it brings numpy.
-_HEAVY = "rosglass.images"
-#: Read-only properties that are looked at ten times per second, as they are without a stream.
-_START: dict[str, Any] = {
-    "subscribed": False,
-    "transport": "",
-    "framerate": 0.0,
-    "networkLatency": -1.0,
-    "processingLatency": -1.0,
-    "latency": -1.0,
-    "dropped": 0,
-    "lost": 0,
-    "problem": "",
-}
+_NUMPY_MODULE = "rosglass.images"
 
 
 class ImageTransportSubscription(LookElement):
@@ -52,28 +43,38 @@ class ImageTransportSubscription(LookElement):
         PausedState = 2
 
     topicChanged = Signal()
-    defaultTransportChanged = Signal()
-    enabledChanged = Signal()
-    timeoutChanged = Signal()
     videoSinkChanged = Signal()
-    subscribedChanged = Signal()
-    transportChanged = Signal()
-    framerateChanged = Signal()
-    networkLatencyChanged = Signal()
-    processingLatencyChanged = Signal()
-    latencyChanged = Signal()
-    encodingChanged = Signal()
-    staleChanged = Signal()
-    droppedChanged = Signal()
-    lostChanged = Signal()
-    problemChanged = Signal()
     playbackStateChanged = Signal()
-    #: A picture is in a file, whose absolute path is given.
+    #: A picture was saved in this file, an absolute path.
     snapshotSaved = Signal(str)
-    #: It is not, and why.
+    #: A picture was not saved, for this reason.
     snapshotFailed = Signal(str)
 
-    _HOLDS = ("_picture", "_stream", "_have")
+    topic = Writable(str, read="_get_topic", write="_set_topic")
+    defaultTransport = Writable(str, "compressed")
+    enabled = Writable(bool, True, then="_on_enabled_changed")
+    timeout = Writable(int, DEFAULT_TIMEOUT_MS, at_least(0), then="_update_stale", unit="ms")
+    videoSink = Writable(QtCore.QObject, read="_get_sink", write="_set_sink")
+    #: What Qt 5's VideoOutput looks for.
+    videoSurface = Writable(
+        QtCore.QObject, read="_get_sink", write="_set_sink", notify="videoSinkChanged"
+    )
+    subscribed = ReadOnly(bool, False)
+    transport = ReadOnly(str, "")
+    framerate = ReadOnly(float, 0.0, tolerance=0.01)
+    #: Milliseconds, -1 while unknown.
+    networkLatency = ReadOnly(float, -1.0, tolerance=0.01)
+    processingLatency = ReadOnly(float, -1.0, tolerance=0.01)
+    latency = ReadOnly(float, -1.0, tolerance=0.01)
+    dropped = ReadOnly(int, 0)
+    lost = ReadOnly(int, 0)
+    encoding = ReadOnly(str, "")
+    hasAlpha = ReadOnly(bool, False, notify="encodingChanged")
+    isColor = ReadOnly(bool, False, notify="encodingChanged")
+    playbackState = ReadOnly(int, read="_get_state")
+
+    _HOLDS = ("_picture",)
+    _endpoint: SharedStream | None
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -81,19 +82,11 @@ class ImageTransportSubscription(LookElement):
         super().__init__(parent, runtime)
         # Loaded before QML hands over its sink: what Qt gave Python as a plain QObject stays one.
         optional("QtMultimedia")
-        self._preferred = "compressed"
-        self._timeout = DEFAULT_TIMEOUT
         self._paused = False
         self._sink: Sink | None = None
-        self._stream: SharedStream | None = None
-        self._have: tuple[Node, str, str] | None = None
-        self._has_look: Look | None = None
+        self._shown_look: Look | None = None
         self._picture: Picture | None = None
-        self._looks: tuple[str, bool, bool] = ("", False, False)
         self._blank = True
-        self._values: dict[str, Any] = dict(_START)
-
-    # Properties that QML sets.
 
     def _get_topic(self) -> str:
         return self._resolved or self._topic
@@ -106,30 +99,13 @@ class ImageTransportSubscription(LookElement):
             return  # the same topic, now whatever the node's namespace becomes
         self._resolved = ""
         # What is paused would stay on the screen under another name.
-        self._clear_sink()
+        self._clear_shown()
         self.topicChanged.emit()
         self._schedule()
 
-    def _set_transport(self, name: str) -> None:
-        if name != self._preferred:
-            self._preferred = name
-            self.defaultTransportChanged.emit()
-            self._schedule()
-
-    def _set_enabled(self, enabled: bool) -> None:
-        if enabled != self._enabled:
-            self._enabled = enabled
-            self.enabledChanged.emit()
-            self.playbackStateChanged.emit()
-            self._schedule()
-
-    def _set_timeout(self, timeout: int) -> None:
-        if timeout < 0:
-            self._refuse(f"{self._who}: timeout {timeout} ms < 0")
-        elif timeout != self._timeout:
-            self._timeout = timeout
-            self.timeoutChanged.emit()
-            self._judge()
+    def _on_enabled_changed(self) -> None:
+        self.playbackStateChanged.emit()
+        self._schedule()
 
     def _get_sink(self) -> QtCore.QObject | None:
         return self._sink.item if self._sink is not None and self._sink.is_alive else None
@@ -140,63 +116,30 @@ class ImageTransportSubscription(LookElement):
         try:
             sink = None if item is None else Sink(item, self)
         except Error as error:
-            self._refuse(f"{self._who}: {error}")
+            self._refuse(f"{self.label}: {error}")
             return
-        self._clear_sink()
+        self._clear_shown()
         self._sink = sink
         if item is not None:
             item.destroyed.connect(self._schedule)
         self.videoSinkChanged.emit()
-        # Another kind of display needs other frames: join the stream anew.
-        self._leave()
-        self._have = None
+        # Another kind of display needs other frames: join the stream again.
+        self._close_endpoint()
         self._schedule()
-
-    topic = Property(str, _get_topic, _set_topic, notify=topicChanged)
-    defaultTransport = Property(
-        str, lambda self: self._preferred, _set_transport, notify=defaultTransportChanged
-    )
-    enabled = Property(bool, lambda self: self._enabled, _set_enabled, notify=enabledChanged)
-    timeout = Property(int, lambda self: self._timeout, _set_timeout, notify=timeoutChanged)
-    videoSink = Property(QtCore.QObject, _get_sink, _set_sink, notify=videoSinkChanged)
-    #: What Qt 5's VideoOutput looks for.
-    videoSurface = Property(QtCore.QObject, _get_sink, _set_sink, notify=videoSinkChanged)
-
-    # Properties that QML reads.
-
-    subscribed = Property(bool, lambda self: self._values["subscribed"], notify=subscribedChanged)
-    transport = Property(str, lambda self: self._values["transport"], notify=transportChanged)
-    framerate = Property(float, lambda self: self._values["framerate"], notify=framerateChanged)
-    networkLatency = Property(
-        float, lambda self: self._values["networkLatency"], notify=networkLatencyChanged
-    )
-    processingLatency = Property(
-        float, lambda self: self._values["processingLatency"], notify=processingLatencyChanged
-    )
-    latency = Property(float, lambda self: self._values["latency"], notify=latencyChanged)
-    dropped = Property(int, lambda self: self._values["dropped"], notify=droppedChanged)
-    lost = Property(int, lambda self: self._values["lost"], notify=lostChanged)
-    problem = Property(str, lambda self: self._values["problem"], notify=problemChanged)
-    stale = Property(bool, lambda self: self._stale, notify=staleChanged)
-    encoding = Property(str, lambda self: self._looks[0], notify=encodingChanged)
-    hasAlpha = Property(bool, lambda self: self._looks[1], notify=encodingChanged)
-    isColor = Property(bool, lambda self: self._looks[2], notify=encodingChanged)
 
     # Playing.
 
     def _get_state(self) -> int:
-        if not self._enabled:
+        if not self.enabled:
             return int(self.PlaybackState.StoppedState)
         paused = self.PlaybackState.PausedState
         return int(paused if self._paused else self.PlaybackState.PlayingState)
-
-    playbackState = Property(int, _get_state, notify=playbackStateChanged)
 
     @Slot()
     def play(self) -> None:
         """Receive pictures, after :meth:`pause` or :meth:`stop`."""
         self._set_paused(False)
-        self._set_enabled(True)
+        self.enabled = True
 
     @Slot()
     def pause(self) -> None:
@@ -207,13 +150,13 @@ class ImageTransportSubscription(LookElement):
     def stop(self) -> None:
         """Receive no more pictures and take the last one off the screen."""
         self._set_paused(False)
-        self._set_enabled(False)
+        self.enabled = False
 
     def _set_paused(self, paused: bool) -> None:
         if paused != self._paused:
             self._paused = paused
             self.playbackStateChanged.emit()
-            self._judge()
+            self._update_stale()
             self._schedule()
 
     @Slot(str, result=QJSValue)
@@ -229,7 +172,7 @@ class ImageTransportSubscription(LookElement):
         runtime, picture = self._find_runtime(), self._picture
         if runtime is None:
             return QJSValue()
-        promise = Deferred(runtime, f"{self._who}: saveSnapshot({path!r})")
+        promise = Deferred(runtime, f"{self.label}: saveSnapshot({path!r})")
 
         def done(result: Path | Error) -> None:
             if isinstance(result, Error):
@@ -240,7 +183,7 @@ class ImageTransportSubscription(LookElement):
                 failed = isinstance(result, Error)
                 (self.snapshotFailed if failed else self.snapshotSaved).emit(str(result))
 
-        look = self._has_look
+        look = self._shown_look
         if picture is None or look is None:
             done(Error("no picture is shown"))
             return promise.promise
@@ -264,70 +207,73 @@ class ImageTransportSubscription(LookElement):
 
     def _count_publishers(self) -> int:
         try:
-            return self._stream.stream.publisher_count() if self._stream is not None else 0
+            return self._endpoint.stream.publisher_count() if self._endpoint is not None else 0
         except Error:
             return 0
+
+    def _wanted(self) -> tuple[Node, str, str] | None:
+        node, resolved = self.node, self._resolve(self._topic)
+        if node is None or not self.enabled or self._paused or not resolved or not self._sink:
+            return None
+        return node, resolved, self.defaultTransport
 
     def _update(self) -> None:
         if self._sink is not None and not self._sink.is_alive:
             self._sink = None
-        node = self.node
-        resolved = self._resolve(self._topic)
-        want = None
-        if node is not None and self._enabled and not self._paused and resolved and self._sink:
-            want = (node, resolved, self._preferred)
-        if want and self._session and not self._session.is_loaded(_HEAVY, self._schedule_again):
+        session, again = self._session, self._schedule_again
+        if self._wanted() and session and not session.is_loaded(_NUMPY_MODULE, again):
             return
-        if want != self._have:
-            self._leave()
-            self._have = want
-            if want is None:
-                self._suspect = True
-                self._judge()
-                self._refresh()
-            else:
-                if resolved != self._resolved:
-                    self._resolved = resolved
-                    self.topicChanged.emit()
-                self._join(*want)
-        elif self._stream is not None:
-            self._follow(self._stream)
-        if not (self._enabled or self._blank):
-            self._clear_sink()
+        super()._update()
+        if self._endpoint is not None:
+            self._change_look(self._endpoint)
+        self._refresh()
+        if not (self.enabled or self._blank):
+            self._clear_shown()
 
     def _schedule_again(self) -> None:
         if is_alive(self):
             self._schedule()
 
-    def _join(self, node: Node, topic: str, preferred: str) -> None:
+    def _create_endpoint(self, wanted: tuple[Any, ...]) -> None:
         from rosglass.qml.image_stream import SharedStream as Stream  # noqa: PLC0415 - brings numpy
 
         session = self._session
         assert session is not None
+        if wanted[1] != self._resolved:
+            self._resolved = wanted[1]
+            self.topicChanged.emit()
+        node, topic, transport = wanted
         look = self._best_look()
         try:
-            stream = Stream.join(session, node, topic, preferred, look, self)
+            self._set_endpoint(Stream.join(session, node, topic, transport, look, self))
         except Error as error:
-            self._say(str(error))
+            self._set_problem(str(error))
             return
-        self._stream, self._has_look = stream, look
+        self._shown_look = look
+
+    def _dispose(self, session: Session, endpoint: SharedStream) -> None:  # noqa: ARG002
+        endpoint.leave(self)
+
+    def _on_created(self, endpoint: SharedStream) -> None:
         self._publishers = self._count_publishers()
         self._expect_publishers()
-        self._at_end["stream"] = lambda: stream.leave(self)
-        channel = stream.channel(self)
-        if channel is not None and channel.last is not None and not self._suspect:
+        channel = endpoint.channel(self)
+        if channel is not None and channel.last is not None and not self._outdated:
             self.show_picture(channel.last)
-        self._refresh()
 
-    def _follow(self, stream: SharedStream) -> None:
-        """Have the pictures as the properties say now."""
+    def _on_closed(self, endpoint: SharedStream | None) -> None:
+        self._no_publisher.stop()
+        if endpoint is not None and not self._paused:
+            self._clear_shown()
+
+    def _change_look(self, stream: SharedStream) -> None:
         look = self._best_look()
-        if look != self._has_look:
-            self._has_look = look
+        if look != self._shown_look:
+            self._shown_look = look
             stream.change_look(self, look)
 
     def _best_look(self) -> Look:
-        """Return what the properties ask for; what they asked for before, when that is wrong."""
+        """Return the view that the properties describe; the one before, if that is impossible."""
         from rosglass.qml.image_rendering import Look  # noqa: PLC0415 - brings numpy
 
         assert self._sink is not None
@@ -335,50 +281,39 @@ class ImageTransportSubscription(LookElement):
         try:
             look = self._look(video, self._sink.room(), painted)
         except Error as error:
-            self._say(f"{self._who}: {error}")
-            before = self._has_look
+            self._set_problem(f"{self.label}: {error}")
+            before = self._shown_look
             fits = before is not None and (before.video, before.painted) == (video, painted)
             return before if before is not None and fits else Look(video, painted=painted)
-        self._say("")
+        self._set_problem("")
         return look
-
-    def _leave(self) -> None:
-        self._lonely.stop()
-        stream, self._stream = self._stream, None
-        self._at_end.pop("stream", None)
-        if stream is not None:
-            stream.leave(self)
-            if not self._paused:
-                self._clear_sink()
 
     def show_picture(self, picture: Picture) -> None:
         """Show a picture; called by the stream on the GUI thread."""
         sink = self._sink
         if not is_alive(self) or sink is None or not sink.is_alive or self._paused:
             return
-        # What a silent link kept back would be taken off the screen at once.
-        if self._timeout and self._age(picture) > self._patience:
+        # What a silent link delayed would be cleared at once.
+        if self.timeout and self._age(picture) > self._max_age_s:
             return
         try:
             if not sink.show(picture):
                 return
         except Error as error:
-            self._say(str(error))
+            self._set_problem(str(error))
             return
-        self._picture, self._blank, self._suspect = picture, False, False
-        looks = (picture.frame.encoding, picture.frame.has_alpha, picture.frame.is_color)
-        if looks != self._looks:
-            self._looks = looks
-            self.encodingChanged.emit()
-        self._judge()
+        self._picture, self._blank, self._outdated = picture, False, False
+        frame = picture.frame
+        if report(self, encoding=frame.encoding, hasAlpha=frame.has_alpha, isColor=frame.is_color):
+            self._update_stale()
 
     def stream_changed(self) -> None:
-        """Look at the stream again; called by the stream on the GUI thread."""
+        """Announce what changed; called by the stream on the GUI thread."""
         if is_alive(self):
             self._publishers = max(self._publishers, self._count_publishers())
             self._refresh()
 
-    def _clear_sink(self) -> None:
+    def _clear_shown(self) -> None:
         """Take the picture off the screen."""
         self._picture, self._blank = None, True
         if self._sink is not None:
@@ -387,61 +322,67 @@ class ImageTransportSubscription(LookElement):
     # Judging.
 
     @property
-    def _patience(self) -> float:
+    def _max_age_s(self) -> float:
         """Seconds after which a picture is old."""
-        return (self._timeout or DEFAULT_TIMEOUT) / 1000 + self._interval
+        return (self.timeout or DEFAULT_TIMEOUT_MS) / 1000 + self._interval
 
     def _age(self, picture: Picture) -> float:
         return self._steady() - picture.made + picture.late
 
     def _is_old(self) -> bool:
         picture = self._picture
-        return self._paused or picture is None or self._age(picture) > self._patience
+        return self._paused or picture is None or self._age(picture) > self._max_age_s
 
-    def _judge(self) -> None:
-        super()._judge()
+    def _update_stale(self) -> None:
+        super()._update_stale()
         # A picture that stays is the more dangerous the more it looks like a live one.
-        if self._timeout and not self._blank and not self._paused and self._is_old():
-            self._clear_sink()
+        if self.timeout and not self._blank and not self._paused and self._is_old():
+            self._clear_shown()
 
-    def _stale_changed(self) -> None:
-        self.staleChanged.emit()
-
-    def _problem_changed(self) -> None:
-        self._refresh()
+    def _get_problem(self) -> str:
+        stream = self._endpoint
+        if stream is None:
+            return self._problem or self._mixing
+        channel = stream.channel(self)
+        below = stream.stream.problem or (channel.problem if channel else "")
+        return self._problem or below or self._mixing
 
     @Slot()
     def _on_tick(self) -> None:
         super()._on_tick()
-        # Items are resized, moved to other windows and transformed without a word to their sinks.
-        if self._stream is not None and self._sink is not None and self._sink.is_alive:
-            self._follow(self._stream)
+        # Items are resized, moved to other windows and transformed without a signal of their sinks.
+        if self._endpoint is not None and self._sink is not None and self._sink.is_alive:
+            self._change_look(self._endpoint)
         self._refresh()
 
     def _refresh(self) -> None:
-        """Tell QML about every read-only property that changed."""
-        shared = self._stream
-        now = dict(_START)
-        if shared is not None:
-            network, processing, latency = shared.latencies
-            channel = shared.channel(self)
-            now |= {
-                "subscribed": shared.stream.subscribed,
-                "transport": shared.stream.transport,
-                "dropped": shared.dropped,
-                "lost": shared.lost,
-                "problem": shared.stream.problem or (channel.problem if channel else ""),
-            }
-            if channel is not None and not self._stale:
-                # How fast pictures came once says nothing about one that is not live.
-                now["framerate"] = channel.frame_rate
-                now["networkLatency"] = network
-                now["processingLatency"] = processing
-                now["latency"] = latency
-        now["problem"] = self._problem or now["problem"] or self._mixed
-        for name, value in now.items():
-            before = self._values[name]
-            real = isinstance(value, float)
-            if changed_enough(before, value) if real else value != before:
-                self._values[name] = value
-                getattr(self, f"{name}Changed").emit()
+        """Announce every read-only property that changed."""
+        shared = self._endpoint
+        channel = shared.channel(self) if shared is not None else None
+        framerate, latencies = 0.0, (-1.0, -1.0, -1.0)
+        if shared is not None and channel is not None and not self.stale:
+            # The rate of a stream that is not live any more says nothing.
+            framerate, latencies = channel.frame_rate, shared.latencies
+        report(
+            self,
+            subscribed=shared is not None and shared.stream.subscribed,
+            transport=shared.stream.transport if shared is not None else "",
+            framerate=framerate,
+            networkLatency=latencies[0],
+            processingLatency=latencies[1],
+            latency=latencies[2],
+            dropped=shared.dropped if shared is not None else 0,
+            lost=shared.lost if shared is not None else 0,
+        )
+        if is_alive(self):
+            self._announce_problem()
+
+
+class ImageTransportSubscriber(ImageTransportSubscription):
+    """The element ``ImageTransportSubscriber`` of ``Ros 1.0``, within a namespace."""
+
+    DIALECT = Dialect.ROS1
+
+    nsChanged = Signal()
+
+    ns = Writable(str, read="_get_namespace", write="_set_namespace")

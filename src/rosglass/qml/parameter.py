@@ -10,14 +10,16 @@ from rosglass.errors import ConversionError, Error
 from rosglass.qml.element import Element
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.plain import plain_from_js
+from rosglass.qml.properties import ReadOnly, Writable, report
 from rosglass.qml.to_js import exact
-from rosglass.qt import Property, QJSValue, Signal, Slot, is_alive
+from rosglass.qt import QJSValue, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     from rosglass.comm.node import Node
     from rosglass.comm.parameters import ParameterDescriptor
     from rosglass.qml.parameter_link import ParameterLink, Reading
     from rosglass.qml.runtime import Runtime
+    from rosglass.qml.session import Session
     from rosglass.qt import QtCore
 
 __all__ = ["Parameter"]
@@ -26,206 +28,187 @@ __all__ = ["Parameter"]
 class Parameter(Element):
     """One parameter of a node. See its page in ``docs/elements``."""
 
-    nodeNameChanged = Signal()
-    nameChanged = Signal()
-    valueChanged = Signal()
-    readyChanged = Signal()
-    pendingChanged = Signal()
-    descriptionChanged = Signal()
-    problemChanged = Signal()
-    #: The node refused a value; says why.
+    #: The node refused a value, for this reason.
     rejected = Signal(str, arguments=["reason"])
+    valueChanged = Signal()
+    descriptionChanged = Signal()
+
+    nodeName = Writable(str, "")
+    name = Writable(str, "")
+    value = Writable(
+        QJSValue,
+        read="_get_value",
+        write="_set_value",
+    )
+    ready = ReadOnly(bool, False)
+    pending = ReadOnly(bool, False)
+    type = ReadOnly(str, read="_get_type", notify="descriptionChanged")
+    description = ReadOnly(
+        str,
+        read=lambda self: self._descriptor.description if self._descriptor is not None else "",
+        notify="descriptionChanged",
+    )
+    readOnly = ReadOnly(
+        bool,
+        read=lambda self: self._descriptor is not None and self._descriptor.read_only,
+        notify="descriptionChanged",
+    )
+    minimum = ReadOnly(
+        QJSValue, read=lambda self: self._get_bound("low"), notify="descriptionChanged"
+    )
+    maximum = ReadOnly(
+        QJSValue, read=lambda self: self._get_bound("high"), notify="descriptionChanged"
+    )
+    stepSize = ReadOnly(
+        QJSValue, read=lambda self: self._get_bound("step"), notify="descriptionChanged"
+    )
+
+    _endpoint: ParameterLink | None
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         super().__init__(parent, runtime)
-        self._node_name, self._name = "", ""
-        self._value: Any = None
+        self._shown: Any = None
         self._descriptor: ParameterDescriptor | None = None
-        self._ready, self._writes = False, 0
+        #: Requested changes without an answer.
+        self._writes = 0
         #: Why the node gives no value.
         self._missing = ""
-        self._link: ParameterLink | None = None
-        self._have: tuple[Node, str, str] | None = None
 
-    # Properties.
-
-    def _set_node(self, name: str) -> None:
-        if name != self._node_name:
-            self._node_name = name
-            self.nodeNameChanged.emit()
-            self._schedule()
-
-    def _set_name(self, name: str) -> None:
-        if name != self._name:
-            self._name = name
-            self.nameChanged.emit()
-            self._schedule()
+    @property
+    def label(self) -> str:
+        """What error messages call this element."""
+        return f"Parameter {self.name!r}"
 
     def _get_value(self) -> QJSValue:
         runtime = self._find_runtime()
-        return QJSValue() if runtime is None else runtime.value(_shown(self._value))
+        return QJSValue() if runtime is None else runtime.value(_to_js(self._shown))
 
     def _set_value(self, value: QJSValue) -> None:
-        runtime, link = self._find_runtime(), self._link
-        if link is None or self._have is None:
-            self._refuse(f"Parameter {self._name!r}: nothing was set: {self._reason()}")
+        runtime, link, config = self._find_runtime(), self._endpoint, self._config
+        if link is None or config is None:
+            self._refuse(
+                f"{self.label}: nothing was set: {self._problem or 'there is no node yet'}"
+            )
             return
         try:
             wanted = plain_from_js(value)
         except ConversionError as error:
-            self._refuse(f"Parameter {self._name!r}: {error}")
+            self._refuse(f"{self.label}: {error}")
             return
-        place = runtime.caller() if runtime is not None else None
-        have = self._have
+        caller = runtime.caller() if runtime is not None else None
         self._writes += 1
-        self.pendingChanged.emit()
+        report(self, pending=True)
 
         def done(reason: str | Error) -> None:
-            if not is_alive(self) or have is not self._have:
+            if not is_alive(self) or config is not self._config:
                 return
             self._writes -= 1
-            self.pendingChanged.emit()
+            report(self, pending=self._writes > 0)
             if reason:
-                text = f"Parameter {self._name!r} of {have[1]}: {reason}"
-                if place is not None:
-                    log_from_qml("", logging.WARNING, text, place)
+                text = f"{self.label} of {config[1]}: {reason}"
+                if caller is not None:
+                    log_from_qml("", logging.WARNING, text, caller)
                 self.rejected.emit(str(reason))
-                # Whoever showed the wish already has to show the truth again.
+                # Controls that show the requested value already return to the present one.
                 self.valueChanged.emit()
-            elif link is self._link:
-                self._set_shown(wanted)
-                # The node may have made something else of it.
+            elif link is self._endpoint:
+                self._show(wanted)
+                # The node may have changed it to something else.
                 link.read_soon()
 
-        link.write(have[2], wanted, done)
+        link.write(config[2], wanted, done)
 
-    def _reason(self) -> str:
-        return self._problem or "there is no node yet"
-
-    def _describe(self) -> str:
-        return self._descriptor.description if self._descriptor is not None else ""
-
-    def _type(self) -> str:
+    def _get_type(self) -> str:
         return self._descriptor.type.name.lower() if self._descriptor is not None else ""
 
-    def _is_read_only(self) -> bool:
-        return self._descriptor is not None and self._descriptor.read_only
-
-    def _bound(self, end: str) -> QJSValue:
+    def _get_bound(self, end: str) -> QJSValue:
         allowed = self._descriptor.range if self._descriptor is not None else None
         runtime = self._find_runtime()
         if allowed is None or runtime is None:
             return QJSValue()
         return runtime.value(getattr(allowed, end))
 
-    nodeName = Property(str, lambda self: self._node_name, _set_node, notify=nodeNameChanged)
-    name = Property(str, lambda self: self._name, _set_name, notify=nameChanged)
-    value = Property(QJSValue, _get_value, _set_value, notify=valueChanged)
-    ready = Property(bool, lambda self: self._ready, notify=readyChanged)
-    pending = Property(bool, lambda self: self._writes > 0, notify=pendingChanged)
-    type = Property(str, _type, notify=descriptionChanged)
-    description = Property(str, _describe, notify=descriptionChanged)
-    readOnly = Property(bool, _is_read_only, notify=descriptionChanged)
-    minimum = Property(QJSValue, lambda self: self._bound("low"), notify=descriptionChanged)
-    maximum = Property(QJSValue, lambda self: self._bound("high"), notify=descriptionChanged)
-    stepSize = Property(QJSValue, lambda self: self._bound("step"), notify=descriptionChanged)
-    problem = Property(str, lambda self: self._problem, notify=problemChanged)
-
     # Following the node.
 
-    def _update(self) -> None:
+    def _wanted(self) -> tuple[Node, str, str] | None:
         node = self.node
-        want: tuple[Node, str, str] | None = None
-        if node is not None and self._name and self._node_name:
+        if node is not None and self.name and self.nodeName:
             try:
-                want = (node, node.resolve(self._node_name), self._name)
+                return node, node.resolve(self.nodeName), self.name
             except Error as error:
-                self._say(f"Parameter {self._name!r}: {error}")
-        if want == self._have:
-            return
-        self._leave()
-        self._have = want
-        if want is None or self._session is None:
-            return
+                self._set_problem(f"{self.label}: {error}")
+        return None
+
+    def _create_endpoint(self, wanted: tuple[Any, ...]) -> None:
         from rosglass.qml.parameter_link import ParameterLink as Link  # noqa: PLC0415 - few need it
 
-        link = self._link = Link.join(
-            self._session, want[0], want[1], self, self._name, self._on_reading
-        )
-        self._at_end["link"] = lambda: link.leave(self)
+        session = self._session
+        assert session is not None
+        node, node_name, name = wanted
+        self._set_endpoint(Link.join(session, node, node_name, self, name, self._on_reading))
+
+    def _dispose(self, session: Session, endpoint: ParameterLink) -> None:  # noqa: ARG002
+        endpoint.leave(self)
+
+    def _on_created(self, endpoint: ParameterLink) -> None:  # noqa: ARG002 - the base's signature
         self._on_tick()
 
-    def _leave(self) -> None:
-        link, self._link = self._link, None
-        self._at_end.pop("link", None)
-        if link is not None:
-            link.leave(self)
+    def _on_closed(self, endpoint: ParameterLink | None) -> None:  # noqa: ARG002 - as above
         self._missing = ""
-        self._set_ready(False)
-        if self._writes:
-            # Their replies will never arrive.
-            self._writes = 0
-            self.pendingChanged.emit()
-        self._set_shown(None)
+        # Replies to pending writes will never arrive.
+        self._writes = 0
+        report(self, ready=False, pending=False)
+        self._show(None)
 
     @Slot()
     def _on_graph(self) -> None:
-        if self._link is not None:
-            self._link.on_graph()
+        if self._endpoint is not None:
+            self._endpoint.on_graph()
 
     @Slot()
     def _on_tick(self) -> None:
-        link = self._link
+        link = self._endpoint
         if link is None:
             return
         link.on_tick()
-        self._say(link.problem or self._missing)
+        self._set_problem(link.problem or self._missing)
         if link.problem or not link.ready:
-            self._set_ready(False)
-
-    def _set_ready(self, ready: bool) -> None:
-        if ready != self._ready:
-            self._ready = ready
-            self.readyChanged.emit()
+            report(self, ready=False)
 
     def _on_reading(self, reading: Reading) -> None:
-        link = self._link
+        link = self._endpoint
         if not is_alive(self) or link is None:
             return
-        self._missing = reading.problem and f"Parameter {self._name!r}: {reading.problem}"
-        self._say(link.problem or self._missing)
+        self._missing = reading.problem and f"{self.label}: {reading.problem}"
+        self._set_problem(link.problem or self._missing)
         described = reading.descriptor != self._descriptor
         if described:
             # The range comes before the value: a slider would clamp it to the old one.
             self._descriptor = reading.descriptor
             self.descriptionChanged.emit()
-        self._set_shown(reading.value, again=described)
+        self._show(reading.value, again=described)
         # Handlers may have changed which parameter this is.
-        if is_alive(self) and link is self._link:
-            self._set_ready(reading.value is not None and link.ready)
+        if is_alive(self) and link is self._endpoint:
+            report(self, ready=reading.value is not None and link.ready)
 
-    def _set_shown(self, value: Any, again: bool = False) -> None:
+    def _show(self, value: Any, again: bool = False) -> None:
         """Show a value; announce it even if it is the same `again`."""
-        if is_alive(self) and (
-            again or value != self._value or type(value) is not type(self._value)
-        ):
-            self._value = value
+        same = value == self._shown and type(value) is type(self._shown)
+        if is_alive(self) and (again or not same):
+            self._shown = value
             self.valueChanged.emit()
 
-    def _problem_changed(self) -> None:
-        self.problemChanged.emit()
 
-
-def _shown(value: Any) -> Any:
+def _to_js(value: Any) -> Any:
     """Return a parameter's value as JavaScript can hold it."""
     if type(value) is int:
         return exact(value)
     if isinstance(value, dict):
-        return {str(key): _shown(inner) for key, inner in value.items()}
+        return {str(key): _to_js(inner) for key, inner in value.items()}
     if isinstance(value, (list, tuple, bytes, bytearray)):
-        return [_shown(inner) for inner in value]
+        return [_to_js(inner) for inner in value]
     if value is None or isinstance(value, (bool, float, str)):
         return value
     return str(value)

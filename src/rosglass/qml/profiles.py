@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.qos import BEST_AVAILABLE, Durability, History, Liveliness, QoS, Reliability
@@ -12,7 +13,7 @@ from rosglass.qml.js_values import shown
 if TYPE_CHECKING:
     from rosglass.qt import QJSValue
 
-__all__ = ["qos_from_js", "qos_parts"]
+__all__ = ["qos_from_js", "qos_parts", "queue_from_js"]
 
 _BEST = "best_available"
 
@@ -61,6 +62,17 @@ def qos_from_js(value: QJSValue | None, default: QoS) -> QoS:
         raise ConversionError(f"qos.{error.path}", shown(value), error.expected) from None
     except ValueError:
         raise ConversionError("qos", shown(value), "a queue size or Ros2.QoS()") from None
+
+
+def queue_from_js(value: QJSValue, default: QoS) -> QoS:
+    """Return the profile of a queue size, or one given; 0 means no limit, as in ROS 1.
+
+    Raises:
+        ConversionError: As of :func:`qos_from_js`.
+    """
+    if value.isNumber() and value.toNumber() == 0:
+        return replace(default, history=History.KEEP_ALL)
+    return qos_from_js(value, default)
 
 
 def _limit(value: QJSValue, name: str) -> Duration | None:

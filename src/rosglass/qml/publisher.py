@@ -11,31 +11,35 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rosglass.comm.names import similar
-from rosglass.comm.qos import Durability, History
-from rosglass.errors import ConversionError, Error, TypeNotFoundError
-from rosglass.qml.element import LONELY_MS, RETRY, Element
+from rosglass.comm.qos import Durability, History, QoS
+from rosglass.errors import ConversionError, Error, UnsupportedError
+from rosglass.qml.dialect import Dialect
+from rosglass.qml.element import NO_PEER_MS, Element, single_shot
 from rosglass.qml.from_js import fields_from_js
 from rosglass.qml.log import log_from_qml
+from rosglass.qml.properties import ReadOnly
 from rosglass.qml.session import NOT_INITIALIZED
-from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+from rosglass.qml.singleton import full_type
+from rosglass.qt import Property, QJSValue, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rosglass.comm.events import Matched
     from rosglass.comm.node import Node
     from rosglass.comm.publisher import Publisher as Sender
-    from rosglass.comm.qos import QoS
     from rosglass.messages import Message, MessageType
     from rosglass.messages.schema import Schema
     from rosglass.qml.runtime import Runtime
-    from rosglass.qml.session import Session
 
-__all__ = ["Publisher"]
+__all__ = ["Publisher", "RosPublisher"]
 
 #: Seconds that a message is held at most until its topic is advertised and the node connected.
 _HOLD_TIMEOUT_S = 2.0
 #: Seconds after that in which messages are held until known subscribers are connected.
 _MATCH_TIMEOUT_S = 1.0
 #: Messages that are held at most with keep-all history.
-_MOST_HELD = 1000
+_MAX_HELD = 1000
 
 
 class Publisher(Element):
@@ -54,15 +58,20 @@ class Publisher(Element):
     #: :attr:`isAdvertised` changed.
     advertised = Signal()
     topicChanged = Signal()
-    problemChanged = Signal()
+
+    topic = ReadOnly(str, read=lambda self: self._resolved or self._topic)
+    type = Property(str, lambda self: self._type, constant=True)
+    queueSize = Property(int, lambda self: self._qos.depth, constant=True)
+    qos = Property(QJSValue, lambda self: self._runtime.qos(self._qos), constant=True)
+    isAdvertised = ReadOnly(bool, read=lambda self: self._endpoint is not None, notify="advertised")
+
+    _endpoint: Sender | None
 
     def __init__(self, runtime: Runtime, topic: str, type_name: str, qos: QoS) -> None:
         super().__init__(None, runtime)
         self._topic, self._type, self._qos = topic, type_name, qos
         self._resolved = ""
-        self._sender: Sender | None = None
         self._schema: Schema | None = None
-        self._have: Node | None = None
         #: What waits, each until a time by :func:`time.monotonic`.
         self._held: deque[tuple[Message, float]] = deque()
         #: Keeps JavaScript from collecting this while something waits.
@@ -72,24 +81,17 @@ class Publisher(Element):
         #: When the node was connected and the topic advertised, monotonic.
         self._ready_at: float | None = None
         self._settled = False
-        self._retry = QtCore.QTimer(self)
-        self._retry.setSingleShot(True)
-        self._retry.timeout.connect(self._advertise)
-        self._lonely = QtCore.QTimer(self)
-        self._lonely.setSingleShot(True)
-        self._lonely.timeout.connect(self._warn_no_subscribers)
+        self._no_subscriber = single_shot(self, self._log_no_subscriber)
 
-    topic = Property(str, lambda self: self._resolved or self._topic, notify=topicChanged)
-    type = Property(str, lambda self: self._type, constant=True)
-    queueSize = Property(int, lambda self: self._qos.depth, constant=True)
-    qos = Property(QJSValue, lambda self: self._runtime.qos(self._qos), constant=True)
-    isAdvertised = Property(bool, lambda self: self._sender is not None, notify=advertised)
-    problem = Property(str, lambda self: self._problem, notify=problemChanged)
+    @property
+    def label(self) -> str:
+        """What error messages call this element."""
+        return self._topic
 
     @Slot(result=int)
     def getSubscriptionCount(self) -> int:
         """Return how many subscriptions match; 0 before the topic is advertised."""
-        sender = self._sender
+        sender = self._endpoint
         try:
             return sender.subscription_count() if sender is not None else 0
         except Error:
@@ -106,11 +108,11 @@ class Publisher(Element):
             false while there is no node and none is connecting, while the topic cannot be
             advertised, and while the connection is lost, or was not made in time.
         """
-        sender, schema = self._sender, self._schema
+        sender, schema = self._endpoint, self._schema
         kind = self._early_type() if sender is None else sender.type
         if kind is None:
-            told = self._problem.removeprefix(f"{self._topic}: ")
-            reason = told or "it is not advertised yet"
+            why = self._problem.removeprefix(f"{self._topic}: ")
+            reason = why or "it is not advertised yet"
             if self._session is not None and not self._session.is_initialized:
                 if self._session.closed:
                     return False  # the program ends
@@ -148,11 +150,11 @@ class Publisher(Element):
         return True
 
     def _send(self, sender: Sender, message: dict[str, object] | Message) -> None:
-        waits = self._have is not None and self._have.wire != "ros1"  # ROS 1 queues without limit
+        waits = self.node is not None and self.node.wire != "ros1"  # ROS 1 queues without limit
         if waits and self._qos.history is History.KEEP_ALL and self._session is not None:
             # A publisher that must not lose anything waits for a network that is stuck: not here.
             data = sender.type.encode(message)
-            self._session.background(lambda: sender.publish_serialized(data), self._sent_late)
+            self._session.background(lambda: sender.publish_serialized(data), self._on_sent_late)
         else:
             sender.publish(message)
 
@@ -203,19 +205,19 @@ class Publisher(Element):
 
     def _is_matched(self, sender: Sender) -> bool:
         """Return whether a subscriber is connected, and all that the graph shows."""
-        if self._have is None:
+        if self.node is None:
             return False
         try:
             count = sender.subscription_count()
-            return 0 < count >= len(self._have.subscriptions(self._resolved))
+            return 0 < count >= len(self.node.subscriptions(self._resolved))
         except Error:
             return False
 
     def _hold(self, message: Message) -> None:
-        most = _MOST_HELD if self._qos.history is History.KEEP_ALL else self._qos.depth
+        most = _MAX_HELD if self._qos.history is History.KEEP_ALL else self._qos.depth
         if len(self._held) >= most:
             self._held.popleft()
-            if self._sender is None or self._qos.history is History.KEEP_ALL:
+            if self._endpoint is None or self._qos.history is History.KEEP_ALL:
                 text = f"{self._topic}: messages are dropped, the oldest first: more than "
                 text += f"{most} were published before it was advertised"
                 self._complain(text, logging.WARNING)
@@ -227,14 +229,14 @@ class Publisher(Element):
 
     def _send_held(self) -> None:
         """Send what was held, once that makes sense; give up what is too old."""
-        sender, held = self._sender, self._held
+        sender, held = self._endpoint, self._held
         if sender is not None and self._is_settled(sender):
             while held:
                 message, _ = held.popleft()
                 try:
                     self._send(sender, message)
                 except Error as error:
-                    self._sent_late(error)
+                    self._on_sent_late(error)
         elif sender is None or not self._is_connected():
             while held and time.monotonic() > held[0][1]:
                 held.popleft()
@@ -242,15 +244,15 @@ class Publisher(Element):
                 late = "it could not be advertised in time"
                 if sender is not None and self._session is not None:
                     late = f"not connected in time: {self._session.detail}"
-                self._sent_late(Error(self._problem or late))
+                self._on_sent_late(Error(self._problem or late))
         if not held:
             self._reference = None
 
-    def _sent_late(self, result: Error | None) -> None:
+    def _on_sent_late(self, result: Error | None) -> None:
         """Tell that what waited for the network was not sent in the end."""
         if result is not None and is_alive(self):
             text = f"nothing was published on {self._resolved or self._topic}: {result}"
-            self._tell(self.DIALECT.spelled(text), logging.ERROR)
+            self._log(self.DIALECT.spelled(text), logging.ERROR)
 
     def _complain(self, text: str, level: int) -> None:
         """Log with the QML place, but not for every message of a stream."""
@@ -260,59 +262,38 @@ class Publisher(Element):
         if self._limit.allows((caller, text)):
             log_from_qml("", level, text, caller)
 
-    def _update(self) -> None:
-        node = self.node
-        if node is self._have:
-            return
-        self._withdraw()
-        self._have = node
-        if node is not None:
-            self._advertise()
-        elif self._held:
-            self._held.clear()
-            self._reference = None
-            self._sent_late(Error("the node was shut down"))
+    def _wanted(self) -> tuple[Node] | None:
+        return None if self.node is None else (self.node,)
 
-    @Slot()
-    def _advertise(self) -> None:
-        node = self._have
-        if node is None or self._session is None or self._sender is not None:
-            return
-        self._make(
-            lambda: node.create_publisher(self._topic, self._type, self._qos),
-            lambda: self._have is node,
-            self._advertised,
-        )
+    def _factory(self, node: Node) -> Callable[[], Sender]:
+        return lambda: node.create_publisher(self._topic, self._type, self._qos)
 
-    def _advertised(self, result: Sender | Error) -> None:
-        if isinstance(result, Error):
-            self._say(f"{self._topic}: {result}")
-            if isinstance(result, TypeNotFoundError):
-                self._retry.start(RETRY)
-            return
+    def _on_created(self, endpoint: Sender) -> None:
         from rosglass.messages.schema import schema_of  # noqa: PLC0415 - loaded by now
 
-        session = self._session
-        assert session is not None
-        self._sender, self._resolved = result, result.topic
-        self._schema = schema_of(result.type.definition)
+        self._resolved = endpoint.topic
+        self._schema = schema_of(endpoint.type.definition)
         self._ready_at, self._settled = None, False
-        self._lonely.start(LONELY_MS)
-        self._at_end["sender"] = lambda: session.background(result.close)
-        self._watch(result, session)
-        self._say("")
+        self._no_subscriber.start(NO_PEER_MS)
+        self._set_problem("")
         self.topicChanged.emit()
         self.advertised.emit()
         if is_alive(self):
             self._send_held()
 
-    def _watch(self, sender: Sender, session: Session) -> None:
-        """Listen to what a new publisher tells."""
+    def _on_closed(self, endpoint: Sender | None) -> None:
+        self._no_subscriber.stop()
+        if endpoint is not None:
+            self.advertised.emit()
+        if self.node is None and self._held:
+            self._held.clear()
+            self._reference = None
+            self._on_sent_late(Error("the node was shut down"))
 
     @Slot()
-    def _warn_no_subscribers(self) -> None:
-        """Log that the topic has no subscribers, with a near name: it may be misspelt."""
-        node, sender = self._have, self._sender
+    def _log_no_subscriber(self) -> None:
+        """Log that the topic has no subscription, with a similar name: it may be misspelt."""
+        node, sender = self.node, self._endpoint
         if node is None or sender is None or not self._is_connected():
             return
         # A node that has just been closed answers nothing.
@@ -322,25 +303,58 @@ class Publisher(Element):
             subscribed = [name for name in node.topics() if node.subscriptions(name)]
             hint = similar(self._resolved, subscribed)
             level = logging.WARNING if hint else logging.INFO
-            self._tell(f"{self._resolved}: nobody subscribes to this topic{hint}", level)
+            self._log(f"{self._resolved}: this topic has no subscription{hint}", level)
 
     @Slot()
     def _on_tick(self) -> None:
         if self._held:
             self._send_held()
-        if self._sender is not None:
-            self._is_settled(self._sender)  # for what is published next
-            self._say(self._sender.problem)
+        if self._endpoint is not None:
+            self._is_settled(self._endpoint)  # for what is published next
+            self._set_problem(self._endpoint.problem)
 
-    def _withdraw(self) -> None:
-        self._retry.stop()
-        self._lonely.stop()
-        sender, self._sender = self._sender, None
-        if sender is None or self._session is None:
-            return
-        self._at_end.pop("sender", None)
-        self._session.background(sender.close)
-        self.advertised.emit()
 
-    def _problem_changed(self) -> None:
-        self.problemChanged.emit()
+class RosPublisher(Publisher):
+    """A publisher with the names of ``Ros 1.0``.
+
+    Args:
+        runtime: The engine's runtime.
+        type_name: Message type, as in QML.
+        topic: Topic name, as in QML.
+        queue_size: Messages that wait for a slow subscriber; 0 for no limit.
+        latch: Whether new subscribers get the last message at once.
+    """
+
+    DIALECT = Dialect.ROS1
+
+    connected = Signal()
+    disconnected = Signal()
+
+    def __init__(
+        self, runtime: Runtime, type_name: str, topic: str, queue_size: int, latch: bool
+    ) -> None:
+        qos = QoS(depth=queue_size) if queue_size else QoS(history=History.KEEP_ALL)
+        if latch:
+            qos = QoS(depth=1, durability=Durability.TRANSIENT_LOCAL)
+        super().__init__(runtime, topic, full_type(type_name), qos)
+        self._written, self._size = type_name, queue_size
+
+    type = Property(str, lambda self: self._written, constant=True)
+    queueSize = Property(int, lambda self: self._size, constant=True)
+    isLatched = Property(
+        bool, lambda self: self._qos.durability is Durability.TRANSIENT_LOCAL, constant=True
+    )
+
+    @Slot(result=int)
+    def getNumSubscribers(self) -> int:
+        """Return how many subscribers are connected; 0 before the topic is advertised."""
+        return self.getSubscriptionCount()
+
+    def _on_created(self, endpoint: Sender) -> None:
+        def on_matched(event: Matched) -> None:
+            if is_alive(self):
+                (self.connected if event.change > 0 else self.disconnected).emit()
+
+        with suppress(UnsupportedError):  # a recording, which has no subscribers
+            endpoint.on_matched(on_matched, self._executor)
+        super()._on_created(endpoint)

@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
 from rosglass.qml.element import Element
+from rosglass.qml.properties import ReadOnly, Writable, report
 from rosglass.qml.robot_place import RobotPlace
 from rosglass.qml.singleton import strings
-from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+from rosglass.qt import QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rosglass.bags import Playback
     from rosglass.comm.node import Node
     from rosglass.qml.runtime import Runtime
@@ -19,82 +22,97 @@ if TYPE_CHECKING:
 __all__ = ["Replay"]
 
 _SCHEME = "replay:"
-_MOST_TOPICS = 10_000
+_MAX_TOPICS = 10_000
+
+
+def _topic_names(value: QJSValue) -> tuple[str, ...]:
+    """Return the names in an array of QML; raises ValueError for anything else."""
+    if value.isUndefined() or value.isNull():
+        return ()
+    # A Python list is not what JavaScript calls an array.
+    if not (value.isObject() and value.property("length").toNumber() <= _MAX_TOPICS):
+        raise ValueError("must be an array of names")
+    return tuple(strings(value))
 
 
 class Replay(Element):
     """Controls the recording that an interface shows. See its page in ``docs/elements``."""
 
-    fileChanged = Signal()
+    #: The end was reached.
+    finished = Signal()
     rateChanged = Signal()
     loopChanged = Signal()
     playingChanged = Signal()
     positionChanged = Signal()
     durationChanged = Signal()
-    topicsChanged = Signal()
-    toRobotChanged = Signal()
-    readyChanged = Signal()
-    problemChanged = Signal()
-    #: The end was reached, and it stays there.
-    finished = Signal()
 
-    _HOLDS = ("_playback", "_have")
+    file = Writable(
+        str, "", lambda path: QtCore.QUrl(path).toLocalFile() if path[:5] == "file:" else path
+    )
+    rate = Writable(float, read="_get_rate", write="_set_rate")
+    loop = Writable(bool, read="_get_loop", write="_set_loop")
+    playing = Writable(
+        bool,
+        read=lambda self: self._state[0],
+        write="_set_playing",
+    )
+    position = Writable(
+        float,
+        read=lambda self: self._state[1],
+        write="_set_position",
+    )
+    duration = ReadOnly(float, read=lambda self: self._state[2])
+    # Qt 5 ends the program when it makes a list of texts of certain objects.
+    topics = Writable(QJSValue, (), _topic_names, read="_get_topics")
+    toRobot = Writable(bool, False)
+    ready = ReadOnly(bool, False)
+
+    _HOLDS = ("_playback",)
+    _topics: tuple[str, ...]
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         super().__init__(parent, runtime)
-        self._file = ""
-        self._topics: list[str] = []
-        self._to_robot = False
         # What QML has not set is as the recording's address says.
-        self._rate: float | None = None
-        self._loop: bool | None = None
-        self._wish: bool | None = None
-        self._place: float | None = None
-        self._shown = (False, 0.0, 0.0)
-        #: What stands for it where it must not be kept alive.
+        self._wanted_rate: float | None = None
+        self._wanted_loop: bool | None = None
+        self._wanted_playing: bool | None = None
+        self._wanted_position: float | None = None
+        #: Playing, position, duration.
+        self._state = (False, 0.0, 0.0)
+        #: The key of this element where the element itself must not be kept alive.
         self._user = object()
         self._playback: Playback | None = None
-        self._have: tuple[Node, str, tuple[str, ...]] | None = None
-
-    # Properties.
-
-    def _set_file(self, file: str) -> None:
-        file = QtCore.QUrl(file).toLocalFile() if file.startswith("file:") else file
-        if file != self._file:
-            self._file = file
-            self.fileChanged.emit()
-            self._schedule()
 
     def _get_rate(self) -> float:
         if self._playback is not None:
             return self._playback.rate
-        return 1.0 if self._rate is None else self._rate
+        return 1.0 if self._wanted_rate is None else self._wanted_rate
 
     def _set_rate(self, rate: float) -> None:
         if not 1e-3 <= rate <= 1e3:
             self._refuse(f"Replay: rate {rate:g} is not from 0.001 to 1000")
-        elif rate != self._rate:
-            self._rate = rate
+        elif rate != self._wanted_rate:
+            self._wanted_rate = rate
             if self._playback is not None:
                 self._playback.set_rate(rate)
             self.rateChanged.emit()
 
     def _get_loop(self) -> bool:
-        return self._playback.loop if self._playback is not None else bool(self._loop)
+        return self._playback.loop if self._playback is not None else bool(self._wanted_loop)
 
     def _set_loop(self, loop: bool) -> None:
-        if loop != self._loop:
-            self._loop = loop
+        if loop != self._wanted_loop:
+            self._wanted_loop = loop
             if self._playback is not None:
                 self._playback.set_loop(loop)
             self.loopChanged.emit()
 
     def _set_playing(self, playing: bool) -> None:
-        self._wish = playing
+        self._wanted_playing = playing
         if self._playback is not None:
-            self._obey()
+            self._play_or_pause()
 
     def _set_position(self, seconds: float) -> None:
         problem = self._seek(seconds)
@@ -103,38 +121,7 @@ class Replay(Element):
 
     def _get_topics(self) -> QJSValue:
         runtime = self._find_runtime()
-        return QJSValue() if runtime is None else runtime.value(self._topics)
-
-    def _set_topics(self, value: QJSValue | None) -> None:
-        topics: list[str] = []
-        if value is not None and not value.isUndefined() and not value.isNull():
-            # A list of Python is none that JavaScript calls an array.
-            if not (value.isObject() and value.property("length").toNumber() <= _MOST_TOPICS):
-                self._refuse("Replay: topics must be an array of names")
-                return
-            topics = strings(value)
-        if topics != self._topics:
-            self._topics = topics
-            self.topicsChanged.emit()
-            self._schedule()
-
-    def _set_to_robot(self, to_robot: bool) -> None:
-        if to_robot != self._to_robot:
-            self._to_robot = to_robot
-            self.toRobotChanged.emit()
-            self._schedule()
-
-    file = Property(str, lambda self: self._file, _set_file, notify=fileChanged)
-    rate = Property(float, _get_rate, _set_rate, notify=rateChanged)
-    loop = Property(bool, _get_loop, _set_loop, notify=loopChanged)
-    playing = Property(bool, lambda self: self._shown[0], _set_playing, notify=playingChanged)
-    position = Property(float, lambda self: self._shown[1], _set_position, notify=positionChanged)
-    duration = Property(float, lambda self: self._shown[2], notify=durationChanged)
-    # Qt 5 ends the program when it makes a list of texts of certain objects.
-    topics = Property(QJSValue, _get_topics, _set_topics, notify=topicsChanged)
-    toRobot = Property(bool, lambda self: self._to_robot, _set_to_robot, notify=toRobotChanged)
-    ready = Property(bool, lambda self: self._playback is not None, notify=readyChanged)
-    problem = Property(str, lambda self: self._problem, notify=problemChanged)
+        return QJSValue() if runtime is None else runtime.value(list(self._topics))
 
     # Controlling.
 
@@ -150,7 +137,7 @@ class Replay(Element):
 
     @Slot(float)
     def seek(self, seconds: float) -> None:
-        """Go on at another place, in seconds from the beginning; what there is none of throws."""
+        """Continue at another position, in seconds from the beginning; an impossible one throws."""
         problem = self._seek(seconds)
         runtime = self._find_runtime()
         if problem and runtime is not None:
@@ -159,107 +146,90 @@ class Replay(Element):
     def _seek(self, seconds: float) -> str:
         """Return why it cannot be done, empty when it can."""
         if self._playback is None:
-            self._place = seconds
+            self._wanted_position = seconds
             return ""
         try:
             self._playback.seek(seconds)
         except Error as error:
             return str(error)
-        self._watch()
+        self._refresh()
         return ""
 
-    def _obey(self) -> None:
-        playback, wish = self._playback, self._wish
-        if playback is not None and wish is not None and wish != playback.is_playing:
-            (playback.play if wish else playback.pause)()
-        self._watch()
+    def _play_or_pause(self) -> None:
+        playback, playing = self._playback, self._wanted_playing
+        if playback is not None and playing is not None and playing != playback.is_playing:
+            (playback.play if playing else playback.pause)()
+        self._refresh()
 
     # Finding what to control.
 
-    def _update(self) -> None:
-        refused = self._take_place()
-        node = self.node
+    def _wanted(self) -> tuple[Node, str, tuple[str, ...]] | None:
+        refused, node = self._set_robot_place(), self.node
         shown = node is not None and node.url.lower().startswith(_SCHEME)
-        if self._to_robot:
-            key = (node, self._file, tuple(self._topics)) if node is not None else None
-            want = key if self._file and not shown else None
-            if shown:
-                self._say("Replay: toRobot: the interface shows a recording; there is no robot")
-        else:
-            want = (node, "", ()) if node is not None and shown and not refused else None
+        if not self.toRobot:
             if refused:
-                self._say(f"Replay: {refused}")
-        if want != self._have:
-            self._let_go()
-            self._have = want
-            if want is not None and self._to_robot:
-                self._open(*want)
-            elif want is not None:
-                self._take(getattr(node, "playback"))  # noqa: B009 - only a recording's node has it
-        if not self._to_robot and want is not None:
-            self._choose(node)
+                self._set_problem(f"Replay: {refused}")
+            return (node, "", ()) if node is not None and shown and not refused else None
+        if shown:
+            self._set_problem("Replay: toRobot: the interface shows a recording; there is no robot")
+        if node is None or shown or not self.file:
+            return None
+        return node, self.file, self._topics
 
-    def _take_place(self) -> str:
-        """Put the recording in the robot's place, or let the robot back; returns why not."""
+    def _update(self) -> None:
+        super()._update()
+        if not self.toRobot and self._config is not None:
+            node: Any = self._config[0]
+            try:
+                node.choose(self._topics)
+            except Error as error:
+                self._set_problem(f"Replay: topics: {error}")
+
+    def _create_endpoint(self, wanted: tuple[Any, ...]) -> None:
+        if self.toRobot:
+            super()._create_endpoint(wanted)
+        else:
+            self._on_created(wanted[0].playback)  # which belongs to the recording's node
+
+    def _factory(self, node: Node, file: str, topics: tuple[str, ...]) -> Callable[[], Playback]:
+        def create() -> Playback:
+            from rosglass.bags import Playback, open_bag  # noqa: PLC0415 - few ever need it
+
+            # Nothing is sent to a robot before QML says so.
+            return Playback(node, open_bag(file), topics=topics, paused=True)
+
+        return create
+
+    def _set_robot_place(self) -> str:
+        """Put the recording in the robot's place, or take it out; return why it is not shown."""
         session, user = self._session, self._user
         assert session is not None
         place = RobotPlace.of(session)
-        if self._to_robot or not self._file:
-            self._at_end.pop("place", None)
+        if self.toRobot or not self.file:
+            self._cleanup.pop("place", None)
             place.leave(user)
             return ""
-        self._at_end["place"] = lambda: place.leave_soon(user)
-        return place.take(user, self._file)
+        self._cleanup["place"] = lambda: place.leave_soon(user)
+        return place.take(user, self.file)
 
-    def _choose(self, node: Any) -> None:
-        try:
-            node.choose(self._topics)
-        except Error as error:
-            self._say(f"Replay: topics: {error}")
+    def _on_created(self, endpoint: Playback) -> None:
+        playback = self._playback = endpoint
+        self._set_problem("")
+        if self._wanted_rate is not None:
+            playback.set_rate(self._wanted_rate)
+        if self._wanted_loop is not None:
+            playback.set_loop(self._wanted_loop)
+        position, self._wanted_position = self._wanted_position, None
+        if position is not None:
+            self._set_position(position)
+        self._play_or_pause()
+        report(self, ready=True)
 
-    def _open(self, node: Node, file: str, topics: tuple[str, ...]) -> None:
-        session, want = self._session, self._have
-        assert session is not None
-
-        def work() -> Playback:
-            from rosglass.bags import Playback, open_bag  # noqa: PLC0415 - few ever need it
-
-            # To a robot nothing is sent before someone says so.
-            return Playback(node, open_bag(file), topics=topics, paused=True)
-
-        def done(result: Playback | Error) -> None:
-            if not is_alive(self) or self._have is not want:
-                if not isinstance(result, Error):
-                    session.background(result.close)
-            elif isinstance(result, Error):
-                self._say(f"Replay: {result}")
-            else:
-                self._at_end["playback"] = lambda: session.background(result.close)
-                self._take(result)
-
-        session.background(work, done)
-
-    def _take(self, playback: Playback) -> None:
-        self._playback = playback
-        self._say("")
-        if self._rate is not None:
-            playback.set_rate(self._rate)
-        if self._loop is not None:
-            playback.set_loop(self._loop)
-        place, self._place = self._place, None
-        if place is not None:
-            self._set_position(place)
-        self._obey()
-        self.readyChanged.emit()
-
-    def _let_go(self) -> None:
+    def _on_closed(self, endpoint: Playback | None) -> None:  # noqa: ARG002 - the base's signature
         playback, self._playback = self._playback, None
-        end = self._at_end.pop("playback", None)
-        if end is not None:
-            end()
         if playback is not None:
-            self._watch()
-            self.readyChanged.emit()
+            self._refresh()
+            report(self, ready=False)
 
     # Watching.
 
@@ -267,28 +237,28 @@ class Replay(Element):
     def _on_connection(self) -> None:
         playback, session = self._playback, self._session
         lost = session is not None and session.state != "connected"
-        if lost and self._to_robot and playback is not None and playback.is_playing:
-            # Nobody expects a robot that is back to go on with commands from a recording.
+        if lost and self.toRobot and playback is not None and playback.is_playing:
+            # A robot that is back must not continue with commands from a recording.
             self._refuse("Replay: paused, as the connection with the robot was lost")
             self.pause()
 
     @Slot()
     def _on_tick(self) -> None:
-        self._watch()
+        self._refresh()
 
-    def _watch(self) -> None:
-        """Tell what changed since the last look."""
+    def _refresh(self) -> None:
+        """Announce what changed since the last call."""
         playback = self._playback
-        before, now = self._shown, (False, 0.0, 0.0)
+        before, now = self._state, (False, 0.0, 0.0)
         if playback is not None:
             now = (playback.is_playing, playback.position, playback.duration)
-            self._say(playback.problem)
+            self._set_problem(playback.problem)
         elif self._session is not None and self._session.state == "failed":
-            self._say(self._session.detail)
-        self._shown = now
+            self._set_problem(self._session.detail)
+        self._state = now
         ended = playback is not None and before[0] and playback.is_at_end
         if ended:
-            self._wish = None
+            self._wanted_playing = None
         if before[2] != now[2]:
             self.durationChanged.emit()
         if before[1] != now[1]:
@@ -297,6 +267,3 @@ class Replay(Element):
             self.playingChanged.emit()
         if ended and is_alive(self):
             self.finished.emit()
-
-    def _problem_changed(self) -> None:
-        self.problemChanged.emit()

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from rosglass.errors import Error, ServiceUnavailableError
 from rosglass.qml.callbacks import Deferred, call_back
-from rosglass.qml.client_element import ClientElement, given_fields, named
+from rosglass.qml.client_element import CONNECTION_TIMEOUT_MS, ClientElement, given_fields, named
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.log import log_from_qml
-from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+from rosglass.qml.properties import ReadOnly, Writable, at_least, report
+from rosglass.qt import Property, QJSValue, QtCore, Slot, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["ServiceClient"]
 
 #: Seconds in which a client that lost its server says itself what became of the requests.
-_GRACE = 4.0
+_GRACE_S = 4.0
 
 
 @dataclass(eq=False)
@@ -56,12 +57,13 @@ class ServiceClient(ClientElement):
         qos: Profile of requests and replies; None for the usual one.
     """
 
-    _client: Caller_ | None
+    ready = ReadOnly(bool, False, notify="serviceReadyChanged")
+    name = Property(str, lambda self: self._name, constant=True)
+    type = Property(str, lambda self: self._type, constant=True)
+    connectionTimeout = Writable(int, CONNECTION_TIMEOUT_MS, at_least(0), then="", unit="ms")
+    pendingRequests = ReadOnly(int, 0)
 
-    serviceReadyChanged = Signal()
-    connectionTimeoutChanged = Signal()
-    pendingRequestsChanged = Signal()
-    problemChanged = Signal()
+    _endpoint: Caller_ | None
 
     def __init__(
         self,
@@ -77,28 +79,15 @@ class ServiceClient(ClientElement):
         #: When its server was lost, monotonic.
         self._lost = 0.0
 
-    # Properties.
-
-    def _set_patience(self, milliseconds: int) -> None:
-        if milliseconds < 0:
-            self._refuse(f"service {self._name}: connectionTimeout {milliseconds} ms is negative")
-        elif milliseconds != self._patience:
-            self._patience = milliseconds
-            self.connectionTimeoutChanged.emit()
-
-    ready = Property(bool, lambda self: self._ready, notify=serviceReadyChanged)
-    name = Property(str, lambda self: self._name, constant=True)
-    type = Property(str, lambda self: self._type, constant=True)
-    connectionTimeout = Property(
-        int, lambda self: self._patience, _set_patience, notify=connectionTimeoutChanged
-    )
-    pendingRequests = Property(int, lambda self: len(self._requests), notify=pendingRequestsChanged)
-    problem = Property(str, lambda self: self._problem, notify=problemChanged)
+    @property
+    def label(self) -> str:
+        """What error messages call this element."""
+        return f"service {self._name}"
 
     @Slot(result=bool)
     def isServiceReady(self) -> bool:
         """Return whether a server is there."""
-        return self._ready
+        return self.ready
 
     # Calling.
 
@@ -160,18 +149,18 @@ class ServiceClient(ClientElement):
         """
         request = _Request(value, done)
         self._requests.append(request)
-        self.pendingRequestsChanged.emit()
-        if self._client is not None and self._client.type is not None:
+        report(self, pendingRequests=len(self._requests))
+        if self._endpoint is not None and self._endpoint.type is not None:
             self._submit(request, running=True)
         if request not in self._requests:
             return False
-        if self._patience and not self._ready:
-            QtCore.QTimer.singleShot(self._patience, lambda: self._give_up(request))
+        if self.connectionTimeout and not self.ready:
+            QtCore.QTimer.singleShot(self.connectionTimeout, lambda: self._give_up(request))
         return True
 
     def _submit(self, request: _Request, *, running: bool = False) -> None:
         """Hand a request to the client; `running` says whether QML is waiting for it right now."""
-        client, session = self._client, self._session
+        client, session = self._endpoint, self._session
         assert client is not None
         assert client.type is not None
         assert session is not None
@@ -197,10 +186,10 @@ class ServiceClient(ClientElement):
 
     def _give_up(self, request: _Request) -> None:
         """End a request for which no server has appeared."""
-        if not is_alive(self) or request not in self._requests or self._ready:
+        if not is_alive(self) or request not in self._requests or self.ready:
             return
         reason = self._problem or "is it running, and is its name right?"
-        seconds = self._patience / 1000
+        seconds = self.connectionTimeout / 1000
         self._end(
             request,
             ServiceUnavailableError(
@@ -214,7 +203,7 @@ class ServiceClient(ClientElement):
         self._requests.remove(request)
         if request.call is not None:
             request.call.cancel()
-        self.pendingRequestsChanged.emit()
+        report(self, pendingRequests=len(self._requests))
         if tell:
             request.done(result)
 
@@ -235,31 +224,28 @@ class ServiceClient(ClientElement):
 
     # The client.
 
-    def _create(self, node: Node, type_name: str | None) -> Caller_:
-        return node.create_service_client(self._name, type_name, self._qos)
+    def _factory(self, node: Node) -> Callable[[], Caller_]:
+        return lambda: node.create_service_client(self._name, self._type or None, self._qos)
 
     def _submit_waiting(self) -> None:
-        if self._client is None or self._client.type is None:
+        if self._endpoint is None or self._endpoint.type is None:
             return
         for request in list(self._requests):
             if request.call is None and request in self._requests:
                 self._submit(request)
 
-    def _ready_changed(self) -> None:
-        if not self._ready:
+    def _set_ready(self, ready: bool) -> None:
+        if self.ready and not ready:
             self._lost = time.monotonic()
-        self.serviceReadyChanged.emit()
+        super()._set_ready(ready)
 
     @Slot()
     def _on_tick(self) -> None:
         # A server that seemed to be there when the request was made may have been dead; the one
         # that takes its place must not be told what was wanted long ago.
-        patience, now = self._patience / 1000, time.monotonic()
-        if not self._patience or self._ready or now - self._lost < _GRACE:
+        timeout_s, now = self.connectionTimeout / 1000, time.monotonic()
+        if not self.connectionTimeout or self.ready or now - self._lost < _GRACE_S:
             return
         for request in list(self._requests):
-            if now - request.made > patience:
+            if now - request.made > timeout_s:
                 self._give_up(request)
-
-    def _problem_changed(self) -> None:
-        self.problemChanged.emit()

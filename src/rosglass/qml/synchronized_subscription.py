@@ -14,11 +14,12 @@ from rosglass.comm.executor import Dispatcher
 from rosglass.comm.statistics import note_time, rate_of
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
 from rosglass.qml.dialect import Dialect
-from rosglass.qml.element import DEFAULT_TIMEOUT, RETRY, Element, changed_enough
+from rosglass.qml.element import DEFAULT_TIMEOUT_MS, Element
 from rosglass.qml.js_values import shown
 from rosglass.qml.profiles import qos_from_js
+from rosglass.qml.properties import ReadOnly, Writable, at_least, report, within
 from rosglass.qml.subscription import DEFAULT_QOS, Subscription
-from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+from rosglass.qt import QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = ["RosSynchronizedSubscription", "SynchronizedSubscription"]
 
-_MAX_SLOP = 3_600_000
+_MAX_SLOP_MS = 3_600_000
 #: Sets over which the frequency is taken.
 _MARKS = 30
 
@@ -157,122 +158,53 @@ class _Matcher:
 class SynchronizedSubscription(Element):
     """Receives topics in sets of messages. See its page in ``docs/elements``."""
 
-    topicsChanged = Signal()
-    subscriptionsChanged = Signal()
-    queueSizeChanged = Signal()
-    slopChanged = Signal()
-    allowHeaderlessChanged = Signal()
-    enabledChanged = Signal()
-    timeoutChanged = Signal()
-    messagesChanged = Signal()
     staleChanged = Signal()
-    frequencyChanged = Signal()
-    droppedChanged = Signal()
-    problemChanged = Signal()
+    messagesChanged = Signal()
     newMessages = Signal(QJSValue, arguments=["messages"])
 
-    _HOLDS = ("_topics", "_subscriptions", "_samples", "_value", "_matcher", "_have")
+    topics = Writable(QJSValue)
+    subscriptions = Writable(QJSValue)
+    queueSize = Writable(int, 10, within(1, 10_000))
+    #: Milliseconds that the stamps of a set may span.
+    slop = Writable(float, 100.0, within(0, _MAX_SLOP_MS), unit="ms")
+    allowHeaderless = Writable(bool, False)
+    enabled = Writable(bool, True)
+    timeout = Writable(int, DEFAULT_TIMEOUT_MS, at_least(0), then="", unit="ms")
+    messages = ReadOnly(QJSValue, read="_get_messages")
+    stale = ReadOnly(bool, True)
+    frequency = ReadOnly(float, 0.0, tolerance=0.01)
+    dropped = ReadOnly(int, 0)
+
+    _HOLDS = ("_topics", "_subscriptions", "_samples", "_value")
+    _endpoint: _Matcher | None
+    _stale: bool
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         super().__init__(parent, runtime)
-        self._topics, self._subscriptions = QJSValue(), QJSValue()
-        self._queue_size, self._slop, self._timeout = 10, 100.0, DEFAULT_TIMEOUT
-        self._headerless, self._enabled = False, True
         self._samples: list[Sample] | None = None
         self._value: QJSValue | None = None
-        self._matcher: _Matcher | None = None
-        self._have: tuple[Any, ...] | None = None
-        self._stale, self._frequency, self._dropped = True, 0.0, 0
-        #: Seconds that the set was kept back on its way; whether the connection was lost since.
+        #: When the set was shown, and the seconds that it was delayed before.
         self._shown_at = self._late = 0.0
-        self._suspect = False
+        #: Whether the connection was lost since.
+        self._outdated = False
         self._times: deque[float] = deque(maxlen=_MARKS)
-        self._retry = QtCore.QTimer(self)
-        self._retry.setSingleShot(True)
-        self._retry.timeout.connect(self._attach)
-
-    # Properties.
-
-    def _set_topics(self, topics: QJSValue) -> None:
-        self._topics = topics
-        self.topicsChanged.emit()
-        self._schedule()
-
-    def _set_subscriptions(self, subscriptions: QJSValue) -> None:
-        self._subscriptions = subscriptions
-        self.subscriptionsChanged.emit()
-        self._schedule()
-
-    def _set_queue_size(self, size: int) -> None:
-        if not 1 <= size <= 10_000:
-            self._refuse(f"SynchronizedSubscription: queueSize {size} is not from 1 to 10000")
-        elif size != self._queue_size:
-            self._queue_size = size
-            self.queueSizeChanged.emit()
-            self._schedule()
-
-    def _set_slop(self, slop: float) -> None:
-        if not 0 <= slop <= _MAX_SLOP:
-            self._refuse(f"SynchronizedSubscription: slop {slop:g} ms is not from 0 to {_MAX_SLOP}")
-        elif slop != self._slop:
-            self._slop = slop
-            self.slopChanged.emit()
-            self._schedule()
-
-    def _set_headerless(self, allowed: bool) -> None:
-        if allowed != self._headerless:
-            self._headerless = allowed
-            self.allowHeaderlessChanged.emit()
-            self._schedule()
-
-    def _set_enabled(self, enabled: bool) -> None:
-        if enabled != self._enabled:
-            self._enabled = enabled
-            self.enabledChanged.emit()
-            self._schedule()
-
-    def _set_timeout(self, timeout: int) -> None:
-        if timeout < 0:
-            self._refuse(f"SynchronizedSubscription: timeout {timeout} ms is negative")
-        elif timeout != self._timeout:
-            self._timeout = timeout
-            self.timeoutChanged.emit()
 
     def _get_messages(self) -> QJSValue:
         if self._value is None:
             self._value = self._build()
         return self._value
 
-    topics = Property(QJSValue, lambda self: self._topics, _set_topics, notify=topicsChanged)
-    subscriptions = Property(
-        QJSValue, lambda self: self._subscriptions, _set_subscriptions, notify=subscriptionsChanged
-    )
-    queueSize = Property(
-        int, lambda self: self._queue_size, _set_queue_size, notify=queueSizeChanged
-    )
-    slop = Property(float, lambda self: self._slop, _set_slop, notify=slopChanged)
-    allowHeaderless = Property(
-        bool, lambda self: self._headerless, _set_headerless, notify=allowHeaderlessChanged
-    )
-    enabled = Property(bool, lambda self: self._enabled, _set_enabled, notify=enabledChanged)
-    timeout = Property(int, lambda self: self._timeout, _set_timeout, notify=timeoutChanged)
-    messages = Property(QJSValue, _get_messages, notify=messagesChanged)
-    stale = Property(bool, lambda self: self._stale, notify=staleChanged)
-    frequency = Property(float, lambda self: self._frequency, notify=frequencyChanged)
-    dropped = Property(int, lambda self: self._dropped, notify=droppedChanged)
-    problem = Property(str, lambda self: self._problem, notify=problemChanged)
-
     # Subscribing.
 
-    def _wanted(self, node: Node) -> tuple[tuple[str, str, QoS], ...]:
+    def _sources(self, node: Node) -> tuple[tuple[str, str, QoS], ...]:
         """Return topic, type and profile of each; nothing while one of them has no topic yet.
 
         Raises:
             Error: They are not what they must be.
         """
-        given = [*_items(self._topics, "topics"), *_items(self._subscriptions, "subscriptions")]
+        given = [*_items(self.topics, "topics"), *_items(self.subscriptions, "subscriptions")]
         found = []
         for at, item in enumerate(given):
             item_object = item.toQObject() if item.isQObject() else None
@@ -295,76 +227,48 @@ class SynchronizedSubscription(Element):
             raise ConversionError("topics", found[0][0], "at least two of them")
         return tuple(found)
 
-    def _update(self) -> None:
+    def _wanted(self) -> tuple[Any, ...] | None:
         node = self.node
-        want = None
-        if node is not None and self._enabled:
-            try:
-                wanted = self._wanted(node)
-                slop = round(self._slop * 1e6)
-                if wanted:
-                    want = (node, wanted, self._queue_size, slop, self._headerless)
-            except Error as error:
-                self._say(f"SynchronizedSubscription: {error}")
-        if want == self._have:
-            return
-        self._detach()
-        self._have = want
-        self._attach()
+        if node is None or not self.enabled:
+            return None
+        try:
+            sources = self._sources(node)
+        except Error as error:
+            self._set_problem(f"{self.label}: {error}")
+            return None
+        slop_ns = round(self.slop * 1e6)
+        return (node, sources, self.queueSize, slop_ns, self.allowHeaderless) if sources else None
 
-    @Slot()
-    def _attach(self) -> None:
-        session, want = self._session, self._have
-        if session is None or want is None or self._matcher is not None:
-            return
+    def _factory(self, *wanted: Any) -> Callable[[], _Matcher]:
+        node, sources, size, slop_ns, headerless = wanted
+        on_sets, executor = self._on_sets, self._executor
+        return lambda: _Matcher(node, sources, size, slop_ns, headerless, on_sets, executor)
 
-        def done(result: _Matcher | Error) -> None:
-            if isinstance(result, Error):
-                self._say(f"SynchronizedSubscription: {result}")
-                if isinstance(result, TypeNotFoundError):
-                    self._retry.start(RETRY)
-            else:
-                self._matcher = result
-                self._at_end["matcher"] = lambda: session.background(result.close)
-                self._say("")
-                self._on_arrival(result)
+    def _on_created(self, endpoint: _Matcher) -> None:
+        self._set_problem("")
+        self._on_sets(endpoint)
 
-        arrived, executor = self._on_arrival, session.executor
-        node, wanted, size, slop, headerless = want
-        self._make(
-            lambda: _Matcher(node, wanted, size, slop, headerless, arrived, executor),
-            lambda: self._have is want,
-            done,
-        )
-
-    def _detach(self) -> None:
-        self._retry.stop()
-        self._matcher = None
+    def _on_closed(self, endpoint: _Matcher | None) -> None:  # noqa: ARG002 - the base's signature
         self._times.clear()
-        end = self._at_end.pop("matcher", None)
-        if end is not None:
-            end()
 
     # Receiving.
 
-    def _on_arrival(self, matcher: _Matcher) -> None:
-        if is_alive(self) and matcher is self._matcher:
-            self._deliver(matcher, matcher.take())
-
-    def _deliver(self, matcher: _Matcher, sets: list[list[Sample]]) -> None:
-        for samples in sets:
+    def _on_sets(self, matcher: _Matcher) -> None:
+        if not is_alive(self) or matcher is not self._endpoint:
+            return
+        for samples in matcher.take():
             self._samples, self._value = samples, None
             note_time(self._times, time.monotonic())
             self._shown_at = self._steady()
-            self._late, self._suspect = matcher.lateness(samples), False
+            self._late, self._outdated = matcher.lateness(samples), False
             was_stale, self._stale = self._stale, self._is_old()
             self.messagesChanged.emit()
-            if not is_alive(self) or matcher is not self._matcher:
+            if not is_alive(self) or matcher is not self._endpoint:
                 return
             if was_stale != self._stale:
                 self.staleChanged.emit()
             self.newMessages.emit(self._get_messages())
-            if not is_alive(self) or matcher is not self._matcher:
+            if not is_alive(self) or matcher is not self._endpoint:
                 return
 
     def _build(self) -> QJSValue:
@@ -381,41 +285,30 @@ class SynchronizedSubscription(Element):
 
     @Slot()
     def _on_connection(self) -> None:
-        self._judge()
+        self._update_stale()
 
     @Slot()
     def _on_tick(self) -> None:
-        if not self._subscriptions.isUndefined():
+        if not self.subscriptions.isUndefined():
             # Their topics, types and profiles may have changed.
             self._update()
-        self._judge()
-        matcher, session = self._matcher, self._session
-        frequency = rate_of(self._times, time.monotonic())
-        if changed_enough(self._frequency, frequency):
-            self._frequency = frequency
-            self.frequencyChanged.emit()
+        self._update_stale()
+        report(self, frequency=rate_of(self._times, time.monotonic()))
+        matcher, session = self._endpoint, self._session
         if matcher is None or session is None:
             return
         mixing = (session.mixing(one.topic) for one in matcher.subscriptions)
-        self._say(matcher.problem or next(filter(None, mixing), ""))
-        if matcher.dropped != self._dropped:
-            self._dropped = matcher.dropped
-            self.droppedChanged.emit()
+        self._set_problem(matcher.problem or next(filter(None, mixing), ""))
+        report(self, dropped=matcher.dropped)
 
     def _is_old(self) -> bool:
         age = self._steady() - self._shown_at + self._late if self._times else math.inf
-        return math.isinf(age) or (self._timeout > 0 and age > self._timeout / 1000)
+        return math.isinf(age) or (self.timeout > 0 and age > self.timeout / 1000)
 
-    def _judge(self) -> None:
+    def _update_stale(self) -> None:
         if self._session is None or self._session.state != "connected":
-            self._suspect = True
-        stale = self._suspect or self._is_old()
-        if stale != self._stale:
-            self._stale = stale
-            self.staleChanged.emit()
-
-    def _problem_changed(self) -> None:
-        self.problemChanged.emit()
+            self._outdated = True
+        report(self, stale=self._outdated or self._is_old())
 
 
 def _items(value: QJSValue, name: str) -> list[QJSValue]:

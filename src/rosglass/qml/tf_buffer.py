@@ -1,43 +1,384 @@
-"""``TfBuffer``: the transforms below one namespace; ``TfTransformListener``: the robot's own."""
-# ruff: noqa: N815 - the names of signals are QML's
+"""``TfBuffer``: the transforms below one namespace; ``TfTransformListener``: those of the robot."""
+# ruff: noqa: N802, N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import logging
+from concurrent.futures import CancelledError
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rosglass.errors import Error
+from rosglass.comm.time import Time
+from rosglass.errors import ConversionError, Error, TransformException
 from rosglass.qml.dialect import Dialect
-from rosglass.qml.tf_queries import TfQueries
-from rosglass.qt import Property, Signal, Slot, is_alive
+from rosglass.qml.element import Element
+from rosglass.qml.properties import Writable
+from rosglass.qml.times import time_from_js
+from rosglass.qml.waiting import wait_for
+from rosglass.qt import QJSValue, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rosglass.comm.handle import Handle
     from rosglass.comm.node import Node
+    from rosglass.comm.promise import Promise
     from rosglass.qml.runtime import Runtime
-    from rosglass.qt import QtCore
+    from rosglass.qml.session import Session
+    from rosglass.tf import FrameInfo, Transform, TransformBuffer, TransformListener
 
-__all__ = ["RosTfBuffer", "RosTfTransformListener", "TfBuffer", "TfTransformListener"]
+__all__ = [
+    "RosTfBuffer",
+    "RosTfTransformListener",
+    "TfBuffer",
+    "TfLink",
+    "TfTransformListener",
+    "shown_transform",
+]
+
+_log = logging.getLogger("rosglass.qml")
+_USAGE = "(target, source, time, timeout) or (target, time, source, time, fixedFrame, timeout)"
 
 
-class _Listening(TfQueries):
+def _checked_namespace(namespace: str) -> str:
+    from rosglass.comm.names import expand  # noqa: PLC0415 - not needed at start-up
+
+    namespace = namespace.rstrip("/")
+    if namespace:
+        try:
+            expand(namespace, "node", "/")
+        except Error as error:
+            raise Error(f"ns: {error}") from None
+    return namespace
+
+
+class TfLink:
+    """The transforms of one namespace, received while elements use them; on the GUI thread only.
+
+    Attributes:
+        buffer: The transforms.
+    """
+
+    def __init__(self, session: Session, node: Node, namespace: str) -> None:
+        self._session, self._key = session, (type(self), node, namespace)
+        self._users: set[Any] = set()
+        self._listener: TransformListener | None = None
+        self._closed = False
+        from rosglass.tf import TransformBuffer  # noqa: PLC0415 - brings in the transforms
+
+        self.buffer = TransformBuffer()
+        self._topic, self._failure = "", ""
+
+        def work() -> None:
+            from rosglass.tf import TransformListener  # noqa: PLC0415 - loaded with the buffer
+
+            # Here and not on the GUI thread: who shuts it may be next on this one.
+            self._listener = TransformListener(node, self.buffer, namespace)
+
+        session.background(work, self._opened)
+
+    @property
+    def problem(self) -> str:
+        """Why they are not received, or mixed with another robot's; empty when all is well."""
+        return self._failure or self._session.mixing(self._topic)
+
+    @classmethod
+    def join(cls, session: Session, node: Node, namespace: str, user: Any) -> TfLink:
+        """Return the link of a namespace, with `user` among those that keep it open."""
+        key = (cls, node, namespace)
+        link = session.shared.get(key)
+        if link is None:
+            link = session.shared[key] = cls(session, node, namespace)
+        made: TfLink = link
+        made._users.add(user)
+        return made
+
+    def leave(self, user: Any) -> None:
+        """Let go of it; the last one who does ends it."""
+        self._users.discard(user)
+        if not self._users and not self._closed:
+            self._closed = True
+            self._session.shared.pop(self._key, None)
+            self._session.background(self._shut)
+
+    def _opened(self, result: Error | None) -> None:
+        if result is not None:
+            self._failure = str(result)
+            _log.warning("transforms are not received: %s", result)
+        elif self._listener is not None:
+            # Not the static ones: nodes of one name may well send each its own.
+            self._topic = self._listener.subscriptions[0].topic
+
+    def _shut(self) -> None:
+        if self._listener is not None:
+            self._listener.close()
+        self.buffer.close()
+
+
+class _Watches(NamedTuple):
+    """A link to transforms, and the callbacks registered with its buffer."""
+
+    link: TfLink
+    watches: list[Handle]
+
+
+class _Queries(Element):
+    """Looks up transforms in a buffer that receives from the session's node."""
+
+    _endpoint: _Watches | None
+
+    @property
+    def buffer(self) -> TransformBuffer | None:
+        """The transforms; None while there is no node."""
+        if self._endpoint is None:
+            # A caller need not wait for the event loop after mentioning it.
+            self._run_update()
+        return self._endpoint.link.buffer if self._endpoint is not None else None
+
+    # Transforms.
+
+    @Slot(QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
+    def canTransform(self, *given: QJSValue) -> QJSValue:
+        """Return true when a transform can be looked up, otherwise why not, as a text.
+
+        Arguments are those of :meth:`lookUpTransform`.
+        """
+        runtime = self._find_runtime()
+        result = self._look_up("canTransform", given)
+        if runtime is None or isinstance(result, str):
+            return QJSValue()
+        return runtime.value(result.why if isinstance(result, _Missing) else True)
+
+    @Slot(QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
+    def lookUpTransform(self, *given: QJSValue) -> QJSValue:
+        """Return where a frame is, seen from another.
+
+        Arguments are target and source frame, and optionally the time (newest when left out) and
+        milliseconds to wait; or target frame, its time, source frame, its time, a frame that does
+        not move in between, and optionally milliseconds to wait. The interface lives on while it
+        waits.
+
+        Returns:
+            A ``geometry_msgs/TransformStamped`` with ``valid``; when that is false, also with
+            ``exception`` and ``message``.
+        """
+        runtime = self._find_runtime()
+        result = self._look_up("lookUpTransform", given)
+        if runtime is None or isinstance(result, str):
+            return QJSValue()
+        if isinstance(result, _Missing):
+            return shown_transform(runtime, result.frames, result.exception, result.why, self)
+        return shown_transform(runtime, result, "", "", self)
+
+    def _look_up(self, what: str, given: Sequence[QJSValue]) -> Transform | _Missing | str:
+        """Return the transform, or what is missing, or an empty text after a thrown error."""
+        runtime = self._find_runtime()
+        if runtime is None:
+            return ""
+        try:
+            query = _Query(given)
+        except Error as error:
+            runtime.throw(f"{what}: {error}")
+            return ""
+        buffer = self.buffer
+        if buffer is None:
+            return _Missing(query.frames, "Uninitialized", "there is no node yet")
+        try:
+            if not query.timeout:
+                return query.look_up(buffer)
+            promise = query.promise(buffer)
+            session = runtime.session
+
+            def begin(end: Callable[[], None]) -> None:
+                promise.on_done(lambda _: end(), session.executor)
+
+            wait_for(session, begin)
+            promise.cancel()
+            return promise.result(0)
+        except TransformException as error:
+            return _Missing(query.frames, type(error).__name__, str(error))
+        except (CancelledError, Error) as error:
+            return _Missing(query.frames, "TransformException", str(error) or "given up")
+
+    # The tree.
+
+    @Slot(str, result=str)
+    def getFrameAuthority(self, frame: str) -> str:
+        """Return the node that publishes a frame; empty when there is no such frame."""
+        info = self._frame(frame)
+        return (
+            "" if info is None else info.authority or ("unknown_publisher" if info.parent else "")
+        )
+
+    @Slot(str, result=QJSValue)
+    def getFrame(self, frame: str) -> QJSValue:
+        """Return what is known of a frame; undefined when there is no such frame."""
+        buffer, info, runtime = self.buffer, self._frame(frame), self._find_runtime()
+        if buffer is None or info is None or runtime is None:
+            return QJSValue()
+        return runtime.value(_described(buffer, info))
+
+    @Slot(result=QJSValue)
+    def getAllFrames(self) -> QJSValue:
+        """Return what is known of every frame."""
+        buffer, runtime = self.buffer, self._find_runtime()
+        if buffer is None or runtime is None:
+            return QJSValue()
+        tree = buffer.tree()
+        return runtime.value([_described(buffer, tree[name]) for name in sorted(tree)])
+
+    @Slot(str, result=float)
+    def getTransformAge(self, frame: str) -> float:
+        """Return the seconds since a frame's newest transform, by its stamp; -1 when unknown."""
+        info, node = self._frame(frame), self.node
+        if info is None or node is None or info.static:
+            return -1.0
+        age = info.age(node.now())
+        return -1.0 if age is None else age.seconds
+
+    @Slot(str, str, result="QStringList")
+    def getChain(self, target: str, source: str) -> list[str]:
+        """Return the frames from source to target, both included; empty when nothing joins them."""
+        buffer = self.buffer
+        try:
+            return [] if buffer is None else buffer.tree().chain(target, source)
+        except TransformException:
+            return []
+
+    def _frame(self, name: str) -> FrameInfo | None:
+        buffer = self.buffer
+        return None if buffer is None else buffer.frame(name)
+
+
+class _Missing:
+    """A transform that cannot be had, and why: tf2's exception and its text."""
+
+    def __init__(self, frames: Transform, exception: str, why: str) -> None:
+        self.frames, self.exception, self.why = frames, exception, why
+
+
+class _Query:
+    """The arguments of a lookup.
+
+    Raises:
+        ConversionError: They are not what they should be.
+    """
+
+    def __init__(self, given: Sequence[QJSValue]) -> None:
+        from rosglass.tf import Transform  # noqa: PLC0415 - not needed at start-up
+
+        self.full = len(given) > 4
+        places = (0, 2, 4) if self.full else (0, 1)
+        if not all(given[place].isString() for place in places):
+            raise ConversionError("", "other arguments", _USAGE)
+        self.target, self.source, *fixed = (given[place].toString() for place in places)
+        self.fixed = fixed[0] if fixed else ""
+        when = [
+            _time(given[place]) for place in ((1, 3) if self.full else (2,)) if place < len(given)
+        ]
+        self.target_time = when[0] if self.full else Time()
+        self.time = when[-1] if when else Time()
+        last = 5 if self.full else 3
+        milliseconds = given[last].toNumber() if len(given) > last else 0.0
+        if not milliseconds >= 0:
+            raise ConversionError("timeout", milliseconds, "milliseconds from 0 on")
+        #: Seconds to wait.
+        self.timeout = milliseconds / 1000
+        #: The frames that are asked for.
+        self.frames = Transform(frame_id=self.target, child_frame_id=self.source)
+
+    def look_up(self, buffer: TransformBuffer) -> Transform:
+        """Return the transform, or raise one of tf2's exceptions."""
+        if self.full:
+            return buffer.lookup_transform_full(
+                self.target, self.target_time, self.source, self.time, self.fixed
+            )
+        return buffer.lookup_transform(self.target, self.source, self.time)
+
+    def promise(self, buffer: TransformBuffer) -> Promise[Transform]:
+        """Return the promise of the transform within the time."""
+        if self.full:
+            return buffer.lookup_transform_full_async(
+                self.target,
+                self.target_time,
+                self.source,
+                self.time,
+                self.fixed,
+                timeout=self.timeout,
+            )
+        return buffer.lookup_transform_async(
+            self.target, self.source, self.time, timeout=self.timeout
+        )
+
+
+def _time(value: QJSValue) -> Time:
+    """Return a time; zero, which means the newest, for an invalid Date, undefined and null."""
+    if value.isUndefined() or value.isNull():
+        return Time()
+    if value.isDate() and value.property("getTime").callWithInstance(value).toString() == "NaN":
+        return Time()
+    return time_from_js(value)
+
+
+def shown_transform(
+    runtime: Runtime, transform: Transform, exception: str, why: str, element: Element
+) -> QJSValue:
+    """Return a transform as QML gets it.
+
+    Args:
+        runtime: The engine's runtime.
+        transform: The transform; of one that is not valid, only its frames count.
+        exception: Name of tf2's exception; empty for a valid transform.
+        why: Its text.
+        element: Whose habits are followed.
+    """
+    from rosglass.messages import load  # noqa: PLC0415 - brings in the definitions
+
+    kind: Any = load("geometry_msgs/msg/TransformStamped", ros=2)
+    value = runtime.message(kind.create(transform.to_dict(2)), element.DIALECT)
+    value.setProperty("valid", runtime.value(not exception))
+    if exception:
+        value.setProperty("exception", QJSValue(exception))
+        value.setProperty("message", QJSValue(why))
+    return value
+
+
+def _described(buffer: TransformBuffer, info: FrameInfo) -> dict[str, Any]:
+    from rosglass.tf import Transform  # noqa: PLC0415 - loaded by now
+
+    placed = Transform()
+    if info.parent:
+        with suppress(TransformException):
+            placed = buffer.lookup_transform(info.parent, info.name)
+    return {
+        "frameId": info.name,
+        "parentId": info.parent,
+        "authority": info.authority,
+        "translation": dict(zip("xyz", placed.translation, strict=True)),
+        "rotation": dict(zip("xyzw", placed.rotation, strict=True)),
+        "isStatic": info.static,
+        "children": sorted(buffer.tree().children(info.name)),
+        "frequency": info.rate,
+    }
+
+
+class _Listening(_Queries):
     """Receives transforms for as long as it exists."""
 
-    #: Transforms came; many that come at once are told once.
+    #: Transforms were received; several that arrive together are announced once.
     transformChanged = Signal()
-    #: Frames came, went, or have another parent.
+    #: Frames appeared, disappeared, or have another parent.
     framesChanged = Signal()
     #: The buffer is another one, or there is none any more.
     bufferChanged = Signal()
-    problemChanged = Signal()
-
-    _HOLDS = ("_link", "_have")
-
-    def __init__(
-        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
-    ) -> None:
-        super().__init__(parent, runtime)
-        self._have: tuple[Node, str] | None = None
-
-    problem = Property(str, lambda self: self._problem, notify=problemChanged)
 
     @Slot()
     def clear(self) -> None:
@@ -50,35 +391,32 @@ class _Listening(TfQueries):
     def _namespace(self) -> str:
         return "/"
 
-    def _update(self) -> None:
-        node, session = self.node, self._session
-        want = None if node is None else (node, self._namespace())
-        if want == self._have or session is None:
-            return
-        self._leave()
-        self._have = want
-        if want is not None:
-            from rosglass.qml.tf_link import TfLink  # noqa: PLC0415 - brings in the transforms
+    def _wanted(self) -> tuple[Node, str] | None:
+        node = self.node
+        return None if node is None else (node, self._namespace())
 
-            link = self._link = TfLink.join(session, want[0], want[1], self)
-            watches = [
-                link.buffer.on_update(self._on_update, session.executor),
-                link.buffer.on_tree_change(self._on_tree, session.executor),
-            ]
+    def _create_endpoint(self, wanted: tuple[Any, ...]) -> None:
+        session = self._session
+        assert session is not None
+        node, namespace = wanted
+        link = TfLink.join(session, node, namespace, self)
+        watches = [
+            link.buffer.on_update(self._on_update, session.executor),
+            link.buffer.on_tree_change(self._on_tree, session.executor),
+        ]
+        self._set_endpoint(_Watches(link, watches))
 
-            def end() -> None:
-                for watch in watches:
-                    watch.close()
-                link.leave(self)
+    def _dispose(self, session: Session, endpoint: _Watches) -> None:  # noqa: ARG002
+        for watch in endpoint.watches:
+            watch.close()
+        endpoint.link.leave(self)
 
-            self._at_end["link"] = end
+    def _on_created(self, endpoint: _Watches) -> None:  # noqa: ARG002 - the base's signature
         self.bufferChanged.emit()
 
-    def _leave(self) -> None:
-        self._link = None
-        end = self._at_end.pop("link", None)
-        if end is not None:
-            end()
+    def _on_closed(self, endpoint: _Watches | None) -> None:  # noqa: ARG002 - as above
+        if self.node is None:
+            self.bufferChanged.emit()
 
     def _on_update(self) -> None:
         if is_alive(self):
@@ -90,10 +428,7 @@ class _Listening(TfQueries):
 
     @Slot()
     def _on_tick(self) -> None:
-        self._say(self._link.problem if self._link is not None else "")
-
-    def _problem_changed(self) -> None:
-        self.problemChanged.emit()
+        self._set_problem(self._endpoint.link.problem if self._endpoint is not None else "")
 
 
 class TfTransformListener(_Listening):
@@ -107,34 +442,10 @@ class TfTransformListener(_Listening):
 class TfBuffer(_Listening):
     """Transforms below one namespace, apart from all others. See its page in ``docs/elements``."""
 
-    nsChanged = Signal()
-
-    def __init__(
-        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
-    ) -> None:
-        super().__init__(parent, runtime)
-        self._ns = ""
+    ns = Writable(str, "", _checked_namespace)
 
     def _namespace(self) -> str:
-        return self._ns or "/"
-
-    def _set_ns(self, namespace: str) -> None:
-        from rosglass.comm.names import expand  # noqa: PLC0415 - not needed at start-up
-
-        namespace = namespace.rstrip("/")
-        if namespace == self._ns:
-            return
-        try:
-            if namespace:
-                expand(namespace, "node", "/")
-        except Error as error:
-            self._refuse(f"TfBuffer: ns: {error}")
-            return
-        self._ns = namespace
-        self.nsChanged.emit()
-        self._schedule()
-
-    ns = Property(str, lambda self: self._ns, _set_ns, notify=nsChanged)
+        return self.ns or "/"
 
 
 class RosTfTransformListener(TfTransformListener):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from rosglass.qml.session import Session
-    from rosglass.qml.tf_link import TfLink
+    from rosglass.qml.tf_buffer import TfLink
     from rosglass.rviz.registered_properties import RegisteredProperties
 
 __all__ = [
@@ -316,7 +316,7 @@ class Sources:
             self.close()
             self._linked = node
             if node is not None:
-                from rosglass.qml.tf_link import TfLink  # noqa: PLC0415 - brings in the transforms
+                from rosglass.qml.tf_buffer import TfLink  # noqa: PLC0415 - brings in the transforms
 
                 self._link = TfLink.join(self._session, node, "/", self)
 

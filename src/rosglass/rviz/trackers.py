@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error, LookupException, TransformException
-from rosglass.qml.element import DEFAULT_TIMEOUT
-from rosglass.qml.tf_link import TfLink
+from rosglass.qml.element import DEFAULT_TIMEOUT_MS
+from rosglass.qml.tf_buffer import TfLink
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, Signal, is_alive
 from rosglass.rviz.camera import Camera
 from rosglass.rviz.face import VARIANT, errors_to_js, point_of, to_python
@@ -145,7 +145,7 @@ class Frames(QtCore.QObject):
 #: Units and metres below which a change is none.
 _THRESHOLD = 0.01
 #: Seconds without a newer transform after which a frame that has moved is told to be old.
-_OLD = DEFAULT_TIMEOUT / 1000
+_OLD = DEFAULT_TIMEOUT_MS / 1000
 _NAN = (math.nan, math.nan, math.nan)
 
 

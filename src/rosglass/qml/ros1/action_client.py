@@ -7,14 +7,15 @@ import logging
 from typing import TYPE_CHECKING
 
 from rosglass.qml.action_client import GoalSender
+from rosglass.qml.action_server import action_type
 from rosglass.qml.callbacks import call_back
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.goal_handle import GoalCallbacks
 from rosglass.qml.js_values import null
 from rosglass.qml.log import log_from_qml
-from rosglass.qml.ros1.action_server import action_type
+from rosglass.qml.properties import ReadOnly, report
 from rosglass.qml.ros1.goal_handle import RosGoalHandle
-from rosglass.qt import Property, QJSValue, Signal, Slot
+from rosglass.qt import Property, QJSValue, Slot
 
 if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
@@ -34,22 +35,21 @@ class RosActionClient(GoalSender):
     DIALECT = Dialect.ROS1
     _HANDLE = RosGoalHandle
 
-    connectedChanged = Signal()
-    problemChanged = Signal()
+    connected = ReadOnly(bool, False)
+    name = Property(str, lambda self: self._name, constant=True)
+    actionType = Property(str, lambda self: self._given_type, constant=True)
 
     def __init__(self, runtime: Runtime, name: str, type_name: str) -> None:
         super().__init__(runtime, name, action_type(type_name))
         self._given_type = type_name
 
-    connected = Property(bool, lambda self: self._ready, notify=connectedChanged)
-    name = Property(str, lambda self: self._name, constant=True)
-    actionType = Property(str, lambda self: self._given_type, constant=True)
-    problem = Property(str, lambda self: self._problem, notify=problemChanged)
+    def _set_ready(self, ready: bool) -> None:
+        report(self, connected=ready)
 
     @Slot(result=bool)
     def isServerConnected(self) -> bool:
         """Return whether a server is there."""
-        return self._ready
+        return self.connected
 
     @Slot(QJSValue, result=QJSValue)
     @Slot(QJSValue, QJSValue, result=QJSValue)
@@ -71,7 +71,7 @@ class RosActionClient(GoalSender):
         assert runtime is not None
         if not self._check_functions({"transition_cb": transition, "feedback_cb": feedback}):
             return QJSValue()
-        if not self._ready:
+        if not self.connected:
             text = f"action {self._name}: no goal was sent: {self._problem or self._missing()}"
             log_from_qml("", logging.WARNING, text, runtime.caller())
             return null()
@@ -92,9 +92,3 @@ class RosActionClient(GoalSender):
     def cancelGoalsAtAndBeforeTime(self, time: QJSValue) -> None:
         """Ask the server to cancel the goals sent at or before a time, or Date."""
         self._cancel_until(time)
-
-    def _ready_changed(self) -> None:
-        self.connectedChanged.emit()
-
-    def _problem_changed(self) -> None:
-        self.problemChanged.emit()

@@ -8,21 +8,18 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm.qos import History
 from rosglass.errors import Error, InvalidNameError
-from rosglass.qml.action_server import server_functions
-from rosglass.qml.dialect import Dialect
+from rosglass.qml.action_server import RosActionServer, server_functions
+from rosglass.qml.dialect import Dialect, within_namespace
 from rosglass.qml.graph import GraphSingleton
 from rosglass.qml.log import Caller, log_from_qml
 from rosglass.qml.message_waiting import next_message
-from rosglass.qml.ros1.action_server import RosActionServer
+from rosglass.qml.profiles import queue_from_js
+from rosglass.qml.publisher import RosPublisher
 from rosglass.qml.ros1.console import Console, InitOptions, short_logger
-from rosglass.qml.ros1.namespaces import queue_from_js, within
 from rosglass.qml.ros1.package import Package
-from rosglass.qml.ros1.publisher import RosPublisher
-from rosglass.qml.ros1.service_server import RosServiceServer
-from rosglass.qml.ros1.subscriber import Subscriber
-from rosglass.qml.service_server import server_function
+from rosglass.qml.service_server import RosServiceServer, server_function
 from rosglass.qml.singleton import check_type, is_list, strings
-from rosglass.qml.subscription import DEFAULT_QOS
+from rosglass.qml.subscription import DEFAULT_QOS, Subscriber
 from rosglass.qml.value_functions import ValueFunctions
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
 
@@ -114,7 +111,7 @@ class Ros(ValueFunctions, GraphSingleton):
             qos = queue_from_js(rest[0], DEFAULT_QOS)
             size = 0 if qos.history is History.KEEP_ALL else qos.depth
             check_type(type_name, topic)
-            topic = within(namespace, topic)
+            topic = within_namespace(namespace, topic)
             self._check_topic(topic)
         except Error as error:
             self._runtime.throw(f"Ros.advertise: {error}")
@@ -131,7 +128,7 @@ class Ros(ValueFunctions, GraphSingleton):
                 raise InvalidNameError("write Ros.subscribe([ns,] topic, queueSize)")
             names = [value.toString() for value in given[:-1]]
             namespace = names[0] if len(names) > 1 else ""
-            self._check_topic(within(namespace, names[-1]))
+            self._check_topic(within_namespace(namespace, names[-1]))
             qos = queue_from_js(given[-1], DEFAULT_QOS)
         except Error as error:
             self._runtime.throw(f"Ros.subscribe: {error}")
@@ -184,7 +181,7 @@ class Ros(ValueFunctions, GraphSingleton):
             if len(texts) != len(given) or not texts[-2] or not texts[-1]:
                 raise InvalidNameError("write Ros.createActionClient([ns,] type, name)")
             check_type(texts[-2], texts[-1])
-            name = within(texts[0] if len(texts) > 2 else "", texts[-1])
+            name = within_namespace(texts[0] if len(texts) > 2 else "", texts[-1])
             self._check_topic(name)
         except Error as error:
             self._runtime.throw(f"Ros.createActionClient: {error}")
