@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import gc
 import threading
+from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from rosglass.comm.handle import Handle
+from rosglass.qml import Session
+from rosglass.qml.element import Element
 from rosglass.qml.parameter_link import ParameterLink
 from rosglass.tf import TransformBuffer
 
@@ -71,7 +75,7 @@ def test_transforms_are_not_followed_any_more(
 def test_who_leaves_at_once_leaves_no_listener(
     running: Bench, wait: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass.qml.tf_link import TfLink
+    from rosglass.qml.tf_buffer import TfLink
 
     told: list[str] = []
 
@@ -134,3 +138,45 @@ def test_a_question_on_its_way_holds_nothing_up(bench: Bench, wait: Any) -> None
     client.go.set()
     wait(lambda: client.closed_in is not None)
     assert client.closed_in is not threading.main_thread()
+
+
+def reachable(root: object) -> list[object]:
+    """Return what an object keeps alive, apart from the session and globals of functions."""
+    found: dict[int, object] = {}
+    waiting = [root]
+    while waiting:
+        one = waiting.pop()
+        if id(one) in found or isinstance(one, (ModuleType, type, Session)):
+            continue
+        found[id(one)] = one
+        if isinstance(one, FunctionType):
+            waiting += [one.__closure__, one.__defaults__, one.__kwdefaults__]
+        else:
+            waiting += gc.get_referents(one)
+    return list(found.values())
+
+
+def test_the_node_keeps_no_elements(running: Bench, wait: Any) -> None:
+    """Its threads would drop them, and PySide crash if the GUI thread deletes them just then."""
+    running.robot.create_publisher("/chat", "std_msgs/msg/String")
+    root: Any = running.load("""
+        QtObject {
+            property Subscription sub: Subscription { topic: "/chat" }
+            property var both: SynchronizedSubscription { topics: ["/chat", "/chatter"] }
+            property var server: ServiceServer {
+                name: "/s"; serviceType: "std_srvs/Trigger"; handler: function () {}
+            }
+            property var actions: ActionServer {
+                name: "/a"; actionType: "example_interfaces/Fibonacci"; execute: function () {}
+            }
+            property var client: Ros2.createServiceClient("/s", "std_srvs/Trigger")
+            property TfBuffer buffer: TfBuffer { }
+            property TfTransform tf: TfTransform { sourceFrame: "a"; targetFrame: "b" }
+            function ready() {
+                return sub.subscribed && server.ready && actions.ready && client.ready
+            }
+        }
+    """)
+    wait(root.ready)
+    wait.nothing_happens(0.2)
+    assert [one for one in reachable(running.session.node) if isinstance(one, Element)] == []

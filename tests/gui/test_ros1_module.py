@@ -185,7 +185,7 @@ def test_waiting_for_a_message(up: Bench, wait: Any) -> None:
         }
     """)
     wait(lambda: root.property("late") == "undefined")
-    wait(lambda: up.robot.subscriptions("/mode"))
+    wait(lambda: len(up.robot.subscriptions("/mode")) == 2)
     sender.publish(data="auto")
     wait(lambda: root.property("heard") == "auto" and root.property("promised") == "auto")
     wait(lambda: not up.robot.subscriptions("/mode"))

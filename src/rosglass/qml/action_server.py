@@ -44,6 +44,8 @@ class _Goals:
 
     def __init__(self, answers: Answers) -> None:
         self.answers = answers
+        #: What the node's callbacks know this by.
+        self.key = object()
         #: Goals received before the server was created here.
         self.early: list[Callable[[Server], object]] = []
         self.handles: dict[bytes, ServerGoalHandle] = {}
@@ -97,12 +99,16 @@ class ActionServer(Element):
         assert runtime is not None
         goals = self._goals = _Goals(Answers(runtime, f"execute of {self.label}"))
         self._cleanup["goals"] = goals.close
+        # What the node holds does not keep the goals, either: JavaScript has their handles.
+        key = goals.key
+        on_goal, accepts = self._weak(self._on_goal, Error(_GONE)), self._weak(self._accepts, False)
+        allows = self._weak(self._allows, True)
         return lambda: node.create_action_server(
             name,
             type_name,
-            lambda goal: self._on_goal(goals, goal),
-            accept=lambda goal: self._accepts(goals, goal),
-            cancel=lambda goal: self._allows(goals, goal),
+            lambda goal: on_goal(key, goal),
+            accept=lambda goal: accepts(key, goal),
+            cancel=lambda goal: allows(key, goal),
             executor=executor,
         )
 
@@ -123,9 +129,14 @@ class ActionServer(Element):
 
     # What the node asks, on the GUI thread.
 
-    def _accepts(self, goals: _Goals, goal: Message) -> bool:
+    def _goals_of(self, key: object) -> _Goals | None:
+        """Return the goals of the present server; None for those of an earlier one."""
+        goals = self._goals if is_alive(self) else None
+        return goals if goals is not None and goals.key is key else None
+
+    def _accepts(self, key: object, goal: Message) -> bool:
         runtime = self._runtime
-        if not is_alive(self) or self._goals is not goals or runtime is None:
+        if self._goals_of(key) is None or runtime is None:
             return False
         if not self.accept.isCallable():
             return True
@@ -134,16 +145,17 @@ class ActionServer(Element):
             _log.error("accept of %s returned neither true nor false: rejecting", self.label)
         return answer.isBool() and answer.toBool()
 
-    def _allows(self, goals: _Goals, goal: ServerGoal) -> bool:
-        runtime = self._runtime
-        handle = goals.handles.get(goal.id)
-        if not is_alive(self) or runtime is None or handle is None:
+    def _allows(self, key: object, goal: ServerGoal) -> bool:
+        runtime, goals = self._runtime, self._goals_of(key)
+        handle = goals.handles.get(goal.id) if goals is not None else None
+        if runtime is None or handle is None:
             return True
         answer = call_back(runtime, self.cancel, handle.js)
         return not answer.isBool() or answer.toBool()
 
-    def _on_goal(self, goals: _Goals, goal: ServerGoal) -> Any:
-        if not is_alive(self) or self._goals is not goals:
+    def _on_goal(self, key: object, goal: ServerGoal) -> Any:
+        goals = self._goals_of(key)
+        if goals is None:
             raise Error(_GONE)
         if self._endpoint is not None:
             return self._begin(goals, self._endpoint, goal)

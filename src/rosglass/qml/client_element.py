@@ -84,7 +84,7 @@ class ClientElement(Element):
             )
 
     def _on_created(self, endpoint: Any) -> None:
-        self._watch = endpoint.on_ready_change(self._on_ready, self._executor)
+        self._watch = endpoint.on_ready_change(self._weak(self._on_ready), self._executor)
         # A client that has just started to look for its server has not found it yet.
         self._set_problem(endpoint.problem, logging.DEBUG)
         QtCore.QTimer.singleShot(_SEARCH_MS, lambda: self._warn(endpoint))

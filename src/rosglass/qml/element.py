@@ -6,6 +6,7 @@ import logging
 import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, ClassVar
+from weakref import WeakMethod
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error, TypeNotFoundError
@@ -178,6 +179,28 @@ class Element(QtCore.QObject):
         if dispose is not None:
             dispose()
         self._on_closed(endpoint)
+
+    def _weak(self, method: Callable[..., Any], otherwise: Any = None) -> Callable[..., Any]:
+        """Return a callback that does not keep the element, for what other threads hold.
+
+        PySide crashes when a thread drops the last reference to an object that the GUI thread is
+        deleting.
+
+        Args:
+            method: One of this element's methods, called on the GUI thread.
+            otherwise: What the callback returns, or the error it raises, when the element is gone.
+        """
+        reference = WeakMethod(method)
+
+        def call(*arguments: Any) -> Any:
+            found = reference()
+            if found is not None:
+                return found(*arguments)
+            if isinstance(otherwise, Error):
+                raise otherwise
+            return otherwise
+
+        return call
 
     # -- the session -----------------------------------------------------------------------------
 

@@ -351,10 +351,10 @@ class RosPublisher(Publisher):
         return self.getSubscriptionCount()
 
     def _on_created(self, endpoint: Sender) -> None:
-        def on_matched(event: Matched) -> None:
-            if is_alive(self):
-                (self.connected if event.change > 0 else self.disconnected).emit()
-
         with suppress(UnsupportedError):  # a recording, which has no subscribers
-            endpoint.on_matched(on_matched, self._executor)
+            endpoint.on_matched(self._weak(self._on_matched), self._executor)
         super()._on_created(endpoint)
+
+    def _on_matched(self, event: Matched) -> None:
+        if is_alive(self):
+            (self.connected if event.change > 0 else self.disconnected).emit()

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["RosServiceServer", "ServiceServer", "server_function"]
 
+_GONE = "the interface that offered this service is gone"
+
 
 class ServiceServer(Element):
     """Offers a service while it is enabled. See its page in ``docs/elements``."""
@@ -65,9 +67,8 @@ class ServiceServer(Element):
         assert runtime is not None
         answers = self._answers = Answers(runtime, f"the handler of {self.label}")
         self._cleanup["answers"] = answers.give_up
-        return lambda: node.create_service_server(
-            name, type_name, self._on_request, executor=executor
-        )
+        on_request = self._weak(self._on_request, ServiceError(_GONE))
+        return lambda: node.create_service_server(name, type_name, on_request, executor=executor)
 
     def _on_created(self, endpoint: Server) -> None:
         self._set_problem(endpoint.problem)
@@ -84,7 +85,7 @@ class ServiceServer(Element):
 
     def _on_request(self, request: Message) -> Any:
         if not is_alive(self) or self._answers is None:
-            raise ServiceError("the interface that offered this service is gone")
+            raise ServiceError(_GONE)
         if self._endpoint is not None:
             return self._answer(request, self._endpoint, self._answers)
         # A client waited for the service, and called before the worker thread had returned it.

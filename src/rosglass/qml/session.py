@@ -145,6 +145,8 @@ class Session(QtCore.QObject):
         self._rosout: QmlRosout | None = None
         self._logger_level: int | None = None
         self._worker = Dispatcher("rosglass-qml")
+        #: What to call on the GUI thread with the results of background jobs.
+        self._done: dict[object, Callable[[Any], None]] = {}
         self._loaded: set[str] = set()
         self._ticking = 0
         self._ticker = QtCore.QTimer(self)
@@ -342,6 +344,10 @@ class Session(QtCore.QObject):
             work: What to do.
             done: Called on the GUI thread with the result, or with the error it raised.
         """
+        key = object()
+        if done is not None:
+            # Kept here: the worker thread must not hold, and drop last, what holds QML's objects.
+            self._done[key] = done
 
         def run() -> None:
             result: _T | Error
@@ -352,9 +358,8 @@ class Session(QtCore.QObject):
             except Exception as error:
                 _log.exception("a background job failed")
                 result = Error(f"internal error: {error}")
-            if done is not None:
-                finished = done
-                self.executor.post(lambda: finished(result))
+            if key in self._done:
+                self.executor.post(lambda: self._done.pop(key)(result))
 
         self._worker.post(run)
 

@@ -247,8 +247,8 @@ class Subscription(TopicElement):
         super()._create_endpoint(wanted)
 
     def _factory(self, node: Node, topic: str, type_name: str, qos: QoS) -> Callable[[], _Feed]:
-        executor = self._executor
-        return lambda: _Feed(node, topic, type_name, qos, executor, self._on_arrival)
+        executor, on_arrival = self._executor, self._weak(self._on_arrival)
+        return lambda: _Feed(node, topic, type_name, qos, executor, on_arrival)
 
     def _on_created(self, endpoint: _Feed) -> None:  # noqa: ARG002 - the base's signature
         self._set_problem("")

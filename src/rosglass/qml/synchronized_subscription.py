@@ -241,7 +241,7 @@ class SynchronizedSubscription(Element):
 
     def _factory(self, *wanted: Any) -> Callable[[], _Matcher]:
         node, sources, size, slop_ns, headerless = wanted
-        on_sets, executor = self._on_sets, self._executor
+        on_sets, executor = self._weak(self._on_sets), self._executor
         return lambda: _Matcher(node, sources, size, slop_ns, headerless, on_sets, executor)
 
     def _on_created(self, endpoint: _Matcher) -> None:

@@ -401,8 +401,8 @@ class _Listening(_Queries):
         node, namespace = wanted
         link = TfLink.join(session, node, namespace, self)
         watches = [
-            link.buffer.on_update(self._on_update, session.executor),
-            link.buffer.on_tree_change(self._on_tree, session.executor),
+            link.buffer.on_update(self._weak(self._on_update), session.executor),
+            link.buffer.on_tree_change(self._weak(self._on_tree), session.executor),
         ]
         self._set_endpoint(_Watches(link, watches))
 

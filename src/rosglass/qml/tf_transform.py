@@ -154,8 +154,9 @@ class TfTransform(Element):
 
     def _create_endpoint(self, wanted: tuple[Any, ...]) -> None:
         buffer, target, source = wanted
+        on_change = self._weak(self._on_change)
         try:
-            self._set_endpoint(buffer.on_change(target, source, self._on_change, self._executor))
+            self._set_endpoint(buffer.on_change(target, source, on_change, self._executor))
         except TransformException as error:
             self._bad_frames = f"TfTransform: {error}"
             self._set_problem(self._bad_frames)
