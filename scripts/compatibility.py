@@ -17,14 +17,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 from reference_members import NOTES, REFERENCE
 
 from rosglass.qml import ros1, ros2
-from rosglass.qml.action_client import ActionClient
-from rosglass.qml.goal_handle import GoalHandle
-from rosglass.qml.logger import Logger
+from rosglass.qml.action_client import ActionClient, RosActionClient
+from rosglass.qml.goal_handle import GoalHandle, RosGoalHandle
+from rosglass.qml.logger import Console, Logger
 from rosglass.qml.publisher import Publisher, RosPublisher
-from rosglass.qml.ros1.action_client import RosActionClient
-from rosglass.qml.ros1.console import Console
-from rosglass.qml.ros1.goal_handle import RosGoalHandle
-from rosglass.qml.ros1.package import Package
+from rosglass.qml.ros1 import Package
 from rosglass.qml.service_client import ServiceClient
 from rosglass.qml.yaml_io import Io
 from rosglass.qt import QtCore

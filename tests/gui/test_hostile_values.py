@@ -172,7 +172,7 @@ def test_the_largest_types_go_to_javascript_and_back(bench: Any, shape: str) -> 
 def test_what_would_block_the_interface_is_refused(
     bench: Any, tmp_path: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.plain._READ_TIMEOUT_S", -1.0)
+    monkeypatch.setattr("rosglass.qml.from_js._READ_TIMEOUT_S", -1.0)
     path = tmp_path / "slow.yaml"
     text = bench.run(
         f"try {{ Ros2.io.writeYaml('{path}', Array(300).fill(1)) }} catch (e) {{ return '' + e }}"

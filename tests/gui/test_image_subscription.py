@@ -49,7 +49,7 @@ def jpeg(colour: tuple = RED) -> dict:
 
 def colour(root: Any) -> tuple | None:
     """Return the colour that the item shows, None when it is blank."""
-    from rosglass.qml.image_item import ImageItem
+    from rosglass.qml.image_sinks import ImageItem
 
     item = root.property("item")
     assert isinstance(item, ImageItem)

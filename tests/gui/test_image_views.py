@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rosglass.comm import Time
-from rosglass.qml.image_item import ImageItem
+from rosglass.qml.image_sinks import ImageItem
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

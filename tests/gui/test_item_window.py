@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rosglass.qml.image_sinks import Sink
-from rosglass.qml.item_window import window_of
+from rosglass.qml.image_sinks import Sink, window_of
 from rosglass.qt import is_alive
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import pytest
 from rosglass.comm.handle import Handle
 from rosglass.qml import Session
 from rosglass.qml.element import Element
-from rosglass.qml.parameter_link import ParameterLink
+from rosglass.qml.parameter import ParameterLink
 from rosglass.tf import TransformBuffer
 
 if TYPE_CHECKING:

@@ -354,7 +354,7 @@ def test_errors_say_what_to_do(
 
 @pytest.mark.parametrize("module", ["QtMultimedia", "QtQuick.Controls"])
 def test_errors_name_the_package_that_is_missing(file: Path, module: str) -> None:
-    from rosglass.qml.load_errors import error_list
+    from rosglass.qml.live_file import error_list
     from rosglass.qt import QT6, QtCore, QtQml
 
     error = QtQml.QQmlError()
@@ -373,10 +373,10 @@ def test_errors_name_the_package_that_is_missing(file: Path, module: str) -> Non
 def test_a_kiosk_stays_open_and_hides_the_pointer(
     app: Any, file: Path, world: LocalWorld, wait: Any, monkeypatch: Any
 ) -> None:
-    from rosglass.qml import kiosk
+    from rosglass.qml import runner as module
     from rosglass.qt import QtCore, optional
 
-    monkeypatch.setattr(kiosk, "_STILL", 50)
+    monkeypatch.setattr(module, "_STILL", 50)
     session = Session(connect=world.connect)
     runner = Runner(file, session, kiosk=True)
     runner.load()

@@ -269,8 +269,8 @@ def test_what_is_no_time_is_named(bench: Any, script: str) -> None:
 
 def test_python_gives_and_takes_times(bench: Any) -> None:
     from rosglass.qml.dialect import Dialect
+    from rosglass.qml.js_values import duration_from_js, time_from_js
     from rosglass.qml.runtime import runtime_of
-    from rosglass.qml.times import duration_from_js, time_from_js
 
     runtime = runtime_of(bench.engine)
     for dialect in Dialect:

@@ -13,7 +13,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from rosglass.qml import plain
+from rosglass.qml import from_js
 from rosglass.qt import QtCore, Slot, send_deferred_deletes
 from rosglass.rviz import Application
 
@@ -63,7 +63,7 @@ def main(last: str, folder: str) -> None:
     """Drive everything once."""
     faulthandler.enable()
     os.chdir(folder)
-    plain._MOST = MOST_VALUES
+    from_js._MOST = MOST_VALUES
     app = Application()
     # All members of an object are driven by one call from JavaScript, which may take a minute.
     app.session.longest_script = 0

@@ -192,7 +192,7 @@ def test_a_graphics_card_is_used(monkeypatch: pytest.MonkeyPatch, app: Any) -> N
 def test_what_may_come_to_need_opengl_is_found_in_the_files(
     text: str, imports: str, need: str, qml: Any, app: Any, tmp_path: Path
 ) -> None:
-    from rosglass.qml.opengl_needs import need_in_file
+    from rosglass.qml.renderer_choice import need_in_file
     from rosglass.qt import QtQml
 
     qml("Late", f"Item {{ {SHADER} }}")
@@ -207,7 +207,7 @@ def test_what_may_come_to_need_opengl_is_found_in_the_files(
 
 
 def test_folders_that_import_each_other_are_looked_through_once(tmp_path: Path) -> None:
-    from rosglass.qml.opengl_needs import need_in_file
+    from rosglass.qml.renderer_choice import need_in_file
 
     places = {"First": "Parts", "Second": "More Pages", "Third": "Looks"}
     imports = "".join(f'import "../{folder}"\n' for folder in places.values())

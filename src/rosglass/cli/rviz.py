@@ -118,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
     os.environ["ROSGLASS_QT"] = "pyside2"
     received: list[int] = []
     with _noting_signals(received):
-        from rosglass.qml.interrupt import QuitOnSignal
+        from rosglass.qml.process import QuitOnSignal
 
         with QuitOnSignal(received.append, _QUIT_TIMEOUT_S):
             try:
@@ -142,7 +142,7 @@ def _noting_signals(received: list[int]) -> Iterator[None]:
 
 def _show(args: argparse.Namespace, config: str, remappings: list[str], received: list[int]) -> int:
     from rosglass.qml.log import install_message_handler
-    from rosglass.qml.places import interface_file
+    from rosglass.qml.modules import interface_file
 
     format_log(verbose=args.verbose > 1)
     for file in args.overlays:
@@ -184,7 +184,7 @@ def _show(args: argparse.Namespace, config: str, remappings: list[str], received
 
 
 def _add_overlays(app: Application, args: argparse.Namespace) -> None:
-    from rosglass.qml.places import interface_file
+    from rosglass.qml.modules import interface_file
 
     shown = {getattr(overlay, "file", None) for overlay in app.overlays}
     for file in args.overlays:

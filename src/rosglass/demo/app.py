@@ -11,10 +11,8 @@ from rosglass.demo import keyboard, pictures
 from rosglass.demo.figures import CameraFigures, Latency, ProcessFigures, table
 from rosglass.errors import Error, QmlError
 from rosglass.qml import Session
-from rosglass.qml.display import require_display
-from rosglass.qml.interrupt import QuitOnSignal
 from rosglass.qml.log import install_message_handler
-from rosglass.qml.network_access import close_network
+from rosglass.qml.process import QuitOnSignal, close_network, require_display
 from rosglass.qml.runner import Runner
 from rosglass.qml.subscription import Subscription
 from rosglass.qt import QtCore, QtGui, QtQuick

@@ -8,9 +8,8 @@ has a QML engine of its own calls :func:`install`.
 from rosglass.interrupts import InterruptsDeferred
 
 with InterruptsDeferred():
-    from rosglass.qml.executor import GuiExecutor
     from rosglass.qml.modules import IMPORT_PATHS, install
-    from rosglass.qml.session import Session
+    from rosglass.qml.session import GuiExecutor, Session
 
 # Without `typing`; type checkers know this name.
 TYPE_CHECKING = False

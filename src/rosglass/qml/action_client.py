@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, ClassVar
 
 from rosglass.comm.action_client import GoalStatus
 from rosglass.errors import Error, NodeClosedError
+from rosglass.qml.action_server import action_type
 from rosglass.qml.callbacks import Deferred, call_back
-from rosglass.qml.client_element import CONNECTION_TIMEOUT_MS, ClientElement
-from rosglass.qml.goal_handle import GoalCallbacks, GoalHandle, tell_cancelling
+from rosglass.qml.dialect import Dialect
+from rosglass.qml.element import CONNECTION_TIMEOUT_MS, ClientElement
+from rosglass.qml.goal_handle import GoalCallbacks, GoalHandle, RosGoalHandle, tell_cancelling
 from rosglass.qml.js_values import null, properties_of
 from rosglass.qml.log import log_from_qml
-from rosglass.qml.properties import ReadOnly, Writable, at_least
+from rosglass.qml.properties import ReadOnly, Writable, at_least, report
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
@@ -25,7 +27,8 @@ if TYPE_CHECKING:
     from rosglass.comm.promise import Promise
     from rosglass.qml.runtime import Runtime
 
-__all__ = ["ActionClient", "GoalSender"]
+
+__all__ = ["ActionClient", "GoalSender", "RosActionClient"]
 
 _CLOSED = "its client was closed before it ended; nobody knows what becomes of it"
 _CALLBACKS = ("onGoalResponse", "onFeedback", "onResult")
@@ -66,7 +69,7 @@ class GoalSender(ClientElement):
 
     def _cancel_until(self, value: QJSValue) -> None:
         """Ask the server to cancel what it accepted at or before a time."""
-        from rosglass.qml.times import time_from_js  # noqa: PLC0415 - few interfaces ask
+        from rosglass.qml.js_values import time_from_js  # noqa: PLC0415 - few interfaces ask
 
         try:
             time = time_from_js(value)
@@ -280,4 +283,75 @@ class ActionClient(GoalSender):
     @Slot(QJSValue)
     def cancelGoalsBefore(self, time: QJSValue) -> None:
         """Ask the server to cancel the goals that it accepted at or before a time, or Date."""
+        self._cancel_until(time)
+
+
+class RosActionClient(GoalSender):
+    """Sends goals while a server is connected.
+
+    Args:
+        runtime: The engine's runtime.
+        name: Action name, as in QML.
+        type_name: Action type as ROS 1 calls it, ``pkg/DoAction``.
+    """
+
+    DIALECT = Dialect.ROS1
+    _HANDLE = RosGoalHandle
+
+    connected = ReadOnly(bool, False)
+    name = Property(str, lambda self: self._name, constant=True)
+    actionType = Property(str, lambda self: self._given_type, constant=True)
+
+    def __init__(self, runtime: Runtime, name: str, type_name: str) -> None:
+        super().__init__(runtime, name, action_type(type_name))
+        self._given_type = type_name
+
+    def _set_ready(self, ready: bool) -> None:
+        report(self, connected=ready)
+
+    @Slot(result=bool)
+    def isServerConnected(self) -> bool:
+        """Return whether a server is there."""
+        return self.connected
+
+    @Slot(QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, QJSValue, result=QJSValue)
+    def sendGoal(
+        self,
+        goal: QJSValue,
+        transition: QJSValue | None = None,
+        feedback: QJSValue | None = None,
+    ) -> QJSValue:
+        """Send a goal and return its handle; null while no server is connected.
+
+        Args:
+            goal: An object with the goal's fields; one that does not fit throws.
+            transition: Told the handle whenever its ``commState`` has changed.
+            feedback: Told the handle and each feedback.
+        """
+        runtime = self._runtime
+        assert runtime is not None
+        if not self._check_functions({"transition_cb": transition, "feedback_cb": feedback}):
+            return QJSValue()
+        if not self.connected:
+            text = f"action {self._name}: no goal was sent: {self._problem or self._missing()}"
+            log_from_qml("", logging.WARNING, text, runtime.caller())
+            return null()
+        js = QJSValue()
+
+        def changed(handle: QJSValue) -> None:
+            if transition is not None:
+                call_back(runtime, transition, handle)
+
+        def fed(message: QJSValue) -> None:
+            if feedback is not None:
+                call_back(runtime, feedback, js, message)
+
+        js = self._send(goal, GoalCallbacks(transition=changed, feedback=fed))
+        return js
+
+    @Slot(QJSValue)
+    def cancelGoalsAtAndBeforeTime(self, time: QJSValue) -> None:
+        """Ask the server to cancel the goals sent at or before a time, or Date."""
         self._cancel_until(time)

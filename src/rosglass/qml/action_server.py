@@ -9,8 +9,7 @@ from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
-from rosglass.qml.answering import Answers
-from rosglass.qml.callbacks import call_back
+from rosglass.qml.callbacks import Answers, call_back
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import Element
 from rosglass.qml.js_values import properties_of
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from rosglass.comm.action_server import ServerGoal
     from rosglass.comm.node import Node
     from rosglass.messages import Message
-    from rosglass.qml.server_goal import ServerGoalHandle
+    from rosglass.qml.goal_handle import ServerGoalHandle
 
 __all__ = ["ActionServer", "RosActionServer", "action_type", "server_functions"]
 
@@ -170,7 +169,7 @@ class ActionServer(Element):
         runtime = self._runtime
         assert runtime is not None
 
-        from rosglass.qml.server_goal import ServerGoalHandle  # noqa: PLC0415 - few have actions
+        from rosglass.qml.goal_handle import ServerGoalHandle  # noqa: PLC0415 - few have actions
 
         def forget(handle: ServerGoalHandle) -> None:
             if goals.handles.pop(goal.id, None) is handle and is_alive(self):

@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm import Handle
 from rosglass.comm.log import warn_on_terminal
 from rosglass.errors import Error
-from rosglass.qml.display import require_display
-from rosglass.qml.interrupt import QuitOnSignal, end_process_within
 from rosglass.qml.log import LocationFormatter
-from rosglass.qml.network_access import close_network
-from rosglass.qml.places import interface_file
+from rosglass.qml.modules import interface_file
+from rosglass.qml.process import QuitOnSignal, close_network, end_process_within, require_display
 from rosglass.qml.renderer_choice import choice
 from rosglass.qml.runner import Runner, needs_widgets
 from rosglass.qml.session import Session

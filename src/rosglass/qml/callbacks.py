@@ -1,17 +1,79 @@
-"""JavaScript functions that are called later, and promises that are settled later."""
+"""Calls of JavaScript functions, promises for JavaScript, and answers from it."""
 
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
+from concurrent.futures import Future
+from typing import TYPE_CHECKING, Any
 
+from rosglass.errors import Error
 from rosglass.qml.log import Caller, log_from_qml, plain_path
-from rosglass.qt import QJSValue
+from rosglass.qt import QJSValue, QtCore, Signal, Slot
 
 if TYPE_CHECKING:
-    from rosglass.qml.runtime import Runtime
+    from collections.abc import Callable, Sequence
 
-__all__ = ["Deferred", "call_back"]
+    from rosglass.qml.runtime import Runtime
+    from rosglass.qt import QtQml
+
+
+__all__ = ["Answers", "Deferred", "JsCalls", "call_back"]
+
+_SCRIPT = """(function (calls, jobs) {
+    function thrown(value) {
+        return Object.assign(new Error(String(value)), { fileName: undefined })
+    }
+    calls.asked.connect(function (number) {
+        const job = jobs[number]
+        try {
+            job.result = job.callee.apply(undefined, job.passed)
+        } catch (error) {
+            job.result = error instanceof Error ? error : thrown(error)
+        }
+        job.done = true
+    })
+})"""
+_ENDED = "new Error('the function was ended, for it kept the screen from living')"
+
+
+class JsCalls(QtCore.QObject):
+    """Calls functions, in the thread of their engine.
+
+    QJSValue.call keeps Python's lock until the function has returned: one that never does could
+    not even be ended. Sending a signal does not.
+
+    Args:
+        engine: The engine.
+    """
+
+    asked = Signal(int)
+
+    def __init__(self, engine: QtQml.QQmlEngine) -> None:
+        super().__init__(engine)
+        self._engine = engine
+        self._jobs, self._number = engine.newObject(), 0
+        script: Any = engine.evaluate(_SCRIPT)
+        script.call([engine.newQObject(self), self._jobs])
+
+    def call(self, function: QJSValue, arguments: Sequence[QJSValue]) -> QJSValue:
+        """Return what a function returns, or the error that it throws, or that it was ended."""
+        self._number = (self._number + 1) % 2**31
+        name = str(self._number)
+        job, passed = self._engine.newObject(), self._engine.newArray(len(arguments))
+        for index, argument in enumerate(arguments):
+            passed.setProperty(index, argument)
+        job.setProperty("callee", function)
+        job.setProperty("passed", passed)
+        self._jobs.setProperty(name, job)
+        try:
+            self.asked.emit(self._number)
+        finally:
+            self._jobs.deleteProperty(name)
+        result: Any = job.property("result")
+        if not job.property("done").toBool():
+            result = self._engine.evaluate(_ENDED)
+        value: QJSValue = result
+        return value
 
 
 def call_back(runtime: Runtime, callback: QJSValue, *arguments: QJSValue) -> QJSValue:
@@ -60,3 +122,125 @@ class Deferred:
         text = f"{self._what}: {reason}" if self._what not in reason else reason
         log_from_qml("", logging.WARNING, text, self._caller)
         call_back(self._runtime, self._reject, QJSValue(text))
+
+
+class _Settler(QtCore.QObject):
+    """Takes over what a JavaScript promise comes to."""
+
+    def __init__(
+        self,
+        parent: QtCore.QObject,
+        take: Callable[[QJSValue], Any],
+        future: Future[Any],
+    ) -> None:
+        super().__init__(parent)
+        self._take, self._future = take, future
+
+    @Slot(QJSValue)
+    @Slot()
+    def settle(self, value: QJSValue | None = None) -> None:
+        """Let the answer come."""
+        if not self._future.done():
+            try:
+                self._future.set_result(self._take(QJSValue() if value is None else value))
+            except Error as error:
+                self._future.set_exception(error)
+        self.deleteLater()
+
+    @Slot(QJSValue)
+    @Slot()
+    def fail(self, reason: QJSValue | None = None) -> None:
+        """Let the failure come."""
+        if not self._future.done():
+            text = "no reason given" if reason is None else reason.toString()
+            self._future.set_exception(Error(text.removeprefix("Error: ")))
+        self.deleteLater()
+
+
+class Answers:
+    """Asks a JavaScript function, and waits for what it answers; on the GUI thread only.
+
+    Args:
+        runtime: The engine's runtime.
+        what: Who is asked, for errors: ``the handler of service /lamp``.
+    """
+
+    def __init__(self, runtime: Runtime, what: str) -> None:
+        self._runtime, self._what = runtime, what
+        self._pending: set[Future[Any]] = set()
+
+    def ask(
+        self, handler: QJSValue, arguments: list[QJSValue], take: Callable[[QJSValue], Any]
+    ) -> Any:
+        """Return the answer, or the future of it.
+
+        A function that declares one more parameter than it is given is handed a function to answer
+        with, and may do so after it has returned; so may one that returns a promise.
+
+        Args:
+            handler: The function.
+            arguments: What it is given.
+            take: Makes of the JavaScript value what is wanted; raises Error when it cannot.
+
+        Raises:
+            Error: There is no function, it threw, or its answer cannot be taken.
+        """
+        engine = self._runtime.engine
+        if engine is None or not handler.isCallable():
+            raise Error(f"{self._what} is not a function")
+        later = handler.property("length").toInt() > len(arguments)
+        promise, respond, _ = self._runtime.promise() if later else (QJSValue(),) * 3
+        answer = self._runtime.call(handler, [*arguments, respond] if later else arguments)
+        if answer.isError():
+            file, line = answer.property("fileName"), answer.property("lineNumber")
+            place = f"{file.toString()}:{line.toInt()}: " if not file.isUndefined() else ""
+            raise Error(f"{self._what} failed: {place}{answer.toString()}")
+        if later and answer.isUndefined():
+            answer = promise
+        if not answer.property("then").isCallable():
+            return take(answer)
+        future: Future[Any] = Future()
+        self._pending.add(future)
+        future.add_done_callback(self._pending.discard)
+        settler = engine.newQObject(_Settler(self._runtime, take, future))
+        functions = [settler.property("settle"), settler.property("fail")]
+        answer.property("then").callWithInstance(answer, functions)
+        return future
+
+    def later(self, queue: list[Callable[[], None]], ask: Callable[[], Any]) -> Future[Any]:
+        """Return the future of what `ask` will return, or raise, when the queue's job runs."""
+        future: Future[Any] = Future()
+        self._pending.add(future)
+        future.add_done_callback(self._pending.discard)
+
+        def run() -> None:
+            if future.done():
+                return
+            try:
+                answer = ask()
+            except Error as error:
+                future.set_exception(error)
+                return
+            if isinstance(answer, Future):
+                answer.add_done_callback(lambda done: _pass_on(done, future))
+            else:
+                future.set_result(answer)
+
+        queue.append(run)
+        return future
+
+    def give_up(self) -> None:
+        """Fail every answer that has not come: who was asked is gone."""
+        for future in list(self._pending):
+            if not future.done():
+                future.set_exception(Error(f"{self._what} was closed before it answered"))
+
+
+def _pass_on(done: Future[Any], future: Future[Any]) -> None:
+    if future.done():
+        return
+    error = done.exception()
+    if error is None:
+        future.set_result(done.result())
+    else:
+        future.set_exception(error)

@@ -12,6 +12,7 @@ from rosglass.comm.statistics import note_time, rate_of
 from rosglass.comm.time import Time
 from rosglass.images import ImageStream
 from rosglass.qml.image_rendering import Look, Picture, Renderer
+from rosglass.qml.image_subscription import LoadBalancer
 from rosglass.qt import QtCore, is_alive
 
 if TYPE_CHECKING:
@@ -117,6 +118,7 @@ class SharedStream(QtCore.QObject):
         self._period = self._price = 0.0
         self._asked: float | None = None
         self._last_stamp: Time | None = None
+        self._balancer = LoadBalancer.of(session)
         executor = session.executor
         self.stream = ImageStream(
             node, topic, self._render, preferred, lambda: executor.post(self._tell), self._wanted
@@ -178,7 +180,7 @@ class SharedStream(QtCore.QObject):
             return
         self._linger.stop()
         self._turn.stop()
-        self._session.balancer.forget(self)
+        self._balancer.forget(self)
         self._channels = ()
         self._session.streams.pop(self._key, None)
         self.deleteLater()
@@ -214,7 +216,7 @@ class SharedStream(QtCore.QObject):
             self._interval = interval
             # Somebody may want pictures sooner than the next turn.
             self._turn.stop()
-            self._session.balancer.forget(self)
+            self._balancer.forget(self)
             self._fetch()
 
     def _wanted(self) -> bool:
@@ -239,7 +241,7 @@ class SharedStream(QtCore.QObject):
             return
         stream = self.stream
         self._period = stream.period or self._period
-        if not (self._period and self._session.balancer.enabled):
+        if not (self._period and self._balancer.enabled):
             return
         # Between the key frames of a video, a picture that is fetched alone cannot be decoded.
         if stream.video or self._interval <= _HYSTERESIS * max(self._period, self._price):
@@ -255,7 +257,7 @@ class SharedStream(QtCore.QObject):
             self._fetch()
             return
         now = time.monotonic()
-        due = self._session.balancer.place(self, self._interval, now)
+        due = self._balancer.place(self, self._interval, now)
         self._turn.start(max(0, round((due - now) * 1000)))
 
     def _fetch(self) -> None:

@@ -3,18 +3,20 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
 from rosglass.qml.callbacks import Deferred
 from rosglass.qml.dialect import Dialect
-from rosglass.qml.element import DEFAULT_TIMEOUT_MS
-from rosglass.qml.image_look import LookElement
+from rosglass.qml.element import DEFAULT_TIMEOUT_MS, TopicElement
 from rosglass.qml.image_sinks import Sink
 from rosglass.qml.log import plain_path
 from rosglass.qml.properties import ReadOnly, Writable, at_least, report
-from rosglass.qt import QJSValue, QtCore, Signal, Slot, is_alive, optional
+from rosglass.qml.runtime import own_runtime
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive, optional
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,7 +27,178 @@ if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
     from rosglass.qml.session import Session
 
-__all__ = ["ImageTransportSubscriber", "ImageTransportSubscription"]
+
+__all__ = [
+    "ImageTransportManager",
+    "ImageTransportSubscriber",
+    "ImageTransportSubscription",
+    "LoadBalancer",
+    "LookElement",
+]
+
+#: How far the times of others are looked at, in numbers of their turns.
+_MOST_TURNS = 64
+#: By how many seconds a turn is put off at most: pictures that come later would count as old.
+_MOST_DELAY = 1.0
+
+
+class LoadBalancer:
+    """Schedules the pictures that throttled streams fetch one by one."""
+
+    @classmethod
+    def of(cls, session: Session) -> LoadBalancer:
+        """Return the load balancer of a session."""
+        balancer: LoadBalancer = session.shared.setdefault(cls, cls())
+        return balancer
+
+    def __init__(self) -> None:
+        #: Whether streams may receive single pictures; otherwise they receive all.
+        self.enabled = True
+        #: When each stream's turn is, and how far apart its turns are, seconds.
+        self._turns: dict[object, tuple[float, float]] = {}
+
+    def place(self, stream: object, interval: float, now: float) -> float:
+        """Return when a stream is to fetch its next picture.
+
+        A new one gets the middle of the largest gap before `now` plus `interval`. After that its
+        turns are `interval` apart, or somewhat more where it would meet another.
+
+        Args:
+            stream: Who asks.
+            interval: Seconds that it wants between two pictures.
+            now: The time, seconds.
+        """
+        before = self._turns.pop(stream, None)
+        if before is None:
+            due = _widest(self._taken(now, now + interval), now, now + interval)
+        else:
+            wanted = max(before[0] + interval, now)
+            shortest = min([interval, *(other for _, other in self._turns.values())])
+            apart = shortest / (4 * (len(self._turns) + 1))
+            due, latest = wanted, wanted + min(interval / 2, _MOST_DELAY)
+            taken = self._taken(wanted - apart, latest + apart)
+            if taken and min(abs(time - wanted) for time in taken) < apart:
+                due = _widest(taken, wanted, latest)
+        self._turns[stream] = (due, interval)
+        return due
+
+    def forget(self, stream: object) -> None:
+        """Give the turns of a stream to others; safe for one that has none."""
+        self._turns.pop(stream, None)
+
+    def _taken(self, begin: float, end: float) -> list[float]:
+        """Return the turns of all streams within a time, in order."""
+        taken = []
+        for due, interval in self._turns.values():
+            first = max(0, math.ceil((begin - due) / interval))
+            turns = (due + turn * interval for turn in range(first, first + _MOST_TURNS))
+            taken += [time for time in turns if begin <= time <= end]
+        return sorted(taken)
+
+
+def _widest(taken: list[float], begin: float, end: float) -> float:
+    """Return the middle of the largest gap in a time."""
+    edges = [begin, *(time for time in taken if begin < time < end), end]
+    gaps = [(after - before, before) for before, after in itertools.pairwise(edges)]
+    width, start = max(gaps, key=lambda gap: gap[0])
+    return start + width / 2
+
+
+def _quarter_turns(degrees: int) -> int:
+    if degrees % 90:
+        raise ValueError("is no multiple of 90 degrees")
+    return degrees % 360
+
+
+def _zoom(zoom: float) -> float:
+    if not 1 <= zoom < math.inf:
+        raise ValueError("is below 1, where the whole picture is shown")
+    return zoom
+
+
+def _region(region: QtCore.QRectF) -> QtCore.QRectF:
+    edges = (region.x(), region.y(), region.width(), region.height())
+    if not all(0 <= edge < 1e6 for edge in edges):
+        raise ValueError(
+            "is no part of a picture: give x, y, width and height in pixels from its top "
+            "left corner"
+        )
+    return QtCore.QRectF(region)
+
+
+def _depth(depth: float) -> float:
+    if not math.isfinite(depth):
+        raise ValueError("is no depth; metres, or -1 to follow the camera")
+    return depth
+
+
+def _rate(rate: float) -> float:
+    if not 0 <= rate < math.inf:
+        raise ValueError("is no number of pictures per second")
+    return rate
+
+
+class LookElement(TopicElement):
+    """The properties of a camera that say how its pictures are shown."""
+
+    #: Degrees clockwise, a multiple of 90.
+    rotation = Writable(int, 0, _quarter_turns)
+    mirrored = Writable(bool, False)
+    flipped = Writable(bool, False)
+    zoom = Writable(float, 1.0, _zoom)
+    #: Pixels from the top left corner; an empty rectangle is the whole picture.
+    regionOfInterest = Writable(QtCore.QRectF, QtCore.QRectF(), _region)
+    colorMap = Writable(str, "")
+    #: Metres; -1 follows the camera.
+    minimumDepth = Writable(float, -1.0, _depth)
+    maximumDepth = Writable(float, -1.0, _depth)
+    #: Pictures per second at most; 0 shows all.
+    throttleRate = Writable(float, 0.0, _rate)
+    fullResolution = Writable(bool, False)
+
+    def _look(self, video: bool, room: tuple[int, int] | None, painted: bool) -> Look:
+        """Return the view that the properties describe.
+
+        Args:
+            video: Whether video frames are wanted; otherwise images.
+            room: Width and height on the screen, as far as known.
+            painted: Whether images are wanted besides video frames.
+
+        Raises:
+            UnsupportedError: The colour map is unknown, or the depths are no range.
+        """
+        # They bring numpy, which an interface without a camera does not need.
+        from rosglass.images import DepthColors, View  # noqa: PLC0415
+        from rosglass.qml.image_rendering import Look  # noqa: PLC0415
+
+        box = self.regionOfInterest
+        region = None
+        if box.width() or box.height():
+            region = (round(box.x()), round(box.y()), round(box.width()), round(box.height()))
+        view = View(self.rotation, self.mirrored, self.flipped, region, self.zoom)
+        colors = None
+        if self.colorMap:
+            near, far = (
+                None if depth < 0 else depth for depth in (self.minimumDepth, self.maximumDepth)
+            )
+            colors = (self.colorMap, near, far)
+            DepthColors(*colors)
+        if room is not None and self.rotation % 180:
+            room = (room[1], room[0])
+        return Look(
+            video, view, colors, self._interval, None if self.fullResolution else room, painted
+        )
+
+    @property
+    def _interval(self) -> float:
+        """Seconds between two pictures at least."""
+        return 1 / self.throttleRate if self.throttleRate else 0.0
+
+    @property
+    def label(self) -> str:
+        """What error messages call this element."""
+        return f"{type(self).__name__} {self._topic!r}"
+
 
 #: Importing it on the GUI thread would stop the screen for a tenth of a second: it brings numpy.
 _NUMPY_MODULE = "rosglass.images"
@@ -386,3 +559,30 @@ class ImageTransportSubscriber(ImageTransportSubscription):
     nsChanged = Signal()
 
     ns = Writable(str, read="_get_namespace", write="_set_namespace")
+
+
+class ImageTransportManager(QtCore.QObject):
+    """Switches load balancing; one per engine, all of a session sharing the setting."""
+
+    loadBalancingEnabledChanged = Signal()
+
+    @property
+    def _balancer(self) -> LoadBalancer:
+        return LoadBalancer.of(own_runtime(self).session)
+
+    def _is_enabled(self) -> bool:
+        return self._balancer.enabled
+
+    @Slot(bool)
+    def setLoadBalancingEnabled(self, enabled: bool) -> None:
+        """Say whether pictures of throttled cameras are fetched one by one, taking turns.
+
+        Otherwise cameras are received as fast as they send, and what is too much is not decoded.
+        """
+        if enabled != self._balancer.enabled:
+            self._balancer.enabled = enabled
+            self.loadBalancingEnabledChanged.emit()
+
+    loadBalancingEnabled = Property(
+        bool, _is_enabled, setLoadBalancingEnabled, notify=loadBalancingEnabledChanged
+    )

@@ -2,23 +2,40 @@
 
 from __future__ import annotations
 
+import math
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from rosglass.comm.qos import BEST_AVAILABLE, Durability, History, Liveliness, QoS, Reliability
+from rosglass.comm.time import Duration, Time
+from rosglass.errors import ArgumentError, ConversionError
 from rosglass.qt import QJSValue, QtCore, QtQml
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from fractions import Fraction
+
 
 __all__ = [
+    "DECIMAL",
     "Shown",
+    "duration_from_js",
+    "from_milliseconds",
     "integral",
     "is_model",
+    "known_parts",
     "null",
+    "number_from_text",
     "object_of",
     "properties_of",
+    "qos_from_js",
+    "qos_parts",
+    "queue_from_js",
     "roles_of",
     "shown",
+    "time_from_js",
+    "time_parts",
     "wide",
 ]
 
@@ -99,3 +116,179 @@ class Shown:
 def null() -> QJSValue:
     """Return JavaScript's null."""
     return QJSValue(QJSValue.SpecialValue.NullValue)
+
+
+#: What says a number in text.
+DECIMAL = re.compile(r"[+-]?([0-9]{1,40}(\.[0-9]{0,40})?|\.[0-9]{1,40})([eE][+-]?[0-9]{1,3})?\Z")
+_SECONDS, _NANOSECONDS = ("sec", "secs"), ("nanosec", "nsec", "nsecs")
+_NS = 1_000_000_000
+
+
+def number_from_text(text: str) -> Fraction:
+    """Return the number that a decimal text says, exactly; raises ConversionError."""
+    from fractions import Fraction  # noqa: PLC0415 - takes milliseconds at start-up
+
+    if not DECIMAL.match(text.strip()):
+        raise ConversionError("", text, "a decimal number")
+    return Fraction(text.strip())
+
+
+def time_from_js(value: QJSValue, name: str = "time") -> Time:
+    """Return the point in time that QML gave: a time of either module, a Date, or milliseconds.
+
+    Raises:
+        ConversionError: It is none of these; names `name`.
+    """
+    return Time(_nanoseconds(value, name, "a time or a Date"))
+
+
+def duration_from_js(value: QJSValue, name: str = "duration") -> Duration:
+    """Return the span of time that QML gave: milliseconds, or a duration of either module.
+
+    Raises:
+        ConversionError: It is none of these; names `name`.
+    """
+    return Duration(_nanoseconds(value, name, "a duration or milliseconds"))
+
+
+def _nanoseconds(value: QJSValue, name: str, wanted: str) -> int:
+    sec, nanosec = time_parts(value, name, wanted)
+    if type(sec) is not int or type(nanosec) is not int:
+        raise ConversionError(name, shown(value), wanted)
+    return sec * _NS + nanosec
+
+
+def time_parts(value: QJSValue, path: str, wanted: str) -> tuple[Any, Any]:
+    """Return seconds and nanoseconds of anything that says a time; numbers are milliseconds.
+
+    The parts are as they were given, unless they are not integers: the codec knows their ranges.
+
+    Raises:
+        ConversionError: It is no time; says that `wanted` was.
+    """
+    if value.isDate():
+        return from_milliseconds(value.property("getTime").callWithInstance(value).toNumber(), path)
+    if value.isNumber():
+        return from_milliseconds(value.toNumber(), path)
+    if not value.isObject() or value.isArray() or value.isCallable() or is_model(value):
+        raise ConversionError(path, shown(value), wanted)
+    if value.isQObject():
+        known = (*_SECONDS, *_NANOSECONDS)
+        names = [name for name in known if value.hasProperty(name)]
+    else:
+        names = [name for name in properties_of(value) if name != "#messageType"]
+    if not names and value.toString() != "[object Object]" and not value.hasProperty("#kind"):
+        raise ConversionError(path, shown(value), wanted)
+    given = {name: _given(value.property(name)) for name in names}
+    return known_parts(given, path, wanted)
+
+
+def known_parts(given: dict[str, Any], path: str, wanted: str) -> tuple[Any, Any]:
+    """Return seconds and nanoseconds of an object's properties; errors as in :func:`time_parts`."""
+    if set(given) == {"nanoseconds"}:
+        total = wide(given["nanoseconds"]) if isinstance(given["nanoseconds"], str) else None
+        total = integral(given["nanoseconds"]) if total is None else total
+        if type(total) is not int:
+            raise ConversionError(f"{path}.nanoseconds", given["nanoseconds"], "an integer")
+        return divmod(total, _NS)
+    parts: list[Any] = [0, 0]
+    for name, item in given.items():
+        if name not in _SECONDS and name not in _NANOSECONDS:
+            here = f"{path}.{name}" if path else name
+            raise ConversionError(here, item, f"{wanted} of sec and nanosec (or nsec)")
+        if item is not None:
+            parts[name in _NANOSECONDS] = integral(item)
+    return parts[0], parts[1]
+
+
+def from_milliseconds(milliseconds: float, path: str) -> tuple[int, int]:
+    """Return seconds and nanoseconds of milliseconds."""
+    if not math.isfinite(milliseconds) or abs(milliseconds) > 2**53:
+        raise ConversionError(path, milliseconds, "milliseconds")
+    whole = math.floor(milliseconds)
+    return divmod(whole * 1_000_000 + round((milliseconds - whole) * 1_000_000), _NS)
+
+
+def _given(value: QJSValue) -> Any:
+    return None if value.isUndefined() else shown(value)
+
+
+_BEST = "best_available"
+
+
+def qos_parts(qos: QoS) -> tuple[Any, ...]:
+    """Return what ``makeQos`` of helpers.js takes; durations are milliseconds, 0 for no limit."""
+    limits = (qos.deadline, qos.lifespan, qos.lease_duration)
+    head = (qos.reliability.value, qos.durability.value, qos.history.value, qos.depth)
+    return (*head, qos.liveliness.value, *map(_milliseconds, limits))
+
+
+def _milliseconds(limit: Duration | None) -> float | str:
+    if limit is None:
+        return 0
+    return _BEST if limit == BEST_AVAILABLE else limit.nanoseconds / 1e6
+
+
+def qos_from_js(value: QJSValue | None, default: QoS) -> QoS:
+    """Return the profile that QML gave: one made by ``Ros2.QoS()``, or a queue size.
+
+    Raises:
+        ConversionError: It is neither, its depth is not a positive integer, or a limit is no
+            number of milliseconds.
+    """
+    if value is None or value.isUndefined() or value.isNull():
+        return default
+    if value.isNumber():
+        return default.with_depth(_depth(value.toNumber()))
+    try:
+        if not value.hasProperty("reliability"):
+            raise ValueError
+        liveliness = value.property("liveliness")
+        return QoS(
+            depth=_depth(value.property("size").toNumber()),
+            reliability=Reliability(value.property("reliability").toString()),
+            durability=Durability(value.property("durability").toString()),
+            history=History(value.property("history").toString()),
+            deadline=_limit(value, "deadline"),
+            lifespan=_limit(value, "lifespan"),
+            liveliness=Liveliness(
+                "automatic" if liveliness.isUndefined() else liveliness.toString()
+            ),
+            lease_duration=_limit(value, "lease"),
+        )
+    except ArgumentError as error:
+        raise ConversionError(f"qos.{error.path}", shown(value), error.expected) from None
+    except ValueError:
+        raise ConversionError("qos", shown(value), "a queue size or Ros2.QoS()") from None
+
+
+def queue_from_js(value: QJSValue, default: QoS) -> QoS:
+    """Return the profile of a queue size, or one given; 0 means no limit, as in ROS 1.
+
+    Raises:
+        ConversionError: As of :func:`qos_from_js`.
+    """
+    if value.isNumber() and value.toNumber() == 0:
+        return replace(default, history=History.KEEP_ALL)
+    return qos_from_js(value, default)
+
+
+def _limit(value: QJSValue, name: str) -> Duration | None:
+    """Return a profile's duration; None for no limit, which is 0 or infinity."""
+    given = value.property(f"{name}Ms")
+    if given.isString() and given.toString() == _BEST:
+        return BEST_AVAILABLE
+    if given.isUndefined() or (given.isNumber() and given.toNumber() in (0, float("inf"))):
+        return None
+    milliseconds = given.toNumber() if given.isNumber() else -1.0
+    # 292 years, of which nanoseconds can tell.
+    if not 1e-6 <= milliseconds < 9e12:
+        wanted = "milliseconds above zero, or 0 for no limit"
+        raise ConversionError(f"qos.{name}", shown(given), wanted)
+    return Duration(round(milliseconds * 1e6))
+
+
+def _depth(value: float) -> int:
+    if not value.is_integer() or not 1 <= value <= 1_000_000:
+        raise ConversionError("queue size", value, "an integer of 1 to 1000000")
+    return int(value)

@@ -2,26 +2,304 @@
 
 from __future__ import annotations
 
+import ctypes
+import logging
 import os
-from typing import TYPE_CHECKING, NamedTuple
+import re
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.errors import QmlError
-from rosglass.qml.creation import create
-from rosglass.qml.load_errors import error_list
-from rosglass.qml.log import forget_repeats, log_engine_warnings
-from rosglass.qml.modules import install
-from rosglass.qml.places import import_folder, interface_file
+from rosglass.qml.log import forget_repeats, log_engine_warnings, plain_path
+from rosglass.qml.modules import import_folder, install, interface_file
 from rosglass.qml.runtime import runtime_of
 from rosglass.qml.watchdog import Watchdog
-from rosglass.qml.watcher import Watcher
-from rosglass.qt import QT6, QtCore, QtQml, Signal, is_alive
+from rosglass.qt import QT6, QtCore, QtQml, Signal, address, is_alive
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from rosglass.qml.session import Session
 
-__all__ = ["LiveFile", "Made"]
+
+__all__ = [
+    "ERRORS",
+    "ERRORS_BELOW",
+    "NO_NODE",
+    "PANEL",
+    "SCRIPT_ENDED",
+    "ErrorView",
+    "LiveFile",
+    "Made",
+    "Watcher",
+    "create",
+    "error_list",
+]
+
+_LIBRARY = "libQt6Qml.so.6" if QT6 else "libQt5Qml.so.5"
+#: QQmlComponent::completeCreate(), as the Itanium C++ ABI has it.
+_COMPLETE = "_ZN13QQmlComponent14completeCreateEv"
+
+
+@cache
+def _completion() -> Callable[[QtQml.QQmlComponent], object]:
+    """Return what completes what a component has begun, without Python's lock where it can."""
+    try:
+        # The one that the binding has loaded already.
+        complete: Any = ctypes.CDLL(_LIBRARY)[_COMPLETE]
+    except (OSError, AttributeError):
+        return QtQml.QQmlComponent.completeCreate
+    complete.restype = None
+    return lambda component: complete(ctypes.c_void_p(address(component)))
+
+
+def create(component: QtQml.QQmlComponent, engine: QtQml.QQmlEngine) -> QtCore.QObject | None:
+    """Make what a component describes; None with errors, which the component tells.
+
+    QQmlComponent.create keeps Python's lock, while first bindings and ``Component.onCompleted``
+    run: one that never ends could not be ended.
+    """
+    if component.isError():
+        return None
+    root = component.beginCreate(engine.rootContext())
+    if root is None:
+        return None
+    _completion()(component)
+    if component.isError():
+        root.deleteLater()
+        return None
+    return root
+
+
+_log = logging.getLogger("rosglass.qml")
+_SUFFIXES = (".qml", ".js", ".mjs")
+#: Milliseconds without further changes after which an editor has finished saving.
+_DEBOUNCE = 80
+#: Files and folders that are looked at: a file in a home folder must not stop the interface.
+_MOST = 2000
+
+
+class Watcher(QtCore.QObject):
+    """Watches every QML and JavaScript file under some folders.
+
+    Args:
+        folders: The folders; hidden folders in them are left out.
+    """
+
+    #: Files were written, came or went.
+    changed = Signal()
+
+    def __init__(self, *folders: Path) -> None:
+        super().__init__()
+        self._roots = folders
+        self._watcher = QtCore.QFileSystemWatcher(self)
+        self._pause = QtCore.QTimer(self)
+        self._pause.setSingleShot(True)
+        self._pause.setInterval(_DEBOUNCE)
+        self._pause.timeout.connect(self._look)
+        self._watcher.fileChanged.connect(self._soon)
+        self._watcher.directoryChanged.connect(self._soon)
+        self._full = False
+        self._stamps = self._scan()
+
+    def _soon(self, path: str) -> None:  # noqa: ARG002 - all folders are looked at
+        self._pause.start()
+
+    def _look(self) -> None:
+        stamps = self._scan()
+        if stamps != self._stamps:
+            self._stamps = stamps
+            self.changed.emit()
+
+    def _scan(self) -> dict[str, tuple[int, int]]:
+        """Return time and size of every file, and watch those that are not watched.
+
+        Editors save by renaming, after which the new file is not watched yet.
+        """
+        stamps = {path: stamp for root in self._roots for path, stamp in self._files(root)}
+        folders = {os.path.dirname(path) for path in stamps}  # noqa: PTH120
+        folders.update(map(str, self._roots))
+        watched = {*self._watcher.files(), *self._watcher.directories()}
+        missing = [path for path in (*stamps, *folders) if path not in watched]
+        if missing:
+            self._watcher.addPaths(missing)
+        return stamps
+
+    def _files(self, root: Path) -> Iterator[tuple[str, tuple[int, int]]]:
+        left = _MOST
+        for folder, folders, names in os.walk(root):
+            folders[:] = sorted(f for f in folders if not f.startswith(".") and f != "__pycache__")
+            left -= 1
+            for name in names:
+                if not name.endswith(_SUFFIXES) and name != "qmldir":
+                    continue
+                path = os.path.join(folder, name)  # noqa: PTH118 - QFileSystemWatcher speaks text
+                try:
+                    status = os.stat(path)  # noqa: PTH116
+                except OSError:
+                    continue
+                left -= 1
+                yield path, (status.st_mtime_ns, status.st_size)
+            if left <= 0:
+                if not self._full:
+                    self._full = True
+                    _log.warning("%s has too many files to watch them all", root)
+                return
+
+
+_MODULE = re.compile(r'module "([\w.]+)"(?: version ([\d.]+))?')
+_UNVERSIONED = re.compile(r"\s*import\s+[\w.]+\s*(?:as\b|;|//|$)")
+_OURS = {"Ros", "Ros2"}
+_TYPE = re.compile(r"^(\w+) is not a type$")
+#: Types that only one of our modules has -> the module, and what the other one calls it.
+_ONLY_IN = {
+    "Subscriber": ("Ros 1.0", "Subscription"),
+    "ImageTransportSubscriber": ("Ros 1.0", "ImageTransportSubscription"),
+    "Subscription": ("Ros2 1.0", "Subscriber"),
+    "ImageTransportSubscription": ("Ros2 1.0", "ImageTransportSubscriber"),
+}
+#: Import -> types that only it has, of those that are used most.
+_IMPORTED_BY = {
+    "QtQuick.Controls 2.15": {
+        *("ApplicationWindow", "Button", "CheckBox", "ComboBox", "Dial", "Dialog", "Drawer"),
+        *("Label", "Menu", "Popup", "ProgressBar", "RoundButton", "ScrollView", "Slider"),
+        *("SpinBox", "StackView", "Switch", "TabBar", "TextArea", "TextField"),
+    },
+    "QtQuick.Layouts 1.15": {"ColumnLayout", "GridLayout", "RowLayout", "StackLayout"},
+    "QtQuick.Shapes 1.15": {"Shape", "ShapePath"},
+    "QtQuick.Window 2.15": {"Window"},
+    "RosRviz 1.0": {"AnchoredPopup", "MessageDialog"},
+}
+#: Module -> what brings it, on Qt 6 and on Qt 5.
+_BROUGHT_BY = {
+    "QtMultimedia": ('pip install "rosglass[camera]"', "apt install qml-module-qtmultimedia"),
+    "QtQuick3D": ('pip install "rosglass[camera]"', ""),
+    "QtCharts": ('pip install "rosglass[camera]"', "apt install qml-module-qtcharts"),
+    "QtQuick.Controls": ("", "apt install qml-module-qtquick-controls2"),
+    "QtQuick.Layouts": ("", "apt install qml-module-qtquick-layouts"),
+    "QtQuick.Window": ("", "apt install qml-module-qtquick-window2"),
+}
+#: Modules that Qt 6 has no longer -> what to use.
+_GONE = {
+    "QtQuick.Controls.Styles": "QtQuick.Controls 2.15",
+    "QtQuick.Extras": "QtQuick.Controls 2.15",
+    "QtQuick.Dialogs": "QtQuick.Dialogs 6.0",
+    "QtQuick.Controls": "QtQuick.Controls 2.15",
+    "QtGraphicalEffects": "Qt5Compat.GraphicalEffects",
+}
+
+
+def error_list(errors: Sequence[QtQml.QQmlError], file: Path) -> str:
+    """Return errors as ``file:line:column: message``, or ``file: message``, one per line.
+
+    Args:
+        errors: What Qt says.
+        file: The file that was loaded, for errors that name none.
+    """
+    lines = []
+    for error in errors:
+        place = plain_path(error.url().toString()) or str(file)
+        text = error.description()
+        hint = _advice(text)
+        line, column = max(error.line(), 0), max(error.column(), 0)
+        if not line and "requires a version" in text:
+            line, column = _unversioned(place), 1
+        where = f"{place}:{line}:{column}" if line else place
+        lines.append(f"{where}: {text}{f'; {hint}' if hint else ''}")
+    return "\n".join(lines) or f"{file}: it could not be created"
+
+
+def _unversioned(place: str) -> int:
+    """Return the line of the first import without a version, which Qt 5 does not tell; or 0."""
+    try:
+        lines = Path(place).read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return 0
+    return next((n for n, line in enumerate(lines, 1) if _UNVERSIONED.match(line)), 0)
+
+
+def _advice(text: str) -> str:
+    """Return what to do about an error; empty when it says it itself."""
+    if "requires a version" in text:
+        return "Qt 5 needs one after the module's name: import QtQuick 2.15"
+    kind = _TYPE.search(text)
+    if kind is not None and kind[1] in _ONLY_IN:
+        module, other = _ONLY_IN[kind[1]]
+        return f"{module} has it; the other module calls it {other}"
+    if kind is not None:
+        imports = (module for module, kinds in _IMPORTED_BY.items() if kind[1] in kinds)
+        return next((f"it comes with: import {module}" for module in imports), "")
+    found = _MODULE.search(text)
+    if found is None:
+        return ""
+    module, version = found[1], found[2]
+    if module in _OURS:
+        return f"its version is 1.0: import {module} 1.0"
+    for ours in _OURS:
+        if module.lower() == ours.lower():
+            return f"it is written {ours}: import {ours} 1.0"
+    if QT6 and module in _GONE:
+        return f"Qt 6 has {_GONE[module]} instead"
+    if version and "is not installed" in text and module.startswith("Qt"):
+        hint = "this Qt may have another version of it"
+    else:
+        hint = "folders that hold modules are named with -I FOLDER or in QML_IMPORT_PATH"
+    package = _BROUGHT_BY.get(module, ("", ""))[0 if QT6 else 1]
+    return f"to install it: {package}" if package else hint
+
+
+#: The QML file of an item that is no larger than its text, and can be closed.
+PANEL = Path(__file__).with_name("ErrorPanel.qml")
+#: Headings, by what is below.
+ERRORS = "This interface has errors. It is shown once they are mended."
+ERRORS_BELOW = "The interface below is the last one without errors."
+NO_NODE = "This interface has no node: nothing is received or sent."
+SCRIPT_ENDED = "The interface below goes on, but a part of what it should have done was left out."
+
+
+class ErrorView:
+    """Items that show errors, one in each window.
+
+    Args:
+        engine: The engine of the interface.
+        look: The QML file of such an item, with properties ``heading`` and ``text``.
+    """
+
+    def __init__(self, engine: QtQml.QQmlEngine, look: Path) -> None:
+        self._engine, self._look = engine, look
+        self._component: QtQml.QQmlComponent | None = None
+        #: The items, while there are errors.
+        self.items: list[Any] = []
+        self._contents: list[Any] = []
+
+    def show(self, text: str, windows: Iterable[Any], heading: str) -> None:
+        """Show errors; others that are shown already go.
+
+        Args:
+            text: The errors.
+            windows: Where to show them.
+            heading: What they mean for what is below.
+        """
+        self.hide()
+        url = QtCore.QUrl.fromLocalFile(str(self._look))
+        component = self._component = QtQml.QQmlComponent(self._engine, url)
+        for window in windows:
+            item: Any = component.create()
+            item.setProperty("heading", heading)
+            item.setProperty("text", text)
+            # PySide2 takes an item for gone as soon as nobody in Python knows what it is in.
+            content = window.contentItem()
+            item.setParentItem(content)
+            self.items.append(item)
+            self._contents.append(content)
+
+    def hide(self) -> None:
+        """Show none."""
+        for item in (*self.items, self._component):
+            if is_alive(item):
+                item.deleteLater()
+        self.items, self._contents, self._component = [], [], None
 
 
 class Made(NamedTuple):

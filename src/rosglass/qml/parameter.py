@@ -4,25 +4,291 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any
+import time
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rosglass.errors import ConversionError, Error
+from rosglass.comm.executor import Dispatcher
+from rosglass.comm.names import similar
+from rosglass.comm.parameters import ParameterDescriptor, ParameterType
+from rosglass.errors import ConversionError, Error, ParameterError
 from rosglass.qml.element import Element
+from rosglass.qml.from_js import plain_from_js
 from rosglass.qml.log import log_from_qml
-from rosglass.qml.plain import plain_from_js
 from rosglass.qml.properties import ReadOnly, Writable, report
 from rosglass.qml.to_js import exact
 from rosglass.qt import QJSValue, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rosglass.comm.handle import Handle
     from rosglass.comm.node import Node
-    from rosglass.comm.parameters import ParameterDescriptor
-    from rosglass.qml.parameter_link import ParameterLink, Reading
+    from rosglass.comm.parameters import ParameterClient, ParameterEvent
     from rosglass.qml.runtime import Runtime
     from rosglass.qml.session import Session
     from rosglass.qt import QtCore
 
-__all__ = ["Parameter"]
+
+__all__ = ["Parameter", "ParameterLink", "Reading"]
+
+_log = logging.getLogger("rosglass.qml")
+#: Seconds that a node is given to answer.
+_ANSWER_TIMEOUT_S = 5.0
+#: Seconds between two readings. A change is lost if the node makes it before it knows that we
+#: listen, so the values are read again: often while nodes come and go, then now and then.
+_QUICK_READ_S, _READ_S = 1.0, 5.0
+#: Seconds after a change of the graph in which values are read often.
+_UNSETTLED_S = 10.0
+#: Seconds until a node that is not found is called missing.
+_DISCOVERY_S = 3.0
+
+
+class Reading(NamedTuple):
+    """What a node says of a parameter.
+
+    Attributes:
+        value: Its value; None without one.
+        descriptor: Its description; None if it is not declared.
+        problem: Why there is no value; empty if there is one.
+    """
+
+    value: Any
+    descriptor: ParameterDescriptor | None
+    problem: str = ""
+
+
+class ParameterLink:
+    """Reads the parameters of one node that elements show, on a thread of its own.
+
+    Values and descriptions come together, so that a range is known before its value; changes that
+    the node announces are passed on in between. Made by :meth:`join`, and ended when the last
+    listener has left; on the GUI thread only.
+    """
+
+    def __init__(self, session: Session, node: Node, name: str) -> None:
+        self._session, self._node, self._name = session, node, name
+        self._listeners: dict[Any, tuple[str, Callable[[Reading], None]]] = {}
+        self._worker = Dispatcher(f"rosglass-qml parameters of {name}")
+        self._client: ParameterClient | None = None
+        self._watch: Handle | None = None
+        self._closed = False
+        now = time.monotonic()
+        self._missing_since, self._unsettled_until = now, now + _UNSETTLED_S
+        #: When to read; and whether a reading is on its way, and what changed since it was sent.
+        self._read_at, self._reading = 0.0, False
+        self._changed_since: dict[str, Any] = {}
+        self._known: dict[str, Reading] = {}
+        self._was_ready = False
+        self._failure = ""
+        #: Why the node cannot be asked; empty when it can.
+        self.problem = ""
+        self._worker.post(self._open)
+
+    @classmethod
+    def join(
+        cls,
+        session: Session,
+        node: Node,
+        name: str,
+        listener: Any,
+        parameter: str,
+        on_reading: Callable[[Reading], None],
+    ) -> ParameterLink:
+        """Return the link to a node, which reads a parameter for a listener from now on.
+
+        Args:
+            session: The session.
+            node: Its node.
+            name: Full name of the other node.
+            listener: The key for :meth:`leave`.
+            parameter: Name of the parameter.
+            on_reading: Called on the GUI thread with what the node says of it, changed or not.
+        """
+        key = (cls, node, name)
+        link = session.shared.get(key)
+        if link is None:
+            link = session.shared[key] = cls(session, node, name)
+        made: ParameterLink = link
+        made._listeners[listener] = (parameter, on_reading)
+        made._read_at = 0.0
+        return made
+
+    def leave(self, listener: Any) -> None:
+        """Stop calling a listener."""
+        self._listeners.pop(listener, None)
+        if not self._listeners:
+            self.close()
+
+    def close(self) -> None:
+        """End it; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self._session.shared.pop((type(self), self._node, self._name), None)
+        # A question may be on its way, which the GUI thread must not wait for.
+        self._session.background(self._shut)
+
+    @property
+    def ready(self) -> bool:
+        """Whether the node is there and serves its parameters."""
+        client = self._client
+        try:
+            return client is not None and client.ready
+        except Error:
+            return False
+
+    def on_graph(self) -> None:
+        """Read often for a while: a node may have been restarted under its name."""
+        self._unsettled_until = time.monotonic() + _UNSETTLED_S
+        self._read_at = min(self._read_at, time.monotonic() + _QUICK_READ_S)
+
+    def on_tick(self) -> None:
+        """Read the parameters when it is time; find out why the node does not answer."""
+        now, ready = time.monotonic(), self.ready
+        if ready != self._was_ready:
+            self._was_ready, self._missing_since = ready, now
+            self._read_at, self._unsettled_until = now, now + _UNSETTLED_S
+            self.problem = ""
+        if ready:
+            if not self._reading and now >= self._read_at:
+                self._read()
+        elif self._failure:
+            self.problem = self._failure
+        elif now - self._missing_since > _DISCOVERY_S:
+            self.problem = self._why_missing()
+
+    def read_soon(self) -> None:
+        """Read at the next tick."""
+        self._read_at = 0.0
+
+    def write(self, name: str, value: Any, done: Callable[[str | Error], None]) -> None:
+        """Set a parameter; `done` gets why the node refused, or an empty text."""
+
+        def work(client: ParameterClient) -> str:
+            wanted = client.describe([name], timeout=_ANSWER_TIMEOUT_S)[name].type
+            result = client.set({name: _as(value, wanted)}, timeout=_ANSWER_TIMEOUT_S)[name]
+            return "" if result.successful else result.reason or "refused without a reason"
+
+        self._ask(work, done)
+
+    def _read(self) -> None:
+        names = sorted({name for name, _ in self._listeners.values()})
+        self._reading, self._changed_since = True, {}
+        now = time.monotonic()
+        self._read_at = now + (_QUICK_READ_S if now < self._unsettled_until else _READ_S)
+
+        def work(client: ParameterClient, names: Sequence[str] = names) -> dict[str, Reading]:
+            try:
+                return self._readings(client, names)
+            except ParameterError as error:
+                if len(names) == 1:
+                    return {names[0]: Reading(None, None, str(error))}
+            # One impossible name must not take the others' values.
+            return {n: r for name in names for n, r in work(client, [name]).items()}
+
+        def done(result: dict[str, Reading] | Error) -> None:
+            self._reading = False
+            if isinstance(result, Error):
+                self.problem = str(result)
+                return
+            self.problem = ""
+            for name, value in self._changed_since.items():
+                reading = result.get(name)
+                if reading is not None and reading.value is not None and value is not None:
+                    result[name] = reading._replace(value=value)
+            self._known = result
+            self._notify(result)
+
+        self._ask(work, done)
+
+    def _readings(self, client: ParameterClient, names: Sequence[str]) -> dict[str, Reading]:
+        """Ask for values and descriptions; raises Error."""
+        values = client.get(names, timeout=_ANSWER_TIMEOUT_S)
+        described = client.describe(names, timeout=_ANSWER_TIMEOUT_S)
+        found = {name: Reading(values[name], described[name]) for name in names}
+        missing = [name for name in names if values[name] is None]
+        if missing:
+            declared = client.names(timeout=_ANSWER_TIMEOUT_S)
+            for name in missing:
+                if name in declared:
+                    found[name] = Reading(None, described[name], f"{name!r} has no value yet")
+                else:
+                    found[name] = Reading(None, None, self._why_undeclared(name, declared))
+        return found
+
+    def _why_undeclared(self, name: str, declared: list[str]) -> str:
+        """Return what to say of a parameter that the node does not have."""
+        hint = similar(name, declared)
+        if not declared:
+            hint = similar(self._name, (str(node) for node in self._node.nodes()))
+        return f"{self._name} has no parameter {name!r}{hint}"
+
+    def _why_missing(self) -> str:
+        """Return what to say of a node that does not serve parameters."""
+        try:
+            names = [str(node) for node in self._node.nodes()]
+        except Error as error:
+            return str(error)
+        if self._name in names:
+            return f"{self._name} is there, but does not serve parameters"
+        return f"there is no node {self._name}{similar(self._name, names)}"
+
+    def _ask(self, work: Callable[[ParameterClient], Any], done: Callable[[Any], None]) -> None:
+        def run() -> None:
+            client, result = self._client, None
+            try:
+                if client is None:
+                    raise ParameterError(f"the parameters of {self._name}: {self._failure}")
+                result = work(client)
+            except Error as error:
+                result = error
+            except Exception as error:
+                _log.exception("asking for parameters failed")
+                result = Error(f"internal error: {error}")
+            self._session.executor.post(lambda: None if self._closed else done(result))
+
+        self._worker.post(run)
+
+    def _open(self) -> None:
+        try:
+            self._client = self._node.create_parameter_client(self._name)
+            self._watch = self._client.watch(self._on_event, self._session.executor)
+        except Error as error:
+            self._failure = str(error)
+            _log.warning("the parameters of %s: %s", self._name, error)
+
+    def _shut(self) -> None:
+        self._worker.close()
+        for part in (self._watch, self._client):
+            if part is not None:
+                part.close()
+
+    def _on_event(self, event: ParameterEvent) -> None:
+        changes = {**event.new, **event.changed, **dict.fromkeys(event.deleted)}
+        self._changed_since |= changes
+        known = {}
+        for name, value in changes.items():
+            reading = self._known.get(name)
+            if name in event.changed and value is not None and reading and reading.descriptor:
+                known[name] = self._known[name] = reading._replace(value=value, problem="")
+            elif any(name == shown for shown, _ in self._listeners.values()):
+                # Declared or forgotten: the description is another one, too.
+                self.read_soon()
+        self._notify(known)
+
+    def _notify(self, readings: dict[str, Reading]) -> None:
+        for name, on_reading in list(self._listeners.values()):
+            if name in readings:
+                on_reading(readings[name])
+
+
+def _as(value: Any, wanted: ParameterType) -> Any:
+    """Return a number of JavaScript, which has only one kind, as the type of the parameter."""
+    if wanted is ParameterType.DOUBLE and type(value) is int:
+        return float(value)
+    if wanted is ParameterType.DOUBLE_ARRAY and isinstance(value, list):
+        return [float(one) if type(one) is int else one for one in value]
+    return value
 
 
 class Parameter(Element):
@@ -142,12 +408,13 @@ class Parameter(Element):
         return None
 
     def _create_endpoint(self, wanted: tuple[Any, ...]) -> None:
-        from rosglass.qml.parameter_link import ParameterLink as Link  # noqa: PLC0415 - few need it
 
         session = self._session
         assert session is not None
         node, node_name, name = wanted
-        self._set_endpoint(Link.join(session, node, node_name, self, name, self._on_reading))
+        self._set_endpoint(
+            ParameterLink.join(session, node, node_name, self, name, self._on_reading)
+        )
 
     def _dispose(self, session: Session, endpoint: ParameterLink) -> None:  # noqa: ARG002
         endpoint.leave(self)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error, ServiceError
-from rosglass.qml.answering import Answers
+from rosglass.qml.callbacks import Answers
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import Element
 from rosglass.qml.from_js import fields_from_js

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import importlib
 import logging
+import math
+import numbers
 import os
 import re
 import threading
 import time
+from collections import deque
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, overload
 
 from rosglass.comm.executor import Dispatcher
 from rosglass.comm.graph import ConnectionState, Status
+from rosglass.comm.handle import Executor
 from rosglass.errors import ConnectionLostError, Error, InvalidNameError
-from rosglass.qml.executor import GuiExecutor
-from rosglass.qml.load_balancer import LoadBalancer
-from rosglass.qml.log import logger_name
-from rosglass.qml.rosout import QmlRosout
-from rosglass.qml.script_limit import ScriptLimit
+from rosglass.qml.log import QmlRosout, logger_name
 from rosglass.qt import QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
@@ -29,9 +29,130 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Node
     from rosglass.ros2.ros_arguments import Arguments
 
-__all__ = ["NOT_INITIALIZED", "Session"]
+
+__all__ = ["NOT_INITIALIZED", "GuiExecutor", "ScriptLimit", "Session"]
 
 _log = logging.getLogger("rosglass.qml")
+
+
+class _Waker(QtCore.QObject):
+    """Lives on the GUI thread, which its signal wakes.
+
+    An event of our own would do the same, but whoever posts it from another thread touches it once
+    more when it may have been delivered, and deleted, already: PySide2 crashes.
+    """
+
+    _asked = Signal()
+
+    def __init__(self, job: Callable[[], None]) -> None:
+        super().__init__()
+        self._job, self._home = job, threading.get_ident()
+        # Queued between threads without saying so; naming the kind makes PySide load all of Qt's
+        # enumerations, which takes longer than anything else here.
+        self._asked.connect(self.run)
+
+    def wake(self) -> None:
+        """Run the job soon; from any thread."""
+        if threading.get_ident() == self._home:
+            QtCore.QTimer.singleShot(0, self.run)
+        else:
+            self._asked.emit()
+
+    @Slot()
+    def run(self) -> None:
+        """Run the job; Qt calls this on the GUI thread."""
+        self._job()
+
+
+class GuiExecutor(Executor):
+    """Runs jobs on the thread that made it, which must run a Qt event loop.
+
+    Many jobs posted at once cost one event. Jobs posted while jobs run wait for the next event, so
+    that a busy topic cannot keep the user interface from drawing.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._jobs: deque[Callable[[], None]] = deque()
+        #: Those whose turn it is.
+        self._turn: deque[Callable[[], None]] = deque()
+        self._waker = _Waker(self._run)
+        self._closed = False
+
+    def post(self, job: Callable[[], None]) -> None:
+        """Run `job` soon; forgotten when the executor is closed."""
+        with self._lock:
+            if self._closed:
+                return
+            self._jobs.append(job)
+            first = len(self._jobs) == 1
+        if first:
+            self._waker.wake()
+
+    def close(self) -> None:
+        """Forget the waiting jobs and take no more; safe to call twice."""
+        with self._lock:
+            self._closed = True
+            self._jobs.clear()
+            self._turn.clear()
+
+    def resume(self) -> None:
+        """Go on with the other jobs although one is running: it waits in an event loop."""
+        self._waker.wake()
+
+    def _run(self) -> None:
+        with self._lock:
+            self._turn.extend(self._jobs)
+            self._jobs.clear()
+        for _ in range(len(self._turn)):
+            # A job that waits may have let others take their turn.
+            if self._turn:
+                _guarded(self._turn.popleft())
+
+
+def _guarded(job: Callable[[], None]) -> None:
+    try:
+        job()
+    except Exception:
+        # Nothing may be raised through Qt's event loop.
+        _log.exception("a callback failed")
+
+
+class ScriptLimit:
+    """An attribute in seconds, 0 for no limit; what is set is checked.
+
+    Args:
+        seconds: As long as nothing is set.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self._default = seconds
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name, self._key = f"{owner.__name__}.{name}", f"_{name}"
+
+    @overload
+    def __get__(self, item: None, owner: type) -> ScriptLimit: ...
+
+    @overload
+    def __get__(self, item: QtCore.QObject, owner: type) -> float: ...
+
+    def __get__(self, item: QtCore.QObject | None, owner: type) -> ScriptLimit | float:
+        if item is None:
+            return self
+        value: float = vars(item).get(self._key, self._default)
+        return value
+
+    def __set__(self, item: QtCore.QObject, seconds: float) -> None:
+        real = isinstance(seconds, numbers.Real) and not isinstance(seconds, bool)
+        if not real or not math.isfinite(seconds) or seconds < 0:
+            raise Error(
+                f"{self._name}: {seconds!r:.80} is not a number of seconds, 0 or more; 0 for no "
+                "limit"
+            )
+        vars(item)[self._key] = float(seconds)
+
+
 _T = TypeVar("_T")
 #: Milliseconds between two looks at ages and rates.
 TICK = 100
@@ -125,8 +246,6 @@ class Session(QtCore.QObject):
         self.streams: dict[Any, Any] = {}
         #: What elements share, other than pictures, by what it is.
         self.shared: dict[Any, Any] = {}
-        #: When throttled streams fetch their pictures.
-        self.balancer = LoadBalancer()
         #: While any, QML's wish to shut down is ignored: its successor, or others, need the node.
         self.holding = 0
         #: Calls from QML that wait in an event loop of their own.

@@ -7,9 +7,10 @@ import logging
 import os
 import re
 from abc import abstractmethod
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rosglass.errors import Error, InvalidNameError
+from rosglass.errors import Error, InvalidNameError, TypeNotFoundError
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.runtime import Runtime, own_runtime
@@ -18,10 +19,21 @@ from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rosglass.comm.graph import EndpointInfo
     from rosglass.comm.node import Node
+    from rosglass.messages import ActionType, Message, MessageType, ServiceType
     from rosglass.qml.session import Session
 
-__all__ = ["RosSingleton", "check_type", "full_type", "is_list", "strings"]
+
+__all__ = [
+    "GraphSingleton",
+    "RosSingleton",
+    "ValueFunctions",
+    "check_type",
+    "full_type",
+    "is_list",
+    "strings",
+]
 
 _log = logging.getLogger("rosglass.qml")
 _SHORT = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)\Z")
@@ -223,3 +235,302 @@ def full_type(name: str, kind: str = "msg") -> str:
     """Return ``pkg/msg/Type`` for ``pkg/Type``; `kind` is ``msg``, ``srv`` or ``action``."""
     match = _SHORT.match(name)
     return f"{match[1]}/{kind}/{match[2]}" if match else name
+
+
+#: What an action is made of has names with this in them.
+_HIDDEN = "/_action/"
+
+
+class GraphSingleton(RosSingleton):
+    """The graph as it is now; ``graphChanged`` tells of changes. Empty while there is no node."""
+
+    @Slot(result="QStringList")
+    @Slot(str, result="QStringList")
+    def queryTopics(self, datatype: str = "") -> list[str]:
+        """Return the topics, those of one type if given."""
+        return _of_type(self._topics(), full_type(datatype))
+
+    @Slot(result=QJSValue)
+    def getTopicNamesAndTypes(self) -> QJSValue:
+        """Return an object from topic names to lists of types."""
+        return self._spelled(self._topics())
+
+    @Slot(str, result="QStringList")
+    def getTopicTypes(self, topic: str) -> list[str]:
+        """Return the types announced for a topic."""
+        return self._types("getTopicTypes", topic, self._topics())
+
+    @Slot(result="QStringList")
+    @Slot(str, result="QStringList")
+    def queryServices(self, datatype: str = "") -> list[str]:
+        """Return the services but those that actions are made of; of one type if given."""
+        return _of_type(self._services(), full_type(datatype, "srv"))
+
+    @Slot(result=QJSValue)
+    def getServiceNamesAndTypes(self) -> QJSValue:
+        """Return an object from service names to lists of types."""
+        return self._spelled(self._services())
+
+    @Slot(str, result="QStringList")
+    def getServiceTypes(self, name: str) -> list[str]:
+        """Return the types announced for a service."""
+        return self._types("getServiceTypes", name, self._services())
+
+    @Slot(result="QStringList")
+    @Slot(str, result="QStringList")
+    def queryActions(self, datatype: str = "") -> list[str]:
+        """Return the actions, those of one type if given."""
+        return _of_type(self._actions(), full_type(datatype, "action"))
+
+    @Slot(result=QJSValue)
+    def getActionNamesAndTypes(self) -> QJSValue:
+        """Return an object from action names to lists of types."""
+        return self._spelled(self._actions())
+
+    @Slot(str, result="QStringList")
+    def getActionTypes(self, name: str) -> list[str]:
+        """Return the types announced for an action."""
+        return self._types("getActionTypes", name, self._actions())
+
+    @Slot(result="QStringList")
+    def queryNodes(self) -> list[str]:
+        """Return the full names of all nodes."""
+        found: list[str] = self._ask(
+            "queryNodes", lambda node: [name.full for name in node.nodes()], []
+        )
+        return found
+
+    @Slot(str, result=QJSValue)
+    def getPublishersInfo(self, topic: str) -> QJSValue:
+        """Return ``{node, type, typeHash, qos}`` of each publisher of a topic."""
+        found = self._ask(
+            "getPublishersInfo", lambda node: node.publishers(node.resolve(topic)), []
+        )
+        return self._endpoints(found)
+
+    @Slot(str, result=QJSValue)
+    def getSubscriptionsInfo(self, topic: str) -> QJSValue:
+        """Return ``{node, type, typeHash, qos}`` of each subscription of a topic."""
+        found = self._ask(
+            "getSubscriptionsInfo", lambda node: node.subscriptions(node.resolve(topic)), []
+        )
+        return self._endpoints(found)
+
+    @Slot(str, result=QJSValue)
+    def getNodeInfo(self, name: str) -> QJSValue:
+        """Return what a node publishes, subscribes, serves and calls.
+
+        Args:
+            name: The node's full name.
+
+        Returns:
+            ``{publishers, subscriptions, services, clients}``, each a list of ``{name, type}``.
+        """
+        found = self._ask("getNodeInfo", lambda node: node.endpoints(name), [])
+        kinds = {
+            "publisher": "publishers",
+            "subscription": "subscriptions",
+            "service server": "services",
+            "service client": "clients",
+        }
+        info: dict[str, list[dict[str, str]]] = {kind: [] for kind in kinds.values()}
+        for one in sorted(found, key=lambda one: one.name):
+            kind = info[kinds[one.kind.value]]
+            kind.append({"name": one.name, "type": self._spell(one.type)})
+        return self._runtime.value(info)
+
+    def _endpoints(self, found: list[EndpointInfo]) -> QJSValue:
+        runtime = self._runtime
+        infos = runtime.value(
+            [
+                {"node": one.node.full, "type": self._spell(one.type), "typeHash": one.type_hash}
+                for one in found
+            ]
+        )
+        for index, one in enumerate(found):
+            infos.property(index).setProperty("qos", runtime.qos(one.qos))
+        return infos
+
+    def _topics(self) -> dict[str, list[str]]:
+        return _shown(self._ask("topics", lambda node: node.topics(), {}))
+
+    def _services(self) -> dict[str, list[str]]:
+        return _shown(self._ask("services", lambda node: node.services(), {}))
+
+    def _actions(self) -> dict[str, list[str]]:
+        return _shown(self._ask("actions", lambda node: node.actions(), {}))
+
+    def _types(self, what: str, name: str, known: dict[str, list[str]]) -> list[str]:
+        node = self._node(what)
+        try:
+            types = known.get(node.resolve(name), []) if node is not None else []
+        except Error as error:
+            self._runtime.throw(f"{self.NAME}.{what}: {error}")
+            return []
+        return [self._spell(kind) for kind in types]
+
+    def _ask(self, what: str, ask: Callable[[Node], Any], otherwise: Any) -> Any:
+        node = self._node(what)
+        if node is None:
+            return otherwise
+        try:
+            return ask(node)
+        except Error as error:
+            self._log(logging.WARNING, f"{self.NAME}.{what}: {error}")
+            return otherwise
+
+    def _spelled(self, known: dict[str, list[str]]) -> QJSValue:
+        return self._runtime.value(
+            {name: [self._spell(kind) for kind in types] for name, types in known.items()}
+        )
+
+    def _spell(self, type: str) -> str:
+        """Return a type's name as this module spells it."""
+        return self.DIALECT.type_name(type) if "/" in type else type
+
+
+def _shown(known: dict[str, list[str]]) -> dict[str, list[str]]:
+    return {name: types for name, types in sorted(known.items()) if _HIDDEN not in name}
+
+
+def _of_type(known: dict[str, list[str]], wanted: str) -> list[str]:
+    return [name for name, types in known.items() if not wanted or wanted in types]
+
+
+class ValueFunctions(GraphSingleton):
+    """Mixed into the singletons; what they give follows their dialect."""
+
+    @Slot(str, result=QJSValue)
+    def createEmptyMessage(self, type_name: str) -> QJSValue:
+        """Return a message with every field at its default; undefined for unknown types."""
+        return self._empty("createEmptyMessage", type_name, "message")
+
+    @Slot(str, result=QJSValue)
+    def createEmptyServiceRequest(self, type_name: str) -> QJSValue:
+        """Return a service's request with every field at its default; undefined if unknown."""
+        return self._empty("createEmptyServiceRequest", type_name, "service")
+
+    @Slot(str, result=QJSValue)
+    def createEmptyActionGoal(self, type_name: str) -> QJSValue:
+        """Return an action's goal with every field at its default; undefined if unknown."""
+        return self._empty("createEmptyActionGoal", type_name, "action")
+
+    def _empty(self, function: str, type_name: str, wanted: str) -> QJSValue:
+        try:
+            found = self._load(type_name, wanted == "action")
+            parts: dict[str, MessageType] = getattr(found, "parts", {"message": found})
+            first = {"message": "message", "service": "request", "action": "goal"}[wanted]
+            if first not in parts:
+                raise InvalidNameError(f"{type_name} is no {wanted} type")
+            message: Message = parts[first].create()
+            return self._runtime.message(message, self.DIALECT)
+        except Error as error:
+            self._log(logging.WARNING, f"{self.NAME}.{function}: {error}")
+            return QJSValue()
+
+    @Slot(str, result=QJSValue)
+    def constants(self, type_name: str) -> QJSValue:
+        """Return the constants of a message type by name.
+
+        Those of services and actions come as ``request``, ``response``, ``goal``, ``result`` and
+        ``feedback``; an unknown type throws.
+        """
+        from rosglass.qml.to_js import constants_of  # noqa: PLC0415 - brings in the messages
+
+        return self._parts("constants", type_name, lambda kind: constants_of(kind.definition))
+
+    @Slot(str, result=QJSValue)
+    def documentation(self, type_name: str) -> QJSValue:
+        """Return what a type's definition says about it, its fields and its constants.
+
+        Services and actions as in :meth:`constants`; an unknown type throws.
+        """
+        return self._parts("documentation", type_name, self._document)
+
+    def _document(self, kind: MessageType) -> dict[str, Any]:
+        from rosglass.qml.to_js import constants_of  # noqa: PLC0415 - brings in the messages
+
+        definition = kind.definition
+        values = constants_of(definition)
+        return {
+            "type": self.DIALECT.type_name(definition.name),
+            "comment": definition.comment,
+            "fields": {
+                field.name: {
+                    "type": str(field.type),
+                    "comment": field.comment,
+                    "unit": field.unit,
+                    "default": _plain(field.default),
+                }
+                for field in definition.fields
+            },
+            "constants": {
+                constant.name: {
+                    "type": constant.type,
+                    "value": values[constant.name],
+                    "comment": constant.comment,
+                }
+                for constant in definition.constants
+            },
+        }
+
+    def _parts(self, function: str, type_name: str, show: Any) -> QJSValue:
+        try:
+            found = self._load(type_name)
+        except Error as error:
+            self._runtime.throw(f"{self.NAME}.{function}: {error}")
+            return QJSValue()
+        parts: dict[str, MessageType] | None = getattr(found, "parts", None)
+        if parts is None:
+            return self._runtime.value(show(found))
+        return self._runtime.value({name: show(part) for name, part in parts.items()})
+
+    def _load(self, name: str, action: bool = False) -> MessageType | ServiceType | ActionType:
+        """Return a type, of the module's ROS if it is known there, otherwise of the other."""
+        from rosglass.messages import load  # noqa: PLC0415 - brings in the definitions
+
+        # ROS 1 calls actions by their message, pkg/DoAction.
+        names = [name.removesuffix("Action"), name] if action else [name]
+        tries = [(ros, one) for ros in (self.DIALECT.ros, 3 - self.DIALECT.ros) for one in names]
+        for ros, one in tries:
+            with suppress(TypeNotFoundError):
+                return load(one, ros=ros)
+        return load(name, ros=self.DIALECT.ros)
+
+    # Times.
+
+    @Slot(QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, result=QJSValue)
+    def time(self, first: QJSValue, second: QJSValue | None = None) -> QJSValue:
+        """Return a time of seconds, of seconds and nanoseconds, of decimal text, of a Date."""
+        return self._create_time("time", first, second)
+
+    @Slot(QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, result=QJSValue)
+    def duration(self, first: QJSValue, second: QJSValue | None = None) -> QJSValue:
+        """Return a duration of seconds, of seconds and nanoseconds, of decimal text."""
+        return self._create_time("duration", first, second)
+
+    def _create_time(self, kind: str, first: QJSValue, second: QJSValue | None) -> QJSValue:
+        runtime = self._runtime
+        made = runtime.create_time(self.DIALECT, kind, first, second or QJSValue())
+        if made.isError():
+            runtime.throw(f"{self.NAME}.{kind}: {made.property('message').toString()}")
+            return QJSValue()
+        return made
+
+    # Files.
+
+    def _get_io(self) -> QtCore.QObject:
+        found: QtCore.QObject | None = getattr(self, "_io", None)
+        if found is None:
+            from rosglass.qml.yaml_io import Io  # noqa: PLC0415 - few interfaces have files
+
+            found = self._io = Io(self._runtime, self.DIALECT, self)
+        return found
+
+    io = Property(QtCore.QObject, _get_io, constant=True)
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value

@@ -15,8 +15,7 @@ from rosglass.comm.statistics import note_time, rate_of
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import DEFAULT_TIMEOUT_MS, Element
-from rosglass.qml.js_values import shown
-from rosglass.qml.profiles import qos_from_js
+from rosglass.qml.js_values import qos_from_js, shown
 from rosglass.qml.properties import ReadOnly, Writable, at_least, report, within
 from rosglass.qml.subscription import DEFAULT_QOS, Subscription
 from rosglass.qt import QJSValue, QtCore, Signal, Slot, is_alive
@@ -28,8 +27,8 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Node
     from rosglass.comm.qos import QoS
     from rosglass.comm.subscription import Subscription as Received
-    from rosglass.qml.executor import GuiExecutor
     from rosglass.qml.runtime import Runtime
+    from rosglass.qml.session import GuiExecutor
 
 __all__ = ["RosSynchronizedSubscription", "SynchronizedSubscription"]
 

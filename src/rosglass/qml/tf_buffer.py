@@ -12,8 +12,8 @@ from rosglass.comm.time import Time
 from rosglass.errors import ConversionError, Error, TransformException
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import Element
+from rosglass.qml.js_values import time_from_js
 from rosglass.qml.properties import Writable
-from rosglass.qml.times import time_from_js
 from rosglass.qml.waiting import wait_for
 from rosglass.qt import QJSValue, Signal, Slot, is_alive
 

@@ -1,9 +1,11 @@
-"""Waiting within a call from QML without freezing the screen."""
+"""Waiting in a call from QML: for an answer while the screen is drawn, for files with a limit."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import threading
+from typing import TYPE_CHECKING, TypeVar
 
+from rosglass.errors import Error
 from rosglass.qt import QtCore, is_alive
 
 if TYPE_CHECKING:
@@ -11,7 +13,8 @@ if TYPE_CHECKING:
 
     from rosglass.qml.session import Session
 
-__all__ = ["MOST_WAITING", "wait_for"]
+
+__all__ = ["FILE_PATIENCE", "FOLDER_PATIENCE", "MOST_WAITING", "wait_for", "within"]
 
 #: Calls that wait within each other at most. Each needs a part of the stack, and once that is used
 #: up, nothing works any more, a stop button neither.
@@ -86,3 +89,43 @@ def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> b
         session.waiting_calls -= 1
         session.call_ended.emit()
     return True
+
+
+_T = TypeVar("_T")
+
+#: Seconds that a file may hold up the interface, and a tree of folders that is searched.
+FILE_PATIENCE, FOLDER_PATIENCE = 2.0, 5.0
+
+
+def within(seconds: float, what: str, work: Callable[[], _T]) -> _T:
+    """Return what `work` returns; it runs on a thread, since calls to a dead server never end.
+
+    Args:
+        seconds: How long it may take.
+        what: The file or folder, for the error.
+        work: Touches files, and nothing else.
+
+    Raises:
+        Error: It took longer; it may come to its end later.
+        Exception: What `work` raises.
+    """
+    found: list[_T] = []
+    failed: list[Exception] = []
+
+    def run() -> None:
+        try:
+            found.append(work())
+        except Exception as error:
+            failed.append(error)
+
+    thread = threading.Thread(target=run, name="rosglass-files", daemon=True)
+    thread.start()
+    thread.join(seconds)
+    if failed:
+        raise failed[0]
+    if not found:
+        raise Error(
+            f"{what} did not answer within {seconds:g} s: is it on a network drive that cannot be "
+            "reached? Nothing on the screen moves meanwhile"
+        )
+    return found[0]

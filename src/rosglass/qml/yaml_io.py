@@ -14,10 +14,10 @@ from rosglass.comm.text_files import load_yaml
 from rosglass.comm.time import Duration, Time
 from rosglass.errors import Error, UnsupportedError
 from rosglass.qml.dialect import Dialect
-from rosglass.qml.file_access import FILE_PATIENCE, within
+from rosglass.qml.from_js import plain_from_js
 from rosglass.qml.log import log_from_qml
-from rosglass.qml.plain import plain_from_js
 from rosglass.qml.to_js import exact
+from rosglass.qml.waiting import FILE_PATIENCE, within
 from rosglass.qt import QJSValue, QtCore, Slot
 
 if TYPE_CHECKING:

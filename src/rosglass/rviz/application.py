@@ -12,11 +12,9 @@ from rosglass.comm import Handle
 from rosglass.comm.log import warn_on_terminal
 from rosglass.comm.names import validate_node_name
 from rosglass.errors import ConnectionLostError, Error, UnsupportedError
-from rosglass.qml.display import require_display
-from rosglass.qml.interrupt import QuitOnSignal, end_process_within
 from rosglass.qml.log import LocationFormatter
-from rosglass.qml.network_access import close_network
-from rosglass.qml.places import import_folder
+from rosglass.qml.modules import import_folder
+from rosglass.qml.process import QuitOnSignal, close_network, end_process_within, require_display
 from rosglass.qml.session import Session
 from rosglass.qt import QtCore, run_event_loop
 from rosglass.ros1.options import Ros1Options

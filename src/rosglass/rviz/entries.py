@@ -8,7 +8,7 @@ from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error, QmlError
-from rosglass.qml.places import locate
+from rosglass.qml.modules import locate
 from rosglass.qt import QtCore, Signal, Slot, is_alive
 from rosglass.rviz.host import pyqt, rviz
 from rosglass.rviz.overlay import QML_CLASS, REFERENCE_QML_CLASS, SCALES, class_id_of, maker_of

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error
+from rosglass.qml.from_js import plain_from_js
 from rosglass.qml.js_values import object_of
 from rosglass.qml.log import log_from_qml
-from rosglass.qml.plain import plain_from_js
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, QtQml, Signal, Slot
 from rosglass.rviz.property_values import shown
 

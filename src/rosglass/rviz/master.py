@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from rosglass.errors import ConnectionLostError, Error
-from rosglass.qml.executor import GuiExecutor
+from rosglass.qml.session import GuiExecutor
 from rosglass.qt import QtCore, Signal, run_event_loop
 from rosglass.rviz.qt5 import QtWidgets
 from rosglass.wires.tcpros.master import call_node

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.errors import QmlError
-from rosglass.qml.error_view import ERRORS, ERRORS_BELOW, PANEL, SCRIPT_ENDED, ErrorView
-from rosglass.qml.live_file import LiveFile
-from rosglass.qml.opengl_needs import need_in_file, need_in_items
-from rosglass.qml.places import interface_file
+from rosglass.qml.live_file import ERRORS, ERRORS_BELOW, PANEL, SCRIPT_ENDED, ErrorView, LiveFile
+from rosglass.qml.modules import interface_file
+from rosglass.qml.renderer_choice import need_in_file, need_in_items
 from rosglass.qt import QtCore, Signal, is_alive
 from rosglass.rviz.input import (
     BUTTONS,

@@ -8,7 +8,7 @@ import logging
 from typing import TYPE_CHECKING, Any, cast
 
 from rosglass.errors import Error
-from rosglass.qml.plain import plain_from_js
+from rosglass.qml.from_js import plain_from_js
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 from rosglass.rviz.face import VARIANT, errors_to_js, spell_checked, switch, text, to_python
 from rosglass.rviz.property_values import KINDS, merged, shown, writable

@@ -1,19 +1,22 @@
-"""The enumerations of goals, and what they mean in the terms of both worlds."""
+"""Enumerations in QML: states of goals, and kinds of clocks."""
 
 from __future__ import annotations
 
 from enum import IntEnum
 from typing import TYPE_CHECKING
 
-from rosglass.qt import QtCore
+from rosglass.qml.runtime import own_runtime
+from rosglass.qt import Property, QJSValue, QtCore
 
 if TYPE_CHECKING:
     from rosglass.comm.action_client import GoalStatus
+
 
 __all__ = [
     "ActionCommStates",
     "ActionGoalStatus",
     "ActionTerminalStates",
+    "ClockTypes",
     "comm_state_of",
     "status_code",
     "terminal_state_of",
@@ -119,3 +122,18 @@ def terminal_state_of(status: GoalStatus, executed: bool) -> ActionTerminalState
     if status.value == "canceled" and not executed:
         return _Terminal.RECALLED
     return _TERMINAL.get(status.value, _Terminal.UNKNOWN)
+
+
+class ClockTypes(QtCore.QObject):
+    """Kinds of clocks; their numbers are rcl's (``rcl_clock_type_t``).
+
+    They are what ``clockType`` of a time is, as property (Qt 5's plugin) and as function (Qt 6's).
+    """
+
+    def _get(self, number: int) -> QJSValue:
+        return own_runtime(self).clock(number)
+
+    Uninitialized = Property(QJSValue, lambda self: self._get(0), constant=True)
+    Ros = Property(QJSValue, lambda self: self._get(1), constant=True)
+    System = Property(QJSValue, lambda self: self._get(2), constant=True)
+    Steady = Property(QJSValue, lambda self: self._get(3), constant=True)

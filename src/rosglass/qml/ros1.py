@@ -1,39 +1,247 @@
-"""The singleton ``Ros``: the node, the graph, and the makers of everything else."""
+"""The module ``Ros 1.0``: its singletons, and the types that it registers."""
 # ruff: noqa: N802 - the names of slots and signals are QML's
 
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
+import os
+import shlex
+import threading
+from typing import TYPE_CHECKING, TypeVar
 
 from rosglass.comm.qos import History
-from rosglass.errors import Error, InvalidNameError
+from rosglass.comm.time import Time as Moment
+from rosglass.errors import Error, InvalidNameError, UnsupportedError
 from rosglass.qml.action_server import RosActionServer, server_functions
 from rosglass.qml.dialect import Dialect, within_namespace
-from rosglass.qml.graph import GraphSingleton
+from rosglass.qml.enums import ActionCommStates, ActionGoalStatus, ActionTerminalStates
+from rosglass.qml.image_publisher import RosImagePublisher
+from rosglass.qml.image_sinks import ImageItem
+from rosglass.qml.image_subscription import ImageTransportManager, ImageTransportSubscriber
+from rosglass.qml.js_values import queue_from_js
 from rosglass.qml.log import Caller, log_from_qml
-from rosglass.qml.message_waiting import next_message
-from rosglass.qml.profiles import queue_from_js
+from rosglass.qml.logger import Console, ConsoleLevels, InitOptions, short_logger
+from rosglass.qml.parameter import Parameter
 from rosglass.qml.publisher import RosPublisher
-from rosglass.qml.ros1.console import Console, InitOptions, short_logger
-from rosglass.qml.ros1.package import Package
+from rosglass.qml.replay import Replay
+from rosglass.qml.runtime import Runtime, own_runtime
+from rosglass.qml.service_client import Service
 from rosglass.qml.service_server import RosServiceServer, server_function
-from rosglass.qml.singleton import check_type, is_list, strings
-from rosglass.qml.subscription import DEFAULT_QOS, Subscriber
-from rosglass.qml.value_functions import ValueFunctions
+from rosglass.qml.singleton import ValueFunctions, check_type, is_list, strings
+from rosglass.qml.subscription import DEFAULT_QOS, Subscriber, next_message
+from rosglass.qml.synchronized_subscription import RosSynchronizedSubscription
+from rosglass.qml.tf_buffer import RosTfBuffer, RosTfTransformListener
+from rosglass.qml.tf_transform import RosTfBroadcaster, RosTfTransform
+from rosglass.qml.waiting import FOLDER_PATIENCE, MOST_WAITING, wait_for, within
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
+    from rosglass.interfaces.folders import Folders
     from rosglass.qml.session import Session
 
-__all__ = ["Ros"]
+
+__all__ = ["NATIVE", "TYPES", "Package", "Ros", "Time", "WallTime"]
+
+
+class WallTime(QtCore.QObject):
+    """What QML calls ``WallTime``: the time of the operator's machine."""
+
+    @property
+    def _runtime(self) -> Runtime:
+        return own_runtime(self)
+
+    @Slot(result=QJSValue)
+    def now(self) -> QJSValue:
+        """Return the system's time."""
+        return self._runtime.time(Moment.now(), Dialect.ROS1)
+
+    @Slot(QJSValue, result=QJSValue)
+    @Slot(QJSValue, QJSValue, result=QJSValue)
+    def create(self, first: QJSValue, second: QJSValue | None = None) -> QJSValue:
+        """Return a time of seconds, or of whole seconds and nanoseconds."""
+        runtime = self._runtime
+        made = runtime.create_time(Dialect.ROS1, "time", first, second or QJSValue())
+        if made.isError():
+            name = type(self).__name__
+            runtime.throw(f"{name}.create: {made.property('message').toString()}")
+            return QJSValue()
+        return made
+
+
+class Time(WallTime):
+    """What QML calls ``Time``: the time of the robot, which may be simulated."""
+
+    def _now(self) -> Moment:
+        session = self._runtime.session
+        if session.node is not None:
+            return session.node.now()
+        # Asked for, but still connecting: nobody has said yet that time is simulated.
+        return Moment.now() if session.is_initialized else Moment()
+
+    @Slot(result=QJSValue)
+    def now(self) -> QJSValue:
+        """Return the time of the node's clock; zero before init, and before a simulation's."""
+        return self._runtime.time(self._now(), Dialect.ROS1)
+
+    @Slot(result=bool)
+    def isSimTime(self) -> bool:
+        """Return whether the time comes from a simulation."""
+        node = self._runtime.session.node
+        try:
+            return node is not None and node.clock.is_simulated
+        except UnsupportedError:
+            return False
+
+    @Slot(result=bool)
+    def isSystemTime(self) -> bool:
+        """Return whether the time is that of the operator's machine."""
+        return not self.isSimTime()
+
+    @Slot(result=bool)
+    def isValid(self) -> bool:
+        """Return whether there is a time: false before init, and before a simulation's first."""
+        return self._now() != Moment()
+
+
+_T = TypeVar("_T")
+
+#: Seconds that the program ``rospack`` is given.
+_PATIENCE = 10
+
+
+class Package(QtCore.QObject):
+    """The packages that the environment names: ``ROS_PACKAGE_PATH`` and sourced workspaces.
+
+    Args:
+        runtime: The engine's runtime.
+        parent: The singleton.
+    """
+
+    def __init__(self, runtime: Runtime, parent: QtCore.QObject) -> None:
+        super().__init__(parent)
+        self._runtime = runtime
+        self._found: Folders | None = None
+        self._searched: tuple[str | None, ...] = ()
+
+    def _look(self, search: Callable[[Folders], _T], otherwise: _T, *, again: bool = False) -> _T:
+        """Return what is found in the folders, searched once for each state of the environment."""
+        from rosglass.interfaces.folders import (  # noqa: PLC0415 - few need it
+            workspace,
+            workspace_variables,
+        )
+
+        paths = workspace_variables(os.environ)
+
+        def look() -> _T:
+            if self._found is None or paths != self._searched or again:
+                self._found, self._searched = workspace(os.environ), paths
+            return search(self._found)
+
+        try:
+            return within(FOLDER_PATIENCE, "a folder of packages", look)
+        except Error as error:
+            text = f"Ros.package: {error}"
+            log_from_qml("", logging.ERROR, text, self._runtime.caller())
+            return otherwise
+
+    @Slot(str, result=str)
+    def getPath(self, package: str) -> str:
+        """Return a package's folder; empty when there is no such package."""
+        return self._look(lambda folders: folders.package(package), "")
+
+    @Slot(result="QStringList")
+    def getAll(self) -> list[str]:
+        """Return the names of all packages, sorted."""
+        return self._look(lambda folders: sorted(folders.packages()), [])
+
+    @Slot(str, str, result=QJSValue)
+    @Slot(str, str, bool, result=QJSValue)
+    def getPlugins(self, name: str, attribute: str, force_recrawl: bool = False) -> QJSValue:
+        """Return what packages export for a package.
+
+        Args:
+            name: Name of the element within ``<export>``, usually the package that is extended.
+            attribute: The attribute whose values are returned.
+            force_recrawl: Whether to look at the folders again.
+
+        Returns:
+            An object from names of packages to lists of values; ``${prefix}`` is their folder.
+        """
+
+        def search(folders: Folders) -> dict[str, list[str]]:
+            return {
+                package: values
+                for package, folder in sorted(folders.packages().items())
+                if (values := _exports(folder, name, attribute))
+            }
+
+        nothing: dict[str, list[str]] = {}
+        return self._runtime.value(self._look(search, nothing, again=force_recrawl))
+
+    @Slot(str, result=str)
+    def command(self, command: str) -> str:
+        """Return what the program ``rospack`` prints; empty, with a line in the log, without it."""
+        caller, session = self._runtime.caller(), self._runtime.session
+        printed: list[str | Error] = [""]
+
+        def begin(end: Callable[[], None]) -> None:
+            def work() -> None:
+                try:
+                    printed[0] = _rospack(command)
+                except Error as error:
+                    printed[0] = error
+                session.executor.post(end)
+
+            # Not on the session's worker: whoever subscribes meanwhile would wait, too.
+            threading.Thread(target=work, name="rospack", daemon=True).start()
+
+        if not wait_for(session, begin):
+            printed[0] = Error(f"{MOST_WAITING} calls wait already")
+        result = printed[0]
+        if isinstance(result, Error):
+            text = f"Ros.package.command({command!r}) failed: {result}"
+            log_from_qml("", logging.WARNING, text, caller)
+            return ""
+        return result
+
+
+def _rospack(command: str) -> str:
+    import subprocess  # noqa: PLC0415 - few interfaces need it
+
+    try:
+        words = ["rospack", *shlex.split(command)]
+        done = subprocess.run(words, capture_output=True, text=True, timeout=_PATIENCE, check=False)
+    except FileNotFoundError:
+        raise Error("rospack is not installed; getPath() and getAll() need no ROS") from None
+    except (OSError, ValueError, subprocess.TimeoutExpired) as error:
+        raise Error(str(error)) from None
+    if done.returncode:
+        raise Error(done.stderr.strip())
+    return done.stdout.strip()
+
+
+def _exports(folder: str, name: str, attribute: str) -> list[str]:
+    """Return the values of an attribute of ``<export><name .../></export>`` in a package.xml.
+
+    Format: REP 140, "Package Manifest Format Two", section "<export>".
+    """
+    from xml.etree import ElementTree  # noqa: PLC0415 - few interfaces need it
+
+    try:
+        root = ElementTree.parse(os.path.join(folder, "package.xml")).getroot()  # noqa: PTH118
+    except (OSError, ElementTree.ParseError):
+        return []
+    elements = [element for element in root.iterfind("./export/*") if element.tag == name]
+    values = [element.get(attribute) for element in elements]
+    return [value.replace("${prefix}", folder) for value in values if value is not None]
+
 
 _OPTIONS = sum(InitOptions.Option)
 
 
-class Ros(ValueFunctions, GraphSingleton):
+class Ros(ValueFunctions):
     """What QML calls ``Ros``; one per engine, all of a session sharing its node."""
 
     DIALECT = Dialect.ROS1
@@ -186,7 +394,7 @@ class Ros(ValueFunctions, GraphSingleton):
         except Error as error:
             self._runtime.throw(f"Ros.createActionClient: {error}")
             return None
-        from rosglass.qml.ros1.action_client import RosActionClient  # noqa: PLC0415 - few have any
+        from rosglass.qml.action_client import RosActionClient  # noqa: PLC0415 - few have any
 
         return self._runtime.keep(RosActionClient(self._runtime, name, texts[-2]))
 
@@ -272,3 +480,34 @@ def _split(given: Sequence[QJSValue], usage: str) -> tuple[tuple[str, str, str],
         raise InvalidNameError(f"something is missing; write {usage}")
     namespace, type_name, topic = texts if count == 3 else ("", *texts)
     return (namespace, type_name, topic), list(given[count:])
+
+
+#: Bases of the module's singletons (``imports/Ros/*.qml``), by their name in ``Ros.Native``.
+NATIVE = {
+    "TfTransformListenerNative": RosTfTransformListener,
+    "RosNative": Ros,
+    "ServiceNative": Service,
+    "TimeNative": Time,
+    "WallTimeNative": WallTime,
+    "ImageTransportManagerNative": ImageTransportManager,
+}
+#: What QML can write, by name.
+TYPES = {
+    "SynchronizedSubscription": RosSynchronizedSubscription,
+    "Replay": Replay,
+    "ImagePublisher": RosImagePublisher,
+    "TfBroadcaster": RosTfBroadcaster,
+    "TfBuffer": RosTfBuffer,
+    "TfTransform": RosTfTransform,
+    "Parameter": Parameter,
+    "ServiceServer": RosServiceServer,
+    "Subscriber": Subscriber,
+    "ImageTransportSubscriber": ImageTransportSubscriber,
+    "ImageItem": ImageItem,
+    "RosConsoleLevels": ConsoleLevels,
+    "RosInitOptions": InitOptions,
+    "ActionCommStates": ActionCommStates,
+    "ActionGoalStatus": ActionGoalStatus,
+    "ActionServer": RosActionServer,
+    "ActionTerminalStates": ActionTerminalStates,
+}

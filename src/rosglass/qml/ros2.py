@@ -1,33 +1,117 @@
-"""The singleton ``Ros2``: the node, the graph, and the makers of everything else."""
+"""The module ``Ros2 1.0``: its singletons, and the types that it registers."""
 # ruff: noqa: N802, N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import logging
+import os
+from typing import TYPE_CHECKING, TypeVar
 
 from rosglass.comm.qos import QoS
 from rosglass.comm.time import Time
 from rosglass.errors import Error, InvalidNameError
 from rosglass.qml.action_server import ActionServer, server_functions
-from rosglass.qml.graph import GraphSingleton
-from rosglass.qml.logger import Logger
-from rosglass.qml.message_waiting import next_message
-from rosglass.qml.profiles import qos_from_js
+from rosglass.qml.enums import ActionGoalStatus, ClockTypes
+from rosglass.qml.image_publisher import ImagePublisher
+from rosglass.qml.image_sinks import ImageItem
+from rosglass.qml.image_subscription import ImageTransportManager, ImageTransportSubscription
+from rosglass.qml.js_values import qos_from_js
+from rosglass.qml.logger import Logger, LoggerLevel
+from rosglass.qml.message_item_model import MessageItemModel
+from rosglass.qml.parameter import Parameter
 from rosglass.qml.publisher import Publisher
+from rosglass.qml.replay import Replay
 from rosglass.qml.service_client import ServiceClient
 from rosglass.qml.service_server import ServiceServer, server_function
-from rosglass.qml.singleton import check_type, full_type, is_list, strings
-from rosglass.qml.subscription import DEFAULT_QOS, Subscription
-from rosglass.qml.value_functions import ValueFunctions
+from rosglass.qml.singleton import (
+    ValueFunctions,
+    check_type,
+    full_type,
+    is_list,
+    strings,
+)
+from rosglass.qml.subscription import DEFAULT_QOS, Subscription, next_message
+from rosglass.qml.synchronized_subscription import SynchronizedSubscription
+from rosglass.qml.tf_buffer import TfBuffer, TfTransformListener
+from rosglass.qml.tf_transform import TfBroadcaster, TfTransform
+from rosglass.qml.waiting import FOLDER_PATIENCE, within
 from rosglass.qt import QJSValue, QtCore, Signal, Slot
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rosglass.qml.session import Session
 
-__all__ = ["Ros2"]
+
+__all__ = ["NATIVE", "TYPES", "AmentIndex", "Ros2"]
+
+_T = TypeVar("_T")
+_log = logging.getLogger("rosglass.qml")
+#: Where an install space lists its packages; ament's resource index, section "File System Index".
+_LIST = "share/ament_index/resource_index/packages"
 
 
-class Ros2(ValueFunctions, GraphSingleton):
+class AmentIndex(QtCore.QObject):
+    """The packages in the install spaces that ``AMENT_PREFIX_PATH`` names, the first one winning.
+
+    Without ROS 2 there are none. Install spaces that cannot be read are named in the log.
+    """
+
+    @Slot(str, result=str)
+    def getPackageShareDirectory(self, package: str) -> str:
+        """Return a package's folder of shared files; empty when there is no such package."""
+        prefix = self.getPackagePrefix(package)
+        return os.path.join(prefix, "share", package) if prefix else ""  # noqa: PTH118
+
+    @Slot(str, result=str)
+    def getPackagePrefix(self, package: str) -> str:
+        """Return the install space that a package is in; empty when there is none."""
+        if not package or "/" in package or package.startswith("."):
+            return ""
+        return _look(lambda: _prefix(package), "")
+
+    @Slot(result="QStringList")
+    def getPackages(self) -> list[str]:
+        """Return the names of all packages, sorted."""
+        return _look(_packages, [])
+
+
+def _look(search: Callable[[], _T], otherwise: _T) -> _T:
+    try:
+        return within(FOLDER_PATIENCE, "a folder in AMENT_PREFIX_PATH", search)
+    except Error as error:
+        _log.error("AmentIndex: %s", error)
+        return otherwise
+
+
+def _prefix(package: str) -> str:
+    # Unlike pathlib's, this never raises.
+    found = (
+        prefix
+        for prefix in _prefixes()
+        if os.path.isfile(os.path.join(prefix, _LIST, package))  # noqa: PTH113, PTH118
+    )
+    return next(found, "")
+
+
+def _packages() -> list[str]:
+    names: set[str] = set()
+    for prefix in _prefixes():
+        folder = os.path.join(prefix, _LIST)  # noqa: PTH118
+        try:
+            names.update(os.listdir(folder))  # noqa: PTH208
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+        except OSError as error:
+            _log.warning("AmentIndex: %s cannot be read: %s", folder, error.strerror)
+    return sorted(name for name in names if not name.startswith("."))
+
+
+def _prefixes() -> list[str]:
+    return [path for path in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if path]
+
+
+class Ros2(ValueFunctions):
     """What QML calls ``Ros2``; one per engine, all of a session sharing its node."""
 
     aboutToShutdown = Signal()
@@ -300,3 +384,31 @@ def _read_options(options: QJSValue | None) -> tuple[str, int]:
     if not domain.is_integer() or not -1 <= domain <= 232:
         raise InvalidNameError(f"the domain id must be 0 to 232, got {domain:g}")
     return namespace, int(domain)
+
+
+#: Bases of the module's singletons (``imports/Ros2/*.qml``), by their name in ``Ros2.Native``.
+NATIVE = {
+    "TfTransformListenerNative": TfTransformListener,
+    "AmentIndexNative": AmentIndex,
+    "Ros2ClockTypesNative": ClockTypes,
+    "Ros2Native": Ros2,
+    "ImageTransportManagerNative": ImageTransportManager,
+}
+#: What QML can write, by name.
+TYPES = {
+    "SynchronizedSubscription": SynchronizedSubscription,
+    "Replay": Replay,
+    "ImagePublisher": ImagePublisher,
+    "TfBroadcaster": TfBroadcaster,
+    "TfBuffer": TfBuffer,
+    "TfTransform": TfTransform,
+    "Parameter": Parameter,
+    "ServiceServer": ServiceServer,
+    "Subscription": Subscription,
+    "ImageTransportSubscription": ImageTransportSubscription,
+    "ImageItem": ImageItem,
+    "MessageItemModel": MessageItemModel,
+    "Ros2LoggerLevel": LoggerLevel,
+    "ActionGoalStatus": ActionGoalStatus,
+    "ActionServer": ActionServer,
+}

@@ -1,0 +1,283 @@
+"""The process around interfaces: its display, its signals, and no network for QML.
+
+Qt Quick fetches pictures, fonts, QML files and modules from any address that it finds, those in
+rich text included. It does so in threads of its own, where Python must not be called: a thread that
+waits for the GIL is waited for by the GUI thread, which holds it. So Qt is given a proxy that
+refuses every request. Qt uses no proxy for addresses of this machine (``localhost``). For the same
+reason, Python cannot decide which files Qt may open. What its own switches close is closed:
+JavaScript's access to files, and requests of media players, which bypass proxies.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import os
+import signal
+import socket
+import sys
+import threading
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import UnsupportedError
+from rosglass.qt import QT6, QtCore, optional
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import TracebackType
+
+
+__all__ = ["NETWORK_HINT", "QuitOnSignal", "close_network", "end_process_within", "require_display"]
+
+_ADVICE = (
+    "run it where there is a screen, over `ssh -X`, or on a virtual screen: "
+    "xvfb-run -s '-screen 0 1280x800x24' rosglass ..."
+)
+
+
+def require_display() -> Callable[[], None]:
+    """Make sure that Qt can open a window.
+
+    Returns:
+        A function to call once Qt is connected. Until then a connection stays open: a virtual
+        screen starts over when its last client leaves, and refuses others meanwhile.
+
+    Raises:
+        UnsupportedError: There is no display, or a library is missing that Qt needs to use it; the
+            message says what to do.
+    """
+    wanted = os.environ.get("QT_QPA_PLATFORM", "").partition(":")[0].partition(";")[0]
+    if not QT6 and wanted == "offscreen" and not os.environ.get("DISPLAY"):
+        # Qt 5 would look for OpenGL on a display that is not there, and crash.
+        os.environ.setdefault("QT_QUICK_BACKEND", "software")
+    if not sys.platform.startswith("linux") or wanted not in {"", "xcb", "wayland"}:
+        return _nothing
+    if _wayland_answers() and wanted != "xcb":
+        probe = _X11Probe()
+        if not wanted and not probe.answers:
+            os.environ["QT_QPA_PLATFORM"] = "wayland"
+        return probe.close
+    display = os.environ.get("DISPLAY", "")
+    if not display:
+        raise UnsupportedError(f"there is no display (DISPLAY is not set): {_ADVICE}")
+    probe = _X11Probe()
+    if not probe.answers:
+        raise UnsupportedError(f"the display {display} does not answer: {_ADVICE}")
+    _require_x11_plugin()
+    return probe.close
+
+
+def _nothing() -> None:
+    pass
+
+
+def _wayland_answers() -> bool:
+    name = os.environ.get("WAYLAND_DISPLAY", "")
+    if not name:
+        return False
+    import socket  # noqa: PLC0415 - where there is no Wayland, starting up need not wait for it
+
+    path = Path(os.environ.get("XDG_RUNTIME_DIR", "/")) / name
+    try:
+        with socket.socket(socket.AF_UNIX) as probe:
+            probe.connect(str(path))
+    except OSError:
+        return False
+    return True
+
+
+class _X11Probe:
+    """A connection to the X server, authorised as Qt's will be.
+
+    Attributes:
+        answers: Whether the server answered; true when it cannot be tried.
+    """
+
+    def __init__(self) -> None:
+        self.answers = False
+        self._xcb: ctypes.CDLL | None = None
+        if not os.environ.get("DISPLAY"):
+            return
+        try:
+            xcb = ctypes.CDLL("libxcb.so.1")
+        except OSError:
+            self.answers = True
+            return
+        xcb.xcb_connect.restype = ctypes.c_void_p
+        xcb.xcb_connection_has_error.argtypes = xcb.xcb_disconnect.argtypes = [ctypes.c_void_p]
+        self._xcb = xcb
+        self._connection = xcb.xcb_connect(None, None)
+        self.answers = not xcb.xcb_connection_has_error(self._connection)
+
+    def close(self) -> None:
+        """Disconnect."""
+        if self._xcb is not None:
+            self._xcb.xcb_disconnect(self._connection)
+            self._xcb = None
+
+
+def _require_x11_plugin() -> None:
+    """Load Qt's X11 plugin; its own error names neither the library nor the package."""
+    if not QT6:
+        return
+    plugins = QtCore.QLibraryInfo.path(QtCore.QLibraryInfo.LibraryPath.PluginsPath)
+    plugin = Path(plugins, "platforms", "libqxcb.so")
+    if not plugin.exists():
+        return
+    try:
+        ctypes.CDLL(str(plugin))
+    except OSError as error:
+        library = str(error).partition(":")[0]
+        raise UnsupportedError(
+            f"Qt cannot use the display: the library {library} is missing; on Debian and Ubuntu: "
+            "apt install libxcb-cursor0 libxkbcommon-x11-0 libxcb-icccm4 libxcb-keysyms1 "
+            "libxcb-image0 libxcb-render-util0 libxcb-shape0 libegl1 libgl1"
+        ) from None
+
+
+#: Seconds that the program has to end in good order.
+_PATIENCE = 4.0
+#: The signals that end a program, with Python's own handlers.
+_DEFAULTS: dict[int, Any] = {
+    signal.SIGINT: signal.default_int_handler,
+    signal.SIGTERM: signal.SIG_DFL,
+}
+
+
+def end_process_within(seconds: float, code: int) -> None:
+    """End the process after some time with an exit code, unless it has ended by then."""
+
+    def end() -> None:
+        try:
+            # Not time.sleep(), which fails where a clock is set under it (libfaketime).
+            threading.Event().wait(seconds)
+        finally:
+            os._exit(code)
+
+    threading.Thread(target=end, name="end", daemon=True).start()
+
+
+class QuitOnSignal:
+    """Calls `quit` when the process is told to end, and ends it itself when that does not help.
+
+    Python runs its signal handlers only between two instructions of Python; an event loop in C++,
+    or QML that hangs, would put that off for ever. A thread is told at once.
+
+    Args:
+        quit: Called in that thread with the signal's number.
+        patience: Seconds that the program has to end in good order.
+        keep_handlers: Leave signals alone that the program ignores or has a handler of its own for.
+    """
+
+    def __init__(
+        self,
+        quit: Callable[[int], None],
+        patience: float = _PATIENCE,
+        *,
+        keep_handlers: bool = False,
+    ) -> None:
+        self._quit, self._patience = quit, patience
+        self._signals = [n for n in _DEFAULTS if not (keep_handlers and _is_programs_own(n))]
+        self._reader, self._writer = os.pipe()
+        self._ended = threading.Event()
+        self._before: dict[int, Any] = {}
+        self._wakeup = -1
+        self._thread = threading.Thread(target=self._watch, name="signals", daemon=True)
+
+    def __enter__(self) -> QuitOnSignal:
+        if sys.platform != "win32":
+            os.set_blocking(self._writer, False)
+        self._wakeup = signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
+        for number in self._signals:
+            self._before[number] = signal.signal(number, _note)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._ended.set()
+        for number, handler in self._before.items():
+            # One that was installed from C cannot be put back from Python.
+            signal.signal(number, _DEFAULTS[number] if handler is None else handler)
+        signal.set_wakeup_fd(self._wakeup)
+        os.close(self._writer)
+        # What `quit` refers to must not outlive this in a thread.
+        self._thread.join()
+
+    def _watch(self) -> None:
+        ending = {int(number) for number in self._signals}
+        while received := os.read(self._reader, 1):
+            if received[0] not in ending:
+                # As asyncio's, which learns of its signals by it.
+                with suppress(OSError):
+                    os.write(self._wakeup, received)
+            else:
+                self._quit(received[0])
+                if not self._ended.wait(self._patience):
+                    sys.stderr.write("rosglass: the interface does not react; ending it\n")
+                    sys.stderr.flush()
+                    os._exit(128 + received[0])
+        os.close(self._reader)
+
+
+def _note(*_: object) -> None:
+    """Take a signal that :class:`QuitOnSignal` answers in its thread."""
+
+
+def _is_programs_own(number: int) -> bool:
+    """Return whether a signal's handler is neither Python's own nor one of this package."""
+    handler = signal.getsignal(number)
+    if handler in (signal.SIG_DFL, _DEFAULTS[number]):
+        return False
+    return str(getattr(handler, "__module__", "")).partition(".")[0] != "rosglass"
+
+
+_log = logging.getLogger("rosglass.qml")
+#: What Qt's messages about refused requests are followed by.
+NETWORK_HINT = "; the network is closed to interfaces: start with --allow-network to open it"
+#: What Qt is told by the environment, where that does not say otherwise.
+_CLOSED = {
+    # Qt 5 lets an XMLHttpRequest read and write any file unless it is told not to, unlike Qt 6.
+    "QML_XHR_ALLOW_FILE_READ": "0",
+    "QML_XHR_ALLOW_FILE_WRITE": "0",
+    # FFmpeg, which plays the films of Qt 6, names this list when it refuses an address.
+    "QT_FFMPEG_PROTOCOL_WHITELIST": "file,others with --allow-network",
+}
+
+
+@cache
+def close_network() -> None:
+    """Let nothing that Qt loads in this process reach a network, from now on.
+
+    JavaScript cannot read or write files, either. A proxy that the program has set itself is left
+    alone.
+    """
+    for name, value in _CLOSED.items():
+        os.environ.setdefault(name, value)
+    network: Any = optional("QtNetwork")
+    if network is None:
+        _log.warning(
+            "the network is open to interfaces, for Qt's QtNetwork is missing; on Debian: "
+            "sudo apt install python3-pyside2.qtnetwork"
+        )
+        return
+    proxy = network.QNetworkProxy
+    kinds = proxy.ProxyType
+    if proxy.applicationProxy().type() in (kinds.DefaultProxy, kinds.NoProxy):
+        proxy.setApplicationProxy(proxy(kinds.Socks5Proxy, "127.0.0.1", _refusing_port()[1]))
+
+
+@cache
+def _refusing_port() -> tuple[socket.socket, int]:
+    """Return a port of this machine that refuses all, and its socket, which keeps it that way."""
+    closed = socket.socket()
+    # It never listens, and nothing else can as long as it is bound.
+    closed.bind(("127.0.0.1", 0))
+    return closed, closed.getsockname()[1]
