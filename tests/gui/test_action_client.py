@@ -242,7 +242,7 @@ def test_cancelling_what_nobody_hears_of_any_more_is_told(
     root.cancelAll()
     told = json.loads(root.told())
     assert [who for who, _ in told] == ["goal", "client"]
-    assert "nobody hears of it any more" in told[0][1]
+    assert "no further news of it will arrive" in told[0][1]
     assert told[0][1] in caplog.text
 
 

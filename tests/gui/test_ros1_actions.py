@@ -137,7 +137,7 @@ def test_the_interface_shuts_down(
     assert actionlib.of("state")[-1] == [True, DONE, GOAL_LOST]
     assert actionlib.run("[handle.expired, client.connected]") == [True, False]
     actionlib.run("handle.cancel()")
-    assert "nobody hears of it any more" in caplog.text
+    assert "no further news of it will arrive" in caplog.text
 
 
 def test_misuse_throws(actionlib: Client, counter: Counter, wait: Any) -> None:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ActionClient", "GoalSender", "RosActionClient"]
 
-_CLOSED = "its client was closed before it ended; nobody knows what becomes of it"
+_CLOSED = "its client was closed before it ended; its outcome is unknown"
 _CALLBACKS = ("onGoalResponse", "onFeedback", "onResult")
 
 
@@ -98,7 +98,7 @@ class GoalSender(ClientElement):
 
     # Sending.
 
-    def _send(self, goal: QJSValue | None, told: GoalCallbacks) -> QJSValue:
+    def _send(self, goal: QJSValue | None, callbacks: GoalCallbacks) -> QJSValue:
         """Send a goal as soon as there is a server; one that does not fit throws into JavaScript.
 
         Returns:
@@ -110,7 +110,7 @@ class GoalSender(ClientElement):
             runtime,
             self._name,
             QJSValue() if goal is None else goal,
-            told,
+            callbacks,
             self._dialect,
             self._timeout_ms,
             self._forget,
@@ -151,8 +151,8 @@ class GoalSender(ClientElement):
         if is_alive(self) and handle in self._goals and not handle.sent:
             why = self._problem or self._missing()
             seconds = (self._timeout_ms or 0) / 1000
-            told = f"no goal could be sent to {self._name} within {seconds:g} s: {why}"
-            handle.end(GoalStatus.LOST, None, told)
+            reason = f"no goal could be sent to {self._name} within {seconds:g} s: {why}"
+            handle.end(GoalStatus.LOST, None, reason)
 
     def _missing(self) -> str:
         client = self._endpoint
@@ -226,7 +226,7 @@ class ActionClient(GoalSender):
 
         Args:
             goal: An object with the goal's fields.
-            options: Functions ``onGoalResponse(handle)``, told null when the server does not accept
+            options: Functions ``onGoalResponse(handle)``, with null when the server does not accept
                 it, ``onFeedback(handle, feedback)`` and ``onResult({goalId, code, result})``.
         """
         runtime = self._runtime

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Application"]
 
-#: Seconds after which a program ends that was told to, whatever the robot is doing.
+#: Seconds after which a program that was asked to end is ended, whatever the robot does.
 _PATIENCE = 1.7
 
 
@@ -46,10 +46,10 @@ class Application(Handle):
         context: Objects that QML finds by name: QObjects, or plain values.
         import_paths: Further folders with QML modules; ``package://`` as well.
         arguments: What the interface finds in ``Qt.application.arguments``.
-        ros_arguments: What the node is told, ``--ros-args`` included; see :func:`rosglass.connect`.
+        ros_arguments: Arguments of the node, ``--ros-args`` included; see :func:`rosglass.connect`.
         watch: Show it anew whenever a file in its folder is saved.
         fullscreen: Fill the screen.
-        kiosk: Fill the screen, and let nobody close it by accident: Alt-F4 is ignored, the pointer
+        kiosk: Fill the screen, and prevent closing it by accident: Alt-F4 is ignored, the pointer
             disappears while it is not moved; ``Qt.quit()``, Ctrl-C and SIGTERM end it.
         renderer: What draws: "opengl", "software" (Qt's own, without shaders), or "auto" for the
             software renderer where there is no graphics card and the file needs none.
@@ -200,7 +200,7 @@ class Application(Handle):
             try:
                 self._load()
                 code = self._runner.exit_code
-                # A call that waits may have been told to end before there was a loop to do so.
+                # A waiting call may have been asked to end before there was a loop to end.
                 if code is None:
                     code = run_event_loop(self.qt)
                 if signals:

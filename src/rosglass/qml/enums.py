@@ -28,7 +28,7 @@ class ActionGoalStatus(QtCore.QObject):
 
     @QtCore.QEnum
     class Status(IntEnum):
-        """``Unknown`` until the server has accepted it, and when nobody knows any more."""
+        """``Unknown`` until the server has accepted it, and once the outcome cannot be known."""
 
         Unknown = 0
         Accepted = 1

@@ -517,8 +517,8 @@ class _Reader:
                 return [_number(number) for number in value.toVariant()]
         length = value.property("length").toNumber()
         if length > self._left:
-            told = f"at most {_MOST} values in all; numbers in a typed array count as one"
-            raise ConversionError(path, Shown(f"{length:.0f} elements"), told)
+            expected = f"at most {_MOST} values in all; numbers in a typed array count as one"
+            raise ConversionError(path, Shown(f"{length:.0f} elements"), expected)
         return [
             self.read(value.property(index), f"{path}[{index}]", depth + 1)
             for index in range(int(length))

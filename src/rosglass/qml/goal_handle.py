@@ -45,7 +45,7 @@ __all__ = [
 ]
 
 #: Let go when JavaScript collects a handle: PySide 6.11 never frees the Python half.
-_HELD = ("_goal", "_told", "_forget", "_value", "_feedback", "_result", "_shown")
+_HELD = ("_goal", "_callbacks", "_forget", "_value", "_feedback", "_result", "_shown")
 
 
 def _ignore(_: object) -> None:
@@ -53,7 +53,7 @@ def _ignore(_: object) -> None:
 
 
 class GoalCallbacks(NamedTuple):
-    """Who is told what becomes of a goal; on the GUI thread.
+    """The callbacks of one goal, on the GUI thread.
 
     Attributes:
         response: Whether the server accepts it; once.
@@ -77,7 +77,7 @@ class GoalHandle(QtCore.QObject):
         runtime: The engine's runtime.
         action: Name of the action, as in QML.
         value: What is asked for.
-        told: Who is told what becomes of it.
+        callbacks: Called with its status, feedback and result.
         dialect: Whose habits feedback and result follow.
         patience: Milliseconds for a server to appear and to answer; 0 for ever.
         forget: Called when it has ended.
@@ -96,14 +96,14 @@ class GoalHandle(QtCore.QObject):
         runtime: Runtime,
         action: str,
         value: QJSValue,
-        told: GoalCallbacks,
+        callbacks: GoalCallbacks,
         dialect: Dialect,
         patience: int,
         forget: Callable[[GoalHandle], None],
     ) -> None:
         super().__init__()
         self._runtime, self._action, self._value = runtime, action, value
-        self._told, self._dialect, self._forget = told, dialect, forget
+        self._callbacks, self._dialect, self._forget = callbacks, dialect, forget
         self._deadline = time.monotonic() + patience / 1000 if patience else None
         self._caller = runtime.caller()
         self._goal: ClientGoal | None = None
@@ -158,7 +158,7 @@ class GoalHandle(QtCore.QObject):
         """Ask the server to cancel it; a goal that was not sent yet is not sent at all."""
         caller = self._runtime.caller()
         if self._status is GoalStatus.LOST:
-            reason = f"nobody hears of it any more: {self._reason}"
+            reason = f"no further news of it will arrive: {self._reason}"
             log_from_qml("", logging.WARNING, f"{self._label} is not cancelled: {reason}", caller)
             self.cancelFailed.emit(reason)
             return
@@ -231,15 +231,15 @@ class GoalHandle(QtCore.QObject):
         active, self._over, self._result = self._is_active(), True, result
         # ROS 1 servers tell why.
         self._reason = reason or getattr(self._goal, "text", "")
-        if reason and not self._told.handles_failure:
+        if reason and not self._callbacks.handles_failure:
             text = named(self._action, Error(reason))
             log_from_qml("", logging.WARNING, text, self._caller)
         self._set_status(status, active)
         self.resultChanged.emit()
         self._ended(js)
-        self._told.result(self)
+        self._callbacks.result(self)
         # From here on it lives for as long as JavaScript holds it.
-        self.js, self._told = QJSValue(), GoalCallbacks()
+        self.js, self._callbacks = QJSValue(), GoalCallbacks()
 
     def outcome(self) -> QJSValue:
         """Return ``{goalId, code, result, reason}``; the result is empty when there is none."""
@@ -295,14 +295,14 @@ class GoalHandle(QtCore.QObject):
     def _answer(self, accepted: bool) -> None:
         if not self._answered:
             self._answered = True
-            self._told.response(accepted)
+            self._callbacks.response(accepted)
 
     def _on_feedback(self, feedback: Message) -> None:
         if is_alive(self) and not self._over:
             self._feedback = feedback
             self._shown.pop("feedback", None)
             self.feedbackChanged.emit()
-            self._told.feedback(self._get_feedback())
+            self._callbacks.feedback(self._get_feedback())
 
     def _on_done(self, goal: ClientGoal) -> None:
         if not is_alive(self) or self._over:
@@ -448,10 +448,10 @@ class RosGoalHandle(GoalHandle):
         if _ORDER.index(state) > _ORDER.index(self._comm):
             self._comm = state
             self.commStateChanged.emit()
-            self._told.transition(js or self.js)
+            self._callbacks.transition(js or self.js)
 
 
-#: Milliseconds after which a request to cancel that has had no effect is told of.
+#: Milliseconds after which a cancel request without effect is reported.
 _REMINDER = 5000
 #: Let go when JavaScript collects a handle: PySide 6.11 never frees the Python half.
 _SERVER_HELD = ("_goal", "_forget", "_type", "_asked")
@@ -538,7 +538,7 @@ class ServerGoalHandle(QtCore.QObject):
     @Slot()
     @Slot(QJSValue)
     def canceled(self, result: QJSValue | None = None) -> None:
-        """End it as cancelled; throws as :meth:`succeed`, and when nobody asked for that."""
+        """End it as cancelled; throws as :meth:`succeed`, and without a cancel request."""
         self._do("canceled", self._goal.canceled, self._type.result, result)
 
     def _do(self, what: str, do: Callable[[Any], None], kind: Any, value: QJSValue | None) -> None:

@@ -93,7 +93,7 @@ class ItemGrab:
         return self._result is not None and is_alive(self._item) and is_alive(self.window)
 
     def cancel(self) -> None:
-        """Tell nobody."""
+        """Cancel the callback."""
         self._result = None
 
     def _ready(self) -> None:
@@ -115,7 +115,7 @@ def pixels_of(image: QtGui.QImage, size: tuple[int, int], encoding: str) -> NDAr
     Returns:
         Rows x columns (x channels) of bytes, top row first.
     """
-    import numpy as np  # noqa: PLC0415 - not before somebody wants a picture
+    import numpy as np  # noqa: PLC0415 - only once a picture is wanted
 
     formats = QtGui.QImage.Format
     if (image.width(), image.height()) != size:
@@ -451,8 +451,8 @@ def _fields(
     if transport == "compressed":
         from rosglass.images.compressed import compress  # noqa: PLC0415 - needs numpy
 
-        data, told = compress(pixels, encoding, kind, quality)
-        return {"format": told, "data": data}
+        data, name = compress(pixels, encoding, kind, quality)
+        return {"format": name, "data": data}
     width, height = size
     step = width * GRABBED[encoding][1]
     return {

@@ -187,11 +187,11 @@ class Picture:
 
     Attributes:
         frame: Its size, encoding and stamps; its planes may be the memory of `video`.
-        video: The ``QVideoFrame``; None when nobody wants one.
-        image: The ``QImage``; None when nobody wants one.
+        video: The ``QVideoFrame``; None when not wanted.
+        image: The ``QImage``; None when not wanted.
         received: When it arrived.
         late: Seconds that it was kept back on its way.
-        made: When it was ready, seconds of the clock by which ages are told.
+        made: When it was ready, seconds of the clock that ages are measured by.
         whole: What was received, when `frame` is smaller.
     """
 
@@ -215,7 +215,7 @@ class Renderer:
     """Makes the pictures of one stream; used by its thread only.
 
     Args:
-        clock: By which ages are told.
+        clock: The clock that ages are measured by.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:

@@ -23,7 +23,7 @@ def window_of(item: QtQuick.QQuickItem) -> QtQuick.QQuickWindow | None:
     """Return the window that an item is in, None when it is in none.
 
     PySide takes an item for the owner of what ``item.window()`` gives: with the item's wrapper that
-    of the window would end, whoever holds it.
+    of the window would be destroyed, other references or not.
     """
     for window in QtGui.QGuiApplication.allWindows():
         if isinstance(window, QtQuick.QQuickWindow):
@@ -97,7 +97,7 @@ class Sink:
     def room(self) -> tuple[int, int] | None:
         """Return the width and height in pixels that it has on the screen, rounded up generously.
 
-        None when that cannot be told: nobody knows what becomes of the pictures then.
+        None when that is unknown: it cannot be said where the pictures are shown.
         """
         item = self.item if isinstance(self.item, ImageItem) else self.item.parent()
         window = window_of(item) if isinstance(item, QtQuick.QQuickItem) else None

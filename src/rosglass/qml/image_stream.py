@@ -112,7 +112,7 @@ class SharedStream(QtCore.QObject):
         self._network: deque[float] = deque(maxlen=_LATENCY_WINDOW)
         self._processing: deque[float] = deque(maxlen=_LATENCY_WINDOW)
         self._total: deque[float] = deque(maxlen=_LATENCY_WINDOW)
-        #: Seconds between two pictures that satisfy everybody; 0 when somebody wants all.
+        #: Seconds between two pictures that satisfy all viewers; 0 when one wants all.
         self._interval = 0.0
         #: Seconds between two pictures when none are left out, and those that fetching one takes.
         self._period = self._price = 0.0
@@ -270,7 +270,7 @@ class SharedStream(QtCore.QObject):
         """Make the pictures that are wanted; in the stream's thread."""
         now, channels = time.monotonic(), self._due()
         repeated = image.stamp is not None and image.stamp == self._last_stamp
-        # A publisher that repeats its last picture to whoever comes has sent nothing new.
+        # A publisher that repeats its last picture for a new subscriber has sent nothing new.
         if not channels or (repeated and self._interval):
             return
         self._last_stamp = image.stamp

@@ -59,7 +59,7 @@ def _iterate(value: QJSValue) -> Iterator[str]:
 
 def object_of(value: QJSValue) -> Any:
     """Return the QObject that a value is; something else when it is none."""
-    # PySide2 takes the value for the owner of what toQObject() gives: whoever else holds the object
+    # PySide2 takes the value for the owner of what toQObject() gives: other holders of the object
     # in Python would find it gone with the value.
     return value.toVariant()
 

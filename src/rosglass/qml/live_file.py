@@ -288,7 +288,7 @@ class ErrorView:
             item: Any = component.create()
             item.setProperty("heading", heading)
             item.setProperty("text", text)
-            # PySide2 takes an item for gone as soon as nobody in Python knows what it is in.
+            # PySide2 takes an item for deleted as soon as Python has no reference to its parent.
             content = window.contentItem()
             item.setParentItem(content)
             self.items.append(item)

@@ -292,12 +292,12 @@ class QmlRosout(logging.Handler):
             return
         if not (logger.isEnabledFor(record.levelno) or _has_level(record.name)):
             return
-        told = copy.copy(record)
-        told.name = logger.name + record.name.removeprefix(ROOT)
-        # Printed it is already: only those who publish are told.
+        copied = copy.copy(record)
+        copied.name = logger.name + record.name.removeprefix(ROOT)
+        # It is printed already; only publishing handlers get it.
         for handler in logger.handlers:
             if isinstance(handler, RosoutHandler):
-                handler.emit(told)
+                handler.emit(copied)
 
     def close(self) -> None:
         """Hand on no more; safe to call twice."""

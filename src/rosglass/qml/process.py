@@ -43,7 +43,7 @@ def require_display() -> Callable[[], None]:
 
     Returns:
         A function to call once Qt is connected. Until then a connection stays open: a virtual
-        screen starts over when its last client leaves, and refuses others meanwhile.
+        screen starts over when its last client leaves, and refuses others until then.
 
     Raises:
         UnsupportedError: There is no display, or a library is missing that Qt needs to use it; the
@@ -161,10 +161,10 @@ def end_process_within(seconds: float, code: int) -> None:
 
 
 class QuitOnSignal:
-    """Calls `quit` when the process is told to end, and ends it itself when that does not help.
+    """Calls `quit` when a signal asks the process to end, and ends it if that does not help.
 
     Python runs its signal handlers only between two instructions of Python; an event loop in C++,
-    or QML that hangs, would put that off for ever. A thread is told at once.
+    or QML that hangs, would delay that for ever. A thread notices at once.
 
     Args:
         quit: Called in that thread with the signal's number.
@@ -242,9 +242,9 @@ def _is_programs_own(number: int) -> bool:
 _log = logging.getLogger("rosglass.qml")
 #: What Qt's messages about refused requests are followed by.
 NETWORK_HINT = "; the network is closed to interfaces: start with --allow-network to open it"
-#: What Qt is told by the environment, where that does not say otherwise.
+#: Environment variables that Qt reads, set unless they are set already.
 _CLOSED = {
-    # Qt 5 lets an XMLHttpRequest read and write any file unless it is told not to, unlike Qt 6.
+    # Qt 5 lets an XMLHttpRequest read and write any file unless this forbids it, unlike Qt 6.
     "QML_XHR_ALLOW_FILE_READ": "0",
     "QML_XHR_ALLOW_FILE_WRITE": "0",
     # FFmpeg, which plays the films of Qt 6, names this list when it refuses an address.

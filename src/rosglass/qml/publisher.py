@@ -134,7 +134,7 @@ class Publisher(Element):
                 return True
             self._send(sender, fields)
         except ConversionError as error:
-            # Logged by Qt, with the place, unless somebody catches it.
+            # Logged by Qt, with the place, unless JavaScript catches it.
             if self._runtime is not None:
                 text = f"nothing was published on {self._resolved or self._topic}: {error}"
                 self._runtime.throw(self.DIALECT.spelled(text))

@@ -47,7 +47,7 @@ class RobotPlace:
             self._wanted.pop(user, None)
             self._wanted[user] = file
         shown = self._settle()
-        return "" if shown == file else f"another Replay shows {shown} meanwhile"
+        return "" if shown == file else f"another Replay shows {shown} now"
 
     def leave(self, user: Any) -> None:
         """Show it no longer; what was shown before comes back."""

@@ -77,7 +77,7 @@ class Time(WallTime):
         session = self._runtime.session
         if session.node is not None:
             return session.node.now()
-        # Asked for, but still connecting: nobody has said yet that time is simulated.
+        # Requested, but still connecting: whether time is simulated is not known yet.
         return Moment.now() if session.is_initialized else Moment()
 
     @Slot(result=QJSValue)
@@ -194,7 +194,7 @@ class Package(QtCore.QObject):
                     printed[0] = error
                 session.executor.post(end)
 
-            # Not on the session's worker: whoever subscribes meanwhile would wait, too.
+            # Not on the session's worker: subscribing would have to wait for it.
             threading.Thread(target=work, name="rospack", daemon=True).start()
 
         if not wait_for(session, begin):
@@ -434,7 +434,7 @@ class Ros(ValueFunctions):
 
     @Slot(str, result=str)
     def queryTopicType(self, topic: str) -> str:
-        """Return a topic's type; empty when nobody knows it."""
+        """Return a topic's type; empty when it is unknown."""
         types = self._types("queryTopicType", topic, self._topics())
         return types[0] if types else ""
 

@@ -136,8 +136,8 @@ class Ros2(ValueFunctions):
         args, options = (first, second) if is_list(first) else (None, first)
         try:
             namespace, domain = _read_options(options)
-            told = strings(args) if args is not None else ()
-            self._session.init(name, namespace, domain, told)
+            given = strings(args) if args is not None else ()
+            self._session.init(name, namespace, domain, given)
         except Error as error:
             self._runtime.throw(f"Ros2.init: {error}")
 

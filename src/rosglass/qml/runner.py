@@ -36,7 +36,7 @@ _STILL = 3000
 
 
 class Kiosk(QtCore.QObject):
-    """Keeps windows open, and hides the pointer while nobody moves it.
+    """Keeps windows open, and hides the pointer while it is not moved.
 
     Closing a window, as Alt-F4 does, is ignored. ``Qt.quit()``, Ctrl-C and SIGTERM end the program.
 
@@ -138,7 +138,7 @@ class Runner(QtCore.QObject):
         session: The node its QML talks through.
         watch: Show it anew whenever a file in its folder, or in `import_paths`, changes.
         fullscreen: Fill the screen; an interface of several windows, all screens it uses.
-        kiosk: Fill the screen, and let nobody close it by accident.
+        kiosk: Fill the screen, and prevent closing it by accident.
         import_paths: Further folders with QML modules.
 
     Raises:

@@ -98,7 +98,7 @@ class ServiceClient(ClientElement):
     @Slot(QJSValue)
     @Slot(QJSValue, QJSValue)
     def sendRequestAsync(self, request: QJSValue, callback: QJSValue | None = None) -> None:
-        """Call the service; `callback` is told the response, or false.
+        """Call the service; `callback` is called with the response, or false.
 
         A value that does not fit throws a JavaScript Error that names the field; nothing is sent.
         """
@@ -138,7 +138,7 @@ class ServiceClient(ClientElement):
 
     @Slot()
     def cancelRequests(self) -> None:
-        """Give up every request that has no response yet; servers are not told."""
+        """Give up every request without a response; servers are not notified."""
         self._fail_all(Error(f"the request to {self._name} was given up"))
 
     def send(self, value: QJSValue, done: Done) -> bool:
@@ -216,7 +216,7 @@ class ServiceClient(ClientElement):
             self._end(request, error)
 
     def shown(self, result: Message | Error) -> QJSValue:
-        """Return what a callback is told."""
+        """Return the argument for a callback."""
         runtime = self._runtime
         if runtime is None:
             return QJSValue()
@@ -246,7 +246,7 @@ class ServiceClient(ClientElement):
     @Slot()
     def _on_tick(self) -> None:
         # A server that seemed to be there when the request was made may have been dead; the one
-        # that takes its place must not be told what was wanted long ago.
+        # that takes its place must not receive outdated requests.
         timeout_s, now = self.connectionTimeout / 1000, time.monotonic()
         if not self.connectionTimeout or self.ready or now - self._lost < _GRACE_S:
             return
@@ -269,7 +269,7 @@ class Service(QtCore.QObject):
     @Slot(str, str, result=QJSValue)
     @Slot(str, str, QJSValue, result=QJSValue)
     def call(self, service: str, type_name: str, request: QJSValue | None = None) -> QJSValue:
-        """Call a service and return the response; the interface lives on meanwhile.
+        """Call a service and return the response; the interface keeps running.
 
         Returns:
             The response; true when its type has no fields; false when the call failed, which is
@@ -316,7 +316,7 @@ class Service(QtCore.QObject):
         request: QJSValue | None = None,
         callback: QJSValue | None = None,
     ) -> None:
-        """Call a service; `callback` is told what :meth:`call` returns."""
+        """Call a service; `callback` is called with what :meth:`call` returns."""
         client = self._client(self._runtime(), service, type_name)
         client.sendRequestAsync(QJSValue() if request is None else request, callback)
 

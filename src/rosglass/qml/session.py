@@ -38,7 +38,7 @@ _log = logging.getLogger("rosglass.qml")
 class _Waker(QtCore.QObject):
     """Lives on the GUI thread, which its signal wakes.
 
-    An event of our own would do the same, but whoever posts it from another thread touches it once
+    An event of our own would do the same, but the posting thread touches it once
     more when it may have been delivered, and deleted, already: PySide2 crashes.
     """
 
@@ -158,9 +158,9 @@ _T = TypeVar("_T")
 TICK = 100
 #: Milliseconds until connecting is tried again when this machine could not open a session.
 _RETRY = 1000
-#: Milliseconds that elements wait for a node before the author is told that nobody asked for one.
+#: Milliseconds that elements wait for a node before a missing init() is reported.
 _FORGOTTEN = 3000
-#: What is wrong while nobody has asked for a node, and what to do.
+#: The problem before init(), and what to do.
 NOT_INITIALIZED = (
     'no node was asked for: call Ros2.init("name"), or Ros.init("name") with Ros 1.0, '
     "e.g. in Component.onCompleted"
@@ -181,7 +181,7 @@ def _parse(arguments: Sequence[str], url: str) -> Arguments | None:
     """Return what the command line tells a ROS 2 node; ROS 1's own tells its name itself."""
     if not arguments or url.startswith("ros1:"):
         return None
-    from rosglass.ros2.ros_arguments import Arguments  # noqa: PLC0415 - few programs are told anything
+    from rosglass.ros2.ros_arguments import Arguments  # noqa: PLC0415 - few programs have arguments
 
     return Arguments.parse(arguments)
 
@@ -196,7 +196,7 @@ class Session(QtCore.QObject):
         url: Address of the robot; empty asks the environment when connecting.
         name: Node name that overrides the one that QML asks for; empty for none.
         connect: Makes a node of URL, name and namespace; for tests and embedding.
-        arguments: What the node is told, ``--ros-args`` included; see :func:`rosglass.connect`.
+        arguments: Arguments of the node, ``--ros-args`` included; see :func:`rosglass.connect`.
 
     Raises:
         RosArgumentError: One of `arguments` is not valid.
@@ -238,7 +238,7 @@ class Session(QtCore.QObject):
         super().__init__()
         self._arguments = tuple(arguments)
         self._asked: tuple[str, ...] = ()
-        self._told = _parse(arguments, url)
+        _parse(arguments, url)  # raises what is wrong with them
         self.executor = GuiExecutor()
         #: The node; None before it is there and after it is closed.
         self.node: Node | None = None
@@ -335,7 +335,7 @@ class Session(QtCore.QObject):
         return self._owns_node
 
     def steady(self) -> float:
-        """Return seconds by which ages are told, in any thread; see :meth:`Node.steady`.
+        """Return the seconds that ages are measured by, in any thread; see :meth:`Node.steady`.
 
         They never run back, whatever node comes next.
         """
@@ -359,7 +359,7 @@ class Session(QtCore.QObject):
             namespace: Its absolute namespace.
             domain: ROS domain, -1 for what the URL or the environment says. Where neither names a
                 middleware, it means DDS, as ROS_DOMAIN_ID does.
-            arguments: What the node is told besides what the session was.
+            arguments: Arguments of the node, besides those of the session.
 
         Returns:
             False when there is a node already, which stays as it is.
@@ -373,10 +373,10 @@ class Session(QtCore.QObject):
         from rosglass.comm.names import validate_namespace, validate_node_name  # noqa: PLC0415
 
         name = self._forced_name or name
-        told = _parse((*self._arguments, *arguments), self._url)
-        if told is not None:
-            name = told.node_name(name)
-            namespace = told.namespace(name, namespace)
+        parsed = _parse((*self._arguments, *arguments), self._url)
+        if parsed is not None:
+            name = parsed.node_name(name)
+            namespace = parsed.namespace(name, namespace)
         validate_node_name(name)
         validate_namespace(namespace)
         if self.is_initialized:
@@ -536,7 +536,7 @@ class Session(QtCore.QObject):
             self._ticker.stop()
 
     def _remind(self) -> None:
-        """Tell once that elements wait for a node that nobody has asked for."""
+        """Report once that elements wait for a node without a call of init()."""
         if self._ticking > 0 and not self._closed and not self.is_initialized:
             _log.warning("nothing is received or sent: %s", NOT_INITIALIZED)
             self.forgotten.emit()
@@ -600,7 +600,7 @@ class Session(QtCore.QObject):
         self._apply_logger_level()
         self._set_status(node.status())
         self.node_changed.emit()
-        # What it saw before anybody listened is told to nobody else.
+        # The changes before the callback was registered are not reported again.
         self.graph_changed.emit()
 
     def _drop_node(self) -> None:
@@ -686,9 +686,8 @@ class Session(QtCore.QObject):
         before = (self.state, self.detail)
         self._status = status
         if (self.state, self.detail) != before or not self.is_initialized:
-            told = (self.state, self.detail)
-            text = told[1] if told[1].startswith(told[0]) else ": ".join(filter(None, told))
-            # Whoever has ended it knows.
+            state, detail = self.state, self.detail
+            text = detail if detail.startswith(state) else ": ".join(filter(None, (state, detail)))
             _log.log(logging.INFO if self.is_initialized else logging.DEBUG, "%s", text)
             self.connection_changed.emit()
 

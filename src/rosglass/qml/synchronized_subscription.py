@@ -80,16 +80,16 @@ class _Matcher:
 
     @property
     def dropped(self) -> int:
-        """Messages that came into no set, and those in sets that nobody took in time."""
+        """Messages that fit into no set, and those of sets that were not taken in time."""
         return self._match.dropped + self._lost
 
     @property
     def problem(self) -> str:
         """What is wrong with one of the topics; empty when nothing is."""
         for index, subscription in enumerate(self.subscriptions):
-            told = subscription.problem or self._bad.get(index, "")
-            if told:
-                return f"{subscription.topic}: {told}"
+            problem = subscription.problem or self._bad.get(index, "")
+            if problem:
+                return f"{subscription.topic}: {problem}"
         return ""
 
     def take(self) -> list[list[Sample]]:
@@ -217,8 +217,8 @@ class SynchronizedSubscription(Element):
                 type_name = "" if kind.isUndefined() else kind.toString()
                 qos = qos_from_js(item.property("qos"), DEFAULT_QOS)
             else:
-                told = 'a topic, {topic: "/scan", type: "...", qos: ...}, or a Subscription'
-                raise ConversionError(f"topics[{at}]", shown(item), told)
+                expected = 'a topic, {topic: "/scan", type: "...", qos: ...}, or a Subscription'
+                raise ConversionError(f"topics[{at}]", shown(item), expected)
             if not topic:
                 return ()
             found.append((node.resolve(topic), type_name, qos))

@@ -25,7 +25,7 @@ class _Keeper(QtCore.QObject):
     """Puts off the deletion of objects while a call waits.
 
     Qt ends the program when an object is destroyed whose signal handler is still running, which
-    is what a page that is closed meanwhile would bring about.
+    happens when a page is closed during the call.
     """
 
     def __init__(self) -> None:
@@ -47,7 +47,7 @@ class _Keeper(QtCore.QObject):
 
 
 def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> bool:
-    """Return once something has ended; meanwhile the interface lives on.
+    """Return once an operation has ended; the interface keeps running until then.
 
     Events are handled as ever: pictures are drawn, a stop button works. Ends early when the
     program does.
@@ -126,6 +126,6 @@ def within(seconds: float, what: str, work: Callable[[], _T]) -> _T:
     if not found:
         raise Error(
             f"{what} did not answer within {seconds:g} s: is it on a network drive that cannot be "
-            "reached? Nothing on the screen moves meanwhile"
+            "reached? The screen is frozen until then"
         )
     return found[0]

@@ -40,7 +40,7 @@ _MAGIC = b"qv4cdata"
 #: Bytes from the start of a compiled file within which its functions are looked for.
 _LONGEST = 1 << 24
 _PAGE = 4096
-#: Frames that are told.
+#: Stack frames that are reported.
 _MOST = 12
 #: Bytes from the number of a compiled file's strings to that of the string with its name.
 _FILE = 124
@@ -198,7 +198,7 @@ class JsStack:
         while frame:
             yield frame
             before, frame = frame, self._memory.number(frame + _CALLER, 8)
-            # The stack grows downwards, so it is a caller's, or has changed meanwhile.
+            # The stack grows downwards, so it is a caller's, or has changed since.
             if frame <= before:
                 return
 
@@ -248,9 +248,9 @@ _log = logging.getLogger("rosglass.qml")
 _BEAT = 250
 #: Seconds between two looks at them; and between two looks at what it does while there are none.
 _LOOK, _CLOSE_LOOK = 0.5, 0.1
-#: For how many seconds JavaScript is told to end, one after the other: until it has, for it goes on
-#: where it is when it is told no longer; and not longer, for what it does next must not be told so.
-#: At first nobody else runs Python meanwhile, who could keep this thread from noticing.
+#: Seconds for which JavaScript stays interrupted, one after the other: until it has ended, for it
+#: continues where it is when the interruption ends; and not longer, for it would end the next
+#: handler, too. At first no other thread runs Python, which could keep this one from noticing.
 _HOLDS = (0.0005,) * 6
 #: The same while others may: JavaScript that calls Python cannot end before.
 _SHARED_HOLDS = (0.001, 0.001, 0.004, 0.004, 0.016, 0.032)
@@ -296,15 +296,15 @@ class _Watched(NamedTuple):
         return self.stack.is_known and self.stack.frame != self.waiting[0]
 
     def hold(self, wanted: tuple[int, int], seconds: float) -> float:
-        """Tell JavaScript to end, until it has, or until some seconds have passed.
+        """Interrupt JavaScript until its function has ended, or until some seconds have passed.
 
         Args:
             wanted: The :attr:`handler` to end.
             seconds: How long.
 
         Returns:
-            For how many seconds at most it was told on after it had ended: what came next was told
-            so, too.
+            For how many seconds at most the interruption outlasted the function: it may have ended
+            the next one, too.
         """
         outermost, handler = wanted
         if self.handler != wanted:
@@ -350,7 +350,7 @@ class Watchdog(QtCore.QObject):
     Lives on the GUI thread, which gives signs of life by a timer. A thread of its own looks for
     them. While there are none it adds up for how long the GUI thread has computed in JavaScript,
     and ends that when it is longer than :attr:`Session.longest_script`; native code and Python are
-    only told.
+    only reported.
 
     JavaScript that runs while a function of Qt keeps Python's lock cannot be ended, for no thread
     of Python runs then: QObject.setProperty, QQmlComponent.create (for which there is
@@ -377,7 +377,7 @@ class Watchdog(QtCore.QObject):
         self._lives = False
         #: When the thread last looked, and seconds in which it could not.
         self._looked, self._blind = self._beaten, 0.0
-        self._told = ""
+        self._report = ""
         self._end = threading.Event()
         self._thread: threading.Thread | None = None
         self._timer = QtCore.QTimer(self)
@@ -438,13 +438,13 @@ class Watchdog(QtCore.QObject):
         for watched in self._watched.values():
             watched.waiting[0] = watched.stack.frame
         lived, self._lives = self._lives, True
-        told, self._told = self._told, ""
+        report, self._report = self._report, ""
         blind, self._blind = self._blind, 0.0
         limit = self._session.longest_script
         if not lived or not limit or still < limit:
             return
-        if told:
-            _log.warning("the screen stood still for %.1f s in all: %s", still, told)
+        if report:
+            _log.warning("the screen stood still for %.1f s in all: %s", still, report)
         elif max(blind, now - self._looked) > limit / 2:
             _log.warning(
                 "the screen stood still for %.1f s, and the whole program with it: the process was "
@@ -461,7 +461,7 @@ class Watchdog(QtCore.QObject):
 
     @Slot()
     def _on_quit(self) -> None:
-        # Whether the event loop runs once more, nobody knows.
+        # It is unknown whether the event loop will run once more.
         self._lives = False
 
     # The thread that watches.
@@ -510,7 +510,7 @@ class Watchdog(QtCore.QObject):
                     continue
                 if self._beaten == beaten and self._end_script(innermost, script):
                     return
-            if self._lives and still >= limit and not self._told and self._beaten == beaten:
+            if self._lives and still >= limit and not self._report and self._beaten == beaten:
                 self._tell_still(still, innermost)
 
     def _end_script(self, watched: _Watched, seconds: float) -> bool:
@@ -537,7 +537,7 @@ class Watchdog(QtCore.QObject):
             finally:
                 sys.setswitchinterval(before)
         if ended:
-            self._told = ""
+            self._report = ""
             self._tell_ended(watched, callers, seconds, late)
         return ended
 
@@ -554,7 +554,7 @@ class Watchdog(QtCore.QObject):
         self, watched: _Watched, callers: list[Caller], seconds: float, late: float
     ) -> None:
         where = callers[0] if callers else Caller("<unknown>", 0, "")
-        shown = dict.fromkeys(map(_told, [*callers[:3], *callers[-1:]]))
+        shown = dict.fromkeys(map(_place, [*callers[:3], *callers[-1:]]))
         chain = ", called at ".join(shown)
         text = (
             f"JavaScript computed for {seconds:.1f} s and kept the screen from living; it was "
@@ -568,12 +568,12 @@ class Watchdog(QtCore.QObject):
         """Tell of what is not JavaScript, and can only be waited for."""
         frame = sys._current_frames().get(self._main)
         callers = watched.stack.callers() if watched is not None else []
-        called = f", called at {_told(callers[0])}" if callers else ""
+        called = f", called at {_place(callers[0])}" if callers else ""
         if frame is None or _identity(frame) == self._loop:
             text = f"native code of Qt, RViz or a plugin is at work{called}"
         else:
             text = f"Python is at work in {_python_place(frame)}{called}"
-        self._told = text
+        self._report = text
         _log.warning("the screen has stood still for %.1f s: %s", seconds, text)
 
     def _show(self, watched: _Watched, text: str) -> None:
@@ -584,7 +584,7 @@ class Watchdog(QtCore.QObject):
         self._session.executor.post(show)
 
 
-def _told(caller: Caller) -> str:
+def _place(caller: Caller) -> str:
     name = caller.function.removeprefix("expression for ")
     return f"{caller.place}{f' ({name})' if name else ''}"
 

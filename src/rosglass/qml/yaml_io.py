@@ -116,7 +116,7 @@ def _read(file: Path) -> str:
 
 
 def _replace(file: Path, text: str) -> None:
-    """Write a file at once, so that nobody ever reads half of it."""
+    """Write a file atomically: readers never see half of it."""
     if file.is_dir():
         raise IsADirectoryError(f"{file} is a folder")
     data = text.encode("utf-8")
