@@ -201,7 +201,7 @@ def test_a_goal_is_accepted_by_true_alone(
     wait(goal.done.done)
     assert isinstance(goal.done.exception(), GoalRejectedError)
     assert root.property("asked") == 0
-    assert "did not say true or false" in caplog.text
+    assert "returned neither true nor false" in caplog.text
 
 
 def test_withdrawing_ends_the_goals(live: Bench, robot: Robot, wait: Any) -> None:

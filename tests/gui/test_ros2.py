@@ -185,7 +185,8 @@ def test_the_state_of_the_connection_is_shown(running: Any, wait: Any) -> None:
 
 
 def test_the_address_can_be_changed_while_running(running: Any, wait: Any) -> None:
-    root = running.load('QtObject { property QtObject s: Subscription { topic: "/t" } }')
+    chat = 'Subscription { topic: "/t"; messageType: "std_msgs/String" }'
+    root = running.load(f"QtObject {{ property QtObject s: {chat} }}")
     wait(lambda: root.property("s").property("subscribed"))
     running.run("Ros2.url = 'memory://other'")
     wait(lambda: running.session.node is not None and running.session.node.url == "memory://other")

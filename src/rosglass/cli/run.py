@@ -125,7 +125,7 @@ def add_allow_network(parser: argparse.ArgumentParser) -> None:
 
 
 def add_longest_script(parser: argparse.ArgumentParser) -> None:
-    """Declare the option that says for how long JavaScript may keep the screen from living."""
+    """Declare the option that says for how long JavaScript may block the interface."""
     parser.add_argument(
         "--longest-script",
         metavar="SECONDS",

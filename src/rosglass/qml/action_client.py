@@ -35,7 +35,7 @@ _CALLBACKS = ("onGoalResponse", "onFeedback", "onResult")
 
 
 class GoalSender(ClientElement):
-    """Sends goals, and stays until they have ended even if JavaScript has let it go.
+    """Sends goals, and exists until they have ended even without references in JavaScript.
 
     Args:
         runtime: The engine's runtime.
@@ -161,7 +161,7 @@ class GoalSender(ClientElement):
         return client.problem or "is its server running, and its name right?"
 
     def _forget(self, handle: GoalHandle) -> None:
-        """Let a goal go that has ended."""
+        """Drop a goal that has ended."""
         if handle in self._goals:
             self._goals.remove(handle)
         if not self._goals:

@@ -159,7 +159,7 @@ class Application(Handle):
             self._runner.load()
 
     def reload(self) -> bool:
-        """Show the file as it is now; with errors, keep what is shown and show them over it."""
+        """Reload the file; with errors, keep the present interface and show them over it."""
         self.load()
         return self._runner.reload()
 
@@ -172,7 +172,7 @@ class Application(Handle):
         self.session.executor.post(lambda: self._runner.exit(code))
 
     def run(self, *, end_process: bool = False) -> int:
-        """Show the interface until it is closed, and take everything down.
+        """Show the interface until it is closed, then close everything.
 
         Args:
             end_process: End the whole process within 2 s of the interface's end, also while a

@@ -33,11 +33,11 @@ _SCRIPT = """(function (calls, jobs) {
         job.done = true
     })
 })"""
-_ENDED = "new Error('the function was ended, for it kept the screen from living')"
+_ENDED = "new Error('the function was ended because it blocked the interface')"
 
 
 class JsCalls(QtCore.QObject):
-    """Calls functions, in the thread of their engine.
+    """Calls functions in the thread of their engine, without the GIL.
 
     QJSValue.call keeps Python's lock until the function has returned: one that never does could
     not even be ended. Sending a signal does not.
@@ -77,7 +77,7 @@ class JsCalls(QtCore.QObject):
 
 
 def call_back(runtime: Runtime, callback: QJSValue, *arguments: QJSValue) -> QJSValue:
-    """Call a JavaScript function; what it throws is logged with file and line.
+    """Call a JavaScript function; log the error that it throws, with file and line.
 
     Args:
         runtime: The engine's runtime; when the engine is gone, nothing happens.
@@ -100,7 +100,7 @@ def call_back(runtime: Runtime, callback: QJSValue, *arguments: QJSValue) -> QJS
 
 
 class Deferred:
-    """A JavaScript promise and who will settle it; on the GUI thread only.
+    """A JavaScript promise and its functions to settle it; on the GUI thread only.
 
     Args:
         runtime: The engine's runtime.
@@ -114,18 +114,18 @@ class Deferred:
         self.promise, self._resolve, self._reject = runtime.promise()
 
     def resolve(self, value: QJSValue) -> None:
-        """Let it come."""
+        """Resolve the promise."""
         call_back(self._runtime, self._resolve, value)
 
     def reject(self, reason: str) -> None:
-        """Let a JavaScript Error come instead."""
+        """Reject the promise with a JavaScript Error."""
         text = f"{self._what}: {reason}" if self._what not in reason else reason
         log_from_qml("", logging.WARNING, text, self._caller)
         call_back(self._runtime, self._reject, QJSValue(text))
 
 
 class _Settler(QtCore.QObject):
-    """Takes over what a JavaScript promise comes to."""
+    """Settles a future with the outcome of a JavaScript promise."""
 
     def __init__(
         self,
@@ -139,7 +139,7 @@ class _Settler(QtCore.QObject):
     @Slot(QJSValue)
     @Slot()
     def settle(self, value: QJSValue | None = None) -> None:
-        """Let the answer come."""
+        """Set the result of the future."""
         if not self._future.done():
             try:
                 self._future.set_result(self._take(QJSValue() if value is None else value))
@@ -150,7 +150,7 @@ class _Settler(QtCore.QObject):
     @Slot(QJSValue)
     @Slot()
     def fail(self, reason: QJSValue | None = None) -> None:
-        """Let the failure come."""
+        """Set the error of the future."""
         if not self._future.done():
             text = "no reason given" if reason is None else reason.toString()
             self._future.set_exception(Error(text.removeprefix("Error: ")))
@@ -158,11 +158,11 @@ class _Settler(QtCore.QObject):
 
 
 class Answers:
-    """Asks a JavaScript function, and waits for what it answers; on the GUI thread only.
+    """Calls a JavaScript function and returns its answer, now or later; on the GUI thread only.
 
     Args:
         runtime: The engine's runtime.
-        what: Who is asked, for errors: ``the handler of service /lamp``.
+        what: The function, for errors: ``the handler of service /lamp``.
     """
 
     def __init__(self, runtime: Runtime, what: str) -> None:
@@ -230,7 +230,7 @@ class Answers:
         return future
 
     def give_up(self) -> None:
-        """Fail every answer that has not come: who was asked is gone."""
+        """Fail every answer that is outstanding: the function is gone."""
         for future in list(self._pending):
             if not future.done():
                 future.set_exception(Error(f"{self._what} was closed before it answered"))

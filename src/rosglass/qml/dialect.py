@@ -35,7 +35,7 @@ class Dialect(Enum):
 
     @property
     def ros(self) -> int:
-        """The ROS whose words it uses: 1 or 2."""
+        """The ROS version whose names it uses: 1 or 2."""
         return 1 if self is Dialect.ROS1 else 2
 
     @property

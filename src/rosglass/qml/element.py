@@ -147,7 +147,7 @@ class Element(QtCore.QObject):
         session.background(endpoint.close)
 
     def _update(self) -> None:
-        """Create, replace or close the endpoint as the properties ask for."""
+        """Create, replace or close the endpoint as the properties require."""
         wanted = self._wanted()
         if wanted == self._config:
             return
@@ -543,13 +543,13 @@ class ClientElement(Element):
 
 
 def named(name: str, error: BaseException) -> str:
-    """Return an error's text with the name of what it is about in it."""
+    """Return an error's text, with the name of its topic, service or action in it."""
     text = str(error)
     return text if name in text else f"{name}: {text}"
 
 
 def given_fields(value: QJSValue, type: MessageType, dialect: Dialect) -> dict[str, object]:
-    """Return the fields of a request or goal that QML gave; errors as of ``fields_from_js``."""
+    """Return the fields of a request or goal of QML; raises as :func:`fields_from_js`."""
     from rosglass.messages.schema import schema_of  # noqa: PLC0415 - loaded by now
     from rosglass.qml.from_js import fields_from_js  # noqa: PLC0415
 

@@ -40,11 +40,11 @@ class ActionGoalStatus(QtCore.QObject):
 
 
 class ActionCommStates(QtCore.QObject):
-    """How far client and server have come with a goal; actionlib's ``CommState``."""
+    """The communication state of a goal; actionlib's ``CommState``."""
 
     @QtCore.QEnum
     class State(IntEnum):
-        """In the order in which a goal goes through some of them."""
+        """The states, in the order in which a goal passes them."""
 
         WAITING_FOR_GOAL_ACK = 0
         PENDING = 1
@@ -61,7 +61,7 @@ class ActionTerminalStates(QtCore.QObject):
 
     @QtCore.QEnum
     class State(IntEnum):
-        """What the server said, or LOST."""
+        """The server's verdict, or LOST."""
 
         RECALLED = 0
         REJECTED = 1
@@ -113,7 +113,7 @@ def comm_state_of(status: GoalStatus) -> ActionCommStates.State:
 
 
 def terminal_state_of(status: GoalStatus, executed: bool) -> ActionTerminalStates.State:
-    """Return how actionlib would say that a goal ended.
+    """Return actionlib's terminal state of a goal.
 
     Args:
         status: What has become of it.

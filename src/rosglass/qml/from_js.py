@@ -66,7 +66,7 @@ _HEADER = "std_msgs/msg/Header"
 def fields_from_js(
     value: QJSValue, schema: Schema, path: str = "", dialect: Dialect = Dialect.ROS2
 ) -> dict[str, Any]:
-    """Return the fields that a JavaScript value gives for a message; undefined ones are left out.
+    """Return the fields of a message in a JavaScript value; undefined ones are left out.
 
     Args:
         value: An object, a message received before, a QML object with properties of the fields'
@@ -119,7 +119,7 @@ class _Conversion:
         self._loose = dialect is Dialect.ROS2
 
     def fields(self, value: QJSValue, schema: Schema, path: str) -> dict[str, Any]:
-        """Return the fields that a value gives for a message."""
+        """Return the fields of a message in a value."""
         if schema.is_time:
             parts = time_parts(value, path, f"a time ({schema.name})")
             return dict(zip((member.name for member in schema.members), parts, strict=True))
@@ -371,7 +371,7 @@ def typed_array(value: QJSValue) -> Any:
 
 
 def _as_bools(found: Any, number: Number) -> Any:
-    """Return the bools that bytes are: ``buffer()`` of a received array gives bytes."""
+    """Return bytes as bools: ``buffer()`` of a received array returns bytes."""
     fits = (
         number.code == "?" and found.dtype.kind != "f" and bool(((found == 0) | (found == 1)).all())
     )
@@ -379,7 +379,7 @@ def _as_bools(found: Any, number: Number) -> Any:
 
 
 def _buffer(value: QJSValue, member: Member, path: str) -> Any:
-    """Return an ArrayBuffer's elements: what ``buffer()`` of a received array gives."""
+    """Return the elements of an ArrayBuffer, as ``buffer()`` of a received array returns it."""
     assert member.number is not None
     held = value.toVariant()
     if not isinstance(held, QtCore.QByteArray):
@@ -407,7 +407,7 @@ def _text(value: float) -> str:
 
 
 def _as_number(value: Any, code: str) -> Any:
-    """Return what a text or bool says as a number, and a number or text as a bool."""
+    """Convert a text or bool to a number, and a number or text to a bool."""
     if code == "?":
         words = {"true": True, "false": False, "1": True, "0": False, 1: True, 0: False}
         return words.get(value, value) if isinstance(value, (str, int, float)) else value

@@ -185,7 +185,7 @@ class GoalHandle(QtCore.QObject):
 
     @property
     def left(self) -> float | None:
-        """Seconds that a server may take yet, as errors show them; None for ever."""
+        """Seconds left for a server to answer, as errors show them; None for no limit."""
         if self._deadline is None:
             return None
         return round(max(0.0, self._deadline - time.monotonic()), 1)
@@ -216,7 +216,7 @@ class GoalHandle(QtCore.QObject):
         self._sent(goal, executor)
 
     def end(self, status: GoalStatus, result: Message | None, reason: str) -> None:
-        """Let it have ended, and tell everybody; for once.
+        """End the goal and notify all listeners; only once.
 
         Args:
             status: How.
@@ -256,7 +256,7 @@ class GoalHandle(QtCore.QObject):
         return self._reason if self._result is None else ""
 
     def expire(self, reason: str) -> None:
-        """Let it have ended, as its client is gone."""
+        """End the goal because its client is gone."""
         self.end(GoalStatus.LOST, None, reason)
 
     # What others make of it.
@@ -414,7 +414,7 @@ class RosGoalHandle(GoalHandle):
                 self._warn("resend", str(error))
 
     def expire(self, reason: str) -> None:
-        """Let it have ended, as its client is gone."""
+        """End the goal because its client is gone."""
         self._expired = True
         self.end(GoalStatus.LOST, None, reason)
         if is_alive(self):
@@ -551,7 +551,7 @@ class ServerGoalHandle(QtCore.QObject):
     # For its server.
 
     def take(self, answer: QJSValue) -> Any:
-        """Return the fields of the result that JavaScript gave; None for undefined.
+        """Return the fields of the result from JavaScript; None for undefined.
 
         Raises:
             ConversionError: It does not fit.
@@ -561,7 +561,7 @@ class ServerGoalHandle(QtCore.QObject):
         return given_fields(answer, self._type.result, self._dialect)
 
     def settle(self, answer: Future[Any]) -> None:
-        """End it with what a promise came to."""
+        """End the goal with the outcome of a promise."""
         error = answer.exception(0)
         if error is not None:
             self.fail(error)
@@ -569,7 +569,7 @@ class ServerGoalHandle(QtCore.QObject):
             self.finish(answer.result(0))
 
     def finish(self, result: Any) -> None:
-        """End it with its result: done, or cancelled if that was asked for."""
+        """End the goal with its result: succeeded, or canceled if that was requested."""
         if not self.ended.done():
             self.ended.set_result(result)
         elif result is not None and not self._abandoned:
@@ -588,7 +588,7 @@ class ServerGoalHandle(QtCore.QObject):
         self._abandoned = True
 
     def refresh(self) -> None:
-        """Tell what has changed."""
+        """Announce what has changed."""
         if "_goal" not in self.__dict__:
             return
         status = self._goal.status

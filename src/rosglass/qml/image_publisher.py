@@ -45,7 +45,7 @@ _GREY = (0.299, 0.587, 0.114)
 
 
 class ItemGrab:
-    """One picture of an item, which the renderer takes with its next frame.
+    """One picture of an item, taken with the next frame of its renderer.
 
     Args:
         item: The item.
@@ -89,7 +89,7 @@ class ItemGrab:
 
     @property
     def is_possible(self) -> bool:
-        """Whether the picture can still come: the item is there, and in the same window."""
+        """Whether the picture is still possible: the item exists, in the same window."""
         return self._result is not None and is_alive(self._item) and is_alive(self.window)
 
     def cancel(self) -> None:
@@ -388,7 +388,7 @@ class ImagePublisher(Element):
         self._measure()
 
     def _measure(self) -> None:
-        """Find out how often pictures go out, and whether one is overdue."""
+        """Announce the rate of published pictures, and whether one is overdue."""
         now, sent = time.monotonic(), self._sent
         age = now - sent[-1] if sent else math.inf
         longest = max(1.0, 3 / self.rate if self.rate else 0.0)

@@ -1,4 +1,4 @@
-"""From a received picture to what each kind of display takes, every step done once."""
+"""Received pictures as video frames and images for displays, each step done once."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ _MOST_COLORS = 8
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How a viewer wants its pictures; viewers with equal looks get the same ones.
+    """The view that a viewer shows; viewers with equal looks share their pictures.
 
     Attributes:
         video: Whether it takes video frames; otherwise it takes images.

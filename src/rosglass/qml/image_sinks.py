@@ -263,7 +263,7 @@ class ImageItem(QtQuick.QQuickPaintedItem):
         painter.drawImage(target, image, source)
 
     def _place(self, image: QtGui.QImage) -> tuple[QtCore.QRectF, QtCore.QRectF]:
-        """Return where the picture goes, and which part of it."""
+        """Return the target rectangle, and the part of the picture that is drawn there."""
         width, height = self.width(), self.height()
         whole = QtCore.QRectF(0, 0, image.width(), image.height())
         target = QtCore.QRectF(0, 0, width, height)

@@ -65,7 +65,7 @@ class Channel:
         return now >= self._due
 
     def take(self, now: float) -> None:
-        """Count a picture, so that the mean rate stays within what is wanted."""
+        """Count a picture, so that the mean rate stays within the requested one."""
         interval = self.look.interval
         self._due = (self._due if now - self._due < interval else now) + interval
 
@@ -152,7 +152,7 @@ class SharedStream(QtCore.QObject):
         return made
 
     def change_look(self, viewer: Viewer, look: Look) -> None:
-        """Let a viewer have its pictures in another way, from the next one on."""
+        """Change the view of a viewer, from the next picture on."""
         self._take_out(viewer)
         channel = next((c for c in self._channels if c.look == look), None)
         if channel is None:
@@ -162,7 +162,7 @@ class SharedStream(QtCore.QObject):
         self._look_at_channels()
 
     def leave(self, viewer: Viewer) -> None:
-        """Take a viewer away; the stream ends some time after the last one has left."""
+        """Remove a viewer; the stream ends some time after the last one."""
         self._take_out(viewer)
         self._look_at_channels()
         if not self._channels:
@@ -220,7 +220,7 @@ class SharedStream(QtCore.QObject):
             self._fetch()
 
     def _wanted(self) -> bool:
-        """Return whether a picture that has come is wanted; in the middleware's thread."""
+        """Return whether a received picture is wanted; in the middleware's thread."""
         if self._due():
             return True
         self._rest_if_possible()

@@ -83,7 +83,7 @@ class LoadBalancer:
         return due
 
     def forget(self, stream: object) -> None:
-        """Give the turns of a stream to others; safe for one that has none."""
+        """Remove a stream from the schedule; safe for one without turns."""
         self._turns.pop(stream, None)
 
     def _taken(self, begin: float, end: float) -> list[float]:
@@ -139,7 +139,7 @@ def _rate(rate: float) -> float:
 
 
 class LookElement(TopicElement):
-    """The properties of a camera that say how its pictures are shown."""
+    """The properties of a camera's view: rotation, region, zoom, colours and rate."""
 
     #: Degrees clockwise, a multiple of 90.
     rotation = Writable(int, 0, _quarter_turns)
@@ -316,12 +316,12 @@ class ImageTransportSubscription(LookElement):
 
     @Slot()
     def pause(self) -> None:
-        """Receive no more pictures and keep the last one on the screen, where it is stale."""
+        """Stop receiving, and keep the last picture on the screen, marked as stale."""
         self._set_paused(True)
 
     @Slot()
     def stop(self) -> None:
-        """Receive no more pictures and take the last one off the screen."""
+        """Stop receiving, and clear the screen."""
         self._set_paused(False)
         self.enabled = False
 
@@ -575,7 +575,7 @@ class ImageTransportManager(QtCore.QObject):
 
     @Slot(bool)
     def setLoadBalancingEnabled(self, enabled: bool) -> None:
-        """Say whether pictures of throttled cameras are fetched one by one, taking turns.
+        """Set whether pictures of throttled cameras are fetched one by one, in turns.
 
         Otherwise cameras are received as fast as they send, and what is too much is not decoded.
         """

@@ -76,7 +76,7 @@ def roles_of(model: Any) -> dict[str, int]:
 
 
 def wide(text: str) -> int | str:
-    """Return the integer that a decimal text says, otherwise the text."""
+    """Return the integer in a decimal text, otherwise the text."""
     return int(text) if _WHOLE.match(text) else text
 
 
@@ -125,7 +125,7 @@ _NS = 1_000_000_000
 
 
 def number_from_text(text: str) -> Fraction:
-    """Return the number that a decimal text says, exactly; raises ConversionError."""
+    """Return the exact number in a decimal text; raises ConversionError."""
     from fractions import Fraction  # noqa: PLC0415 - takes milliseconds at start-up
 
     if not DECIMAL.match(text.strip()):
@@ -134,7 +134,7 @@ def number_from_text(text: str) -> Fraction:
 
 
 def time_from_js(value: QJSValue, name: str = "time") -> Time:
-    """Return the point in time that QML gave: a time of either module, a Date, or milliseconds.
+    """Return a point in time from QML: a time of either module, a Date, or milliseconds.
 
     Raises:
         ConversionError: It is none of these; names `name`.
@@ -143,7 +143,7 @@ def time_from_js(value: QJSValue, name: str = "time") -> Time:
 
 
 def duration_from_js(value: QJSValue, name: str = "duration") -> Duration:
-    """Return the span of time that QML gave: milliseconds, or a duration of either module.
+    """Return a duration from QML: milliseconds, or a duration of either module.
 
     Raises:
         ConversionError: It is none of these; names `name`.
@@ -159,7 +159,7 @@ def _nanoseconds(value: QJSValue, name: str, wanted: str) -> int:
 
 
 def time_parts(value: QJSValue, path: str, wanted: str) -> tuple[Any, Any]:
-    """Return seconds and nanoseconds of anything that says a time; numbers are milliseconds.
+    """Return seconds and nanoseconds of any form of time; numbers are milliseconds.
 
     The parts are as they were given, unless they are not integers: the codec knows their ranges.
 
@@ -217,7 +217,7 @@ _BEST = "best_available"
 
 
 def qos_parts(qos: QoS) -> tuple[Any, ...]:
-    """Return what ``makeQos`` of helpers.js takes; durations are milliseconds, 0 for no limit."""
+    """Return the arguments of ``makeQos`` in helpers.js; durations in ms, 0 for no limit."""
     limits = (qos.deadline, qos.lifespan, qos.lease_duration)
     head = (qos.reliability.value, qos.durability.value, qos.history.value, qos.depth)
     return (*head, qos.liveliness.value, *map(_milliseconds, limits))
@@ -230,7 +230,7 @@ def _milliseconds(limit: Duration | None) -> float | str:
 
 
 def qos_from_js(value: QJSValue | None, default: QoS) -> QoS:
-    """Return the profile that QML gave: one made by ``Ros2.QoS()``, or a queue size.
+    """Return the profile from QML: one made by ``Ros2.QoS()``, or a queue size.
 
     Raises:
         ConversionError: It is neither, its depth is not a positive integer, or a limit is no

@@ -55,7 +55,7 @@ def _completion() -> Callable[[QtQml.QQmlComponent], object]:
 
 
 def create(component: QtQml.QQmlComponent, engine: QtQml.QQmlEngine) -> QtCore.QObject | None:
-    """Make what a component describes; None with errors, which the component tells.
+    """Create the object of a component without the GIL; None with errors in the component.
 
     QQmlComponent.create keeps Python's lock, while first bindings and ``Component.onCompleted``
     run: one that never ends could not be ended.
@@ -211,7 +211,7 @@ def error_list(errors: Sequence[QtQml.QQmlError], file: Path) -> str:
 
 
 def _unversioned(place: str) -> int:
-    """Return the line of the first import without a version, which Qt 5 does not tell; or 0."""
+    """Return the line of the first import without a version, which Qt 5 does not report; or 0."""
     try:
         lines = Path(place).read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
@@ -220,7 +220,7 @@ def _unversioned(place: str) -> int:
 
 
 def _advice(text: str) -> str:
-    """Return what to do about an error; empty when it says it itself."""
+    """Return what to do about an error; empty when its text says so."""
     if "requires a version" in text:
         return "Qt 5 needs one after the module's name: import QtQuick 2.15"
     kind = _TYPE.search(text)
@@ -274,7 +274,7 @@ class ErrorView:
         self._contents: list[Any] = []
 
     def show(self, text: str, windows: Iterable[Any], heading: str) -> None:
-        """Show errors; others that are shown already go.
+        """Show errors in place of earlier ones.
 
         Args:
             text: The errors.
@@ -311,7 +311,7 @@ class Made(NamedTuple):
 
 
 class LiveFile(QtCore.QObject):
-    """A QML file, its engine, and what it was made into last.
+    """A QML file, its engine, and the interface made from it last.
 
     What shows it makes it with :meth:`create`, and hands what was made to :meth:`replace`, so that
     a file with errors leaves what is shown as it is.
@@ -328,7 +328,7 @@ class LiveFile(QtCore.QObject):
 
     #: It is to be made anew: it has changed, or :meth:`is_ready` said no before, and would not now.
     due = Signal()
-    #: JavaScript of it was ended, for it kept the screen from living: what, where, and what to do.
+    #: JavaScript of it was ended, because it blocked the interface: which, where, and what to do.
     script_ended = Signal(str)
 
     def __init__(
@@ -375,7 +375,7 @@ class LiveFile(QtCore.QObject):
             self._watcher.changed.connect(self.due)
 
     def is_ready(self) -> bool:
-        """Return whether it may be made anew now; :attr:`due` tells when, otherwise.
+        """Return whether it may be reloaded now; otherwise :attr:`due` is when.
 
         Not while a call from QML waits, which would return into an interface that is gone.
         """
@@ -402,7 +402,7 @@ class LiveFile(QtCore.QObject):
         return Made(root, component)
 
     def replace(self, made: Made, show: Callable[[], None]) -> None:
-        """Have what was made take the place of what was made before, which is destroyed.
+        """Replace the previous interface, which is destroyed, by the new one.
 
         Args:
             made: What was made.
@@ -418,7 +418,7 @@ class LiveFile(QtCore.QObject):
             self._session.holding -= 1
 
     def drop(self, made: Made) -> None:
-        """Destroy what was made, whose cleaning up leaves the node to others."""
+        """Destroy the interface; its clean-up leaves the node to its successor."""
         root, component = made
         if not is_alive(root):
             self._dropped(component)
@@ -436,7 +436,7 @@ class LiveFile(QtCore.QObject):
         root.deleteLater()
 
     def close(self, *, hold: bool = False) -> None:
-        """Let go of everything; safe to call twice.
+        """Close everything; safe to call twice.
 
         Args:
             hold: Others need the node: what QML does at its end must not shut it down.

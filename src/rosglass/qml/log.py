@@ -1,4 +1,4 @@
-"""Logging from QML: through Python's logging, with the QML file and line that it came from."""
+"""Logging from QML through Python's logging, with file and line of the QML."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class RateLimit:
 
 
 class LocationFormatter(logging.Formatter):
-    """Shows what came from QML as ``file:line: LEVEL text``, the rest as ``LEVEL logger: text``."""
+    """Formats records from QML as ``file:line: LEVEL text``, others as ``LEVEL logger: text``."""
 
     def __init__(self) -> None:
         super().__init__("%(levelname)s %(name)s: %(message)s")
@@ -150,7 +150,7 @@ _MOST = 1000
 
 
 class _Repeats:
-    """Warnings of QML's engine that come again: a binding's come with every message.
+    """Repeated warnings of QML's engine: those of a binding are repeated with every message.
 
     Each is logged the first, the tenth, the hundredth time and so on, and once a minute.
     """

@@ -69,7 +69,7 @@ class TreeItem:
 
     @property
     def is_fixed(self) -> bool:
-        """Whether it is an array whose length its type says."""
+        """Whether it is an array of fixed length."""
         return self.member is not None and self.member.fixed_count is not None
 
     @property
@@ -243,7 +243,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
 
     messageChanged = Signal()
     messageTypeChanged = Signal()
-    #: Somebody edited the message here.
+    #: The message was edited in a view.
     modified = Signal()
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
@@ -343,7 +343,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         self.endResetModel()
 
     def _merge(self, item: TreeItem, value: Any) -> None:
-        """Take an item's new value over, and tell views what changed."""
+        """Replace an item's value, and notify views of the changes."""
         index = self._index_of(item)
         before, after = (len(item.value), len(value)) if item.is_array else (0, 0)
         if after < before:
@@ -513,7 +513,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         return item
 
     def _renumbered(self, item: TreeItem, row: int) -> None:
-        """Tell views that elements have other indices, which is what their names are."""
+        """Notify views of changed element indices, which are the elements' names."""
         if row < item.count:
             index = self._index_of(item)
             first, last = self.index(row, _NAME, index), self.index(item.count - 1, _NAME, index)

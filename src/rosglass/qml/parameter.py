@@ -44,7 +44,7 @@ _DISCOVERY_S = 3.0
 
 
 class Reading(NamedTuple):
-    """What a node says of a parameter.
+    """A node's answer about a parameter.
 
     Attributes:
         value: Its value; None without one.
@@ -217,14 +217,14 @@ class ParameterLink:
         return found
 
     def _why_undeclared(self, name: str, declared: list[str]) -> str:
-        """Return what to say of a parameter that the node does not have."""
+        """Return the problem of a parameter that the node does not have."""
         hint = similar(name, declared)
         if not declared:
             hint = similar(self._name, (str(node) for node in self._node.nodes()))
         return f"{self._name} has no parameter {name!r}{hint}"
 
     def _why_missing(self) -> str:
-        """Return what to say of a node that does not serve parameters."""
+        """Return the problem of a node that does not serve parameters."""
         try:
             names = [str(node) for node in self._node.nodes()]
         except Error as error:

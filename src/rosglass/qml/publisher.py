@@ -159,7 +159,7 @@ class Publisher(Element):
             sender.publish(message)
 
     def _early_type(self) -> MessageType | None:
-        """Return the type of what is about to be advertised; None when it will not be, or may not.
+        """Return the type of a topic that is about to be advertised; None when it will not be.
 
         A type that only the robot knows is not known before the topic is advertised.
         """
@@ -190,7 +190,7 @@ class Publisher(Element):
         return self._unreachable or self._is_settled(sender)
 
     def _is_settled(self, sender: Sender) -> bool:
-        """Return whether the subscribers get what is sent now, as far as is known."""
+        """Return whether the known subscribers receive what is sent now."""
         if self._is_connected():
             self._unreachable = False
             if self._ready_at is None:
@@ -228,7 +228,7 @@ class Publisher(Element):
         self._held.append((message, time.monotonic() + _HOLD_TIMEOUT_S))
 
     def _send_held(self) -> None:
-        """Send what was held, once that makes sense; give up what is too old."""
+        """Send held messages once subscribers receive them; drop those that are too old."""
         sender, held = self._endpoint, self._held
         if sender is not None and self._is_settled(sender):
             while held:
@@ -249,7 +249,7 @@ class Publisher(Element):
             self._reference = None
 
     def _on_sent_late(self, result: Error | None) -> None:
-        """Tell that what waited for the network was not sent in the end."""
+        """Log that a message that waited for the network was not sent."""
         if result is not None and is_alive(self):
             text = f"nothing was published on {self._resolved or self._topic}: {result}"
             self._log(self.DIALECT.spelled(text), logging.ERROR)

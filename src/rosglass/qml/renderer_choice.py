@@ -80,7 +80,7 @@ def need_in_items(root: Any, file: Path) -> str:
 
 
 def need_in_file(file: Path, import_paths: Sequence[str]) -> str:
-    """Return what a file, or one that it uses, may come to show that only OpenGL draws.
+    """Return what only OpenGL draws of a file and those that it uses.
 
     Args:
         file: The file.
@@ -212,7 +212,7 @@ class RendererChoice:
         self.reason = ""
 
     def prefer(self, renderer: str) -> None:
-        """Take note of what the user wants, which counts for more than what Qt's variables say.
+        """Set the user's choice, which overrides Qt's environment variables.
 
         Args:
             renderer: One of :data:`RENDERERS`.
@@ -241,7 +241,7 @@ class RendererChoice:
             )
 
     def expect(self, file: str | os.PathLike[str]) -> None:
-        """Take note of a file that is to be shown sooner or later; what it needs counts as well."""
+        """Add a file that will be shown later; its needs count as well."""
         if self.renderer:
             return
         with suppress(QmlError):
@@ -271,7 +271,7 @@ class RendererChoice:
         return self.renderer
 
     def tell_missing(self, need: str) -> str:
-        """Return what to say of an interface that needs OpenGL, and does not get it."""
+        """Return the warning for an interface that needs OpenGL where there is none."""
         return (
             f"{need} is not drawn, or wrongly: Qt's software renderer draws all {self._subject} "
             f"here ({self.reason}); start with --renderer opengl, or Application(renderer='opengl')"
@@ -314,7 +314,7 @@ class RendererChoice:
         return device
 
     def _try_opengl(self) -> None:
-        """Raise UnsupportedError, or take the software renderer, where OpenGL cannot be used."""
+        """Use the software renderer where OpenGL is unavailable, or raise UnsupportedError."""
 
 
 #: That of the process, for windows of its own.

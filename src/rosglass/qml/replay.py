@@ -50,7 +50,7 @@ class RobotPlace:
         return "" if shown == file else f"another Replay shows {shown} now"
 
     def leave(self, user: Any) -> None:
-        """Show it no longer; what was shown before comes back."""
+        """Stop showing it; show the one before again."""
         if self._wanted.pop(user, None) is not None:
             self._settle()
 
@@ -64,7 +64,7 @@ class RobotPlace:
         QtCore.QTimer.singleShot(0, leave)
 
     def _settle(self) -> str:
-        """Have the session connect to what is wanted; returns the recording that is."""
+        """Connect the session to the last recording; return that one."""
         session = self._session
         if not self._wanted:
             if session.url == self._ours:

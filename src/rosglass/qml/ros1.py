@@ -87,7 +87,7 @@ class Time(WallTime):
 
     @Slot(result=bool)
     def isSimTime(self) -> bool:
-        """Return whether the time comes from a simulation."""
+        """Return whether time is simulated."""
         node = self._runtime.session.node
         try:
             return node is not None and node.clock.is_simulated
@@ -126,7 +126,7 @@ class Package(QtCore.QObject):
         self._searched: tuple[str | None, ...] = ()
 
     def _look(self, search: Callable[[Folders], _T], otherwise: _T, *, again: bool = False) -> _T:
-        """Return what is found in the folders, searched once for each state of the environment."""
+        """Return the packages in the folders, searched once per state of the environment."""
         from rosglass.interfaces.folders import (  # noqa: PLC0415 - few need it
             workspace,
             workspace_variables,
@@ -293,7 +293,7 @@ class Ros(ValueFunctions):
 
     @Slot()
     def spinOnce(self) -> None:
-        """Do nothing: callbacks come by themselves."""
+        """Do nothing: callbacks need no spinning."""
 
     @Slot(int)
     def setThreads(self, count: int) -> None:
@@ -307,7 +307,7 @@ class Ros(ValueFunctions):
     @Slot(QJSValue, QJSValue, QJSValue, QJSValue, result=QtCore.QObject)
     @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QtCore.QObject)
     def advertise(self, *given: QJSValue) -> QtCore.QObject | None:
-        """Return a publisher; it lives as long as JavaScript holds it.
+        """Return a publisher, which exists as long as JavaScript refers to it.
 
         Arguments are optional namespace, message type, topic, queue size (0 for no limit), and
         optionally whether
@@ -351,7 +351,7 @@ class Ros(ValueFunctions):
     def waitForMessageAsync(
         self, topic: str, first: QJSValue | None = None, second: QJSValue | None = None
     ) -> QJSValue:
-        """Give the next message of a topic to a function, undefined when none came in time.
+        """Call a function with the next message of a topic, undefined when none arrived in time.
 
         Arguments are topic, optional milliseconds (0: for ever) and function. Without a function,
         a promise of the message is returned.
@@ -364,7 +364,7 @@ class Ros(ValueFunctions):
     def advertiseService(
         self, type_name: str, name: str, handler: QJSValue
     ) -> QtCore.QObject | None:
-        """Offer a service for as long as JavaScript holds what is returned.
+        """Offer a service for as long as JavaScript refers to the server returned.
 
         Args:
             type_name: Service type, ``pkg/Type``.
@@ -380,7 +380,7 @@ class Ros(ValueFunctions):
     @Slot(QJSValue, QJSValue, result=QtCore.QObject)
     @Slot(QJSValue, QJSValue, QJSValue, result=QtCore.QObject)
     def createActionClient(self, *given: QJSValue) -> QtCore.QObject | None:
-        """Return a client of an action; it lives as long as JavaScript holds it, or a goal runs.
+        """Return an action client, which exists as long as JavaScript refers to it or a goal runs.
 
         Arguments are optional namespace, action type (``pkg/DoAction``) and name.
         """
@@ -402,7 +402,7 @@ class Ros(ValueFunctions):
     def advertiseAction(
         self, type_name: str, name: str, execute: QJSValue
     ) -> QtCore.QObject | None:
-        """Offer an action for as long as JavaScript holds what is returned.
+        """Offer an action for as long as JavaScript refers to the server returned.
 
         Args:
             type_name: Action type, ``pkg/DoAction``.
@@ -416,7 +416,7 @@ class Ros(ValueFunctions):
         )
 
     def _check_topic(self, topic: str) -> None:
-        """Raise InvalidNameError unless ROS 1 takes this for a name."""
+        """Raise InvalidNameError unless this is a name in ROS 1."""
         from rosglass.ros1.names import expand  # noqa: PLC0415 - not needed at start-up
 
         expand(topic, "node", "/")
@@ -448,7 +448,7 @@ class Ros(ValueFunctions):
     def logInternal(
         self, level: int, function: str, file: str, line: int, message: QJSValue, name: str = ""
     ) -> None:
-        """Log a message from a place that the caller gives; `level` is of RosConsoleLevels."""
+        """Log a message from a given place; `level` is one of RosConsoleLevels."""
         levels = (logging.DEBUG, logging.INFO, logging.WARNING, logging.ERROR, logging.CRITICAL)
         if not 0 <= level < len(levels):
             self._runtime.throw(f"Ros.logInternal: {level} is not one of RosConsoleLevels")

@@ -196,7 +196,7 @@ class Ros2(ValueFunctions):
     def createPublisher(
         self, topic: str, type_name: str, qos: QJSValue | None = None
     ) -> QtCore.QObject | None:
-        """Return a publisher; it lives as long as JavaScript holds it.
+        """Return a publisher, which exists as long as JavaScript refers to it.
 
         Args:
             topic: Topic name.
@@ -221,7 +221,7 @@ class Ros2(ValueFunctions):
     def createSubscription(
         self, topic: str, first: QJSValue | None = None, second: QJSValue | None = None
     ) -> QtCore.QObject | None:
-        """Return a subscription; it lives as long as JavaScript holds it.
+        """Return a subscription, which exists as long as JavaScript refers to it.
 
         Args:
             topic: Topic name.
@@ -247,7 +247,7 @@ class Ros2(ValueFunctions):
     def waitForMessageAsync(
         self, topic: str, first: QJSValue | None = None, second: QJSValue | None = None
     ) -> QJSValue:
-        """Give the next message of a topic to a function, undefined when none came in time.
+        """Call a function with the next message of a topic, undefined when none arrived in time.
 
         Arguments are topic, optional milliseconds (0: for ever) and function. Without a function,
         a promise of the message is returned.
@@ -261,7 +261,7 @@ class Ros2(ValueFunctions):
     def createServiceClient(
         self, name: str, type_name: str, qos: QJSValue | None = None
     ) -> QtCore.QObject | None:
-        """Return a client of a service; it lives as long as JavaScript holds it.
+        """Return a service client, which exists as long as JavaScript refers to it.
 
         Args:
             name: Service name.
@@ -283,7 +283,7 @@ class Ros2(ValueFunctions):
     def createServiceServer(
         self, name: str, type_name: str, handler: QJSValue
     ) -> QtCore.QObject | None:
-        """Offer a service for as long as JavaScript holds what is returned.
+        """Offer a service for as long as JavaScript refers to the server returned.
 
         Args:
             name: Service name.
@@ -298,7 +298,7 @@ class Ros2(ValueFunctions):
 
     @Slot(str, str, result=QtCore.QObject)
     def createActionClient(self, name: str, type_name: str) -> QtCore.QObject | None:
-        """Return a client of an action; it lives as long as JavaScript holds it, or a goal runs.
+        """Return an action client, which exists as long as JavaScript refers to it or a goal runs.
 
         Args:
             name: Action name.
@@ -319,7 +319,7 @@ class Ros2(ValueFunctions):
     def createActionServer(
         self, name: str, type_name: str, execute: QJSValue
     ) -> QtCore.QObject | None:
-        """Offer an action for as long as JavaScript holds what is returned.
+        """Offer an action for as long as JavaScript refers to the server returned.
 
         Args:
             name: Action name.
@@ -356,7 +356,7 @@ class Ros2(ValueFunctions):
         return types
 
     def _check_topic(self, topic: str) -> None:
-        """Raise InvalidNameError unless ROS 2 takes this for a name."""
+        """Raise InvalidNameError unless this is a name in ROS 2."""
         from rosglass.comm.names import expand  # noqa: PLC0415 - not needed at start-up
 
         session = self._session

@@ -70,7 +70,7 @@ class Kiosk(QtCore.QObject):
             window.installEventFilter(self)
 
     def close(self) -> None:
-        """Show the pointer, and let windows be closed."""
+        """Show the pointer, and allow windows to be closed."""
         self._pause.stop()
         self._app.focusWindowChanged.disconnect(self.keep)
         for window in self._app.topLevelWindows():
@@ -112,7 +112,7 @@ def needs_widgets(file: Path) -> bool:
 
 
 def _line_to_add(file: Path) -> str:
-    """Return what is to be added to a file that asks for no node."""
+    """Return the lines to add to a file that does not call init()."""
     module = "Ros2" if _ROS2_MODULE.search(_text(file)) else "Ros"
     name = re.sub(r"\W+", "_", file.stem, flags=re.ASCII).strip("_").lower()
     name = name if name[:1].isalpha() else f"ui_{name}".rstrip("_")
@@ -205,7 +205,7 @@ class Runner(QtCore.QObject):
         self._live.due.connect(self.reload)
 
     def reload(self) -> bool:
-        """Show the file as it is now; with errors, keep what is shown and show them over it.
+        """Reload the file; with errors, keep the present interface and show them over it.
 
         Put off while a call from QML waits, which would return into an interface that is gone.
 
@@ -255,7 +255,7 @@ class Runner(QtCore.QObject):
         return QtGui.QImage() if window is None else window.grabWindow()
 
     def exit(self, code: int) -> None:
-        """End the program, also when this is asked for before the event loop runs."""
+        """End the program, also when called before the event loop runs."""
         self.exit_code = code
         QtCore.QTimer.singleShot(0, lambda: QtCore.QCoreApplication.exit(code))
 
@@ -332,7 +332,7 @@ class Runner(QtCore.QObject):
         self._show_errors(text)
 
     def _fit(self, item: QtQuick.QQuickItem, window: QtQuick.QQuickWindow, first: bool) -> None:
-        """Put an item into a window, which then gives it its size."""
+        """Put an item into a window, and size it with the window."""
         if first:
             width = item.width() or item.implicitWidth() or _DEFAULT_SIZE[0]
             height = item.height() or item.implicitHeight() or _DEFAULT_SIZE[1]
@@ -350,7 +350,7 @@ class Runner(QtCore.QObject):
         resize()
 
     def _let_go(self, window: QtQuick.QQuickWindow) -> None:
-        """Close a window of the old interface, whatever its handlers say."""
+        """Close a window of the old interface, even if its handlers refuse."""
         if self._kiosk is not None:
             window.removeEventFilter(self._kiosk)
         window.setVisible(False)
@@ -367,7 +367,7 @@ class Runner(QtCore.QObject):
         self._notice.show(text, self.windows(), SCRIPT_ENDED)
 
     def _tell_not_drawn(self, items: Sequence[QtQuick.QQuickItem]) -> None:
-        """Warn of what only OpenGL draws, as a file that is shown anew may come to need it."""
+        """Warn of items that only OpenGL draws, which a reloaded file may have added."""
         if choice.renderer != "software":
             return
         needs = [need for item in items if (need := need_in_items(item, self.file))]

@@ -1,4 +1,4 @@
-"""What one QML engine needs from us: its session, its JavaScript helpers, its value conversions."""
+"""The runtime of one QML engine: its session, JavaScript helpers and value conversions."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _LONGEST = 2**53 * _NS
 
 
 class LongArrays(QtCore.QObject):
-    """The long arrays of one message; lives as long as JavaScript holds one of them."""
+    """The long arrays of one message; exists as long as JavaScript refers to one of them."""
 
     def __init__(self, runtime: Runtime, arrays: list[LongArray], dialect: Dialect) -> None:
         super().__init__()
@@ -110,7 +110,7 @@ class Host(QtCore.QObject):
             log_from_qml("", level, f"{text}{end} It is undefined here.", caller)
 
     def know(self, schema: Schema, dialect: Dialect) -> int:
-        """Return the number by which scripts ask for a type."""
+        """Return the number that stands for a type in scripts."""
         self._types.append((schema, dialect))
         return len(self._types) - 1
 
@@ -264,13 +264,13 @@ class Runtime(QtCore.QObject):
         return Caller("<python>", 0, "")
 
     def forget_warnings(self) -> None:
-        """Say again what was said before: the files may have changed."""
+        """Repeat warnings about missing fields: the files may have changed."""
         self._host.named.clear()
         if "_helper" in self.__dict__:
             self._call("forgetAbsent", [])
 
     def keep(self, item: QtCore.QObject) -> QtCore.QObject:
-        """Hand an object to JavaScript: it lives until JavaScript has collected it."""
+        """Give an object to JavaScript, which owns it until it is collected."""
         QtQml.QQmlEngine.setObjectOwnership(
             item, QtQml.QQmlEngine.ObjectOwnership.JavaScriptOwnership
         )
@@ -358,7 +358,7 @@ class Runtime(QtCore.QObject):
         return self._call("makeOptions", [])
 
     def qos(self, qos: QoS) -> QJSValue:
-        """Return a profile that QML can change and give to a publisher or subscription."""
+        """Return a profile that QML can change and pass to publishers and subscriptions."""
         from rosglass.qml.js_values import qos_parts  # noqa: PLC0415 - few are made at start-up
 
         return self._call("makeQos", [self.value(part) for part in qos_parts(qos)])
@@ -409,7 +409,7 @@ class Runtime(QtCore.QObject):
 
 
 def runtime_of(item: QtCore.QObject) -> Runtime | None:
-    """Return the runtime of the engine an object lives in; None when it lives in none of ours.
+    """Return the runtime of an object's engine; None for an engine without one.
 
     An engine, given itself, that has none yet gets the application's own session.
     """

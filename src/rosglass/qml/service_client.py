@@ -163,7 +163,7 @@ class ServiceClient(ClientElement):
         return True
 
     def _submit(self, request: _Request, *, running: bool = False) -> None:
-        """Hand a request to the client; `running` says whether QML is waiting for it right now."""
+        """Send a request; `running` says whether the QML function that made it still runs."""
         client, session = self._endpoint, self._session
         assert client is not None
         assert client.type is not None

@@ -1,4 +1,4 @@
-"""The node that a user interface talks through: made, replaced and closed off the GUI thread."""
+"""The node of a user interface: created, replaced and closed off the GUI thread."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class GuiExecutor(Executor):
             self._waker.wake()
 
     def close(self) -> None:
-        """Forget the waiting jobs and take no more; safe to call twice."""
+        """Drop the waiting jobs and accept no more; safe to call twice."""
         with self._lock:
             self._closed = True
             self._jobs.clear()
@@ -119,7 +119,7 @@ def _guarded(job: Callable[[], None]) -> None:
 
 
 class ScriptLimit:
-    """An attribute in seconds, 0 for no limit; what is set is checked.
+    """An attribute in seconds, 0 for no limit; other values raise Error.
 
     Args:
         seconds: As long as nothing is set.
@@ -178,7 +178,7 @@ def _connect(url: str | None, name: str, namespace: str, arguments: Sequence[str
 
 
 def _parse(arguments: Sequence[str], url: str) -> Arguments | None:
-    """Return what the command line tells a ROS 2 node; ROS 1's own tells its name itself."""
+    """Return the ROS arguments of a ROS 2 node; the ROS 1 client reads its own."""
     if not arguments or url.startswith("ros1:"):
         return None
     from rosglass.ros2.ros_arguments import Arguments  # noqa: PLC0415 - few programs have arguments
@@ -296,7 +296,7 @@ class Session(QtCore.QObject):
 
     @property
     def is_initialized(self) -> bool:
-        """Whether a node was asked for and not shut down again."""
+        """Whether init() was called, without a shutdown since."""
         return bool(self.name)
 
     @property
@@ -394,7 +394,7 @@ class Session(QtCore.QObject):
         return True
 
     def put_off(self) -> None:
-        """Have the node that is asked for wait for :meth:`go_on`, a second at most.
+        """Delay connecting until :meth:`go_on`, a second at most.
 
         Connecting keeps Python busy, which the first frame of an interface needs, too.
         """
@@ -457,7 +457,7 @@ class Session(QtCore.QObject):
     def background(
         self, work: Callable[[], _T], done: Callable[[_T | Error], None] | None = None
     ) -> None:
-        """Do something that may wait on the worker thread, jobs in the order they were given.
+        """Run a job that may wait on the worker thread, jobs in the order of the calls.
 
         Args:
             work: What to do.
@@ -500,7 +500,7 @@ class Session(QtCore.QObject):
         return False
 
     def attach(self, item: QtCore.QObject, **handlers: Callable[[], None]) -> Callable[[], None]:
-        """Have signals handled for an object.
+        """Connect handlers to signals for the life of an object.
 
         Plain calls, because a signal connected to a method of an object that QML destroys, or
         extends, keeps being delivered to what is left of it, or is not delivered at all.
@@ -621,7 +621,7 @@ class Session(QtCore.QObject):
                 self.background(node.close)
 
     def mixing(self, topic: str) -> str:
-        """Return what to say when nodes of one name publish a topic; empty otherwise.
+        """Return the problem of a topic that nodes of one name publish; empty otherwise.
 
         Args:
             topic: Absolute; nothing is said of an empty one.
@@ -665,7 +665,7 @@ class Session(QtCore.QObject):
             self.killed.emit()
 
     def set_logger_level(self, name: str, level: int) -> None:
-        """Log only what is at least as important; the node's own logger follows on ``/rosout``.
+        """Set the level of a logger; the node's own logger follows on ``/rosout``.
 
         Args:
             name: Name of the QML logger; empty for the node's own.
@@ -703,7 +703,7 @@ def _call_all(handlers: dict[int, tuple[QtCore.QObject, Callable[[], None]]]) ->
 
 
 def _with_domain(url: str, domain: int) -> str:
-    """Return `url` with another ``domain`` option; for an empty one, what the environment says."""
+    """Return `url` with another ``domain`` option; an empty one becomes the default URL."""
     if not url:
         from rosglass.connection import default_url  # noqa: PLC0415 - not before someone connects
 

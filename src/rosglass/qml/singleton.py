@@ -1,4 +1,4 @@
-"""What the singletons of both modules have in common: the node's life, its name, its log."""
+"""The bases of ``Ros`` and ``Ros2``: node, log, graph, and functions for values."""
 # ruff: noqa: N802, N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ class RosSingleton(QtCore.QObject):
 
     @Slot(result=bool)
     def isInitialized(self) -> bool:
-        """Return whether a node was asked for and not shut down again."""
+        """Return whether init() was called, without a shutdown since."""
         return self._session.is_initialized
 
     @Slot(result=bool)
@@ -176,7 +176,7 @@ class RosSingleton(QtCore.QObject):
         type_name: str,
         given: Callable[[], object],
     ) -> QtCore.QObject | None:
-        """Return a server that lives as long as JavaScript holds it; what is wrong throws.
+        """Return a server that exists as long as JavaScript refers to it; errors are thrown.
 
         Args:
             function: What QML calls.
@@ -221,7 +221,7 @@ def check_type(type_name: str, name: str) -> None:
 
 
 def is_list(value: QJSValue | None) -> bool:
-    """Return whether QML gave an array."""
+    """Return whether a value is an array."""
     return value is not None and value.isArray()
 
 
@@ -242,7 +242,7 @@ _HIDDEN = "/_action/"
 
 
 class GraphSingleton(RosSingleton):
-    """The graph as it is now; ``graphChanged`` tells of changes. Empty while there is no node."""
+    """The present graph, announced by ``graphChanged``; empty while there is no node."""
 
     @Slot(result="QStringList")
     @Slot(str, result="QStringList")
@@ -398,7 +398,7 @@ def _of_type(known: dict[str, list[str]], wanted: str) -> list[str]:
 
 
 class ValueFunctions(GraphSingleton):
-    """Mixed into the singletons; what they give follows their dialect."""
+    """Empty messages, constants, times and files, in the form of the singleton's module."""
 
     @Slot(str, result=QJSValue)
     def createEmptyMessage(self, type_name: str) -> QJSValue:
@@ -441,7 +441,7 @@ class ValueFunctions(GraphSingleton):
 
     @Slot(str, result=QJSValue)
     def documentation(self, type_name: str) -> QJSValue:
-        """Return what a type's definition says about it, its fields and its constants.
+        """Return the documentation of a type, its fields and its constants.
 
         Services and actions as in :meth:`constants`; an unknown type throws.
         """

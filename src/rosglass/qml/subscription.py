@@ -37,7 +37,7 @@ DEFAULT_QOS = QoS(depth=1, reliability=Reliability.BEST_EFFORT)
 
 
 class _Feed(Executor):
-    """A subscription whose samples the GUI thread takes when it shows them.
+    """A subscription whose samples wait until the GUI thread shows them.
 
     The inbox posts one delivery job here, and no other one before that job has run: a fast topic
     costs one event per delivery, not per message.
@@ -387,7 +387,7 @@ class Subscription(TopicElement):
         self._refresh()
 
     def _refresh(self) -> None:
-        """Announce what the subscription's statistics and problem say now."""
+        """Announce the subscription's present statistics and problem."""
         feed = self._endpoint
         if feed is None:
             report(self, frequency=0.0, bandwidth=0.0)
@@ -451,7 +451,7 @@ def next_message(
     first: QJSValue | None,
     second: QJSValue | None,
 ) -> QJSValue:
-    """Do what ``waitForMessageAsync`` was asked for.
+    """Implement ``waitForMessageAsync``.
 
     Args:
         subscription: A new one, made for this.
@@ -500,7 +500,7 @@ def wait_for_message(
     milliseconds: float,
     done: Callable[[QJSValue | None], None],
 ) -> None:
-    """Give the next message of a topic, a latched one included, to a function.
+    """Call a function with the next message of a topic, a latched one included.
 
     Args:
         runtime: The engine's runtime, which keeps the subscription.

@@ -84,7 +84,7 @@ class TfLink:
 
     @classmethod
     def join(cls, session: Session, node: Node, namespace: str, user: Any) -> TfLink:
-        """Return the link of a namespace, with `user` among those that keep it open."""
+        """Return the link of a namespace, kept open by `user`."""
         key = (cls, node, namespace)
         link = session.shared.get(key)
         if link is None:
@@ -94,7 +94,7 @@ class TfLink:
         return made
 
     def leave(self, user: Any) -> None:
-        """Let go of it; the last one who does ends it."""
+        """Remove a user; the last one closes the link."""
         self._users.discard(user)
         if not self._users and not self._closed:
             self._closed = True
@@ -179,7 +179,7 @@ class _Queries(Element):
         return shown_transform(runtime, result, "", "", self)
 
     def _look_up(self, what: str, given: Sequence[QJSValue]) -> Transform | _Missing | str:
-        """Return the transform, or what is missing, or an empty text after a thrown error."""
+        """Return the transform, or what is missing; an empty text after a thrown error."""
         runtime = self._find_runtime()
         if runtime is None:
             return ""
@@ -220,7 +220,7 @@ class _Queries(Element):
 
     @Slot(str, result=QJSValue)
     def getFrame(self, frame: str) -> QJSValue:
-        """Return what is known of a frame; undefined when there is no such frame."""
+        """Return the description of a frame; undefined when there is no such frame."""
         buffer, info, runtime = self.buffer, self._frame(frame), self._find_runtime()
         if buffer is None or info is None or runtime is None:
             return QJSValue()
@@ -228,7 +228,7 @@ class _Queries(Element):
 
     @Slot(result=QJSValue)
     def getAllFrames(self) -> QJSValue:
-        """Return what is known of every frame."""
+        """Return the descriptions of all frames."""
         buffer, runtime = self.buffer, self._find_runtime()
         if buffer is None or runtime is None:
             return QJSValue()

@@ -243,7 +243,7 @@ class TfTransform(Element):
     # Judging.
 
     def _update_stale(self) -> None:
-        """Announce whether what is shown still changes."""
+        """Announce the age, and whether the transform is stale."""
         moving = self._transform is not None and self._transform.stamp.nanoseconds > 0
         arrived = self._arrived
         age = self._steady() - arrived if moving and arrived is not None else -1.0
@@ -422,7 +422,7 @@ class TfBroadcaster(Element):
 
 
 def _numbers(value: QJSValue, type_name: str, what: str, names: str) -> tuple[float, ...]:
-    """Return the numbers of a vector that QML gave; raises Error."""
+    """Return the numbers of a vector from QML; raises Error."""
     from rosglass.messages import load  # noqa: PLC0415 - brings in the definitions
     from rosglass.messages.schema import schema_of  # noqa: PLC0415 - the same
 

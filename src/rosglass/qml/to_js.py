@@ -1,4 +1,4 @@
-"""Messages on their way to QML: the part of a message that becomes JSON, and its long arrays.
+"""Conversion of messages for QML: short parts become JSON, long arrays stay in Python.
 
 Only what is short is written out. Arrays longer than :data:`INLINE` stay in Python, where the
 JavaScript side fetches what it is asked for.
@@ -146,7 +146,7 @@ def _array_fix(member: Member, dialect: Dialect) -> Callable[[Any, list[LongArra
 
 
 class Shape(NamedTuple):
-    """What JavaScript has to know about a type.
+    """The description of a type for JavaScript.
 
     Attributes:
         name: The type's name.
@@ -163,7 +163,7 @@ class Shape(NamedTuple):
 
 
 def describe(schema: Schema, dialect: Dialect = Dialect.ROS2) -> Shape:
-    """Return what JavaScript has to know about a type."""
+    """Return the description of a type for JavaScript."""
     constants = constants_of(schema.definition)
     if dialect is Dialect.ROS1 and schema.name == _HEADER and "seq" not in schema.by_name:
         # Interfaces of ROS 1 may show it; ROS 2 does not count.
@@ -191,7 +191,7 @@ def constants_of(definition: Definition) -> dict[str, Any]:
 
 
 def to_json(value: Any) -> tuple[str, bool]:
-    """Return JSON, and whether it marks floats that JSON cannot say as ``{"#": name}``."""
+    """Return JSON, and whether it has NaN or infinities, as ``{"#": name}``."""
     try:
         return json.dumps(value, allow_nan=False), False
     except ValueError:

@@ -22,7 +22,7 @@ MOST_WAITING = 16
 
 
 class _Keeper(QtCore.QObject):
-    """Puts off the deletion of objects while a call waits.
+    """Delays the deletion of objects while a call waits.
 
     Qt ends the program when an object is destroyed whose signal handler is still running, which
     happens when a page is closed during the call.
@@ -33,14 +33,14 @@ class _Keeper(QtCore.QObject):
         self._kept: list[QtCore.QObject] = []
 
     def eventFilter(self, watched: QtCore.QObject, event: QtCore.QEvent) -> bool:  # noqa: N802
-        """Keep deletions back; Qt calls this before every event."""
+        """Delay deletions; Qt calls this before every event."""
         if event.type() == QtCore.QEvent.Type.DeferredDelete:
             self._kept.append(watched)
             return True
         return False
 
     def release(self) -> None:
-        """Let the objects go."""
+        """Delete the objects after all."""
         for item in self._kept:
             if is_alive(item):
                 item.deleteLater()

@@ -1,4 +1,4 @@
-"""Noticing that the screen stands still, and ending the JavaScript that keeps it from living."""
+"""The watchdog of the GUI thread: reports a frozen screen, and ends JavaScript that blocks it."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ class JsStack:
 
     @property
     def frame(self) -> int:
-        """What tells the innermost function that runs from its callers; 0 while none does."""
+        """The identity of the innermost function that runs; 0 while none does."""
         return self.pointer.value or 0
 
     def handler(self, waiting: int) -> tuple[int, int]:
@@ -454,7 +454,7 @@ class Watchdog(QtCore.QObject):
 
     @Slot()
     def _on_call_ended(self) -> None:
-        """A function of JavaScript that waited is about to go on."""
+        """Continue after a JavaScript function has waited."""
         self._beaten = time.monotonic()
         for watched in self._watched.values():
             watched.waiting[0] = 0
@@ -486,7 +486,7 @@ class Watchdog(QtCore.QObject):
         return 0.0
 
     def _look_closely(self, end: threading.Event) -> None:
-        """Look at what the GUI thread does, until it lives again."""
+        """Inspect the GUI thread until it responds again."""
         beaten, before = self._beaten, self._use()
         still, script, handler = self._looked - beaten - self._blind, 0.0, (0, 0)
         while self._beaten == beaten and not end.wait(_CLOSE_LOOK):
@@ -557,7 +557,7 @@ class Watchdog(QtCore.QObject):
         shown = dict.fromkeys(map(_place, [*callers[:3], *callers[-1:]]))
         chain = ", called at ".join(shown)
         text = (
-            f"JavaScript computed for {seconds:.1f} s and kept the screen from living; it was "
+            f"JavaScript computed for {seconds:.1f} s and blocked the interface; it was "
             f"ended{f' in {chain}' if chain else ''}: {_ADVICE}"
             f"{_AND_OTHERS if late > _LATE else ''}"
         )
@@ -565,7 +565,7 @@ class Watchdog(QtCore.QObject):
         self._show(watched, text)
 
     def _tell_still(self, seconds: float, watched: _Watched | None) -> None:
-        """Tell of what is not JavaScript, and can only be waited for."""
+        """Report a blocked GUI thread that does not run JavaScript; it can only be waited for."""
         frame = sys._current_frames().get(self._main)
         callers = watched.stack.callers() if watched is not None else []
         called = f", called at {_place(callers[0])}" if callers else ""
@@ -590,7 +590,7 @@ def _place(caller: Caller) -> str:
 
 
 def _identity(frame: FrameType) -> tuple[int, object]:
-    """Return what tells a frame from others, without keeping what it holds."""
+    """Return the identity of a frame, without keeping its objects."""
     return id(frame), frame.f_code
 
 
@@ -604,7 +604,7 @@ def _python_place(frame: FrameType) -> str:
 
 
 def _thread_clock(ident: int) -> Callable[[], float]:
-    """Return what tells for how many seconds a thread has computed."""
+    """Return a function for the seconds of processor time of a thread."""
     of_thread: Any = getattr(time, "pthread_getcpuclockid", None)
     if of_thread is None:
         # On Windows, other threads than this one hardly ever compute while nothing is drawn.
@@ -614,7 +614,7 @@ def _thread_clock(ident: int) -> Callable[[], float]:
 
 
 def _watch_thread(number: int, clock: Callable[[], float]) -> Callable[[], _Use]:
-    """Return what tells what a thread does.
+    """Return a function for the present activity of a thread.
 
     Args:
         number: Of the thread, the system's.

@@ -212,7 +212,7 @@ def _load(text: str, file: Path) -> Any:
 
 
 class _Reader:
-    """Makes JavaScript values of what a file says."""
+    """Converts the contents of a file to JavaScript values."""
 
     def __init__(self, runtime: Runtime, dialect: Dialect) -> None:
         self._runtime, self._dialect = runtime, dialect

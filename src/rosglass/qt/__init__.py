@@ -1,4 +1,4 @@
-"""The one place that chooses a Qt binding; everything above imports Qt from here.
+"""The choice of the Qt binding; everything above imports Qt from here.
 
 PySide6 (Qt 6) is the default. PySide2 (Qt 5) is taken when a Qt 5 binding is already in the
 process, as inside RViz, or when the environment variable ``ROSGLASS_QT`` says ``pyside2``. Two Qt
@@ -133,7 +133,7 @@ def is_alive(item: QtCore.QObject | None) -> bool:
 
 
 def address(item: QtCore.QObject) -> int:
-    """Return where the C++ object is; for C functions, and for what Qt tells in no other way."""
+    """Return the address of the C++ object."""
     return int(_shiboken.getCppPointer(item)[0])
 
 
