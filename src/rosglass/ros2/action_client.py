@@ -1,4 +1,4 @@
-"""Actions over ROS 2's three services and two topics, as their client has them.
+"""Action clients of ROS 2: three service clients and two subscriptions.
 
 Protocol: http://design.ros2.org/articles/actions.html and ``rcl_action``'s ``action_client.c``.
 """
@@ -72,16 +72,16 @@ if TYPE_CHECKING:
 __all__ = ["Ros2ActionClient", "Ros2ClientGoal"]
 
 _log = logging.getLogger("rosglass.ros2")
-#: Seconds that do not fit into a time stamp any more, and their year.
+#: First second beyond the range of a time stamp, and its year.
 _END_OF_TIME = 2**31, 2038
-#: Time after which a result is asked for again, when asking failed or an end was announced.
+#: Seconds until a result is requested again, after a failed request or a status of its end.
 _RETRY_S = 1.0
-#: The same for an end that was announced, from then on.
+#: The same after a status of its end, from then on.
 _OVERDUE_S = 5.0
-#: What feedback and status are received with. The status topic's latched array is not asked for:
-#: a client needs none from before its goals, and some servers' topic is volatile.
+#: Profile of the subscriptions. The status topic's latched array is not requested: a client needs
+#: none from before its goals, and some servers' topic is volatile.
 _QOS = QoS()
-#: Where a goal's id is in feedback: behind the encapsulation header.
+#: The bytes of a feedback message that are the goal's id, behind the encapsulation header.
 _ID = slice(4, 20)
 
 _RANK = {
@@ -94,12 +94,12 @@ _END = 4
 
 
 class Ros2ClientGoal(ClientGoal):
-    """A goal: it asks for its acceptance, then for its result, and follows the status topic.
+    """A goal of an action client: requests its acceptance and result, and follows its status.
 
     Args:
         client: Its client.
         id: Its id, 16 random bytes.
-        goal: What is asked for: a message of the action's type, or what becomes one.
+        goal: A message of the action's type, or its fields.
         timeout: Seconds for the server to appear and to accept or reject it.
         typed: Whether the action's type is known.
     """
@@ -112,14 +112,14 @@ class Ros2ClientGoal(ClientGoal):
         super().__init__(client, id, goal, timeout, typed=typed, jobs=InOrder(), log=_log)
         self._deadline = None if timeout is None else time.monotonic() + timeout
         self._accepted: Time | None = None
-        #: Feedback that waits for the goal's acceptance.
+        #: Feedback from before the goal's acceptance.
         self._held: deque[Message] = deque(maxlen=FEEDBACK_DEPTH)
         self._early_status: tuple[GoalStatus, Time] | None = None
         self._sending: Call | None = None
         self._asking: Call | None = None
         self._servers: frozenset[bytes | str] = frozenset()
-        self._strangers: frozenset[bytes | str] = frozenset()
-        self._alone: float | None = None
+        self._queried: frozenset[bytes | str] = frozenset()
+        self._lost_at: float | None = None
         self._asked = 0.0
 
     @property
@@ -137,8 +137,8 @@ class Ros2ClientGoal(ClientGoal):
         call.add_done_callback(lambda _: self._jobs.add(lambda: self._on_answer(call)))
 
     def _take_back(self, service: ActionServiceClient) -> bool:
-        """Take it back from its service if it was not sent yet; return whether that was so."""
-        call, self._sending = self._sending, None  # its end is not the goal's
+        """Take the goal back if its request was not sent yet; return whether it was not."""
+        call, self._sending = self._sending, None  # the call's end must not end the goal
         if call is None or service.withdraw(call):
             return call is not None
         self._sending = call
@@ -147,7 +147,7 @@ class Ros2ClientGoal(ClientGoal):
         return False
 
     def _send_again(self, kind: MessageType) -> None:
-        """Send it with another version of its type."""
+        """Send the goal with another version of its type."""
         try:
             assert self.goal is not None  # it waited to be sent
             self.goal = kind.create(self.goal.to_dict())
@@ -161,7 +161,7 @@ class Ros2ClientGoal(ClientGoal):
     # -- sending ---------------------------------------------------------------------------------
 
     def _on_type(self) -> None:
-        """Send it, now that the type is known."""
+        """Send the goal, now that the type is known."""
         if self._done.done():
             return
         kind = self._client.type
@@ -178,7 +178,7 @@ class Ros2ClientGoal(ClientGoal):
             self._lose(self._client._unsent(self._timeout))
 
     def _on_answer(self, call: Call) -> None:
-        """Take the answer to the goal."""
+        """Handle the response to the goal request."""
         if call is not self._sending or self._status is not GoalStatus.PENDING:
             return
         if call.cancelled():
@@ -191,10 +191,10 @@ class Ros2ClientGoal(ClientGoal):
             if response.accepted:
                 self._accept(stamp_of(response.stamp))
             else:
-                told = f"the server of {self._client.name} does not accept goal {self.id_text}"
-                self._end(GoalStatus.REJECTED, GoalRejectedError(told))
+                text = f"the server of {self._client.name} does not accept goal {self.id_text}"
+                self._end(GoalStatus.REJECTED, GoalRejectedError(text))
         elif self._early_status is not None:
-            self._accept(self._early_status[1])  # its answer got lost, but not the goal
+            self._accept(self._early_status[1])  # the response was lost, but not the goal
         else:
             self._lose(self._explain(error))
 
@@ -203,7 +203,7 @@ class Ros2ClientGoal(ClientGoal):
         if isinstance(error, ServiceUnavailableError):
             return self._client._unsent(seconds)
         if isinstance(error, (TimeoutError, ConnectionLostError)):
-            # It may have been accepted, or be yet: nothing is to run that nobody watches.
+            # It may have been accepted, or be later: no goal is to run without its client.
             self._client._ask_cancel(self.id, Time(), Promise(cancellable=False), 10.0)
         if isinstance(error, TimeoutError):
             return TimeoutError(
@@ -233,7 +233,7 @@ class Ros2ClientGoal(ClientGoal):
     # -- while it runs ---------------------------------------------------------------------------
 
     def _on_status(self, status: GoalStatus, accepted: Time) -> None:
-        """Take what the status topic says of it."""
+        """Handle an entry of the status topic."""
         if self._status is GoalStatus.PENDING:
             self._early_status = (status, accepted)
             return
@@ -241,11 +241,11 @@ class Ros2ClientGoal(ClientGoal):
         known = self._status
         self._advance(status)
         if known.is_active and not status.is_active:
-            # The result should be on its way already; a reply can get lost with a link.
+            # The response should have been sent; it can be lost with a link.
             self._later(_RETRY_S, lambda: self._jobs.add(self._ask_again))
 
     def _on_feedback(self, feedback: Message) -> None:
-        """Take feedback for it."""
+        """Handle feedback."""
         if self._status is GoalStatus.PENDING:
             self._held.append(feedback)
         elif not self._done.done():
@@ -253,12 +253,12 @@ class Ros2ClientGoal(ClientGoal):
             self._add_feedback(feedback)
 
     def _alive(self) -> None:
-        """Take note that a server has the goal, whichever it is."""
-        if self._alone is not None:
-            self._alone, self._servers = None, self._client._servers()
+        """Note that a server has the goal, the former one or another."""
+        if self._lost_at is not None:
+            self._lost_at, self._servers = None, self._client._servers()
 
     def _advance(self, status: GoalStatus) -> None:
-        """Take a later status; what comes late itself is ignored."""
+        """Take a status that is later than the current one; ignore others."""
         if _RANK.get(status, _END) > _RANK.get(self._status, _END):
             self._set_status(status)
 
@@ -274,7 +274,7 @@ class Ros2ClientGoal(ClientGoal):
         elif call is not None and self._client._take_back(call):
             answer.set_result(CancelAnswer((self.id,)))
         else:
-            # Only a goal that was accepted can be cancelled: the server's answer comes first.
+            # Only an accepted goal can be cancelled: wait for the server's response.
             failure = (
                 f"{self._label} could not be cancelled within {timeout or 0.0:g} s: the server has "
                 "neither accepted nor rejected it"
@@ -291,32 +291,33 @@ class Ros2ClientGoal(ClientGoal):
         if not self._status.is_active and now - self._asked >= _OVERDUE_S:
             self._ask_again()
         if self._servers & here:
-            if self._alone is not None:
-                self._alone = None
-                self._ask_again()  # what was asked before may have got lost with the link
+            if self._lost_at is not None:
+                self._lost_at = None
+                self._ask_again()  # the request may have been lost with the link
             return
-        if self._alone is None:
-            self._alone = now
-        if here - self._strangers:
-            # A server that took the place of the server that had the goal should not know it.
-            self._strangers |= here
+        if self._lost_at is None:
+            self._lost_at = now
+        if here - self._queried:
+            # A server that replaced the one that had the goal reports it as unknown.
+            self._queried |= here
             self._ask_again()
         status = self._client._core.status()
         cut_off = not here and status.state is not ConnectionState.CONNECTED
         known = not self._status.is_active
-        if now - self._alone >= (OUTAGE_S if cut_off and not known else GRACE_S):
-            told = "goal {} ended; nobody knows what becomes of it"
+        if now - self._lost_at >= (OUTAGE_S if cut_off and not known else GRACE_S):
+            event = f"goal {self.id_text} ended; its outcome is unknown"
             if known:
-                told = (
-                    "it told the result of goal {}, " + f"which has ended as {self._status.value}"
+                event = (
+                    f"it sent the result of goal {self.id_text}, which has ended as "
+                    f"{self._status.value}"
                 )
-            lost = f"the server of {self._client.name} went away before {told.format(self.id_text)}"
+            lost = f"the server of {self._client.name} went away before {event}"
             self._lose(ConnectionLostError(f"{lost} ({self._client._core.url}: {status})"))
 
     # -- the result ------------------------------------------------------------------------------
 
     def _ask_soon(self, delay: float) -> None:
-        """Ask for the result, not on the thread of the middleware that may have called us."""
+        """Request the result later, and not on a thread of the middleware."""
         self._later(delay, lambda: self._jobs.add(self._ask))
 
     def _ask_again(self) -> None:
@@ -338,7 +339,7 @@ class Ros2ClientGoal(ClientGoal):
         call.add_done_callback(lambda _: self._on_result(call))
 
     def _on_result(self, call: Call) -> None:
-        """Take the end, after the feedback that came before it on another way."""
+        """Handle the result's response, after feedback that was sent before it."""
         self._client._flush()
         self._jobs.add(lambda: self._take_result(call))
 
@@ -353,11 +354,11 @@ class Ros2ClientGoal(ClientGoal):
             if status is None:
                 lost = ConnectionLostError(
                     f"the server of {self._client.name} does not know goal {self.id_text} any "
-                    "more: it was restarted meanwhile, or did not keep the result for long enough"
+                    "more: it was restarted, or did not keep the result for long enough"
                 )
                 self._lose(lost)
             elif status.is_active:
-                self._ask_soon(_RETRY_S)  # a server that does not wait for the end
+                self._ask_soon(_RETRY_S)  # the server does not wait for the end
             else:
                 self._end(status, ActionResult(status, response.result))
         elif isinstance(error, NodeClosedError) or isinstance(error.__cause__, DecodeError):
@@ -367,13 +368,13 @@ class Ros2ClientGoal(ClientGoal):
             self._ask_soon(_RETRY_S)
 
     def _closing(self, error: BaseException) -> BaseException:
-        """Return the error of a goal: asking may fail before the goal hears that all is closed."""
+        """Return the goal's error: a request may fail before the goal is closed by its client."""
         if isinstance(error, NodeClosedError) and self._client.closed:
             return self._client._ended()
         return error
 
     def _lose(self, error: BaseException) -> None:
-        """End it as LOST, unless it has ended."""
+        """End the goal as LOST, unless it has ended."""
         self._end(GoalStatus.LOST, error)
 
     def _end(self, status: GoalStatus, end: ActionResult | BaseException) -> None:
@@ -390,7 +391,7 @@ class Ros2ClientGoal(ClientGoal):
 
 
 class Ros2ActionClient(ActionClient, NodeMember):
-    """An action client, in the version of the type that its server announces.
+    """An action client, for the version of the type that its server announces.
 
     Args:
         core: The node it belongs to.
@@ -406,15 +407,15 @@ class Ros2ActionClient(ActionClient, NodeMember):
         super().__init__(core, name, _END_OF_TIME)
         self._version = ActionVersion(core, name, wanted)
         self._ends: _ClientEndpoints | None = None
-        #: What is to be done once the type is known.
+        #: Jobs that wait for the type.
         self._held: list[Callable[[], None]] = []
         self._version.follow(retry=True)
         if self._version.types is not None:
-            self._speak(self._version.types)
+            self._replace_endpoints(self._version.types)
         core.add(self)
 
     def _is_ready(self) -> bool:
-        """Return whether a server is there that understands the goals."""
+        """Return whether all services of a server of this type are linked."""
         ends = self._ends
         return ends is not None and not self._closed and all(end.ready for end in ends.services)
 
@@ -435,8 +436,8 @@ class Ros2ActionClient(ActionClient, NodeMember):
             for goal in self._live():
                 if goal.accepted is None:
                     goal.cancel(timeout)
-        told = f"{self.name} has not answered the request to cancel"
-        answer: Promise[CancelAnswer] = Promise(told, self._core.dispatcher, cancellable=False)
+        text = f"{self.name} has not answered the request to cancel"
+        answer: Promise[CancelAnswer] = Promise(text, self._core.dispatcher, cancellable=False)
         self._ask_cancel(NO_ID, until or Time(), answer, timeout)
         return answer
 
@@ -446,14 +447,14 @@ class Ros2ActionClient(ActionClient, NodeMember):
         return self._open_ends().send_goal.call_async(request, timeout=timeout)
 
     def _ask_result(self, goal: Ros2ClientGoal) -> Call:
-        """Ask for a goal's result, for as long as it takes."""
+        """Request a goal's result, without timeout."""
         request = {"goal_id": {"uuid": goal.id}}
         return self._open_ends().get_result.call_async(request, timeout=None)
 
     def _ask_cancel(
         self, goal_id: bytes, stamp: Time, answer: Promise[CancelAnswer], timeout: float | None
     ) -> None:
-        """Ask for goals to be cancelled: one, or those until a time, or all."""
+        """Request to cancel goals: one, those accepted until a time, or all."""
         if self._ends is None and not self._closed:
             self._ask_cancel_later(goal_id, stamp, answer, timeout)
             return
@@ -484,18 +485,18 @@ class Ros2ActionClient(ActionClient, NodeMember):
         self._once_typed(ask)
 
     def _take_back(self, call: Call) -> bool:
-        """Take a goal back that was not sent yet; return whether that was so."""
+        """Withdraw a goal request that was not sent yet; return whether it was not."""
         ends = self._ends
         return ends is not None and ends.send_goal.withdraw(call)
 
     def _flush(self) -> None:
-        """Take the feedback and status that have arrived and wait to be taken."""
+        """Deliver waiting feedback and status."""
         ends = self._ends
         if ends is not None:
             ends.flush()
 
     def _servers(self) -> frozenset[bytes | str]:
-        """Return the identities of the servers that understand the goals."""
+        """Return the identities of the servers of this type."""
         ends = self._ends
         return frozenset() if ends is None else ends.send_goal.server_ids()
 
@@ -505,16 +506,16 @@ class Ros2ActionClient(ActionClient, NodeMember):
         return self.type.result.create()
 
     def _replaced(self) -> ConnectionLostError:
-        """Return the error of goals whose server made way for one with another definition."""
+        """Return the error of goals whose server was replaced by one of another version."""
         return ConnectionLostError(
             f"the server of {self.name} was replaced by one with another definition of the type; "
-            "nobody knows what becomes of the goal"
+            "the outcome of the goal is unknown"
         )
 
     def _on_cancel_answer(
         self, goal_id: bytes, call: Call, answer: Promise[CancelAnswer], timeout: float | None
     ) -> None:
-        """Take the answer to a request to cancel."""
+        """Handle the response to a request to cancel."""
         error = call.exception(0)
         if isinstance(error, TimeoutError):
             error = TimeoutError(
@@ -541,18 +542,18 @@ class Ros2ActionClient(ActionClient, NodeMember):
     # -- following the graph ---------------------------------------------------------------------
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - definitions may be added
-        """Follow the graph: the type, whether a server is there, goals whose server went."""
+        """Update the type, readiness and goals after a change of the graph."""
         if self._closed:
             return
         if self._version.follow(retry=idle) and self._version.types is not None:
-            self._speak(self._version.types)
+            self._replace_endpoints(self._version.types)
         self._log_conflicts(_log, logging.INFO if self._version.pending else logging.WARNING)
         self._readiness.update()
         for goal in self._live():
             goal._jobs.add(goal._watch)
 
-    def _speak(self, types: ActionTypes) -> None:
-        """Speak this version of the type from now on."""
+    def _replace_endpoints(self, types: ActionTypes) -> None:
+        """Replace the endpoints by those of a version of the type."""
         ends = _ClientEndpoints(self._core, self.name, types, self._goals)
         with self._lock:
             old, self._ends = self._ends, ends
@@ -574,7 +575,7 @@ class Ros2ActionClient(ActionClient, NodeMember):
         old.close()
 
     def _once_typed(self, job: Callable[[], None]) -> None:
-        """Do something now, or as soon as the type is known."""
+        """Run a job as soon as the type is known."""
         with self._lock:
             if self._ends is None and not self._closed:
                 self._held.append(job)
@@ -601,7 +602,7 @@ class Ros2ActionClient(ActionClient, NodeMember):
         ]
         return self._no_server(offered)
 
-    # -- the end ---------------------------------------------------------------------------------
+    # -- closing ---------------------------------------------------------------------------------
 
     def _withdraw(self) -> None:
         with self._lock:
@@ -609,7 +610,7 @@ class Ros2ActionClient(ActionClient, NodeMember):
         for goal in self._live():
             goal._lose_later(self._ended())
         for job in held:
-            job()  # finds the client closed
+            job()  # fails, as the client is closed
         if ends is not None:
             ends.close()
         self._core.remove(self)
@@ -621,13 +622,13 @@ class Ros2ActionClient(ActionClient, NodeMember):
 
 
 class _ClientEndpoints(Handle):
-    """Speaks one version of an action's type.
+    """The service clients and readers of an action client, for one version of the type.
 
     Args:
         core: The node.
         name: Absolute name of the action.
-        types: The types to speak.
-        goals: The client's goals by their ids, which take feedback and status.
+        types: The types.
+        goals: The client's goals by their ids.
     """
 
     def __init__(
@@ -648,17 +649,17 @@ class _ClientEndpoints(Handle):
         ]
 
     def flush(self) -> None:
-        """Take what has arrived on the topics and waits to be taken, in the calling thread."""
+        """Deliver the waiting samples of both topics, in the calling thread."""
         for reader in self._readers:
             reader.flush()
 
     def close(self) -> None:
-        """Listen and talk no longer; calls that have not ended fail."""
+        """Close all endpoints; pending calls fail."""
         for end in (*self.services, *self._readers):
             end.close()
 
     def _read(self, topic: str, kind: MessageType) -> Reader:
-        """Listen to one of the action's topics."""
+        """Create the reader of one of the action's topics."""
         core, full = self._core, part(self._name, topic)
         endpoint = EndpointInfo(
             EndpointKind.SUBSCRIPTION, full, kind.name, core.name, _QOS, kind.rihs01
@@ -666,12 +667,12 @@ class _ClientEndpoints(Handle):
         return core.middleware.create_reader(endpoint, self._taker(topic, kind))
 
     def _taker(self, topic: str, kind: MessageType) -> OnSample:
-        """Return what takes a topic's samples from the middleware."""
+        """Return the function that takes a topic's samples."""
         ours, repeats, feedback = kind.rihs01, Repeats(), topic == FEEDBACK
 
         def receive(
             data: bytes | memoryview,
-            received: int,  # noqa: ARG001 - more is told than needed
+            received: int,  # noqa: ARG001 - part of OnSample
             sent: int | None,
             gid: bytes,
             sequence: int,
@@ -679,8 +680,8 @@ class _ClientEndpoints(Handle):
         ) -> None:
             try:
                 if hash not in ("", ours):
-                    told = f"another definition of {kind.name} ({hash}, ours is {ours})"
-                    self._complain(topic, gid, told)
+                    text = f"another definition of {kind.name} ({hash}, ours is {ours})"
+                    self._complain(topic, gid, text)
                 elif not repeats.seen(gid, sequence, sent):
                     if feedback:
                         self._take_feedback(kind, data)
@@ -711,7 +712,7 @@ class _ClientEndpoints(Handle):
                 goal._jobs.add(partial(goal._on_status, status, stamp))
 
     def _complain(self, topic: str, gid: bytes, reason: str) -> None:
-        """Log what cannot be understood, once for each publisher."""
+        """Log an ignored sample, once for each publisher."""
         if not self._log_once.is_first((topic, gid)):
             return
         publishers = self._core.graph.endpoints(EndpointKind.PUBLISHER, part(self._name, topic))

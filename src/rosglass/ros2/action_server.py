@@ -1,4 +1,4 @@
-"""Actions over ROS 2's three services and two topics, as their server has them.
+"""Action servers of ROS 2: three service servers and two publishers.
 
 Protocol: http://design.ros2.org/articles/actions.html and ``rcl_action``'s ``action_server.c``.
 """
@@ -45,28 +45,28 @@ if TYPE_CHECKING:
 __all__ = ["Ros2ActionServerProtocol"]
 
 _log = logging.getLogger("rosglass.ros2")
-#: How long results are kept for clients that ask late, as in Humble's rcl_action.
+#: Seconds for which results are kept for late requests, as in Humble's rcl_action.
 _RESULT_TIMEOUT_S = 900.0
 #: Ended goals that are kept at most.
 _MAX_ENDED = 500
-#: Requests for one goal's result that are kept; more come only from a client gone wild.
+#: Requests for one goal's result that are kept; more only of a client gone wild.
 _MAX_WAITING = 1000
-#: Time after its acceptance in which a client asks for a goal's result: closing waits for that.
+#: Seconds from acceptance in which a client requests a goal's result: closing waits for that.
 _ASK_TIMEOUT_S = 1.0
 #: ``action_msgs/srv/CancelGoal``'s return codes.
 _NONE, _REJECTED, _UNKNOWN, _TERMINATED = range(4)
 
 
 class _KeptGoal:
-    """A goal and the requests for its result, until the result is forgotten.
+    """A goal and the requests for its result.
 
     Attributes:
         goal: The goal.
         begun: Monotonic time of its acceptance.
-        asked: Whether its result was asked for.
+        asked: Whether its result was requested.
         ended: Monotonic time of its end, None before.
-        response: The answer to requests for its result, None before its end.
-        waiting: The requests that are not answered yet.
+        response: The response to requests for its result, None before its end.
+        waiting: The pending requests for it.
     """
 
     def __init__(self, goal: ServerGoal) -> None:
@@ -93,15 +93,15 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
         self._core = core
         self._types = ActionTypes.of(type, core.types)
         self._kept: dict[bytes, _KeptGoal] = {}
-        #: The answers to goals that are being decided on.
+        #: The pending responses to goal requests.
         self._deciding: dict[bytes, Future[Any]] = {}
         self._publishing = InOrder()
 
     def open(self, server: ActionServer) -> None:
-        """Announce services and topics."""
+        """Create services and publishers."""
         self._server = server
         core, name, types = self._core, self.name, self._types
-        #: Runs the protocol: neither the middleware's threads nor users' callbacks hold it up.
+        #: Runs the protocol, independent of the middleware's threads and users' callbacks.
         self._desk = Dispatcher(f"{name} goals")
         self._feedback = Publisher(core, part(name, FEEDBACK), types.feedback, FEEDBACK_QOS)
         self._status = Publisher(core, part(name, STATUS), types.status, STATUS_QOS)
@@ -116,7 +116,7 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
         core.add(self)
 
     def withdraw(self) -> None:
-        """Let clients learn the end of their goals, and close services and topics."""
+        """Close services and publishers, after clients could request the results."""
         self._await_questions()
         for end in (*self._services, self._feedback, self._status):
             end.close()
@@ -128,11 +128,11 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
         self._server.close()
 
     def problems(self) -> list[str]:
-        """Say why some clients cannot be served."""
+        """Return why some clients cannot be served."""
         return [service.problem for service in self._services]
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - time passes
-        """Forget results that nobody asked for in time."""
+        """Drop the results that have been kept long enough."""
         if not idle or self.closed:
             return
         oldest = time.monotonic() - _RESULT_TIMEOUT_S
@@ -144,11 +144,11 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
                     del self._kept[kept.goal.id]
 
     def post(self, job: Callable[[], None]) -> None:
-        """Run what follows a decision on the desk, so that it waits for no other callback."""
+        """Run a job that follows a decision on the protocol's own thread."""
         self._desk.post(job)
 
     def _await_questions(self) -> None:
-        """Let clients ask what became of goals accepted just now: nobody else can tell them."""
+        """Wait for result requests of goals that were accepted just now."""
         with self.lock:
             goals = list(self._kept.values())
         if self._desk.is_current or not goals:
@@ -162,7 +162,7 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
         self._desk.post(answered.set)  # behind the last answer
         answered.wait(_ASK_TIMEOUT_S)
 
-    # -- what clients are sent -------------------------------------------------------------------
+    # -- feedback, status, results ---------------------------------------------------------------
 
     def publish_feedback(self, goal: ServerGoal, feedback: Message) -> None:
         """Publish feedback of a goal."""
@@ -216,7 +216,7 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
             _log.warning("%s: rejecting goal %s: its id is in use", self.name, goal_id.hex())
             return {"accepted": False}
         goal = ServerGoal(self, goal_id, request.goal, Time())
-        # Once the answer is waited for: it must be on its way before the goal starts.
+        # Later: the response must be sent before the goal starts.
         self._desk.post(lambda: self._server._on_goal(goal))
         return answer
 
@@ -227,13 +227,13 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
         return True
 
     def start(self, goal: ServerGoal) -> None:
-        """Answer the client, then have the goal executed."""
+        """Send the response, then execute the goal."""
         self._answer(goal, {"accepted": True, "stamp": goal.accepted.to_dict()})
         self.publish_status()
         self._server._run(goal)
 
     def reject(self, goal: ServerGoal, reason: str) -> None:  # noqa: ARG002 - ROS 2 has no room for it
-        """Answer the client of a goal that was not accepted."""
+        """Send the response to a goal that was not accepted."""
         self._answer(goal, {"accepted": False})
 
     def _answer(self, goal: ServerGoal, response: dict[str, Any]) -> None:
@@ -259,10 +259,10 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
         return answer
 
     def _cancel(self, goals: Sequence[ServerGoal], code: int) -> dict[str, Any]:
-        """Cancel goals; return the answer to the request."""
+        """Cancel goals; return the response."""
         canceled = [goal for goal in goals if goal._request_cancel()]
         if goals and not canceled:
-            code = _TERMINATED  # they ended while it was decided
+            code = _TERMINATED  # they have ended since
         if canceled:
             self.publish_status()
         infos = [goal_info(goal.id, goal.accepted) for goal in canceled]
@@ -291,7 +291,7 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
 def _cancelable(
     goals: Sequence[ServerGoal], goal_id: bytes, stamp: Time
 ) -> tuple[list[ServerGoal], int]:
-    """Return the goals that a request to cancel means, and the code that answers it.
+    """Return the goals that a request to cancel selects, and the return code.
 
     An id alone means one goal; a stamp means all accepted until then, and the goal with the id, if
     there is one; neither means all (``rcl_action_process_cancel_request``).

@@ -1,4 +1,4 @@
-"""What an action consists of in ROS 2: three services and two topics, with derived types.
+"""The services and topics of a ROS 2 action, and the types derived for them.
 
 Names, types and profiles: http://design.ros2.org/articles/actions.html; ``rcl_action``'s
 ``names.h`` and ``default_qos.h``.
@@ -79,15 +79,15 @@ _BUILT_IN = {
 
 @dataclass(frozen=True)
 class ActionTypes:
-    """An action's type and those that go over the wire.
+    """An action's type and those of its services and topics.
 
     Attributes:
         action: The action's.
-        send_goal: The service that takes goals.
-        get_result: The service that tells results.
-        cancel_goal: The service that cancels goals.
-        feedback: The topic with feedback.
-        status: The topic with the status of every goal.
+        send_goal: The service type for sending goals.
+        get_result: The service type for requesting results.
+        cancel_goal: The service type for cancelling goals.
+        feedback: The message type of feedback.
+        status: The message type of the status of all goals.
     """
 
     action: ActionType
@@ -147,7 +147,7 @@ def goal_info(goal_id: bytes, stamp: Time) -> dict[str, object]:
 
 
 def stamp_of(message: Message) -> Time:
-    """Return the time that a ``builtin_interfaces/msg/Time`` says."""
+    """Return the time in a ``builtin_interfaces/msg/Time``."""
     return Time.from_parts(int(message.sec), int(message.nanosec))
 
 
@@ -158,14 +158,14 @@ def _service(action: ActionType, suffix: str) -> ServiceDefinition:
 
 
 def _complete(definition: Definition) -> Definition:
-    """Return a derived message with the definitions of what actions themselves add to it."""
+    """Return a derived message with the definitions of the fields that actions add."""
     names = {field.type.name for field in definition.fields} & _BUILT_IN.keys()
     added = {name: parse_message(_BUILT_IN[name], name) for name in names}
     return replace(definition, nested={**definition.nested, **added})
 
 
 class ActionVersion:
-    """Follows the type of one action.
+    """The type of an action, in the version that its server announces.
 
     Two versions of an action often differ in one part only, and each part has a hash of its own:
     the goal's shows at the service ``send_goal``, the result's at ``get_result``, the feedback's
@@ -178,7 +178,7 @@ class ActionVersion:
             whatever type is announced.
 
     Attributes:
-        types: The types in use; None while nobody has told them.
+        types: The types in use; None while they are unknown.
 
     Raises:
         TypeNotFoundError: No definition of the given type is known.
@@ -198,13 +198,13 @@ class ActionVersion:
             self._begin(core.types.action(wanted))
 
     def follow(self, *, retry: bool) -> bool:
-        """Take the type that the server announces, and its version of it.
+        """Take the type and version that the server announces.
 
         Args:
-            retry: Whether to look again for definitions that were not found before.
+            retry: Whether to search again for definitions that were not found before.
 
         Returns:
-            Whether it is another one now.
+            Whether it has changed.
         """
         before = self.types
         try:
@@ -219,14 +219,14 @@ class ActionVersion:
 
     @property
     def pending(self) -> bool:
-        """Whether a definition is being fetched from the robot."""
+        """Whether a definition is being fetched."""
         types = self.types
         return self._fetching or (
             types is not None and any(version.pending for version, _ in self._parts())
         )
 
     def conflicts(self) -> list[str]:
-        """Say what a person has to mend."""
+        """Return the conflicts with servers, one sentence each."""
         types = self.types
         problems = [self._choice, self._missing, self._failure]
         if types is not None:

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
     from os import PathLike
 
-    from rosglass.comm import Executor, Node, ParameterValue, Publisher, Time
+    from rosglass.comm import Executor, Node, ParameterValue, Time
     from rosglass.comm.promise import Deadline
     from rosglass.messages import Message
 
@@ -72,7 +72,7 @@ _log = logging.getLogger("rosglass.ros2")
 #: A parameter that every node has, besides :data:`USE_SIM_TIME`: whether the node describes its
 #: types to others. Only to be given at the start.
 DESCRIBE_TYPES = "start_type_description_service"
-#: What people call the types, and what ROS's own tools print.
+#: Names of the types, as ROS's own tools print them.
 TYPE_NAMES = {
     ParameterType.NOT_SET: "not set",
     ParameterType.BOOL: "boolean",
@@ -134,7 +134,7 @@ class _Entry:
 
 
 class Change(NamedTuple):
-    """Parameters that changed together, with their types; ``deleted`` are names."""
+    """Parameters that were changed together, with their types."""
 
     new: Mapping[str, TypedValue]
     changed: Mapping[str, TypedValue]
@@ -158,6 +158,7 @@ class Ros2Parameters(Parameters):
         self.changes: Listeners[Change] = Listeners()
         self._executor = executor
         self._overrides = dict(overrides or {})
+        #: Guards all of the following: users and the parameter services set parameters.
         self._lock = threading.Lock()
         self._entries: dict[str, _Entry] = {}
         self._version = 0
@@ -190,7 +191,7 @@ class Ros2Parameters(Parameters):
         default: ParameterValue = None,
         descriptor: ParameterDescriptor | None = None,
     ) -> ParameterValue:
-        """Make a parameter known; see :meth:`rosglass.comm.Parameters.declare`."""
+        """Declare a parameter; see :meth:`rosglass.comm.Parameters.declare`."""
         self._check_open()
         check_name(name)
         descriptor = ParameterDescriptor() if descriptor is None else descriptor
@@ -224,7 +225,7 @@ class Ros2Parameters(Parameters):
         return value.copy()
 
     def undeclare(self, name: str) -> None:
-        """Forget a parameter; raises ParameterError."""
+        """Undeclare a parameter; raises ParameterError."""
         self._check_open()
         with self._lock:
             entry = self._entry(name)
@@ -254,7 +255,7 @@ class Ros2Parameters(Parameters):
             raise ParameterError(f"{self.node}: {reason}")
 
     def describe(self, name: str) -> ParameterDescriptor:
-        """Return what is known about it; raises ParameterError when not declared."""
+        """Return the descriptor; raises ParameterError when not declared."""
         self._check_open()
         with self._lock:
             return self._entry(name).descriptor
@@ -282,11 +283,7 @@ class Ros2Parameters(Parameters):
             return {name: entry.value for name, entry in sorted(self._entries.items())}
 
     def try_set(self, values: Mapping[str, TypedValue]) -> str:
-        """Set parameters, all or none.
-
-        Returns:
-            Why they were not set, in words; empty when they were.
-        """
+        """Set parameters, all or none; return why they were not set, empty if they were."""
         while True:
             with self._lock:
                 version = self._version
@@ -294,7 +291,7 @@ class Ros2Parameters(Parameters):
             problem = problem or self._validate({n: value.copy() for n, value in values.items()})
             if problem:
                 return problem
-            # Validators run unlocked; ask them again should another thread have set something.
+            # Validators run unlocked: repeat if another thread has set something since.
             with self._lock:
                 if self._version != version:
                     continue
@@ -303,7 +300,7 @@ class Ros2Parameters(Parameters):
             return ""
 
     def on_set(self, validate: Callable[[Mapping[str, ParameterValue]], str]) -> Handle:
-        """Let `validate` refuse values; see :meth:`rosglass.comm.Parameters.on_set`."""
+        """Add a validator; see :meth:`rosglass.comm.Parameters.on_set`."""
         self._check_open()
         check_plain(validate, f"{self.node}: on_set()")
         validator = _Validator(self, validate)
@@ -333,7 +330,7 @@ class Ros2Parameters(Parameters):
         values = parameter_files.read(path).for_node(self.node)
         if not values:
             raise ParameterError(f"{path} has no parameters for {self.node}")
-        # What is as it shall be may be read-only.
+        # Read-only parameters may be in the file, with the values they have.
         now = self.snapshot()
         wanted = {
             name: value
@@ -354,14 +351,14 @@ class Ros2Parameters(Parameters):
         parameter_files.write(path, {self.node: values})
 
     def close(self) -> None:
-        """Call back no more; safe to call twice."""
+        """Remove validators and listeners; safe to call twice."""
         with self._lock:
             self._closed = True
             self._validators.clear()
         self.changes.clear()
 
     def remove(self, validator: _Validator) -> None:
-        """Ask a validator no more; for its handle."""
+        """Remove a validator."""
         with self._lock:
             if validator in self._validators:
                 self._validators.remove(validator)
@@ -621,7 +618,7 @@ def _check_text(what: str, text: str) -> None:
 
 
 def in_range(allowed: Range, value: float) -> str:
-    """Say why a number is not allowed; an empty string when it is.
+    """Return why a number is not allowed, empty if it is.
 
     The rules are rclcpp's (``node_parameters.cpp``): both ends are allowed, and between them the
     steps counted from the lower one; doubles may be off by rounding.
@@ -673,22 +670,29 @@ _FIELDS = {
 
 
 class ParameterServices(Handle):
-    """Serves a node's parameters.
+    """The parameter services of a node.
 
     Args:
         node: The node.
         parameters: Its parameters.
-        executor: Where requests are answered.
+        executor: Runs the requests.
     """
 
     def __init__(self, node: Node, parameters: Ros2Parameters, executor: Executor) -> None:
         self._node, self._parameters, self._executor = node, parameters, executor
         self._made: list[Handle] = []
-        self._events: Publisher | None = None
 
     def offer(self) -> Iterator[None]:
-        """Offer all of it, in pieces of a millisecond or so."""
-        answers = {
+        """Create publisher and services, in steps of a millisecond or so."""
+        node, parameters = self._node, self._parameters
+        events = node.create_publisher(EVENTS, EVENT_TYPE, EVENTS_QOS)
+
+        def publish(change: Change) -> None:
+            with suppress(NodeClosedError):
+                events.publish(event_to_message(parameters.node, node.now(), *change))
+
+        self._made += [events, parameters.changes.add(publish, IMMEDIATE)]
+        callbacks = {
             "describe_parameters": self._describe,
             "get_parameter_types": self._types,
             "get_parameters": self._get,
@@ -696,41 +700,26 @@ class ParameterServices(Handle):
             "set_parameters": self._set,
             "set_parameters_atomically": self._set_atomically,
         }
-        self._announce()
-        for name, answer in answers.items():
+        for name, callback in callbacks.items():
             yield
-            self._serve(name, answer)
+            server = node.create_service_server(
+                f"~/{name}", SERVICES[name], callback, SERVICES_QOS, executor=self._executor
+            )
+            self._made.append(server)
 
     def close(self) -> None:
-        """Withdraw the services; safe to call twice."""
+        """Close publisher and services; safe to call twice."""
         while self._made:
             self._made.pop().close()
 
-    def _serve(self, name: str, answer: Callable[[Message], dict[str, Any]]) -> None:
-        self._made.append(
-            self._node.create_service_server(
-                f"~/{name}", SERVICES[name], answer, SERVICES_QOS, executor=self._executor
-            )
-        )
-
-    def _announce(self) -> None:
-        self._events = self._node.create_publisher(EVENTS, EVENT_TYPE, EVENTS_QOS)
-        self._made += [self._events, self._parameters.changes.add(self._publish_event, IMMEDIATE)]
-
-    def _publish_event(self, change: Change) -> None:
-        events = self._events
-        assert events is not None
-        with suppress(NodeClosedError):
-            events.publish(event_to_message(self._parameters.node, self._node.now(), *change))
-
-    # -- answers ---------------------------------------------------------------------------------
+    # -- callbacks -------------------------------------------------------------------------------
 
     def _describe(self, request: Message) -> dict[str, Any]:
         descriptors = []
         for name in request.names:
             try:
                 descriptor = self._parameters.describe(name)
-            except (ParameterError, NodeClosedError):  # the service's end says that it closed
+            except (ParameterError, NodeClosedError):
                 descriptor = ParameterDescriptor(name)
             descriptors.append(descriptor_to_message(descriptor))
         return {"descriptors": descriptors}
@@ -758,8 +747,8 @@ class ParameterServices(Handle):
         reason = ""
         try:
             for parameter in parameters:
-                who = f"parameter {parameter.name!r}"
-                values[parameter.name] = value_from_message(parameter.value, who)
+                label = f"parameter {parameter.name!r}"
+                values[parameter.name] = value_from_message(parameter.value, label)
         except ParameterError as error:
             reason = str(error)
         reason = reason or self._parameters.try_set(values)
@@ -767,11 +756,11 @@ class ParameterServices(Handle):
 
 
 class RemoteParameterServices(OtherNode, RemoteParameters):
-    """Another node's parameters, reached by its parameter services.
+    """Another node's parameters, over its parameter services.
 
     Args:
-        owner: The node that asks.
-        node: Full name of the node that is asked.
+        owner: The node that calls the services.
+        node: Full name of the node with the parameters.
     """
 
     def __init__(self, owner: Node, node: str) -> None:
@@ -787,14 +776,14 @@ class RemoteParameterServices(OtherNode, RemoteParameters):
         messages = self._ask("get_parameters", "values", names, deadline)
         found: dict[str, ParameterValue] = {}
         for name, message in messages.items():
-            who = f"parameter {name!r} of {self.node}"
-            found[name] = None if message is None else value_from_message(message, who).value
+            label = f"parameter {name!r} of {self.node}"
+            found[name] = None if message is None else value_from_message(message, label).value
         return found
 
     def descriptors(
         self, names: list[str] | None, deadline: Deadline
     ) -> dict[str, ParameterDescriptor]:
-        """Return what is known by name."""
+        """Return descriptors by name."""
         messages = self._ask("describe_parameters", "descriptors", names, deadline)
         return {
             name: ParameterDescriptor(name)
@@ -823,7 +812,7 @@ class RemoteParameterServices(OtherNode, RemoteParameters):
     def watch(
         self, callback: Callable[[ParameterEvent], None], executor: Executor | None
     ) -> Handle:
-        """Call `callback` with what the node publishes on ``/parameter_events``."""
+        """Call `callback` with the node's events on ``/parameter_events``."""
 
         def receive(message: Message) -> None:
             if message.node == self.node:
@@ -832,7 +821,7 @@ class RemoteParameterServices(OtherNode, RemoteParameters):
         return self._subscribe(EVENTS, EVENT_TYPE, receive, EVENTS_QOS, executor)
 
     def load(self, path: str | PathLike[str], deadline: Deadline) -> list[str]:
-        """Set what a file has for the node, wildcards included."""
+        """Set the parameters that a file has for the node, wildcards included."""
         from rosglass.ros2 import parameter_files  # noqa: PLC0415 - yaml
 
         given = parameter_files.read(path).for_node(self.node)
@@ -842,7 +831,7 @@ class RemoteParameterServices(OtherNode, RemoteParameters):
         results = self.set(values, deadline)
         refused = [name for name, result in results.items() if not result.successful]
         if refused:
-            # What is read-only may stand in a file that was saved, too.
+            # Read-only parameters are in saved files, too.
             now = self.values(refused, deadline)
             refused = [
                 name
@@ -863,14 +852,14 @@ class RemoteParameterServices(OtherNode, RemoteParameters):
     def _ask(
         self, service: str, field: str, names: list[str] | None, deadline: Deadline
     ) -> dict[str, Message | None]:
-        """Return what a service says of each name, None for parameters that are not declared."""
+        """Return a service's response for each name; None for undeclared parameters."""
         wanted = self.find([], 0, deadline) if names is None else [check_name(n) for n in names]
         if not wanted:
             return {}
         found = self._call(service, {"names": wanted}, deadline)[field]
         if len(found) == len(wanted):
             return dict(zip(wanted, found, strict=True))
-        # rclcpp's nodes say nothing at all as soon as one of the parameters is not declared.
+        # rclcpp's nodes respond with nothing if one of the parameters is not declared.
         declared = set(self.find([], 0, deadline))
         known = [name for name in wanted if name in declared]
         found = self._call(service, {"names": known}, deadline)[field] if known else []
@@ -917,17 +906,17 @@ def value_to_message(value: TypedValue) -> dict[str, Any]:
     return {"type": int(value.type), _FIELDS[value.type]: value.value}
 
 
-def value_from_message(message: Message, who: str = "") -> TypedValue:
+def value_from_message(message: Message, label: str = "") -> TypedValue:
     """Return the value of a received ``ParameterValue``.
 
     Args:
         message: The message.
-        who: Whose parameter it is, for messages.
+        label: The parameter, for messages.
 
     Raises:
         ParameterError: Its type is none of ROS's.
     """
-    parameter_type = _type(message["type"], who)
+    parameter_type = _type(message["type"], label)
     if parameter_type is ParameterType.NOT_SET:
         return NOT_SET
     value = getattr(message, _FIELDS[parameter_type])
@@ -939,12 +928,12 @@ def value_from_message(message: Message, who: str = "") -> TypedValue:
     return TypedValue(parameter_type, value)
 
 
-def _type(number: int, who: str) -> ParameterType:
+def _type(number: int, label: str) -> ParameterType:
     try:
         return ParameterType(number)
     except ValueError:
         raise ParameterError(
-            f"{who or 'a parameter'} has the type {number!r}, which ROS 2 does not know "
+            f"{label or 'a parameter'} has the type {number!r}, which ROS 2 does not know "
             f"(0 to {max(ParameterType)})"
         ) from None
 
@@ -975,13 +964,13 @@ def descriptor_to_message(descriptor: ParameterDescriptor) -> dict[str, Any]:
     return fields
 
 
-def descriptor_from_message(message: Message, who: str = "") -> ParameterDescriptor:
+def descriptor_from_message(message: Message, label: str = "") -> ParameterDescriptor:
     """Return a received ``ParameterDescriptor``; raises ParameterError."""
     limits = [*message.integer_range, *message.floating_point_range]
     allowed = Range(limits[0].from_value, limits[0].to_value, limits[0].step) if limits else None
     return ParameterDescriptor(
         message.name,
-        _type(message["type"], who or message.name),
+        _type(message["type"], label or message.name),
         message.description,
         message.additional_constraints,
         message.read_only,

@@ -232,7 +232,7 @@ def test_with_discovery_off_nobody_is_seen(cyclone, dds_domain):
     )
     command = [sys.executable, "-c", code]
     told = subprocess.run(command, check=True, capture_output=True, text=True, timeout=30).stdout
-    assert told.startswith("['/alone'] CONNECTING: nobody else is in DDS domain")
+    assert told.startswith("['/alone'] CONNECTING: no other participant in DDS domain")
 
 
 @pytest.mark.skipif(importlib.util.find_spec("dora") is None, reason="dora-rs is not installed")

@@ -68,7 +68,7 @@ def test_a_cable_that_is_unplugged_for_ten_seconds_over_dds(on_two_machines):
     assert seen["lost"] < 8, "the operator is told when the lease has ended"
     assert seen["states"] == ["LOST", "CONNECTED"]
     meanwhile = seen["meanwhile"]
-    assert meanwhile["status"].startswith("LOST: everyone has left DDS domain")
+    assert meanwhile["status"].startswith("LOST: all other participants have left DDS domain")
     assert (meanwhile["publishers"], meanwhile["ready"]) == (0, False)
     assert "no server offers /add" in meanwhile["server"]
     assert seen["call"].startswith("ConnectionLostError"), "nobody waits for what cannot come"

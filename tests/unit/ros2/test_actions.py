@@ -425,7 +425,7 @@ def test_a_goal_is_lost_with_its_server(client, peer, middleware, impatient, con
     peer.vanish()
     with pytest.raises(
         rosglass.ConnectionLostError,
-        match=f"went away before goal {goal.id_text} ended; nobody knows .* told why",
+        match=f"went away before goal {goal.id_text} ended; its outcome is unknown .* told why",
     ):
         goal.result(30)
     eventually(lambda: told == [ACCEPTED, LOST, goal])

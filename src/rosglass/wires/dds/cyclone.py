@@ -163,7 +163,7 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
 }
 #: What a call returns for an entity that is being deleted.
 GONE = -9
-#: What a call returns that waited for as long as it may.
+#: What a call returns that has timed out.
 TIMEOUT = -10
 #: What it returns for an entity that was deleted, whose number means nothing, or something else, or
 #: to which not even a domain is left.
@@ -186,7 +186,7 @@ _CODES: dict[int, tuple[str, type[Error]]] = {
 
 @cache
 def library() -> Any:
-    """Return the library, whose functions let other Python threads run meanwhile.
+    """Return the library, whose functions release the GIL.
 
     Raises:
         UnsupportedError: The package is not installed, or has another interface.
@@ -195,9 +195,9 @@ def library() -> Any:
 
 
 def strange_version() -> str:
-    """Return why private layouts must not be relied on, empty with the version that is known.
+    """Return why private layouts cannot be used, empty with the known version.
 
-    What needs nothing but the public interface works with every version of the series.
+    The public interface works with every version of the series.
     """
     version = distribution("cyclonedds").version
     return "" if version == VERSION else f"cyclonedds {version} is installed instead of {VERSION}"
@@ -207,25 +207,25 @@ def strange_version() -> str:
 def keeping() -> Any:
     """Return the library, whose functions keep the GIL: for short calls that take no lock.
 
-    Giving the GIL away costs more than such a call, and may cost a switch interval until it is
-    back. A function that waits for a lock which a thread of the library holds while it calls us
-    must not be called this way.
+    Releasing the GIL costs more than such a call, and up to a switch interval to acquire it again.
+    A function must not be called this way if it waits for a lock that a thread of the library
+    holds while it calls Python.
     """
     return _declare(ctypes.PyDLL(library_path()))
 
 
 def check_alive(result: int, call: str, place: str) -> int:
-    """Do as :func:`check` for a call that can only fail because its entity was deleted before."""
+    """Check a call as :func:`check` does, if it can only fail because its entity was deleted."""
     return check(GONE if result in _WRONG_ENTITY else result, call, place)
 
 
 def check(result: int, call: str, place: str) -> int:
-    """Return `result` unless it is negative, which means that a call failed.
+    """Return the result of a call, or raise its error if it is negative.
 
     Args:
         result: What the call returned.
         call: The call, e.g. ``dds_create_reader``.
-        place: What it was made for, e.g. ``topic /scan``.
+        place: The topic or service it was made for, e.g. ``topic /scan``.
 
     Raises:
         NodeClosedError: The entity was deleted.
@@ -265,9 +265,9 @@ def create_participant(domain: int, qos: Qos | None) -> int:
 
 
 def create_topic(participant: int, name: str, type_name: str, *, own_type: bool = False) -> int:
-    """Create a topic whose payloads nobody looks into and whose type matches by its name alone.
+    """Create a topic of opaque payloads, whose type matches by its name alone.
 
-    It announces no type information, so endpoints that do so match it, too.
+    It announces no type information, and matches endpoints that do.
 
     Args:
         participant: The participant it belongs to.
@@ -295,16 +295,16 @@ def create_writer(participant: int, topic: int, qos: Qos | None, place: str) -> 
 
 
 def delete(entity: int) -> None:
-    """Delete an entity and what belongs to it; one that is gone is no error.
+    """Delete an entity and its children; an entity that was deleted is no error.
 
-    Waits for its callbacks to return, so it must not be called while holding what they need, nor
-    from one of them.
+    Waits for its callbacks to return: it must not be called from one of them, or while holding a
+    lock that they need.
     """
     library().dds_delete(entity)
 
 
 def guid(entity: int) -> bytes:
-    """Return the 16 bytes that identify a participant, reader or writer in the domain."""
+    """Return the GUID of a participant, reader or writer, 16 bytes."""
     buffer = ctypes.create_string_buffer(16)
     check_alive(library().dds_get_guid(entity, buffer), "dds_get_guid", f"entity {entity}")
     return buffer.raw
@@ -330,14 +330,14 @@ def sertype(entity: int) -> int:
 
 
 def start_at_first_sample(reader: int) -> str:
-    """Let a reliable reader ask writers that come from now on for all that they still have for it.
+    """Make a reliable reader request all samples that later matched writers have for it.
 
-    A volatile reader starts at the newest sample of another vendor's writer otherwise, and loses
-    what was sent before the writer was discovered. A writer sends volatile readers nothing from
-    before it discovered them; what the reader had before it lost sight of a writer may come again.
+    Otherwise a volatile reader starts at the newest sample of another vendor's writer, and loses
+    those from before it discovered the writer. A writer sends volatile readers none from before it
+    discovered them; after a reconnection, samples may be received again.
 
     Returns:
-        Why it cannot be done on this machine, empty when it was.
+        Why it is not possible on this machine, empty if it is.
     """
     if strange := strange_version():
         return strange
@@ -366,13 +366,13 @@ def matched_subscriptions(writer: int) -> list[int]:
 
 
 def acknowledged(writer: int) -> bool:
-    """Return whether every reliable reader that a writer is matched with has all that was sent."""
+    """Return whether all matched reliable readers of a writer have acknowledged all samples."""
     result: int = library().dds_wait_for_acks(writer, 0)
     return result != TIMEOUT
 
 
 def assert_liveliness(entity: int, place: str) -> None:
-    """Say that a participant or writer with manual liveliness is alive."""
+    """Assert the liveliness of a participant or writer."""
     check_alive(library().dds_assert_liveliness(entity), "dds_assert_liveliness", place)
 
 
@@ -498,7 +498,7 @@ def library_path() -> str:
 def _warn(strange: str, remedy: str) -> None:
     _log.warning(
         "%s: services and actions of nodes that use Fast DDS or RustDDS cannot be called, nor "
-        "offered to them, and nobody has tried the rest; %s",
+        "offered to them, and the rest is untested; %s",
         strange,
         remedy,
     )
@@ -522,10 +522,10 @@ class Qos:
     """A set of policies.
 
     Args:
-        borrowed: Address of policies that someone else frees; None for a new, empty set.
+        borrowed: Address of policies that their owner frees; None for a new, empty set.
 
     Attributes:
-        address: Where the library keeps it.
+        address: Its address.
     """
 
     def __init__(self, borrowed: int | None = None) -> None:
@@ -539,7 +539,7 @@ class Qos:
             library().dds_delete_qos(self.address)
 
     def set_user_data(self, data: bytes) -> None:
-        """Attach bytes that everyone sees who discovers the entity."""
+        """Attach bytes that are announced with the entity."""
         library().dds_qset_userdata(self.address, data, len(data))
 
     def set_history(self, depth: int | None) -> None:
@@ -547,7 +547,7 @@ class Qos:
         library().dds_qset_history(self.address, int(depth is None), depth or 0)
 
     def wait_at_most(self, seconds: float) -> None:
-        """Let a reliable writer wait no longer than so for readers that take nothing."""
+        """Limit how long a reliable writer waits for slow readers."""
         library().dds_qset_reliability(self.address, 1, round(seconds * 1e9))
 
     def user_data(self) -> bytes:
@@ -571,7 +571,7 @@ class Qos:
         return text.decode(errors="replace")
 
     def representations(self) -> list[int]:
-        """Return the numbers of the encodings that are announced, empty when none are."""
+        """Return the numbers of the announced encodings, empty if there are none."""
         values, size = c_void_p(), c_uint32()
         if not library().dds_qget_data_representation(self.address, byref(size), byref(values)):
             return []
@@ -582,9 +582,9 @@ class Qos:
         return found
 
     def profile(self) -> QoS:
-        """Return the policies that ROS 2 has; what was not announced has DDS's default.
+        """Return the policies that ROS 2 has; those not announced have DDS's defaults.
 
-        Depth is never announced by discovery, so it says nothing about remote endpoints.
+        Discovery does not announce the depth of remote endpoints.
         """
         lib, kind, kind2, depth, span = library(), c_int32(), c_int32(), c_int32(), c_int64()
         reliability, durability, history = (
@@ -660,7 +660,7 @@ def _duration(nanoseconds: int) -> Duration | None:
     return None if nanoseconds in (0, INFINITY) else Duration(nanoseconds)
 
 
-#: Conditions that are told at once at most.
+#: Conditions that a wait returns at most.
 _KEYS = 64
 
 
@@ -676,7 +676,7 @@ class Event(IntFlag):
 
 
 def set_events(entity: int, events: Event) -> None:
-    """Let a waitset that an entity is attached to be woken by these events, and no others."""
+    """Set the events of an entity that wake the waitset it is attached to."""
     result = library().dds_set_status_mask(entity, events)
     check_alive(result, "dds_set_status_mask", f"entity {entity}")
 
@@ -731,11 +731,11 @@ class Waitset:
         self._wait = lib.dds_waitset_wait
 
     def attach(self, entity: int, key: int) -> None:
-        """Be woken by a condition, or by an entity with a status mask; `key` must not be 0."""
+        """Wait for a condition, or for an entity with a status mask, too; `key` must not be 0."""
         check(library().dds_waitset_attach(self._entity, entity, key), "dds_waitset_attach", "")
 
     def wait(self, timeout: float | None) -> list[int]:
-        """Return the keys of what holds, empty after `timeout` seconds or :meth:`wake`."""
+        """Return the keys of what was triggered, empty after `timeout` seconds or :meth:`wake`."""
         keys = self._keys
         span = INFINITY if timeout is None else int(timeout * 1e9)
         count = self._wait(self._entity, keys, _KEYS, span)
@@ -748,11 +748,11 @@ class Waitset:
         return found
 
     def wake(self) -> None:
-        """Let :meth:`wait` return, in another thread."""
+        """Make :meth:`wait` return, in another thread."""
         library().dds_set_guardcondition(self._guard, True)
 
     def close(self) -> None:
-        """Delete it; nobody may be waiting."""
+        """Delete it; no thread may be waiting."""
         for entity in (self._guard, self._entity):
             delete(entity)
 
@@ -762,7 +762,7 @@ _ALIVE = 16
 
 
 class BuiltinTopic(IntEnum):
-    """The topics on which discovery tells its news; for :func:`cyclone.create_reader`."""
+    """The built-in topics of discovery; for :func:`create_reader`."""
 
     PARTICIPANT = 0x7FFF0001
     PUBLICATION = 0x7FFF0003
@@ -771,19 +771,19 @@ class BuiltinTopic(IntEnum):
 
 @dataclass(frozen=True)
 class Discovered:
-    """A participant, writer or reader that appeared, changed or went.
+    """A participant, writer or reader that appeared, changed or left.
 
     Attributes:
-        alive: Whether it is there; when not, only `guid` is known.
-        guid: Its 16 bytes of identity.
+        alive: Whether it exists; if not, only `guid` is known.
+        guid: Its GUID, 16 bytes.
         handle: Its number within this process, as with samples and matches.
-        participant: The identity of the participant it belongs to, or is.
-        user_data: What it attached to itself.
+        participant: The GUID of its participant, or its own.
+        user_data: The user data that it announces.
         topic: Its DDS topic, empty for a participant.
         type: Its DDS type, empty for a participant.
         qos: Its profile.
-        representations: The encodings that a writer offers or a reader takes, by their numbers;
-            empty when it does not say, which stands for XCDR1 alone.
+        representations: The numbers of the encodings that a writer offers or a reader takes; empty
+            if none are announced, which stands for XCDR1 alone.
         properties: Those of `__NetworkAddresses`, `__Hostname`, `__Pid` and `__ProcessName` that a
             participant announces.
     """
@@ -801,10 +801,7 @@ class Discovered:
 
 
 def take(reader: int, topic: BuiltinTopic, place: str) -> list[Discovered]:
-    """Take the news that a reader of a built-in topic holds, the oldest first.
-
-    Call it until it returns nothing.
-    """
+    """Take some samples of a built-in topic, the oldest first; empty if there are none."""
     samples = (c_void_p * _ROOM)()
     infos = (_Info * _ROOM)()
     lib = library()
@@ -822,12 +819,12 @@ def take(reader: int, topic: BuiltinTopic, place: str) -> list[Discovered]:
 
 
 def matched_publication(reader: int, handle: int) -> Discovered | None:
-    """Return the writer with a handle that a reader is matched with, None when it is gone."""
+    """Return the matched writer of a reader with a handle, None if it has left."""
     return _matched_endpoint(library().dds_get_matched_publication_data(reader, handle), handle)
 
 
 def matched_subscription(writer: int, handle: int) -> Discovered | None:
-    """Return the reader with a handle that a writer is matched with, None when it is gone."""
+    """Return the matched reader of a writer with a handle, None if it has left."""
     return _matched_endpoint(library().dds_get_matched_subscription_data(writer, handle), handle)
 
 
@@ -874,8 +871,8 @@ def _participant(address: Any, handle: int, alive: bool) -> Discovered:
     if not (alive and data.qos):
         return Discovered(alive, guid, handle, guid)
     qos = Qos(data.qos)
-    told = ((name, qos.property(name)) for name in _PROPERTIES)
-    properties = tuple((name, text) for name, text in told if text)
+    named = ((name, qos.property(name)) for name in _PROPERTIES)
+    properties = tuple((name, text) for name, text in named if text)
     return Discovered(True, guid, handle, guid, qos.user_data(), properties=properties)
 
 

@@ -1,4 +1,4 @@
-"""Identities of samples over Cyclone DDS: whence requests come, which request a reply answers.
+"""Identities of samples over Cyclone DDS: the writer of a request, and the request of a reply.
 
 DDS implementations other than Cyclone do not touch a reply's payload: it carries the identity of
 its request among the inline QoS parameters of its RTPS submessage (OMG DDS-RPC 1.0, section 7.8.2;
@@ -81,6 +81,7 @@ SDK_DATA = 2
 _OPS_OF_TYPE = 8
 _OPS = 17
 
+#: Held while a topic is created: the first one of each hook tests the library.
 _lock = threading.Lock()
 
 
@@ -112,7 +113,7 @@ class Hook(ABC):
         return topic
 
     def prepare(self, sertype: int) -> None:
-        """Replace the functions of a type that nobody else uses."""
+        """Replace the functions of a type that has one user."""
         with _lock:
             if not self.problem:
                 self._install(sertype)
@@ -185,7 +186,7 @@ def expect(found: object, wanted: object) -> None:
         raise ValueError(f"{found!r} instead of {wanted!r}")
 
 
-#: The GUID of nobody.
+#: An unknown GUID.
 UNKNOWN_GUID = bytes(16)
 #: The sequence number of nothing (RTPS 2.5, section 8.3.5.4).
 UNKNOWN_SEQUENCE = -(2**32)
@@ -215,7 +216,7 @@ class Identity(NamedTuple):
 
 
 class Origin(NamedTuple):
-    """Where a received sample comes from.
+    """The origin of a received sample.
 
     Attributes:
         entity: The last 4 bytes of its writer's GUID.
@@ -299,7 +300,7 @@ _RDATA = struct.Struct("=QQIIHHH2x")
 _PACKET = 48
 _RTPS_HEADER = 20
 _INFO_SOURCE = 0x0C
-#: Origins that a reader's samples are kept of until somebody asks for them. Those of samples that
+#: Origins of a reader's samples that are kept until they are taken. Those of samples that
 #: it drops unread make room when their memory is used again, or here.
 _MAX_ORIGINS = 16384
 
@@ -311,7 +312,7 @@ _readers: dict[int, Origins] = {}
 
 
 class Origins:
-    """Where the samples of one reader come from.
+    """The origins of a reader's samples.
 
     Each reader has its own: a sample that is dropped unread leaves its origin behind, under an
     address that may be another reader's sample's later.
@@ -334,7 +335,7 @@ class Origins:
         _readers[sertype] = self
 
     def of(self, serdata: int) -> Origin | None:
-        """Return where a sample comes from, once; None when it came within this process.
+        """Return and remove the origin of a sample; None if it was sent within this process.
 
         A sample that came within this process may be given the origin of one that was dropped
         unread: see :meth:`Origin.may_be_of`.
@@ -345,7 +346,7 @@ class Origins:
         return self._noted.pop(serdata, None)
 
     def hasten(self, take: Take | None) -> None:
-        """Have samples of other processes handed on while they are received.
+        """Deliver samples of other processes on the thread that receives them.
 
         It saves waking a thread, a fifth of a service call's time. The library is in the middle of
         something then, and waits: `take` must not call it but to write, nor wait for anything.
@@ -357,14 +358,14 @@ class Origins:
         self._take = take
 
     def close(self) -> None:
-        """Forget all; for a reader that was deleted."""
+        """Remove all origins; for a reader that was deleted."""
         self._take = None
         if _readers.get(self._type) is self:
             del _readers[self._type]
         self._noted.clear()
 
     def note(self, serdata: int, fragments: int) -> None:
-        """Note the origin of a sample that was just made from fragments, and hand it on."""
+        """Note the origin of a sample that was just made from fragments, and deliver it."""
         self._noted.pop(serdata, None)
         found = _read(fragments)
         if found is None:
@@ -465,7 +466,7 @@ _INFOS = ((0, 0x0C), (24, 0x0E))
 _SUBMESSAGES = 40
 _INLINE_QOS = 0x02
 #: Begins a sample with inline QoS, the payload's own header coming after that: an encapsulation
-#: header with options that nobody uses, and the first parameter.
+#: header with unused options, and the first parameter.
 _MARK = b"\x00\x01\xa5\x00"
 _MARKED = _MARK + b"\x83\x00\x18\x00"
 _QOS_SIZE = 60
@@ -475,7 +476,7 @@ _GetSize = PYFUNCTYPE(c_uint32, c_void_p)
 _ToSerRef = PYFUNCTYPE(c_void_p, c_void_p, c_size_t, c_size_t, c_void_p)
 _ToSerUnref = PYFUNCTYPE(None, c_void_p, c_void_p)
 
-_told = threading.local()
+_sending = threading.local()
 #: Fragments with inline QoS that the library is sending, by their address.
 _fragments: dict[int, Any] = {}
 
@@ -506,13 +507,13 @@ def write_reply(
         parts: The payload in one piece or several; it begins with the encapsulation header.
 
     Returns:
-        Whether it went out with inline QoS; not so if nobody outside this process is matched.
+        Whether it was sent with inline QoS; not if no reader outside this process is matched.
     """
-    _told.identity = False
+    _sending.identity = False
     begin = _MARK + inline_qos(identity)
     small = sum(map(len, parts)) <= COPIED
     writer.write_parts((b"".join((begin, *parts)),) if small else (begin, *parts))
-    return bool(_told.identity)
+    return bool(_sending.identity)
 
 
 class _Writing(Hook):
@@ -554,7 +555,7 @@ class _Writing(Hook):
         """Fill in where the bytes are that follow a submessage's header, and how many."""
         begin = marked + _BEFORE + offset
         if _flag(part, first=offset == 0):
-            _told.identity = True
+            _sending.identity = True
             if offset == 0:
                 begin = marked + len(_MARK)
             else:

@@ -26,7 +26,7 @@ COPIED = 16 * 1024
 
 _ANY_STATE = 0x7F
 _SDK_DATA = 2
-#: Payload, time stamp and handle of the writer, what was told besides.
+#: Payload, time stamp and handle of the writer, and what `describe` returned.
 Taken = tuple["bytes | memoryview", int, int, Any]
 #: ``dds_sample_info_t``: valid_data, source_timestamp, publication_handle of its 64 bytes.
 _INFO = struct.Struct("=12x?3xq8xQ24x")
@@ -40,8 +40,8 @@ class Batch:
     """Room for the samples that one call takes from a reader; not for several threads at once.
 
     Args:
-        describe: Returns what to tell besides of a sample, by the address of its serdata; called
-            while it is still there.
+        describe: Returns a description of a sample, by the address of its serdata, which is valid
+            during the call.
         size: Samples at most.
 
     Attributes:
@@ -90,8 +90,8 @@ class Batch:
         describe = self._describe
         for serdata, (valid, sent, writer) in zip(addresses, infos, strict=True):
             if valid:
-                told = None if describe is None else describe(serdata)
-                taken.append((payload(serdata), sent, writer, told))
+                described = None if describe is None else describe(serdata)
+                taken.append((payload(serdata), sent, writer, described))
             else:
                 discard(serdata)
         return taken
@@ -189,7 +189,7 @@ class _BytesPart(ctypes.Structure):
 
 
 class _Block:
-    """Memory of the library's that gives its reference back when nobody looks at it any more."""
+    """Memory of the library that releases its reference when its last view is gone."""
 
     serdata: int
 

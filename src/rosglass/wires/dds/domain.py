@@ -48,7 +48,7 @@ _KNOWN = ("domain", "range", "peers", "interface", "distro")
 
 
 class DiscoveryRange(Enum):
-    """How far away others are looked for (ROS_AUTOMATIC_DISCOVERY_RANGE, Iron and newer)."""
+    """The range of discovery (ROS_AUTOMATIC_DISCOVERY_RANGE, Iron and newer)."""
 
     SUBNET = "subnet"
     LOCALHOST = "localhost"
@@ -58,7 +58,7 @@ class DiscoveryRange(Enum):
 
 @dataclass(frozen=True)
 class DdsOptions:
-    """How to join a domain over DDS.
+    """A DDS domain and its configuration.
 
     Attributes:
         domain: ROS domain.
@@ -82,7 +82,7 @@ class DdsOptions:
 
     @classmethod
     def parse(cls, url: str, env: Mapping[str, str]) -> DdsOptions:
-        """Return what `url` says, completed by the environment `env`.
+        """Return the options in `url`, completed by the environment `env`.
 
         The environment is read as ROS 2 documents it: ROS_DOMAIN_ID, ROS_LOCALHOST_ONLY (which
         wins over the next two), ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_STATIC_PEERS, CYCLONEDDS_URI.
@@ -142,7 +142,7 @@ def _split(url: str) -> tuple[list[str], dict[str, str]]:
 def _range(
     option: str | None, named: bool, url: str, env: Mapping[str, str]
 ) -> tuple[DiscoveryRange, list[str]]:
-    """Return where to look, and the environment's peers."""
+    """Return the discovery range, and the environment's peers."""
     words = ", ".join(kind.value for kind in DiscoveryRange)
     static = env.get("ROS_STATIC_PEERS", "")
     others = [peer.strip() for peer in static.split(";") if peer.strip()]
@@ -262,16 +262,17 @@ class _Joined:
     users: int = 1
 
 
-#: What this process takes part in, by number.
+#: The domains that this process takes part in, by number.
 joined_domains: dict[int, _Joined] = {}
+#: Guards them.
 _lock = threading.Lock()
 
 
 class Domain(Handle):
-    """A domain that this process takes part in; the last one who closes it leaves it.
+    """A domain that this process takes part in, until its last user closes it.
 
     Args:
-        options: Which one, and how.
+        options: The domain and its configuration.
 
     Attributes:
         number: The ROS domain.
@@ -307,7 +308,7 @@ class Domain(Handle):
                 joined.users += 1
 
     def close(self) -> None:
-        """Leave the domain when this was its last user, who has deleted the participants before."""
+        """Leave the domain after its last user, whose participants were deleted before."""
         with _lock:
             joined = joined_domains.get(self.number)
             if self._closed or joined is None or joined.process != os.getpid():
@@ -351,7 +352,7 @@ def _create(domain: int, config: str) -> int | None:
 
 def _create_quietly(domain: int, config: str) -> int:
     lib = cyclone.library()
-    # It prints a line for each packet that a broken link refuses, and can only be told to print
+    # It prints a line for each packet that a broken link refuses, and can only be set to print
     # nothing. What it has against a configuration is found out in _trial(); a <Tracing> of the
     # user's works all the same.
     lib.dds_set_log_mask(0)
@@ -370,7 +371,7 @@ def _refuse(domain: int, config: str, problem: str) -> None:
 
 
 def _trial(domain: int, config: str) -> str:
-    """Return what Cyclone DDS has against a configuration, empty when it takes it."""
+    """Return Cyclone DDS's errors in a configuration, empty if there are none."""
     if getattr(sys, "frozen", False) or not sys.executable:
         return ""  # what would be started is no Python
     library = cyclone.library()._name
@@ -396,7 +397,7 @@ def _trial(domain: int, config: str) -> str:
 
 
 def domain_config(options: DdsOptions) -> str:
-    """Return what Cyclone DDS is to be configured with; looks up the names of peers.
+    """Return the configuration for Cyclone DDS; looks up the names of peers.
 
     Raises:
         ArgumentError: The URL and the user's own configuration say different things.

@@ -114,9 +114,9 @@ class ParticipantEntities:
 
     @classmethod
     def decode(cls, data: bytes | memoryview) -> ParticipantEntities:
-        """Return what a sample says.
+        """Decode a sample.
 
-        Which width it has shows by its length: only one of the two leaves at most padding over.
+        Its length shows the width of identities: only one of the two leaves at most padding over.
 
         Raises:
             DecodeError: It is no such sample.
@@ -203,7 +203,7 @@ def _put_string(body: bytearray, text: str) -> None:
 
 
 def parse_user_data(data: bytes) -> dict[str, str]:
-    """Return the keys and values of ``key=value;`` user data; what is none is left out.
+    """Return the keys and values of ``key=value;`` user data; other parts are ignored.
 
     Format: rmw's ``parse_key_value``. Values may have any bytes but ``;``.
     """
@@ -270,7 +270,7 @@ class _Participant:
 
 
 class DdsGraph:
-    """Fills a graph with what is in a DDS domain; for one thread at a time.
+    """Fills a graph with the endpoints of a DDS domain; for one thread at a time.
 
     Endpoints are in it under their GUID; a service's servers and clients under that of the reader
     or writer of requests, once the participant also has the one of replies.
@@ -305,9 +305,9 @@ class DdsGraph:
 
     @property
     def unnamed(self) -> int:
-        """How many other participants of ROS 2 have not said, or just have, which nodes they have.
+        """How many other participants of ROS 2 have not announced their nodes, or just have.
 
-        Fast DDS does so 1 to 4 s after it was found; what else it has may come a moment later.
+        Fast DDS does so 1 to 4 s after it was discovered; endpoints may follow a moment later.
         """
         now = time.monotonic()
         return sum(
@@ -319,27 +319,27 @@ class DdsGraph:
 
     @property
     def humble(self) -> bool:
-        """Whether those who speak ROS 2 here all use Humble's wide identities."""
-        told = [
+        """Whether all other participants of ROS 2 use Humble's wide identities."""
+        widths = [
             participant.info.humble
             for participant in self._participants.values()
             if participant.info is not None and participant.info.nodes and not participant.ours
         ]
-        return bool(told) and all(told)
+        return bool(widths) and all(widths)
 
     def participant(self, guid: bytes) -> Discovered | None:
-        """Return the participant that a GUID is of, or belongs to; None when it is gone."""
+        """Return the participant that a GUID belongs to; None if it has left."""
         known = self._participants.get(guid[:_PREFIX])
         return None if known is None else known.found
 
     def is_foreign(self, guid: bytes) -> bool:
-        """Return whether a reader or writer knows no encoding of ours; from any thread."""
+        """Return whether a reader or writer has no encoding in common with ours; thread-safe."""
         return guid in self._foreign
 
     def put_participants(self, news: Iterable[Discovered]) -> None:
-        """Take in participants that came, changed or went.
+        """Update participants that appeared, changed or left.
 
-        Several news of one participant must be given together: it may have gone and come back.
+        All changes of one participant must be given together: it may have left and come back.
         """
         for found in {item.guid: item for item in news}.values():
             prefix = found.guid[:_PREFIX]
@@ -360,7 +360,7 @@ class DdsGraph:
                 self._show(guid)
 
     def put_entities(self, info: ParticipantEntities) -> bool:
-        """Take in what a participant says of its nodes; returns whether it is known here."""
+        """Update the nodes of a participant; return whether the participant is known."""
         prefix = info.gid[:_PREFIX]
         known = self._participants.get(prefix)
         if known is None:
@@ -382,13 +382,13 @@ class DdsGraph:
         return True
 
     def put_own(self, endpoint: EndpointInfo) -> None:
-        """Show an endpoint of our own at once, with the profile that it was created with."""
+        """Add an endpoint of our own, with the profile that it was created with."""
         self._endpoints[endpoint.gid] = endpoint
         self._of.setdefault(endpoint.gid[:_PREFIX], set()).add(endpoint.gid)
         self._put(endpoint.gid)
 
     def put_endpoint(self, found: Discovered, *, reader: bool) -> None:
-        """Take in a reader or writer that came, changed or went."""
+        """Update a reader or writer that appeared, changed or left."""
         if not found.alive:
             self._drop(found.guid)
             return
@@ -466,9 +466,9 @@ class DdsGraph:
         replies = self._replies.get(self._call_of[guid]) if guid in self._call_of else None
         if replies:
             hashes = {self._endpoints[reply].type_hash for reply in replies}
-            told = hashes.pop() if len(hashes) == 1 else ""
-            if told != endpoint.type_hash:
-                endpoint = replace(endpoint, response_hash=told)
+            response = hashes.pop() if len(hashes) == 1 else ""
+            if response != endpoint.type_hash:
+                endpoint = replace(endpoint, response_hash=response)
         self._graph.put_endpoint(guid, endpoint)
 
     def _set_nodes(
@@ -487,9 +487,9 @@ class DdsGraph:
 
 
 def _name(found: Discovered) -> NodeName:
-    """Return a name for what belongs to a participant's nodes as long as these are unknown."""
-    told = dict(found.properties)
-    process = told.get("__ProcessName", "").rpartition("/")[2]
-    parts = [part for part in (process, told.get("__Pid", ""), told.get("__Hostname", "")) if part]
+    """Return a node name for the endpoints of a participant whose nodes are unknown."""
+    known = dict(found.properties)
+    process = known.get("__ProcessName", "").rpartition("/")[2]
+    parts = [p for p in (process, known.get("__Pid", ""), known.get("__Hostname", "")) if p]
     name = re.sub(r"[^A-Za-z0-9_]", "_", "_".join(parts)) if process else ""
     return NodeName(UNKNOWN, name or found.guid[:_PREFIX].hex())

@@ -238,8 +238,12 @@ class DdsMiddleware(Middleware):
             participants = "1 other participant" if peers == 1 else f"{peers} other participants"
             return Status(ConnectionState.CONNECTED, f"{where}, {participants}")
         if discovery is not None and discovery.had_peers:
-            return Status(ConnectionState.LOST, f"everyone has left {where}, waiting for them")
-        return Status(ConnectionState.CONNECTING, f"nobody else is in {where}, waiting for them")
+            return Status(
+                ConnectionState.LOST, f"all other participants have left {where}, waiting for one"
+            )
+        return Status(
+            ConnectionState.CONNECTING, f"no other participant in {where}, waiting for one"
+        )
 
     def unnamed(self) -> int:
         """Return how many participants of ROS 2 have not announced their nodes."""

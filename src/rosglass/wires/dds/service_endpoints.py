@@ -1,4 +1,4 @@
-"""The two topics of a DDS service, as its clients and servers use them, and who else does.
+"""The two topics of a DDS service, and the matched peers on them.
 
 Names and user data are rmw_cyclonedds's, which are every rmw implementation's but for the ids that
 tell it which reader and writer belong together.
@@ -52,8 +52,8 @@ _log = logging.getLogger("rosglass.ros2")
 
 #: First two bytes of a GUID (RTPS 2.5, section 9.3.1.5).
 _CYCLONE = b"\x01\x10"
-#: Stands for who used Cyclone DDS and is gone.
-_NOBODY = _CYCLONE.ljust(16, b"\0")
+#: The GUID of an unknown peer that used Cyclone DDS.
+_DEPARTED = _CYCLONE.ljust(16, b"\0")
 _VENDORS = {
     b"\x01\x01": "RTI Connext",
     b"\x01\x03": "OpenDDS",
@@ -67,20 +67,20 @@ PREFIX = 12
 REMEDY = "start it with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp, or use zenoh:// with rmw_zenoh_cpp"
 #: Requests and replies that are kept until they are acknowledged, or handed on.
 _DEPTH = 1000
-#: Seconds that sending waits in the caller's thread for readers that take nothing.
-_PATIENCE = 0.01
+#: Seconds that sending blocks the caller's thread for slow readers.
+_SEND_TIMEOUT_S = 0.01
 #: Seconds from when a writer of another vendor is matched until its first sample is sure to arrive;
 #: see :meth:`Ends._start_probe`. Cyclone DDS's own writers need none.
-_SETTLING = 0.2
+_SETTLING_S = 0.2
 #: Seconds after joining the domain when everybody on a usual network has answered, and when others
 #: than Cyclone DDS have begun to tell of their endpoints: some do with their next heartbeat, each
 #: second. RustDDS then tells of ten a second, so they are known when it has been quiet for a while,
 #: or after a time that is long enough. A client that finds a server before the server knows it
 #: loses its first request.
-_ANSWERED, _HEARTBEAT, _QUIET, _PATIENT = 0.1, 1.2, 0.3, 4.0
-#: Peers whose rubbish is logged, once each.
+_ANSWERED_S, _HEARTBEAT_S, _QUIET_S, _SYNC_TIMEOUT_S = 0.1, 1.2, 0.3, 4.0
+#: Peers whose malformed samples are logged, once each.
 _MAX_NAMED = 100
-#: Peers that left which are remembered, as what they sent may be handed on after that.
+#: Peers that left and are remembered, as their samples may be delivered later.
 _MAX_DEPARTED = 256
 
 _numbers = itertools.count(1)
@@ -103,7 +103,7 @@ class Scheme(Enum):
 
 
 def scheme_of(guid: bytes) -> Scheme:
-    """Return how a peer does it, from the GUID of its reader or writer."""
+    """Return the scheme of a peer, from the GUID of its reader or writer."""
     return Scheme.HEADER if guid.startswith(_CYCLONE) else Scheme.IDENTITY
 
 
@@ -161,24 +161,24 @@ class Matched:
 class Ends:
     """The reader and the writer of a service's client or server.
 
-    A server's writer comes into being a little later when the participant has only just joined.
-    Whatever the profile says, both hold many samples: a request or a reply is nothing to lose.
+    A server's writer is created a little later if the participant has only just joined. Whatever
+    the profile, both hold many samples, so that no request or reply is lost.
 
     Args:
-        participant: Who they belong to.
-        graph: Where peers' names are looked up.
+        participant: The participant they belong to.
+        graph: Has the names of peers.
         endpoint: The client or server.
-        on_taken: Takes what the reader receives, from :meth:`start` on.
-        on_matched: Called, on the participant's pump mostly, when peers came, went or settled.
+        on_taken: Takes the received samples, from :meth:`start` on.
+        on_matched: Called, mostly on the participant's pump, when peers appeared, left or settled.
 
     Attributes:
-        reader: Receives the other side's.
-        writer: Sends ours; None as long as it must not be there yet.
-        writers: Whom the reader is matched with.
-        readers: Whom the writer is matched with.
-        outbox: What waits to be sent.
-        origins: Where received samples come from.
-        depth: How many of them wait at most, unless the profile keeps all.
+        reader: Receives requests, or replies.
+        writer: Sends the others; None while it must not exist yet.
+        writers: The writers that the reader is matched with.
+        readers: The readers that the writer is matched with.
+        outbox: The samples that wait to be sent.
+        origins: The origins of received samples.
+        depth: How many samples wait at most, unless the profile keeps all.
     """
 
     def __init__(
@@ -246,13 +246,13 @@ class Ends:
             self._wake(False)
 
     def settled(self, writer: bytes) -> bool:
-        """Return whether what a matched writer sends is sure to arrive, also the first sample."""
+        """Return whether all samples of a matched writer arrive, the first one included."""
         if scheme_of(writer) is Scheme.HEADER:
             return True
-        return time.monotonic() - self._since.get(writer, math.inf) >= _SETTLING
+        return time.monotonic() - self._since.get(writer, math.inf) >= _SETTLING_S
 
     def catch_up(self) -> None:
-        """Take note of readers whose coming or going has not been told yet."""
+        """Look up the matched readers if their number has changed before its event."""
         writer, readers = self.writer, self.readers
         if writer is None or readers is None:
             return
@@ -262,26 +262,26 @@ class Ends:
             self.look()
 
     def sender(self, handle: int, origin: Origin | None) -> tuple[Discovered | None, Origin | None]:
-        """Return who sent a sample that was taken, and the sample's origin.
+        """Return the writer of a sample, and the sample's origin.
 
-        Who sends and leaves at once may be gone before it is noticed at all, but what was sent is
-        nothing to lose: of such a peer only the GUID may be known, or that it is Cyclone DDS's.
+        A peer that left right after sending may never have been matched, but its sample must not be
+        lost: of such a peer only the GUID may be known, or that it uses Cyclone DDS.
 
         Args:
             handle: The writer's handle.
-            origin: What the sample is said to come from.
+            origin: The noted origin.
 
         Returns:
-            The writer, None when nothing is known of it; and the origin without mistakes.
+            The writer, None if it is unknown; and the origin, None if another sample's was noted.
         """
         found = self.writers.get(handle)
         if found is not None:
             stale = origin is not None and not origin.may_be_of(found.guid)
             return found, None if stale else origin
         if origin is None:
-            # What comes from this process has no origin, and is Cyclone DDS's.
+            # Samples from this process have no origin, and are Cyclone DDS's.
             known = not cyclone_identity.reading.problem
-            return (Discovered(False, _NOBODY, handle) if known else None), None
+            return (Discovered(False, _DEPARTED, handle) if known else None), None
         return (Discovered(False, origin.guid, handle) if origin.guid else None), origin
 
     def strangers(self) -> list[EndpointInfo]:
@@ -293,7 +293,7 @@ class Ends:
         ]
 
     def who(self, guid: bytes) -> str:
-        """Return whose reader or writer it is, for people."""
+        """Return the node and vendor of a reader or writer, for messages."""
         nodes = {
             peer.node.full
             for peer in self._graph.endpoints(self._kind, self._service)
@@ -302,7 +302,7 @@ class Ends:
         return f"{' or '.join(sorted(nodes)) or guid.hex()} ({_vendor(guid)})"
 
     def name(self, guid: bytes, text: str, *values: object) -> None:
-        """Log what is wrong with a peer, once."""
+        """Log a problem of a peer, once."""
         if guid not in self._named and len(self._named) < _MAX_NAMED:
             self._named.add(guid)
             _log.warning(f"%s: {text}", self._service, *values)
@@ -329,9 +329,8 @@ class Ends:
         """Create the writer."""
         with self._participant.in_use():
             if self._server:
-                # Clients that come from now on find a server that is complete, and call it at once:
-                # their requests may come before we discover them. Those that were there before us
-                # may have called another, whose requests are none of ours.
+                # Clients that appear from now on find a complete server, and may call it before it
+                # discovers them. Clients from before may have called another server.
                 problem = cyclone.start_at_first_sample(self.reader.entity)
                 if problem:
                     _warn_loss(problem)
@@ -343,7 +342,7 @@ class Ends:
                 self._place,
                 # Requests need no identity beyond that which every sample has.
                 cyclone_identity.create_reply_topic if self._server else cyclone.create_topic,
-                _PATIENCE,
+                _SEND_TIMEOUT_S,
             )
             with self._lock:
                 if self.closed:
@@ -361,13 +360,13 @@ class Ends:
             self._participant.add_endpoint(self._node, writer.guid, writer=True)
 
     def _synced(self) -> bool:
-        """Return whether clients that find this server now will be known here by then, too."""
+        """Return whether clients that discover this server now are discovered here, too."""
         now, seen = time.monotonic(), self._participant.seen
         age = now - self._participant.born
-        if seen is None or age < _ANSWERED or age >= _PATIENT:
-            return age >= _ANSWERED
+        if seen is None or age < _ANSWERED_S or age >= _SYNC_TIMEOUT_S:
+            return age >= _ANSWERED_S
         strangers = any(scheme_of(guid) is Scheme.IDENTITY for guid in seen.prefixes())
-        return not strangers or (age >= _HEARTBEAT and now - seen.moved >= _QUIET)
+        return not strangers or (age >= _HEARTBEAT_S and now - seen.moved >= _QUIET_S)
 
     def look(self) -> None:
         """Look up the matched peers, and report changes."""
@@ -393,7 +392,7 @@ class Ends:
                 _log.warning("%s: %s", self._service, error)
 
     def _start_probe(self) -> None:
-        """Have a second reader for a while.
+        """Create a second reader for a while.
 
         A writer tells a reader that it discovers where its samples begin (its heartbeat). When it
         discovered ours before we discovered it, that was lost, and Cyclone DDS drops the writer's
@@ -424,7 +423,7 @@ class Ends:
         self._probe.clear()
 
     def _wake(self, at_once: bool) -> None:
-        """Look on the pump's thread what there is to do, now or up to 30 ms later."""
+        """Schedule :meth:`_do_due` on the pump's thread, now or up to 30 ms later."""
         if self.closed:
             return
         if at_once and self.writer is not None:
@@ -442,7 +441,7 @@ class Ends:
             self._wake(False)
 
     def _do_due(self) -> None:
-        """Do what is due; on the pump's thread, until nothing is left to be done."""
+        """Do what is due; on the pump's thread, repeated until nothing is left."""
         if self.closed:
             self._participant.pump.forget(self.reader.entity)
             return
@@ -470,7 +469,7 @@ def _warn_loss(problem: str) -> None:
 
 
 def in_main_thread() -> bool:
-    """Return whether the calling thread is the one where signals raise exceptions."""
+    """Return whether the calling thread is the main one, where signals raise exceptions."""
     return threading.current_thread() is threading.main_thread()
 
 
@@ -480,13 +479,13 @@ def in_this_process(guid: bytes) -> bool:
 
 
 def names_of(peers: Iterable[EndpointInfo]) -> str:
-    """Return the names of the nodes that peers belong to, and their vendors, for people."""
+    """Return the nodes and vendors of peers, for messages."""
     named = sorted({f"{peer.node} ({_vendor(peer.gid)})" for peer in peers})
     return ", ".join(named)
 
 
 def _new_id(participant: bytes) -> str:
-    """Return what rmw_cyclonedds calls a client or service id, spelled as it does."""
+    """Return a client or service id in rmw_cyclonedds's format."""
     first, *rest = participant[:PREFIX] + next(_numbers).to_bytes(4, "big")
     return ".".join((f"{first:2x}", *(f"{byte:x}" for byte in rest)))
 
@@ -498,11 +497,11 @@ class _Item(NamedTuple):
 
 
 class Outbox:
-    """Sends at once what can be sent, and keeps the rest to be tried again.
+    """Sends samples at once if possible, and keeps the others for a retry.
 
     Args:
-        wake: Called when there is something for :meth:`retry`, with whether it can be done at once.
-        in_order: Whether nothing overtakes anything.
+        wake: Called when :meth:`retry` is due, with whether it is at once.
+        in_order: Whether samples are sent strictly in order.
     """
 
     def __init__(self, wake: Callable[[bool], None], *, in_order: bool) -> None:
@@ -519,13 +518,13 @@ class Outbox:
         *,
         now: bool = True,
     ) -> None:
-        """Send something now, or as soon as it can be done.
+        """Send a sample now, or as soon as possible.
 
         Args:
             attempt: Sends it; returns False to be called again a little later.
             timeout_s: Seconds after which it is given up.
             expired: Called then, and when it cannot be sent at all.
-            now: Whether to try it in the calling thread; what it raises comes out of here then.
+            now: Whether to try it in the calling thread, and raise its errors.
         """
         if now and not (self._in_order and self._items) and attempt():
             return
@@ -534,7 +533,7 @@ class Outbox:
             self._wake(not now)
 
     def retry(self) -> bool:
-        """Try again what is left; returns whether there is still something. For one thread."""
+        """Retry the waiting samples; return whether some are left. For one thread."""
         for item in self._items.copy():
             if self._try(item):
                 with suppress(ValueError):  # it was closed
@@ -544,13 +543,13 @@ class Outbox:
         return bool(self._items)
 
     def drain(self, seconds: float) -> None:
-        """Wait until nothing is left, at most so long; not in the thread that retries."""
+        """Wait until no sample is left, with a timeout; not in the thread that retries."""
         until = time.monotonic() + seconds
         while self._items and time.monotonic() < until:
             time.sleep(0.005)
 
     def close(self) -> None:
-        """Forget what is left."""
+        """Drop the waiting samples."""
         self._closed = True
         self._items.clear()
 
@@ -564,7 +563,7 @@ class Outbox:
             _log.warning(
                 "what was to be sent is lost: %s", error, exc_info=not isinstance(error, Error)
             )
-            item.expired()  # nobody is to wait for it
+            item.expired()  # its caller must not wait for it
             return True
         if time.monotonic() < item.deadline:
             return False

@@ -95,11 +95,11 @@ def without_header(data: bytes | memoryview) -> bytes:
 
 _log = logging.getLogger("rosglass.ros2")
 #: Seconds after which a reader of requests without writer of replies belongs to no server.
-_LISTENER = 2.0
+_ANSWERLESS_S = 2.0
 
 
 class DdsRequester(Requester):
-    """The ends of a service client; arguments as :class:`Ends`'s.
+    """The DDS writer and reader of a service client; arguments as :class:`Ends`'s.
 
     Attributes:
         gid: Identity of its writer of requests, by which the client is known.
@@ -113,16 +113,17 @@ class DdsRequester(Requester):
         on_reply: OnReply,
     ) -> None:
         self._service, self._on_reply = endpoint.name, on_reply
+        #: Guards the calls, and sending: replies are received on other threads.
         self._lock = threading.Lock()
-        #: What rmw_cyclonedds takes an instance handle for: nobody else's may be the same.
+        #: A random number in place of rmw_cyclonedds's instance handle; unique in the domain.
         self._id = secrets.randbits(64)
         #: Numbers of calls, and the sequence number that each was sent with, 0 for none.
         self._calls: dict[int, int] = {}
         self._by_sequence: dict[int, int] = {}
         self._sequence = 0
-        #: Handles of the linked servers' readers of requests; whoever comes back has others.
+        #: Handles of the linked servers' readers of requests; after a reconnection, they differ.
         self._linked: dict[Scheme, frozenset[int]] = {}
-        #: Numbers of calls that were sent, and who was linked then and has been ever since.
+        #: Sent calls, and the readers that have been linked ever since.
         self._asked: dict[int, frozenset[int]] = {}
         #: How requests are sent now; None when no server is linked.
         self._scheme: Scheme | None = None
@@ -177,7 +178,7 @@ class DdsRequester(Requester):
         )
 
     def stranded(self, number: int) -> bool:
-        """Return whether a request's servers have left; what they sent meanwhile is lost."""
+        """Return whether a request's servers have left: their replies are lost."""
         asked = self._asked.get(number)
         return asked is not None and not asked
 
@@ -199,7 +200,7 @@ class DdsRequester(Requester):
 
     def _send(self, number: int, data: bytes | bytearray) -> bool:
         """Send a request; return whether nothing more is to be done for it."""
-        # Whoever has just come must not be sent what it takes for something else.
+        # A server that has just appeared must not be sent what it would misread.
         self._ends.catch_up()
         if self._scheme is Scheme.HEADER and self._ends.strangers():
             self._ends.look()
@@ -218,8 +219,8 @@ class DdsRequester(Requester):
                 return True
             if scheme is Scheme.IDENTITY and self._sequence < 0:
                 raise ServiceError(
-                    f"a request on {self._service} was interrupted, and nobody knows which replies "
-                    "belong to later ones; make another client"
+                    f"a request on {self._service} was interrupted, and replies to later ones "
+                    "cannot be assigned; make another client"
                 )
             sequence, self._sequence = self._sequence, -1
             try:
@@ -237,9 +238,9 @@ class DdsRequester(Requester):
         return True
 
     def _hasten(self, origin: Origin, data: bytes | memoryview) -> bool:
-        """Take a reply while it is received; return False when it should come again later."""
+        """Take a reply on the receiving thread; return False to get it from the pump instead."""
         quick = self.quick
-        # Whoever has the lock may be sending, for longer than anybody may be held up here.
+        # A thread that holds the lock may be sending, and must not block the receiving thread.
         if quick is None or not self._lock.acquire(blocking=False):
             return False
         try:
@@ -253,8 +254,8 @@ class DdsRequester(Requester):
         return True
 
     def _on_replies(self, taken: list[Taken]) -> None:
-        for data, _, handle, told in taken:
-            server, origin = self._ends.sender(handle, told)
+        for data, _, handle, described in taken:
+            server, origin = self._ends.sender(handle, described)
             if origin is not None and origin.taken:
                 continue
             try:
@@ -271,12 +272,12 @@ class DdsRequester(Requester):
         if claim is not None:
             self._answer(*claim, data)
         elif related is not None or server is None:
-            pass  # somebody else's, or forgotten
+            pass  # another client's, or forgotten
         elif scheme_of(server) is Scheme.IDENTITY:
             if not cyclone_identity.reading.problem:
                 text = "ignoring replies of %s, which do not say what they answer"
                 self._ends.name(server, text, self._ends.who(server))
-        # Within this process, what says that a reply is for someone else is not told.
+        # Within this process, replies for other clients carry no identity.
         elif unpack_header(data) is None and not in_this_process(server):
             text = "ignoring a reply of %s, which is too short for its header: %d bytes"
             self._ends.name(server, text, self._ends.who(server), len(data))
@@ -319,7 +320,7 @@ class DdsRequester(Requester):
         return Scheme.HEADER if Scheme.HEADER in schemes else None
 
     def _schemes(self) -> dict[Scheme, bool]:
-        """Return what the linked servers speak, and whether their replies are sure to arrive."""
+        """Return the schemes of the linked servers, and whether their replies surely arrive."""
         ends, now = self._ends, time.monotonic()
         answering = {_server_of(found): ends.settled(found.guid) for found in ends.writers.all}
         schemes: dict[Scheme, bool] = {}
@@ -330,20 +331,20 @@ class DdsRequester(Requester):
             if settled is None and scheme is Scheme.IDENTITY:
                 # Its writer of replies is about to be found, unless it is only listening.
                 unlinked[found.guid] = since = self._unlinked.get(found.guid, now)
-                settled = None if now - since >= _LISTENER else False
+                settled = None if now - since >= _ANSWERLESS_S else False
             if settled is not None:
                 schemes[scheme] = settled or schemes.get(scheme, False)
         if Scheme.IDENTITY not in schemes:
             # A server that was announced may take requests before it is matched at this end.
             for peer in ends.strangers():
                 unlinked[peer.gid] = since = self._unlinked.get(peer.gid, now)
-                if now - since < _LISTENER:
+                if now - since < _ANSWERLESS_S:
                     schemes[Scheme.IDENTITY] = False
         self._unlinked = unlinked
         return schemes
 
     def _readers(self) -> dict[Scheme, frozenset[int]]:
-        """Return the handles of the linked servers' readers of requests, by what they speak."""
+        """Return the handles of the linked servers' readers of requests, by scheme."""
         answering = {_server_of(found) for found in self._ends.writers.all}
         readers: dict[Scheme, set[int]] = {scheme: set() for scheme in Scheme}
         for found in () if self._ends.readers is None else self._ends.readers.all:
@@ -352,30 +353,30 @@ class DdsRequester(Requester):
         return {scheme: frozenset(handles) for scheme, handles in readers.items()}
 
     def _link(self) -> None:
-        """Take note of the servers that are there now."""
+        """Update the route after a change of the matched servers."""
         with self._lock:
             self._linked = linked = self._readers()
             everybody = frozenset().union(*linked.values())
             self._asked = {number: asked & everybody for number, asked in self._asked.items()}
         now = time.monotonic()
         self._scheme = self._route()
-        until = [since + _LISTENER for since in self._unlinked.values()]
+        until = [since + _ANSWERLESS_S for since in self._unlinked.values()]
         self._recheck = min((each for each in until if each > now), default=math.inf)
         if self.changed is not None:
             self.changed()
 
 
 def _server_of(found: Discovered) -> str | bytes:
-    """Return what a server's reader and writer have in common."""
+    """Return the key that a server's reader and writer have in common."""
     return parse_user_data(found.user_data).get("serviceid") or found.guid[:PREFIX]
 
 
 #: Seconds that a reply waits for its client's reader to be found, or to take something.
-_REPLY_PATIENCE = 3.0
+_REPLY_TIMEOUT_S = 3.0
 #: Clients whose newest request is remembered, beside those that are there.
 _MAX_REMEMBERED = 1024
 #: Seconds that closing waits for replies that are on their way.
-_FAREWELL = 0.5
+_DRAIN_TIMEOUT_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -386,7 +387,7 @@ class _Answer:
         client: The writer of the request.
         identity: The request's identity.
         header: What its payload began with, where the reply's is to begin with it, too.
-        reader: The client's reader of replies, where it told.
+        reader: The client's reader of replies, if it was announced.
     """
 
     client: Discovered
@@ -396,7 +397,7 @@ class _Answer:
 
 
 class DdsReplier(Replier):
-    """The ends of a service server; arguments as :class:`Ends`'s.
+    """The DDS reader and writer of a service server; arguments as :class:`Ends`'s.
 
     Attributes:
         gid: Identity of its reader of requests, by which the server is known.
@@ -417,6 +418,7 @@ class DdsReplier(Replier):
         self._newest: dict[bytes, int] = {}
         #: Origins, by their identity, of requests left to the pump: none may overtake them.
         self._left: OrderedDict[int, Origin] = OrderedDict()
+        #: Guards them: requests are received on several threads.
         self._leaving = threading.Lock()
         self._ends = Ends(participant, graph, endpoint, self._on_requests, self._link)
         self._pump = participant.pump
@@ -434,7 +436,7 @@ class DdsReplier(Replier):
         return f"{names_of(strangers)} cannot be answered: {reason}; {REMEDY}"
 
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:
-        """Answer a request, once the client can hear it; a client that is gone is no error."""
+        """Send a reply once the client's reader is matched; a client that left is no error."""
         answer = request.handle
         if not isinstance(answer, _Answer):
             return
@@ -446,7 +448,7 @@ class DdsReplier(Replier):
 
         self._ends.outbox.put(
             lambda: self._answer(answer, data),
-            _REPLY_PATIENCE,
+            _REPLY_TIMEOUT_S,
             expired,
             # See cyclone_identity.create_reply_topic() for what the main thread must not do.
             now=not in_main_thread(),
@@ -456,11 +458,11 @@ class DdsReplier(Replier):
         """Withdraw the server."""
         self._ends.origins.hasten(None)
         if not self._pump.current:
-            self._ends.outbox.drain(_FAREWELL)
+            self._ends.outbox.drain(_DRAIN_TIMEOUT_S)
         self._ends.close()
 
     def _hasten(self, origin: Origin, data: bytes | memoryview) -> bool:
-        """Take a request while it is received; return False when it should come again later."""
+        """Take a request on the receiving thread; return False to get it from the pump instead."""
         guid = origin.guid
         client = self._ends.writers.by_guid.get(guid)
         odd = client is None or (scheme_of(guid) is Scheme.HEADER and unpack_header(data) is None)
@@ -475,8 +477,8 @@ class DdsReplier(Replier):
         return True
 
     def _on_requests(self, taken: list[Taken]) -> None:
-        for data, _, handle, told in taken:
-            client, origin = self._ends.sender(handle, told)
+        for data, _, handle, described in taken:
+            client, origin = self._ends.sender(handle, described)
             if origin is not None and origin.taken:
                 continue
             try:
@@ -490,7 +492,7 @@ class DdsReplier(Replier):
                 self._has_come(origin)
 
     def _has_come(self, origin: Origin) -> None:
-        """Wait no longer for a request that was left, nor for those before it, which are lost."""
+        """Stop waiting for a request that was left to the pump, and those before it: lost."""
         with self._leaving:
             waiting, gone = len(self._left), 0
             if id(origin) not in self._left:
@@ -528,7 +530,7 @@ class DdsReplier(Replier):
     def _answer(self, answer: _Answer, data: bytes | bytearray) -> bool:
         """Send a reply; return whether nothing more is to be done for it."""
         if not self._hears(answer):
-            # Its coming may not have been told yet.
+            # Its event may not have been handled yet.
             self._ends.look()
         writer = self._ends.writer
         if writer is None or not self._hears(answer):
@@ -550,7 +552,7 @@ class DdsReplier(Replier):
         return True
 
     def _link(self) -> None:
-        """Take note of the clients that are there now."""
+        """Update what depends on the matched clients."""
         self._hearing = set()
         readers = () if self._ends.readers is None else self._ends.readers.all
         if len(self._newest) > _MAX_REMEMBERED:
@@ -579,5 +581,5 @@ class DdsReplier(Replier):
 
 
 def _client_of(found: Discovered) -> str | bytes:
-    """Return what a client's reader and writer have in common."""
+    """Return the key that a client's reader and writer have in common."""
     return parse_user_data(found.user_data).get("clientid") or found.guid[:PREFIX]
