@@ -40,6 +40,9 @@ const LEFT_OUT = ["objectName", "objectNameChanged", "deleteLater", "destroyed",
 // Items make points and rectangles of them, in Qt itself, which follows them for ever.
 const WEBS = ["web", "objects"]
 
+// Functions that wait for another thread, which takes long on a machine with much to do.
+const WAITING = ["command", "getPath", "getPlugins", "readYaml", "writeYaml"]
+
 function members(object) {
     const names = []
     for (const name in object) names.push(name)
@@ -72,7 +75,7 @@ function drive(host, object, other, how) {
             if (name.startsWith("Image") && WEBS.indexOf(key) >= 0) continue
             const value = VALUES[key]
             if (kind === "function") {
-                for (const given of (few ? [[value()]] : calls(value))) {
+                for (const given of (few ? [[value()]] : WAITING.indexOf(member) >= 0 ? [[value()], [value(), value(), value()]] : calls(value))) {
                     host.note(name + "." + member + "(" + given.length + " x " + key + ")")
                     try { object[member].apply(object, given) } catch (e) { }
                 }
