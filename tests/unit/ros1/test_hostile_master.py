@@ -12,6 +12,7 @@ from pathlib import Path
 from xml.parsers.expat import ExpatError
 
 import pytest
+from waiting import at_rate
 
 import rosglass
 from rosglass import ros1
@@ -203,9 +204,8 @@ GOOD = xmlrpc.client.dumps(([1, "", 7],), methodresponse=True).encode()
 def drip(sock, data):
     """Send a byte every 50 ms."""
     read_call(sock)
-    for byte in data:
+    for byte, _ in zip(data, at_rate(0.05), strict=False):
         sock.sendall(bytes((byte,)))
-        time.sleep(0.05)
 
 
 def endless(sock):
@@ -219,10 +219,10 @@ def endless(sock):
 
 HEAD = b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n" % len(GOOD)
 FAULTS = {
-    "silent": lambda sock: (read_call(sock), time.sleep(30)),
+    "silent": lambda sock: (read_call(sock), sock.recv(1)),
     "closed at once": lambda _: None,
     "closed after the call": read_call,
-    "half closed": lambda sock: (read_call(sock), sock.shutdown(socket.SHUT_WR), time.sleep(30)),
+    "half closed": lambda sock: (read_call(sock), sock.shutdown(socket.SHUT_WR), sock.recv(1)),
     "a header that never ends": lambda sock: drip(sock, b"HTTP/1.1 200 OK\r\n" + b"X: y\r\n" * 999),
     "a status line that drips": lambda sock: drip(sock, b"HTTP/1.1 " + b"2" * 9999),
     "a body that drips": lambda sock: drip(sock, HEAD + GOOD),
@@ -265,7 +265,13 @@ def test_no_document_type_is_read_in_calls_or_answers(encoding):
 
 
 def test_a_call_that_drips_ends_when_the_node_is_closed():
-    port = serve(FAULTS["a header that never ends"])
+    asked = threading.Event()
+
+    def drip_on(sock):
+        asked.set()
+        FAULTS["a header that never ends"](sock)
+
+    port = serve(drip_on)
     master = Master(f"http://127.0.0.1:{port}", "/panel")
     failed = threading.Event()
 
@@ -275,7 +281,7 @@ def test_a_call_that_drips_ends_when_the_node_is_closed():
         failed.set()
 
     threading.Thread(target=call, daemon=True).start()
-    time.sleep(0.3)
+    assert asked.wait(20)
     master.close()
     assert failed.wait(20)
 
@@ -292,16 +298,16 @@ def test_every_answer_that_is_used_has_its_form():
     assert {"subscribeParam", "registerSubscriber", "requestTopic"} <= known
 
 
-def test_ten_thousand_topics_of_a_master_are_listed(master, connect, eventually, run_command):
-    for number in range(10_000):
+def test_thousands_of_topics_of_a_master_are_listed(master, connect, eventually, run_command):
+    for number in range(2_000):
         master.publishers[f"/t{number}"] = {"/flood": "http://127.0.0.1:1/"}
         master.types[f"/t{number}"] = "std_msgs/String"
     node = connect("panel", own_services=False)
     began = time.process_time()
-    eventually(lambda: len(node.topics()) == 10_000)
+    eventually(lambda: len(node.topics()) == 2_000)
     seen = master.calls.count("getSystemState")
     eventually(lambda: master.calls.count("getSystemState") >= seen + 3)
     # Of this process, which is the master, too; three looks more.
-    assert time.process_time() - began < 30
+    assert time.process_time() - began < 6
     code, out, err = run_command("topic", "list", "--url", master.url)
-    assert (code, out.count("\n")) == (0, 10_000), err
+    assert (code, out.count("\n")) == (0, 2_000), err
