@@ -224,11 +224,21 @@ def test_rosbag_mends_a_recording_that_was_killed(connect, tmp_path, master, too
     try:
         eventually(publisher.subscription_count)
 
+        sent = 0
+
         def written():
+            nonlocal sent
             publisher.publish(data="x" * 100)
+            sent += 1
             return path.exists() and path.stat().st_size > 10_000
 
-        eventually(written, timeout=20, what="the second that may be lost to have passed")
+        def complete():
+            with open_bag(path) as bag:
+                return [channel.count for channel in bag.channels] == [sent]
+
+        eventually(written, what="the second that may be lost to have passed")
+        # Killed in the middle of writing, it may have lost that second, too.
+        eventually(complete)
     finally:
         process.kill()
         process.wait()
