@@ -8,12 +8,12 @@ import pytest
 from rosglass import ConversionError, DecodeError, UnsupportedError, load
 from rosglass.interfaces import Library
 from rosglass.messages import MessageType, ServiceTranslation, ServiceType, Translation
-from rosglass.messages.schema import Kind
+from rosglass.messages.schema import Kind, schema_of
 
 
 def sample_values(kind):
     """Return values for every field; two elements for each sequence that may have them."""
-    return _values(kind._schema)
+    return _values(schema_of(kind.definition))
 
 
 def _values(schema):

@@ -6,6 +6,7 @@ import threading
 import xmlrpc.client
 
 import pytest
+from inside import core_of
 from tcpros import node_uri, publisher_links
 
 from rosglass.comm import IMMEDIATE, History, QoS
@@ -81,7 +82,7 @@ def tell_publishers(node, topic, uris):
     with xmlrpc.client.ServerProxy(node_uri(node)) as api:
         assert api.publisherUpdate("/master", topic, uris)[0] == 1
     taken = threading.Event()
-    node._core.loop.call(taken.set)
+    core_of(node).loop.call(taken.set)
     assert taken.wait(30)
 
 
@@ -140,9 +141,10 @@ def test_a_subscription_made_as_the_publisher_connects_gets_the_latched_message_
     monkeypatch.setattr(topic_subscription.PublisherLink, "_on_header", subscribe_first)
     cockpit.create_subscription("/state", type)
     eventually(lambda: got)
+    core = core_of(cockpit)
     # Two rounds of the loop: what the subscription is still to be handed has come by then.
     for _ in range(2):
         done = threading.Event()
-        cockpit._core.pool.run(lambda done=done: cockpit._core.loop.call(done.set))
+        core.pool.run(lambda done=done: core.loop.call(done.set))
         assert done.wait(30)
     assert [message.data for message in got] == [1]

@@ -10,6 +10,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from inside import core_of
 
 import rosglass
 from rosglass.errors import DefinitionConflictError, NodeClosedError, TypeNotFoundError
@@ -277,9 +278,9 @@ def test_closing_ends_it_and_nothing_is_left(join: Callable[..., Any]) -> None:
     user = join("cockpit")
     open_ = user.fetch_type_async(STATE, timeout=None)
     given_up = user.fetch_type_async(STATE, timeout=None)
-    before = len(user._core.members())
+    before = len(core_of(user).members())
     assert given_up.cancel()
-    assert len(user._core.members()) == before - 1
+    assert len(core_of(user).members()) == before - 1
     began = time.monotonic()
     user.close()
     with pytest.raises(NodeClosedError):
