@@ -437,37 +437,25 @@ def hold(topic, eventually):
     free.set()
 
 
-def test_a_publisher_that_comes_and_goes_between_two_looks_is_reported(
-    robot, console, topic, eventually, hold
+@pytest.mark.parametrize("brief", ["publisher", "subscription"])
+def test_an_endpoint_that_comes_and_goes_between_two_looks_is_reported(
+    robot, console, topic, eventually, hold, brief
 ):
+    if brief == "publisher":
+        lasting, create = console.create_subscription(topic, TEXT), robot.create_publisher
+        free, count = hold(console, robot), lasting.publisher_count
+    else:
+        lasting, create = robot.create_publisher(topic, TEXT), console.create_subscription
+        free, count = hold(robot, console), lasting.subscription_count
     events = []
-    subscription = console.create_subscription(topic, TEXT)
-    subscription.on_matched(lambda e: events.append((e.change, e.count, e.total)))
-    free = hold(console, robot)
-    first = robot.create_publisher(topic, TEXT)
-    eventually(subscription.publisher_count)
+    lasting.on_matched(lambda e: events.append((e.change, e.count, e.total)))
+    first = create(topic, TEXT)
+    eventually(count)
     first.close()
-    eventually(lambda: not subscription.publisher_count())
+    eventually(lambda: not count())
     free.set()
     eventually(lambda: events == [(1, 1, 1), (-1, 0, 1)], lambda: events)
-    assert robot.create_publisher(topic, TEXT)
-    eventually(lambda: events[2:] == [(1, 1, 2)], lambda: events)
-
-
-def test_a_subscription_that_comes_and_goes_between_two_looks_is_reported(
-    robot, console, topic, eventually, hold
-):
-    events = []
-    publisher = robot.create_publisher(topic, TEXT)
-    publisher.on_matched(lambda e: events.append((e.change, e.count, e.total)))
-    free = hold(robot, console)
-    first = console.create_subscription(topic, TEXT)
-    eventually(publisher.subscription_count)
-    first.close()
-    eventually(lambda: not publisher.subscription_count())
-    free.set()
-    eventually(lambda: events == [(1, 1, 1), (-1, 0, 1)], lambda: events)
-    assert console.create_subscription(topic, TEXT)
+    assert create(topic, TEXT)
     eventually(lambda: events[2:] == [(1, 1, 2)], lambda: events)
 
 

@@ -15,10 +15,26 @@ from waiting import eventually
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-__all__ = ["HERE", "THERE", "Cable"]
+__all__ = ["HERE", "ROBOT", "THERE", "Cable"]
 
 #: The operator's and the robot's address.
 HERE, THERE = "10.77.0.1", "10.77.0.2"
+#: A program of a robot of ROS 2: ``ROBOT.format(url)``, after what its URL needs.
+ROBOT = """
+import time, rosglass
+node = rosglass.connect("{}", "robot")
+node.create_service_server("/add", "example_interfaces/srv/AddTwoInts",
+                           lambda request: {{"sum": request.a + request.b}})
+latched = node.create_publisher("/map", "std_msgs/msg/String", rosglass.QoS.latched())
+latched.publish(data="hall")
+numbers = node.create_publisher("/count", "geometry_msgs/msg/Twist")
+print("ready", flush=True)
+number = 0
+while True:
+    numbers.publish(linear={{"x": number}})
+    number += 1
+    time.sleep(0.02)
+"""
 
 
 class Cable:

@@ -13,14 +13,6 @@ def node(connect):
     return connect("cockpit", "/ops")
 
 
-def lines_of(process, count):
-    """Return what a command has printed once that is so many lines."""
-    eventually(
-        lambda: len(process.output) >= count, timeout=20, what=lambda: "".join(process.output)
-    )
-    return "".join(process.output)
-
-
 def test_rostopic_list_and_info_show_our_topics(node, tool, master):
     node.create_publisher("speed", "std_msgs/Float64")
     node.create_subscription("orders", "std_msgs/String")

@@ -10,7 +10,7 @@ import sys
 import time
 
 from summary import tell
-from two_machines import Cable
+from two_machines import ROBOT, Cable
 from waiting import eventually
 
 import rosglass
@@ -21,25 +21,10 @@ ADD, TWIST, STRING = (
     "geometry_msgs/msg/Twist",
     "std_msgs/msg/String",
 )
-ROBOT = """
-import time, rosglass
-node = rosglass.connect("dds://", "robot")
-node.create_service_server("/add", "example_interfaces/srv/AddTwoInts",
-                           lambda request: {"sum": request.a + request.b})
-latched = node.create_publisher("/map", "std_msgs/msg/String", rosglass.QoS.latched())
-latched.publish(data="hall")
-numbers = node.create_publisher("/count", "geometry_msgs/msg/Twist")
-print("ready", flush=True)
-number = 0
-while True:
-    numbers.publish(linear={"x": number})
-    number += 1
-    time.sleep(0.02)
-"""
 
 
 with Cable() as cable:
-    cable.start(sys.executable, "-c", ROBOT, ready="ready")
+    cable.start(sys.executable, "-c", ROBOT.format("dds://"), ready="ready")
     node = rosglass.connect("dds://", "operator")
     began = time.monotonic()
 

@@ -11,34 +11,22 @@ import sys
 import time
 
 from summary import tell
-from two_machines import THERE, Cable
+from two_machines import ROBOT, THERE, Cable
 from waiting import eventually
 
 import rosglass
 from rosglass.comm import IMMEDIATE
 
 ADD, TWIST = "example_interfaces/srv/AddTwoInts", "geometry_msgs/msg/Twist"
-ROBOT = """
-import time, rosglass
+ROUTER = """
 from rosglass.wires.zenoh.router import Router
 router = Router("tcp/0.0.0.0:7447")
-node = rosglass.connect("zenoh://127.0.0.1", "robot")
-node.create_service_server("/add", "example_interfaces/srv/AddTwoInts",
-                           lambda request: {"sum": request.a + request.b})
-latched = node.create_publisher("/map", "std_msgs/msg/String", rosglass.QoS.latched())
-latched.publish(data="hall")
-numbers = node.create_publisher("/count", "geometry_msgs/msg/Twist")
-print("ready", flush=True)
-number = 0
-while True:
-    numbers.publish(linear={"x": number})
-    number += 1
-    time.sleep(0.02)
 """
 
 
 with Cable() as cable:
-    cable.start(sys.executable, "-c", ROBOT, ready="ready")
+    robot = ROUTER + ROBOT.format("zenoh://127.0.0.1")
+    cable.start(sys.executable, "-c", robot, ready="ready")
     node = rosglass.connect(f"zenoh://{THERE}", "operator")
     began = time.monotonic()
     states: list[tuple[float, str]] = []
