@@ -266,7 +266,7 @@ def test_misuse_throws(live: Bench, counter: Counter, wait: Any) -> None:
         ("client.sendGoalAsync({order: 1}, {onResult: 5})", "onResult is not a function"),
         ("client.sendGoalAsync({order: 1}, 5)", "must be an object"),
         ("client.cancelGoalsBefore('noon')", "a time or a Date"),
-        ("client.cancelGoalsBefore(new Date(-5000))", "after 1970"),
+        ("client.cancelGoalsBefore(new Date(-5000))", "between 1970"),
         ("Ros2.createActionClient('no good', 'a/B')", "no good"),
         ("Ros2.createActionClient('a/B', '/count')", "Are name and type swapped?"),
         ("Ros2.createServiceClient('a/B', '/count')", "Are name and type swapped?"),
@@ -406,7 +406,7 @@ def test_the_engine_goes_away_while_a_goal_runs(
     client.run("send(50)")
     client.until("feedback")
     engine.deleteLater()
-    wait.nothing_happens(0.3)
+    wait.settled(live.session)
     assert counter.server.goals
     assert live.session.state == "connected"
     assert "internal error" not in caplog.text
