@@ -325,7 +325,7 @@ def test_pictures_that_a_silent_link_kept_back_are_not_live(
     running.world.held_back_s = 10
     camera.publish(picture(BLUE))
     if timeout:
-        wait.nothing_happens(0.3)
+        wait.settled(running.session)
         assert colour(root) == RED
     else:
         # It was asked to leave pictures on the screen, and says that this one is old.

@@ -254,7 +254,7 @@ class TestDepth:
         sub.setProperty("colorMap", "rainbow")
         wait(lambda: "'rainbow' is unknown" in sub.property("problem"))
         camera.publish(self.depths())
-        wait.nothing_happens(0.1)
+        wait.settled(running.session)
         np.testing.assert_array_equal(seen(root), before)
         sub.setProperty("colorMap", "viridis")
         wait(lambda: sub.property("problem") == "")

@@ -131,7 +131,7 @@ def test_what_a_dead_robot_left_behind_is_stale(live: Bench, robot: Robot, wait:
         }
     """)
     wait(page.valid)
-    wait.nothing_happens(0.2)
+    wait.settled(live.session)
     assert page.seenLive() == 0
 
 
@@ -200,12 +200,14 @@ def test_lookups(live: Bench, robot: Robot, wait: Any) -> None:
     missing = live.run('return TfTransformListener.lookUpTransform("map", "moon")')
     assert (missing["valid"], missing["exception"]) == (False, "LookupException")
     assert "moon" in missing["message"]
-    wait.nothing_happens(0.3)
-    full = live.run("""
-        const then = new Date(Date.now() - 100)
-        return TfTransformListener.lookUpTransform("base", then, "base", Ros2.now(), "map", 5000)
-    """)
-    assert full["valid"] is True, full
+
+    def look_up() -> Any:
+        return live.run("""
+            const then = new Date(Date.now() - 100), at = ["base", then, "base", Ros2.now(), "map"]
+            return TfTransformListener.lookUpTransform(...at, 5000)
+        """)
+
+    full = wait(lambda: (found := look_up())["valid"] and found)
     assert 0 < full["transform"]["translation"]["x"] < 0.2
 
 

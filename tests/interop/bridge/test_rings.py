@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 
 import pytest
-from waiting import eventually
+from waiting import eventually, nothing_happens
 
 from rosglass.bridge import Bridge
 from rosglass.comm import QoS
@@ -46,9 +45,9 @@ def test_three_worlds_in_a_ring(bridge, connect, start_master):
     eventually(arrives)
     eventually(lambda: sum("form a ring" in told for told in problems(*made)) == 2,
              what=lambda: str([one.status() for one in made]))  # fmt: skip
-    time.sleep(1)  # what is on its way
+    talker.publish(data="begin")
     for ear in ears:
-        while ear.wait(0.0) is not None:
+        while ear.wait(30).message().data != "begin":
             pass
     for number in range(20):
         talker.publish(data=str(number))
@@ -80,7 +79,7 @@ def test_two_commands_there_and_back(master, router, connect, start_program):
 
         eventually(crosses)
     eventually(lambda: all(talker.subscription_count() == 2 for talker in talkers))
-    time.sleep(1)  # what is on its way
+    nothing_happens(1)  # what is on its way, and what goes round until the bridges know each other
     for ear in ears:
         while ear.wait(0.0) is not None:
             pass

@@ -11,7 +11,7 @@ import time
 import pytest
 from tcpros import publisher_address, topics_of
 from usage import open_files
-from waiting import eventually
+from waiting import eventually, nothing_happens
 
 import rosglass
 from rosglass.comm import IMMEDIATE
@@ -208,7 +208,8 @@ def test_each_latched_publisher_of_a_node_is_heard_by_who_comes_late(connect):
     assert connect("later").create_subscription("/static").wait(30).message().data == "b"
 
 
-def test_creating_and_closing_a_thousand_times_leaves_nothing(connect):
+def test_creating_and_closing_a_thousand_times_leaves_nothing(connect, monkeypatch):
+    monkeypatch.setattr("rosglass.wires.tcpros.core._IDLE_TIMEOUT_S", 0.5)
     node = connect("busy")
     publisher = node.create_publisher("/busy", STRING)
 
@@ -224,7 +225,7 @@ def test_creating_and_closing_a_thousand_times_leaves_nothing(connect):
     for _ in range(20):
         cycle()
     eventually(lambda: publisher.subscription_count() == 0)
-    time.sleep(6)  # threads of the pool end after 5 s without a job
+    nothing_happens(1.0)  # threads of the pool without a job end
 
     def alive():
         gc.collect()

@@ -6,12 +6,11 @@ import importlib.util
 import struct
 import sys
 import threading
-import time
 from pathlib import Path
 from typing import Any
 
 import pytest
-from waiting import eventually
+from waiting import at_rate, eventually
 
 from rosglass.comm import GoalStatus
 
@@ -82,8 +81,9 @@ class Server:
     def work(self, goal: bytes, order: int) -> None:
         self.tell(goal, EXECUTING)
         sequence = [0]
-        while len(sequence) < order and goal not in self.cancelled:
-            time.sleep(0.05)
+        for _ in at_rate(0.05, order - 1):
+            if goal in self.cancelled:
+                break
             sequence.append(len(sequence))
             layout = "16s I " + "i " * len(sequence)
             self.fast.send("feedback", cdr(layout, goal, len(sequence), *sequence))

@@ -9,7 +9,7 @@ import time
 
 import pytest
 from ports import free_port
-from waiting import eventually, nothing_happens
+from waiting import eventually
 
 from rosglass.wires.tcpros import connection as module
 from rosglass.wires.tcpros.connection import Connection, encode_header
@@ -110,7 +110,8 @@ def test_a_header_in_time_lasts(loop, monkeypatch):
     end = End(loop)
     end.peer.sendall(HEADER)
     eventually(lambda: end.headers)
-    nothing_happens(0.3)
+    later = End(loop)
+    eventually(lambda: later.ended)
     end.peer.sendall(frame(b"still there"))
     assert eventually(lambda: end.frames) == [b"still there"]
 
@@ -219,7 +220,9 @@ def test_pausing_keeps_what_came_with_the_header(loop, end):
     end.on_header = lambda _: end.link.pause(reading=False)
     end.peer.sendall(HEADER + frame(b"latched") + frame(b"next"))
     eventually(lambda: end.link.header)
-    nothing_happens(0.05)
+    turned = threading.Event()
+    loop.call(turned.set)
+    assert turned.wait(30)
     assert end.frames == []
     loop.call(lambda: end.link.pause(reading=True))
     assert eventually(lambda: len(end.frames) == 2)

@@ -702,7 +702,6 @@ def test_a_goal_accepted_just_before_closing_is_told_its_end(robot, node, close,
     closing = threading.Thread(target=(server if close == "server" else robot).close)
     closing.start()
     eventually(lambda: server.closed)
-    time.sleep(0.05)  # on its way
     assert ask["get_result"].call({"goal_id": mine}).status == 6
     closing.join(5)
     assert not closing.is_alive()
