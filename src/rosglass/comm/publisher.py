@@ -92,9 +92,9 @@ class Publisher(TopicEndpoint):
         self._writer = core.create_writer(endpoint, type)
         if self._writer.gid:
             core.local_gids.add(self._writer.gid)
-        core.add(self, self._follow)
         # Where the wire does not know its subscribers, the graph does.
         self._graph = core.graph if self._writer.subscribers() is None else None
+        core.add(self, self._follow)  # closes this publisher if the node is closed
         if isinstance(self._graph, Graph):
             self._graph.watch(topic, self._on_endpoint_removed)
             self._writer.match(self._matching(self._subscriptions()))
