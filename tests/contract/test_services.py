@@ -241,7 +241,7 @@ def test_calls_from_many_threads(offer, client):
         ({"a": "x"}, 1, "a: expected an integer"),
         ({"c": 1}, 1, "c"),
         ("text", 1, "expected"),
-        ({}, -1, "timeout: expected seconds from 0 on, or None for ever, got -1"),
+        ({}, -1, "timeout: expected seconds, at least 0, or None for no limit, got -1"),
         ({}, "soon", "timeout: expected seconds"),
         ({}, True, "timeout: expected seconds"),
         ({}, float("nan"), "timeout: expected seconds"),

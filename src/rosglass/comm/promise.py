@@ -36,7 +36,7 @@ def check_timeout(timeout: float | None, where: str) -> float | None:
     if timeout is None:
         return None
     if isinstance(timeout, bool) or not isinstance(timeout, (int, float)) or not timeout >= 0:
-        raise ArgumentError("timeout", timeout, "seconds from 0 on, or None for ever", where)
+        raise ArgumentError("timeout", timeout, "seconds, at least 0, or None for no limit", where)
     return None if math.isinf(timeout) else float(timeout)
 
 

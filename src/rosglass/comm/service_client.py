@@ -161,7 +161,7 @@ class ServiceRequester(ABC):
         """Return why a request was not sent although there is a server."""
 
     @abstractmethod
-    def look(self) -> None:
+    def find_server(self) -> None:
         """Search for a server now, because a thread waits for one; from any thread."""
 
     @abstractmethod
@@ -237,7 +237,7 @@ class ServiceClient(Client):
             self._requester.waiters += 1
         try:
             if not self.ready:
-                self._requester.look()
+                self._requester.find_server()
             return super().wait_for_server(timeout)
         finally:
             with self._lock:

@@ -250,7 +250,7 @@ class Ros2Requester(ServiceRequester):
             f"{similar(self._name, offered)}"
         )
 
-    def look(self) -> None:
+    def find_server(self) -> None:
         """Do nothing: servers are discovered by the graph."""
 
     def delay(self, pending: PendingCall) -> str:  # noqa: ARG002 - the same for all

@@ -45,7 +45,7 @@ def test_waiting_ends_and_the_promise_stands(promise):
 
 @pytest.mark.parametrize("timeout", [-1, "x", True, float("nan"), []])
 def test_odd_timeouts_are_refused(promise, timeout):
-    with pytest.raises(rosglass.ConversionError, match="seconds from 0 on, or None for ever"):
+    with pytest.raises(rosglass.ConversionError, match="seconds, at least 0, or None for no limit"):
         promise.result(timeout)
 
 

@@ -151,7 +151,7 @@ class TcprosRequester(ServiceRequester):
             return f"{busy} earlier call{'s are' if busy > 1 else ' is'} not answered yet"
         return "its server appeared too late"
 
-    def look(self) -> None:
+    def find_server(self) -> None:
         """Look up the server now, as a thread waits for it."""
         self._core.loop.call(self._finder.look)
 
