@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import logging
-import threading
 import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -29,7 +28,7 @@ from rosglass.errors import (
 from rosglass.wires.base import CALL_DROPPED, SERVER_LEFT
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from rosglass.comm.core import NodeCore
     from rosglass.comm.handle import Executor
@@ -115,13 +114,13 @@ class ServiceRequester(ABC):
 
     Attributes:
         type: The service type; None while it is not discovered yet.
-        waiters: How many threads wait for a server; set by the client.
+        waiters: One item per thread that waits for a server; set by the client.
         max_request: Largest size of a request in bytes; None for no limit.
         warn_level: Level at which the client logs conflicts; None if its owner logs them.
     """
 
     type: ServiceType | None
-    waiters: int = 0
+    waiters: Sequence[None] = ()
     max_request: int | None = None
     warn_level: int | None = logging.WARNING
 
@@ -200,11 +199,12 @@ class ServiceClient(Client):
     ) -> None:
         super().__init__(core, name)
         self.qos = qos
-        #: Guards that no call is added after closing, and the number of waiting threads.
-        self._lock = threading.Lock()
         self._numbers = itertools.count(1)
+        #: Every use of these two is atomic.
+        self._waiters: list[None] = []
         self._pending: dict[int, PendingCall] = {}
         self._requester = create_requester(self._pending, self._on_reply, self._on_change)
+        self._requester.waiters = self._waiters
         core.add(self, self._follow)
 
     def __repr__(self) -> str:
@@ -233,15 +233,13 @@ class ServiceClient(Client):
         Raises:
             NodeClosedError: The client is closed, or is closed during the wait.
         """
-        with self._lock:
-            self._requester.waiters += 1
+        self._waiters.append(None)
         try:
             if not self.ready:
                 self._requester.find_server()
             return super().wait_for_server(timeout)
         finally:
-            with self._lock:
-                self._requester.waiters -= 1
+            self._waiters.pop()
 
     def _on_change(self) -> None:
         """Log conflicts and report changes of :attr:`ready`; by one thread only."""
@@ -345,11 +343,9 @@ class ServiceClient(Client):
             deadline=None if timeout is None else time.monotonic() + timeout,
             private=private,
         )
-        with self._lock:
-            closed = self._closed
-            if not closed:
-                self._pending[pending.number] = pending
-        if closed:
+        self._pending[pending.number] = pending
+        if self._closed:  # by another thread, which may have missed this call
+            self._pending.pop(pending.number, None)
             self._check_open()
         call.add_done_callback(lambda _: self._on_end(pending))
         return pending
@@ -434,14 +430,12 @@ class ServiceClient(Client):
 
     def close(self) -> None:
         """Close the client; pending calls end with NodeClosedError. Safe to call twice."""
-        with self._lock:
-            if self._closed:
-                return
-            self._closed = True
-            pending = list(self._pending.values())
+        if self._closed:
+            return
+        self._closed = True
         if self._core.forked:
             return
-        for each in pending:
+        for each in list(self._pending.values()):
             each.call.set_exception(
                 NodeClosedError(f"the client of {self.name} was closed during a call")
             )

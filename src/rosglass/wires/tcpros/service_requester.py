@@ -382,7 +382,7 @@ class TcprosRequester(ServiceRequester):
     @property
     def waits(self) -> bool:
         """Whether calls or threads wait for the server."""
-        return bool(self._queue) or (self.waiters > 0 and not self.ready())
+        return bool(self._queue) or (bool(self.waiters) and not self.ready())
 
     @property
     def busy(self) -> bool:
