@@ -79,7 +79,7 @@ class Publisher(TopicEndpoint):
         self._left: deque[EndpointInfo] = deque(maxlen=_MAX_LEFT)
         self._big = False
         self._liveliness_listeners: Listeners[LivelinessLost] = Listeners(where=topic)
-        #: Guards the watchdogs, and that none is added after closing.
+        #: Guards the watchdogs, and that one thread alone closes the writer.
         self._lock = threading.Lock()
         self._watchdogs: dict[str, Watchdog] = {}
         self._missed = self._lost = 0
