@@ -667,13 +667,14 @@ class ParameterWatch(Member):
         """Subscribe, and read; again after the master's restart."""
         self._read(master)
 
-    def unregister(self, master: Master) -> Member | None:
-        """Unsubscribe, unless the name is followed again."""
+    def unregister(self, master: Master) -> None:
+        """Unsubscribe."""
         with self._watches.subscribing:
-            heir = self._watches.current(self.name)
-            if heir is None:
-                master.call("unsubscribeParam", self._core.uri, self.name)
-        return heir
+            master.call("unsubscribeParam", self._core.uri, self.name)
+
+    def successor(self) -> Member | None:
+        """Return the new watch of the name, if it is followed again."""
+        return self._watches.current(self.name)
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - not all that moves counts
         """Read it again now and then, in case a change was missed."""

@@ -12,7 +12,7 @@ import itertools
 import logging
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import IMMEDIATE, Handle, QoS
+from rosglass.comm import IMMEDIATE, QoS
 from rosglass.comm.builtin_services import USE_SIM_TIME, BuiltinProtocol, SimTime
 from rosglass.errors import ServiceError
 from rosglass.ros1.parameter_server import StartParameters
@@ -20,15 +20,15 @@ from rosglass.ros1.parameter_server import StartParameters
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from rosglass.comm import Executor, Node, ServiceServer
+    from rosglass.comm import Node
     from rosglass.comm.builtin_services import BuiltinServices
-    from rosglass.comm.log import NodeLog, NodeLogger
+    from rosglass.comm.log import NodeLog
     from rosglass.messages import Message
     from rosglass.ros1.parameter_namespace import Ros1Parameters
     from rosglass.ros1.parameter_server import ParameterServer
     from rosglass.wires.tcpros.core import TcprosCore
 
-__all__ = ["LoggerServices", "RoscppServices"]
+__all__ = ["RoscppServices"]
 
 _NO_TOPICS = "/rosout_disable_topics_generation"
 #: Latched, as in rospy and roscpp.
@@ -126,39 +126,13 @@ class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
         """Publish ``/rosout``, and offer the services for log levels."""
         services.log.open()
         yield
-        loggers = LoggerServices(self._node, services.log.logger, self._core.own_dispatcher)
-        services.own(loggers)
-        loggers.open()
-
-
-class LoggerServices(Handle):
-    """The services that list and set the levels of a node's and the library's loggers.
-
-    Args:
-        node: The node.
-        logger: Its logger.
-        executor: Where the services run.
-    """
-
-    def __init__(self, node: Node, logger: NodeLogger, executor: Executor) -> None:
-        self._node, self._logger, self._executor = node, logger, executor
-        self._servers: list[ServiceServer] = []
-
-    def open(self) -> None:
-        """Offer the services; raises what :meth:`Node.create_service_server` does."""
+        self._logger = services.log.logger
         for name, kind, answer in (
             ("~get_loggers", "roscpp/GetLoggers", self._list_loggers),
             ("~set_logger_level", "roscpp/SetLoggerLevel", self._set_level),
         ):
-            self._servers.append(
-                self._node.create_service_server(name, kind, answer, executor=self._executor)
-            )
-
-    def close(self) -> None:
-        """Withdraw them; safe to call twice."""
-        servers, self._servers = self._servers, []
-        for server in servers:
-            server.close()
+            executor = self._core.own_dispatcher
+            services.own(self._node.create_service_server(name, kind, answer, executor=executor))
 
     def _loggers(self) -> dict[str, logging.Logger]:
         own = {logger.name: logger for logger in self._logger.family()}

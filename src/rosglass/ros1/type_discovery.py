@@ -475,13 +475,13 @@ class GoalProbe(Member):
             name = ros1_name(self._name)
             master.call("registerPublisher", self._topic, name, self._core.uri)
 
-    def unregister(self, master: Master) -> Member | None:
-        """Unregister, unless goals are published by now."""
-        heir = self._topics.published().get(self._topic)
-        if self._core.closed or heir is None:
-            master.call("unregisterPublisher", self._topic, self._core.uri)
-            return None
-        return heir
+    def unregister(self, master: Master) -> None:
+        """Unregister as a publisher of goals."""
+        master.call("unregisterPublisher", self._topic, self._core.uri)
+
+    def successor(self) -> Member | None:
+        """Return the publication of the goals, if they are published by now."""
+        return self._topics.published().get(self._topic)
 
     def close(self) -> None:
         """Hand the waiting subscribers over; safe to call twice."""

@@ -108,13 +108,13 @@ def test_one_that_is_closed_while_the_master_is_told_of_the_one_before(
     first = getattr(node, create)("/a", "std_msgs/Empty")
     eventually(lambda: "/panel" in offers.get("/a", {}))
     second: list[Any] = []
-    unregister = member.unregister
+    successor = member.successor
 
-    def unregister_and_close(self: Any, *arguments: Any) -> Any:
-        left = unregister(self, *arguments)
+    def close_successor(self: Any) -> Any:
+        found = successor(self)
         while second:
             second.pop().close()  # before it was registered itself
-        return left
+        return found
 
     def hold(*_: Any) -> Any:
         # The node's thread is about to tell the master of both.
@@ -123,7 +123,7 @@ def test_one_that_is_closed_while_the_master_is_told_of_the_one_before(
         del master.answers["lookupNode"]
         return master.lookupNode("/panel", "/panel")
 
-    monkeypatch.setattr(member, "unregister", unregister_and_close)
+    monkeypatch.setattr(member, "successor", close_successor)
     master.answers["lookupNode"] = hold
     eventually(lambda: "/panel" not in offers["/a"])
     assert not second

@@ -200,10 +200,6 @@ class TcprosCore(NodeCore):
         if known and not self._closed and isinstance(member, Member):
             self._registrations.forget(member)
 
-    def registrable(self) -> list[Member]:
-        """Return the members that are registered with the master, now or soon."""
-        return [member for member in self.members() if isinstance(member, Member)]
-
     def _state(self) -> Status:
         return self._status
 
@@ -277,7 +273,11 @@ class TcprosCore(NodeCore):
                 survive_outages(sock)
                 reason = self.topics.accept(link, header)
             elif "service" in header:
-                reason = self._accept_client(link, header)
+                replier = self.repliers.get(header["service"])
+                if replier is not None:
+                    reason = replier.accept(link, header)
+                else:
+                    reason = f"{self.name} does not offer {header['service']}"
             else:
                 reason = "neither topic nor service is named in the connection header"
             if reason:
@@ -304,13 +304,6 @@ class TcprosCore(NodeCore):
         replier = self.repliers.get(link.header.get("service", ""))
         if replier is not None:
             replier.on_disconnected(link)
-
-    def _accept_client(self, link: Connection, header: dict[str, str]) -> str:
-        """Accept a service client's connection; return the reason if it is refused."""
-        replier = self.repliers.get(header.get("service", ""))
-        if replier is None:
-            return f"{self.name} does not offer {header.get('service')}"
-        return replier.accept(link, header)
 
     def _on_request(self, link: Connection, data: bytes | memoryview) -> None:
         replier = self.repliers.get(link.header.get("service", ""))

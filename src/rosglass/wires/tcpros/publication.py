@@ -65,6 +65,7 @@ class Publication(Member):
 
     def __init__(self, core: TcprosCore, topics: Topics, topic: str, type: MessageType) -> None:
         self.topic, self.type = topic, type
+        self.endpoint = (EndpointKind.PUBLISHER, topic)
         self._core, self._topics = core, topics
         #: Guards the connections and latched messages: each subscriber gets each message once.
         self._lock = threading.Lock()
@@ -243,23 +244,18 @@ class Publication(Member):
             self.writers = [one for one in self.writers if one is not writer]
             return not self.writers
 
-    @property
-    def endpoint(self) -> tuple[EndpointKind, str]:  # type: ignore[override]
-        """Its kind and name in the master's graph."""
-        return EndpointKind.PUBLISHER, self.topic
-
     def register(self, master: Master) -> None:
         """Register the publisher."""
         name = ros1_name(self.type.name)
         master.call("registerPublisher", self.topic, name, self._core.uri)
 
-    def unregister(self, master: Master) -> Member | None:
-        """Unregister the publisher, unless the topic is published again."""
-        heir = self._topics.published().get(self.topic)
-        if self._core.closed or heir is None:
-            master.call("unregisterPublisher", self.topic, self._core.uri)
-            return None
-        return heir
+    def unregister(self, master: Master) -> None:
+        """Unregister the publisher."""
+        master.call("unregisterPublisher", self.topic, self._core.uri)
+
+    def successor(self) -> Member | None:
+        """Return the topic's new publication, if it is published again."""
+        return self._topics.published().get(self.topic)
 
     def _refusals(self) -> list[str]:
         """Return why subscribers were refused that the master still lists."""

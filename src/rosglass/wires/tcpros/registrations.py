@@ -58,13 +58,11 @@ class Member(NodeMember):
             MasterError: The master refuses.
         """
 
-    def unregister(self, master: Master) -> Member | None:  # noqa: ARG002 - not all are registered
-        """Unregister it; called on a thread that may wait.
+    def unregister(self, master: Master) -> None:
+        """Unregister it; called on a thread that may wait."""
 
-        Returns:
-            The member of this node that has its name by now: the registration is kept then, and
-            belongs to that one. Else None.
-        """
+    def successor(self) -> Member | None:
+        """Return the member that has its name by now, and takes over the registration."""
         return None
 
     def misses_publishers(self, count: int) -> bool:  # noqa: ARG002 - of subscriptions only
@@ -209,21 +207,22 @@ class Registrations:
         while self._leaving:
             member = self._leaving[0]
             if member in self._tried:
-                heir = None
-                with suppress(MasterError):
-                    heir = member.unregister(self._core.master)
+                successor = member.successor()
+                if successor is not None:
+                    # It may leave before it was ever registered itself.
+                    self._tried.add(successor)
+                else:
+                    with suppress(MasterError):
+                        member.unregister(self._core.master)
                 self._tried.discard(member)
                 self._registered.discard(member)
-                if heir is not None:
-                    # It may leave before it was ever registered itself.
-                    self._tried.add(heir)
             self._leaving.popleft()
 
     def _register(self) -> list[str]:
         """Register members that are not; return why the master refuses some."""
         refused = []
-        for member in self._core.registrable():
-            if member in self._registered:
+        for member in self._core.members():
+            if not isinstance(member, Member) or member in self._registered:
                 continue
             # First: the master may know the member although its answer gets lost, and close()
             # looks at these after it has set `_closing`.

@@ -81,6 +81,7 @@ class TopicSubscription(Member):
 
     def __init__(self, core: TcprosCore, topics: Topics, topic: str, type_name: str) -> None:
         self.core, self.topic = core, topic
+        self.endpoint = (EndpointKind.SUBSCRIPTION, topic)
         self.type_name = type_name
         self.readers: tuple[TypeNegotiation, ...] = ()
         self.eager = True
@@ -215,11 +216,6 @@ class TopicSubscription(Member):
 
     # -- as a member -----------------------------------------------------------------------------
 
-    @property
-    def endpoint(self) -> tuple[EndpointKind, str]:  # type: ignore[override]
-        """Its kind and name in the master's graph."""
-        return EndpointKind.SUBSCRIPTION, self.topic
-
     def misses_publishers(self, count: int) -> bool:
         """Return whether fewer publishers are connected."""
         return sum(link.connected for link in self.links()) < count
@@ -237,13 +233,13 @@ class TopicSubscription(Member):
 
         self.core.loop.call(set_publishers)
 
-    def unregister(self, master: Master) -> Member | None:
-        """Unregister the subscription, unless the topic is subscribed to again."""
-        heir = self._topics.subscribed().get(self.topic)
-        if self.core.closed or heir is None:
-            master.call("unregisterSubscriber", self.topic, self.core.uri)
-            return None
-        return heir
+    def unregister(self, master: Master) -> None:
+        """Unregister the subscription."""
+        master.call("unregisterSubscriber", self.topic, self.core.uri)
+
+    def successor(self) -> Member | None:
+        """Return the topic's new registration, if it is subscribed to again."""
+        return self._topics.subscribed().get(self.topic)
 
     def follow(self, moved: bool, idle: bool) -> None:
         """Check for silent publishers, and let the subscriptions' feeds follow the graph."""
