@@ -117,9 +117,9 @@ def action_topic(action: str, name: str) -> str:
 def announced(graph: Graph, action: str) -> str:
     """Return the type of an action by its topics, ``pkg/action/Type``; empty if unknown."""
     for name, suffix in _SUFFIXES.items():
-        kind = graph.type_of(action_topic(action, name))
-        if kind.endswith(suffix) and not kind.endswith("/" + suffix):
-            return kind.removesuffix(suffix).replace("/msg/", "/action/")
+        type_name = graph.type_of(action_topic(action, name))
+        if type_name.endswith(suffix) and not type_name.endswith("/" + suffix):
+            return type_name.removesuffix(suffix).replace("/msg/", "/action/")
     return ""
 
 
@@ -129,9 +129,9 @@ def actions(graph: Graph) -> dict[str, list[str]]:
     for topic in graph.topics():
         name, _, word = topic.rpartition("/")
         if word == STATUS and name and graph.type_of(topic) in (_STATUS_TYPE, ""):
-            kind = announced(graph, name)
-            if kind:
-                found[name] = [kind]
+            type_name = announced(graph, name)
+            if type_name:
+                found[name] = [type_name]
     return found
 
 

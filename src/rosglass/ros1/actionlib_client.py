@@ -258,11 +258,11 @@ class ActionlibClientGoal(ClientGoal):
 
     def _send(self, server: str, epoch: int) -> None:
         """Send it to a server."""
-        kind = self._client.type
-        assert kind is not None  # it is known once there is a server
+        action_type = self._client.type
+        assert action_type is not None  # it is known once there is a server
         try:
             if self.goal is None:
-                self.goal = kind.goal.create(self._given)
+                self.goal = action_type.goal.create(self._given)
             sent = {
                 "header": {"stamp": stamp(self.stamp)},
                 "goal_id": goal_id(self._id_text, self.stamp),
@@ -417,9 +417,9 @@ class ActionlibClientGoal(ClientGoal):
         """End it without having sent it."""
         self._machine.on_status(ServerState.PENDING)
         self._go(self._machine.on_result(ServerState.RECALLED))
-        kind = self._client.type
-        if kind is not None:
-            self._finish(ActionResult(GoalStatus.CANCELED, kind.result.create()))
+        action_type = self._client.type
+        if action_type is not None:
+            self._finish(ActionResult(GoalStatus.CANCELED, action_type.result.create()))
         else:
             self._finish(self._without_result())
 
@@ -844,8 +844,8 @@ class _ClientTopics:
         self._subscriptions: dict[str, Subscription] = {}
         try:
             for word in (GOAL, CANCEL):
-                kind = getattr(types, word)
-                self._publishers[word] = Publisher(core, self._names[word], kind, QUEUE)
+                message_type = getattr(types, word)
+                self._publishers[word] = Publisher(core, self._names[word], message_type, QUEUE)
         except BaseException:
             self.close()
             raise

@@ -284,8 +284,10 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
         self._publish_status()
         for word, callback in ((CANCEL, self._on_cancel), (GOAL, self._on_goal)):
             topic = core.resolve(action_topic(name, word))
-            kind = getattr(self._types, word)
-            subscription = Subscription(topic, kind, QUEUE, IMMEDIATE, raw_callback=callback)
+            message_type = getattr(self._types, word)
+            subscription = Subscription(
+                topic, message_type, QUEUE, IMMEDIATE, raw_callback=callback
+            )
             self._subscriptions.append(subscription)
             topics.subscribe(subscription, False)
         core.add(self)

@@ -233,8 +233,10 @@ class Ros1Node(Node):
 
         self._core.check_open()
         check_order("create_action_server", name, type)
-        kind = self._core.types.action(type)
-        protocol = ActionlibServer(self._core, self._topics, self.resolve(name), kind, simple)
+        action_type = self._core.types.action(type)
+        protocol = ActionlibServer(
+            self._core, self._topics, self.resolve(name), action_type, simple
+        )
         return ActionServer(self._core, protocol, execute, accept, cancel, executor)
 
     def actions(self) -> dict[str, list[str]]:

@@ -91,11 +91,11 @@ class ParameterNamespace:
 
     def describe(self, name: str, value: Any) -> ParameterDescriptor:
         """Return a parameter's descriptor, which has only its type."""
-        kind = type_of(value)
+        parameter_type = type_of(value)
         text = ""
-        if value is not None and kind is ParameterType.NOT_SET:
+        if value is not None and parameter_type is ParameterType.NOT_SET:
             text = f"A {'namespace' if isinstance(value, dict) else type(value).__name__}."
-        return ParameterDescriptor(name, kind, text, dynamic_typing=True)
+        return ParameterDescriptor(name, parameter_type, text, dynamic_typing=True)
 
 
 class _Changes(Handle):
@@ -244,8 +244,8 @@ class Ros1Parameters(Parameters):
         declared = self._declared.get(name)
         if declared is None:
             return found
-        kind = declared.type if found.type is ParameterType.NOT_SET else found.type
-        return replace(declared, name=name, type=kind, dynamic_typing=True)
+        parameter_type = declared.type if found.type is ParameterType.NOT_SET else found.type
+        return replace(declared, name=name, type=parameter_type, dynamic_typing=True)
 
     def names(self) -> list[str]:
         """Return the names that are set or declared, sorted."""

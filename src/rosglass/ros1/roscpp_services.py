@@ -127,12 +127,14 @@ class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
         services.log.open()
         yield
         self._logger = services.log.logger
-        for name, kind, answer in (
+        for name, type_name, answer in (
             ("~get_loggers", "roscpp/GetLoggers", self._list_loggers),
             ("~set_logger_level", "roscpp/SetLoggerLevel", self._set_level),
         ):
             executor = self._core.own_dispatcher
-            services.own(self._node.create_service_server(name, kind, answer, executor=executor))
+            services.own(
+                self._node.create_service_server(name, type_name, answer, executor=executor)
+            )
 
     def _loggers(self) -> dict[str, logging.Logger]:
         own = {logger.name: logger for logger in self._logger.family()}

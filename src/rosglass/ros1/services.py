@@ -71,20 +71,21 @@ class Services:
         Raises:
             ServiceError: The node offers it already.
         """
-        core, kind, profile = self._core, self._core.types.service(type), _profile(qos, name)
+        core, profile = self._core, _profile(qos, name)
+        service_type = core.types.service(type)
 
         # `quick` makes no difference: requests are received in the loop's thread anyway.
         def create(on_request: OnRequest, _quick: bool) -> TcprosReplier:
-            return core.create_replier(name, kind, on_request)
+            return core.create_replier(name, service_type, on_request)
 
-        return ServiceServer(core, name, kind, callback, profile, executor, create)
+        return ServiceServer(core, name, service_type, callback, profile, executor, create)
 
     # -- the graph -------------------------------------------------------------------------------
 
     def listing(self) -> dict[str, list[str]]:
         """Return every service with its type; no type until its server has announced it."""
         names = sorted(self._core.graph.services())
-        return {name: [kind] if (kind := self._type_of(name)[0]) else [] for name in names}
+        return {name: [known] if (known := self._type_of(name)[0]) else [] for name in names}
 
     def described(self, found: list[EndpointInfo]) -> list[EndpointInfo]:
         """Return endpoints, with the types of services."""

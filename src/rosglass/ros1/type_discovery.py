@@ -385,28 +385,28 @@ class ActionDiscovery:
 
     def types(self) -> ActionTypes | None:
         """Return the types of the action; None while they are unknown."""
-        kind = announced(self._core.graph, self._name)
-        if not kind:
+        type_name = announced(self._core.graph, self._name)
+        if not type_name:
             self.problem = ""
             return None
-        known = {word: self._announced(word, kind) for word in _LABELS}
+        known = {word: self._announced(word, type_name) for word in _LABELS}
         result, feedback = known[RESULT], known[FEEDBACK]
         if result is None or feedback is None:
             self.problem = ""
             return None
         with suppress(Error):
-            types = ActionTypes.of(self._core.types.action(kind), self._core.types)
+            types = ActionTypes.of(self._core.types.action(type_name), self._core.types)
             if (types.result.md5, types.feedback.md5) == (result.md5, feedback.md5):
                 return types
-        goal = known[GOAL] or self._goal(kind.replace("/action/", "/msg/") + "ActionGoal")
+        goal = known[GOAL] or self._goal(type_name.replace("/action/", "/msg/") + "ActionGoal")
         if goal is None:
-            short = ros1_name(kind.replace("/action/", "/msg/"))
+            short = ros1_name(type_name.replace("/action/", "/msg/"))
             self.problem = (
                 f"no definition of {short}Goal is known, and the server of {self._name} does not "
-                f"send it: {adding_definitions(kind, 1)}"
+                f"send it: {adding_definitions(type_name, 1)}"
             )
             return None
-        action = assemble(kind, goal, result, feedback)
+        action = assemble(type_name, goal, result, feedback)
         self.problem = ""
         return ActionTypes.of(action, self._core.types)
 
@@ -417,10 +417,10 @@ class ActionDiscovery:
         if self._goal_probe is not None:
             self._goal_probe.close()
 
-    def _announced(self, word: str, kind: str) -> MessageType | None:
+    def _announced(self, word: str, type_name: str) -> MessageType | None:
         """Return the type that the topic's publisher announces, if it is one of this action."""
         found = self._probes[word].type
-        name = kind.replace("/action/", "/msg/") + _LABELS[word]
+        name = type_name.replace("/action/", "/msg/") + _LABELS[word]
         return found if found is not None and found.name == name else None
 
     def _goal(self, name: str) -> MessageType | None:

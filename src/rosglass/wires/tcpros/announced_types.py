@@ -93,11 +93,11 @@ class AnnouncedTypes(Types):
             raise TypeNotFoundError(f"{name} is not a service type here. {hint}")
         return found
 
-    def text(self, kind: MessageType | ServiceType) -> str:
+    def text(self, type: MessageType | ServiceType) -> str:
         """Return a type's definition with all that it needs, as connection headers carry it."""
-        known = self._texts.get(kind)
+        known = self._texts.get(type)
         if known is None:
-            known = self._texts[kind] = full_text(kind.definition)
+            known = self._texts[type] = full_text(type.definition)
         return known
 
     def _known(self, full: str, md5: str) -> MessageType | None:

@@ -388,11 +388,11 @@ class PublicationWriter(Writer):
         return (number, memoryview(parts[0])[_uint32.size :], *parts[1:])
 
 
-def definition_text(types: Any, kind: MessageType) -> str:
+def definition_text(types: Any, message_type: MessageType) -> str:
     """Return a type's full definition; that of an opaque type as it was received."""
     from rosglass.messages import OpaqueType  # noqa: PLC0415 - numpy
 
-    return kind.text if isinstance(kind, OpaqueType) else types.text(kind)
+    return message_type.text if isinstance(message_type, OpaqueType) else types.text(message_type)
 
 
 def _has_header(type: MessageType) -> bool:

@@ -215,7 +215,7 @@ class TcprosRequester(ServiceRequester):
     def _advance(self) -> None:
         """Send queued requests, in order, if there is a server."""
         while self._queue and not self._closed:
-            kind, location = self.type, None
+            service_type, location = self.type, None
             link = self._free_link() if self._persistent else None
             if link is None:
                 if len(self._links) >= (1 if self._persistent else _MAX_LINKS):
@@ -223,7 +223,7 @@ class TcprosRequester(ServiceRequester):
                 location = self._finder.current()
                 if location is None:
                     return
-            if kind is None:
+            if service_type is None:
                 return  # it is being requested from the server
             with self._lock:
                 if not self._queue or (link is not None and link.request is not None):
@@ -233,7 +233,7 @@ class TcprosRequester(ServiceRequester):
                 route.began = time.monotonic()
                 if link is not None:
                     link.request, route.link = pending, link
-            error = self._prepare(pending, kind)
+            error = self._prepare(pending, service_type)
             if error is not None or pending.call.done():
                 if link is not None:
                     link.request = route.link = None
@@ -242,11 +242,15 @@ class TcprosRequester(ServiceRequester):
             elif link is not None:
                 self._send(link, pending)
             elif location is not None:
-                self._dial(kind, location, pending)
+                self._dial(service_type, location, pending)
 
-    def _dial(self, kind: ServiceType, location: ServiceLocation, pending: PendingCall) -> None:
+    def _dial(
+        self, service_type: ServiceType, location: ServiceLocation, pending: PendingCall
+    ) -> None:
         try:
-            link = ServiceLink(self._core, self._name, kind, location, self._persistent, self)
+            link = ServiceLink(
+                self._core, self._name, service_type, location, self._persistent, self
+            )
         except OSError as error:  # no more sockets, or an address family without support
             self._put_back(pending)
             self._finder.fail(location, error.strerror or str(error))
@@ -266,13 +270,13 @@ class TcprosRequester(ServiceRequester):
                 return link
         return None
 
-    def _fits(self, link: ServiceLink, kind: ServiceType | None) -> bool:
+    def _fits(self, link: ServiceLink, service_type: ServiceType | None) -> bool:
         """Return whether a connection has this type and leads to the current server."""
-        return link.kind is kind and self._finder.location in (None, link.location)
+        return link.type is service_type and self._finder.location in (None, link.location)
 
-    def _prepare(self, pending: PendingCall, kind: ServiceType) -> Error | None:
+    def _prepare(self, pending: PendingCall, service_type: ServiceType) -> Error | None:
         try:
-            pending.encode(kind)
+            pending.encode(service_type)
         except Error as error:
             return error
         except Exception as error:
@@ -282,7 +286,7 @@ class TcprosRequester(ServiceRequester):
 
     def _send(self, link: ServiceLink, pending: PendingCall) -> None:
         pending.sent = time.monotonic()
-        link.send(pending.encode(link.kind))
+        link.send(pending.encode(link.type))
 
     def _put_back(self, pending: PendingCall) -> None:
         """Queue a request again that could not be sent, in its order."""
@@ -300,7 +304,7 @@ class TcprosRequester(ServiceRequester):
         pending = link.request
         if pending is None or pending.call.done():
             link.end("")
-        elif peer.md5 not in (ANY, link.kind.md5):
+        elif peer.md5 not in (ANY, link.type.md5):
             link.refusal = self._finder.mismatch() or f"it has md5 {peer.md5}"
             link.end(link.refusal)
         else:
@@ -367,7 +371,7 @@ class TcprosRequester(ServiceRequester):
         def fail(peer: ServerInfo | None, _: str = "") -> None:
             if peer is not None:
                 self._finder.on_server_header(peer)
-            called = f"it was called as {link.kind.name} with md5 {link.kind.md5}"
+            called = f"it was called as {link.type.name} with md5 {link.type.md5}"
             why = self._finder.mismatch() or f"{called}: {link.refusal}"
             refused = f"{link.location.uri} refuses the call of {self._name}: {why}"
             self._on_reply(pending.number, None, ServiceError(refused))
@@ -427,7 +431,7 @@ class ServiceLink:
     Args:
         core: The node.
         name: Absolute service name.
-        kind: The service type.
+        service_type: The service type.
         location: The server's location.
         persistent: Whether to request a persistent connection.
         owner: Handles its events.
@@ -436,7 +440,7 @@ class ServiceLink:
         OSError: The system has no more sockets.
 
     Attributes:
-        kind: The service type.
+        type: The service type.
         location: The server's location.
         peer: What the server announces; None until its header is received.
         refusal: Why the server refuses the connection; empty if it does not.
@@ -449,12 +453,12 @@ class ServiceLink:
         self,
         core: TcprosCore,
         name: str,
-        kind: ServiceType,
+        service_type: ServiceType,
         location: ServiceLocation,
         persistent: bool,
         owner: TcprosRequester,
     ) -> None:
-        self.kind, self.location, self.persistent = kind, location, persistent
+        self.type, self.location, self.persistent = service_type, location, persistent
         self.peer: ServerInfo | None = None
         self.refusal = ""
         self.request: PendingCall | None = None
@@ -462,9 +466,9 @@ class ServiceLink:
         self._owner = owner
         header = {
             "callerid": core.name.full,
-            "md5sum": kind.md5,
+            "md5sum": service_type.md5,
             "service": name,
-            "type": ros1_name(kind.name),
+            "type": ros1_name(service_type.name),
         }
         if persistent:
             header["persistent"] = "1"
@@ -602,9 +606,9 @@ class ServiceFinder:
         known = self._core.graph.services()
         if self.name in known:
             return f"{' and '.join(known[self.name])} offers it, and its type is being requested"
-        kind = "" if self.type is None else f" [{self.type.name}]"
+        suffix = "" if self.type is None else f" [{self.type.name}]"
         return (
-            f"no server offers {self.name}{kind} on {self._core.url} ({self._core.status()})"
+            f"no server offers {self.name}{suffix} on {self._core.url} ({self._core.status()})"
             f"{similar(self.name, known)}"
         )
 
@@ -708,19 +712,19 @@ class ServiceFinder:
 
     def _learn(self, peer: ServerInfo) -> None:
         """Find the server's definition; on a thread that may wait."""
-        kind, fault = None, ""
+        service_type, fault = None, ""
         try:
-            kind = self._core.types.announced_service(peer.type, peer.md5)
+            service_type = self._core.types.announced_service(peer.type, peer.md5)
         except Error as error:
             fault = f"{peer.node} offers it as {peer.type or 'an unknown type'}: {error}"
-        self._core.loop.call(lambda: self._learned(peer, kind, fault))
+        self._core.loop.call(lambda: self._learned(peer, service_type, fault))
 
-    def _learned(self, peer: ServerInfo, kind: ServiceType | None, fault: str) -> None:
+    def _learned(self, peer: ServerInfo, service_type: ServiceType | None, fault: str) -> None:
         if self._closed or self._tried != (peer.type, peer.md5):
             return
-        same_name = self.type is None or kind is None or kind.name == self.type.name
-        if kind is not None and (self._discovers or same_name):
-            self.type = kind
+        same_name = self.type is None or service_type is None or service_type.name == self.type.name
+        if service_type is not None and (self._discovers or same_name):
+            self.type = service_type
         self._type_fault = fault
         self._owner.on_server_changed()
         self._owner.on_server_found(moved=False)

@@ -360,39 +360,39 @@ class TypeNegotiation(TopicMatching, Reader):
         """Find the type that a publisher announces; on a thread that may wait."""
         name, md5 = header["type"], header["md5sum"]
         text = header.get("message_definition", "")
-        kind: MessageType | None = None
+        message_type: MessageType | None = None
         reason = ""
         try:
-            kind = self._core.types.learn(name, md5, text)
+            message_type = self._core.types.learn(name, md5, text)
         except (TypeNotFoundError, DefinitionError, InvalidNameError) as error:
             reason = str(error)
             if not self.feed.decodes:
-                kind = _opaque(name, md5, text, reason)
+                message_type = _opaque(name, md5, text, reason)
 
         def decide() -> None:
             if link.header is header:  # still the same connection
-                self._decide(link, kind, reason)
+                self._decide(link, message_type, reason)
             decided()
 
         self._core.loop.call(decide)
 
-    def _decide(self, link: PublisherLink, kind: MessageType | None, reason: str) -> None:
+    def _decide(self, link: PublisherLink, message_type: MessageType | None, reason: str) -> None:
         current = self.feed.type
-        if kind is None:
+        if message_type is None:
             self._refused[link] = reason
             return
         if self._fixed is None and (current is None or not self._accepted):
-            self.feed.set_type(kind)
-        elif self._fixed is None and current is not None and kind.name != current.name:
+            self.feed.set_type(message_type)
+        elif self._fixed is None and current is not None and message_type.name != current.name:
             self._refused[link] = (
-                f"{link.name} publishes {self.topic.topic} as {kind.name}, others as "
+                f"{link.name} publishes {self.topic.topic} as {message_type.name}, others as "
                 f"{current.name}: nothing is received from it; choose one, e.g. "
-                f"create_subscription({self.topic.topic!r}, {ros1_name(kind.name)!r})"
+                f"create_subscription({self.topic.topic!r}, {ros1_name(message_type.name)!r})"
             )
             return
         if reason:
             self._remarks[link] = f"{reason}: its messages are received as bytes"
-        self._accepted[link] = (kind, link.name.encode())
+        self._accepted[link] = (message_type, link.name.encode())
 
     def on_publisher_disconnected(self, link: PublisherLink) -> None:
         """Remove a publisher."""
@@ -408,20 +408,20 @@ class TypeNegotiation(TopicMatching, Reader):
         """Hand on messages; in the loop's thread, or one that drains the sockets."""
         known = self._accepted.get(link)
         if known is not None:
-            kind, who = known
+            message_type, gid = known
             # Three times as fast as Sample(...).
             make = tuple.__new__
             if len(frames) == 1:
-                sample = make(Sample, (frames[0], "ros1", kind, received, None, who, -1))
+                sample = make(Sample, (frames[0], "ros1", message_type, received, None, gid, -1))
                 self.feed.deliver(sample)
                 return
             given = zip(
                 frames,
                 repeat("ros1"),
-                repeat(kind),
+                repeat(message_type),
                 repeat(received),
                 repeat(None),
-                repeat(who),
+                repeat(gid),
                 repeat(-1),
                 strict=False,
             )
@@ -481,13 +481,13 @@ class TypeNegotiation(TopicMatching, Reader):
         """Return the connected publishers whose types are accepted."""
         return [self._endpoint(link, *accepted) for link, accepted in self._accepted.copy().items()]
 
-    def _endpoint(self, link: PublisherLink, kind: MessageType, gid: bytes) -> EndpointInfo:
+    def _endpoint(self, link: PublisherLink, message_type: MessageType, gid: bytes) -> EndpointInfo:
         return EndpointInfo(
             _PUBLISHER,
             self.topic.topic,
-            kind.name,
+            message_type.name,
             NodeName(*split(link.name)),
-            type_hash=link.header.get("md5sum", kind.md5),
+            type_hash=link.header.get("md5sum", message_type.md5),
             gid=gid,
         )
 

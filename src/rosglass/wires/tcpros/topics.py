@@ -93,8 +93,8 @@ class Topics:
             shared = self._subscribed.get(topic)
             new = shared is None
             if shared is None:
-                kind = subscription.type
-                name = ANY if kind is None else ros1_name(kind.name)
+                message_type = subscription.type
+                name = ANY if message_type is None else ros1_name(message_type.name)
                 name = ros1_name(type_name) if type_name else name
                 shared = self._subscribed[topic] = TopicSubscription(self._core, self, topic, name)
             matching = TypeNegotiation(
