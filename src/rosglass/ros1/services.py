@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -142,7 +141,8 @@ class ServiceTypes(Member):
         self._failed: dict[str, float] = {}
         #: Services whose types users have asked for.
         self._wanted: set[str] = set()
-        self._queue: deque[str] = deque()
+        #: Services whose servers are to be probed, in order.
+        self._queue: dict[str, None] = {}
         self._probed: set[str] = set()
         self._news = 0
         self._following = self._closed = False
@@ -201,12 +201,13 @@ class ServiceTypes(Member):
     def _enqueue(self, name: str) -> None:
         recent = time.monotonic() - self._failed.get(name, -_RETRY_S) < _RETRY_S
         if not (recent or name in self._probed or name in self._queue):
-            self._queue.append(name)
+            self._queue[name] = None
             self._advance()
 
     def _advance(self) -> None:
         while self._queue and len(self._probed) < _MAX_PROBES and not self._closed:
-            name = self._queue.popleft()
+            name = next(iter(self._queue))
+            del self._queue[name]
             self._probed.add(name)
             self._core.lookups.run(lambda name=name: self._locate(name))  # type: ignore[misc]
 

@@ -10,6 +10,7 @@ import selectors
 import socket
 import threading
 import time
+import weakref
 from collections import deque
 from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
@@ -74,6 +75,8 @@ class IoLoop:
         self._wake_in, self._wake_out = socket.socketpair()
         for end in (self._wake_in, self._wake_out):
             end.setblocking(False)
+            # Not by the loop: a thread in call() may be about to write to it.
+            weakref.finalize(self, end.close)
         self._selector.register(self._wake_out, READ, None)
         self._awake = False
         self._closed = False
@@ -204,7 +207,6 @@ class IoLoop:
             self._run_job(lambda handler=handler: handler.end(""))  # type: ignore[misc]
         for selector in selectors:
             selector.close()
-        # The wake-up sockets are left to the garbage collector: a thread in call() may have one.
 
     def _on_wake(self) -> None:
         with suppress(OSError):
