@@ -406,7 +406,7 @@ def test_a_server_killed_in_mid_goal_loses_it(which, request, connect, name):
 @BOTH
 def test_a_server_that_hangs_loses_its_goals(which, request, connect, name, monkeypatch):
     monkeypatch.setattr("rosglass.ros1.actionlib_client._SILENCE_S", 1.0)
-    monkeypatch.setattr("rosglass.ros1.actionlib_client._ANSWER_S", 1.0)
+    monkeypatch.setattr("rosglass.ros1.actionlib_client._ANSWER_TIMEOUT_S", 1.0)
     peer = request.getfixturevalue(f"start_{which}")(f"{which}_frozen_{next(numbers)}")
     peer.call("action_server", name=name)
     client = connect("us").create_action_client(name, TYPE)

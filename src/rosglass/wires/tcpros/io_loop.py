@@ -10,7 +10,6 @@ import selectors
 import socket
 import threading
 import time
-import weakref
 from collections import deque
 from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
@@ -75,8 +74,6 @@ class IoLoop:
         self._wake_in, self._wake_out = socket.socketpair()
         for end in (self._wake_in, self._wake_out):
             end.setblocking(False)
-            # Not by the loop: a thread in call() may be about to write to it.
-            weakref.finalize(self, end.close)
         self._selector.register(self._wake_out, READ, None)
         self._awake = False
         self._closed = False
@@ -100,8 +97,9 @@ class IoLoop:
     def call(self, job: Callable[[], None]) -> None:
         """Run `job` in the loop's thread soon; dropped when the loop has ended."""
         self._jobs.append(job)
-        # Without a lock: at worst two threads wake the loop at once. See _on_wake().
-        if not self._awake:
+        # Without a lock: at worst two threads wake the loop at once; see _on_wake(). A closed loop
+        # needs no waking, and closes the socket.
+        if not (self._awake or self._closed):
             self._awake = True
             with suppress(OSError):
                 self._wake_in.send(b"\0")
@@ -207,6 +205,8 @@ class IoLoop:
             self._run_job(lambda handler=handler: handler.end(""))  # type: ignore[misc]
         for selector in selectors:
             selector.close()
+        self._wake_in.close()
+        self._wake_out.close()
 
     def _on_wake(self) -> None:
         with suppress(OSError):
