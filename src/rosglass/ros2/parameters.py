@@ -655,18 +655,8 @@ SERVICES = {
     "set_parameters": "rcl_interfaces/srv/SetParameters",
     "set_parameters_atomically": "rcl_interfaces/srv/SetParametersAtomically",
 }
-#: A ``ParameterValue``'s field by its type.
-_FIELDS = {
-    ParameterType.BOOL: "bool_value",
-    ParameterType.INTEGER: "integer_value",
-    ParameterType.DOUBLE: "double_value",
-    ParameterType.STRING: "string_value",
-    ParameterType.BYTE_ARRAY: "byte_array_value",
-    ParameterType.BOOL_ARRAY: "bool_array_value",
-    ParameterType.INTEGER_ARRAY: "integer_array_value",
-    ParameterType.DOUBLE_ARRAY: "double_array_value",
-    ParameterType.STRING_ARRAY: "string_array_value",
-}
+#: The fields of a ``ParameterValue``, such as ``bool_value``, by its type.
+_FIELDS = {kind: f"{kind.name.lower()}_value" for kind in ParameterType if kind}
 
 
 class ParameterServices(Handle):
@@ -955,12 +945,10 @@ def descriptor_to_message(descriptor: ParameterDescriptor) -> dict[str, Any]:
     }
     if descriptor.range is not None:
         low, high, step = descriptor.range
-        if descriptor.type is ParameterType.INTEGER:
-            limits = {"from_value": int(low), "to_value": int(high), "step": int(step)}
-            fields["integer_range"] = [limits]
-        else:
-            limits = {"from_value": float(low), "to_value": float(high), "step": float(step)}  # type: ignore[dict-item]
-            fields["floating_point_range"] = [limits]
+        integer = descriptor.type is ParameterType.INTEGER
+        number, field = (int, "integer_range") if integer else (float, "floating_point_range")
+        limits = {"from_value": number(low), "to_value": number(high), "step": number(step)}
+        fields[field] = [limits]
     return fields
 
 

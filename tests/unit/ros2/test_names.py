@@ -78,7 +78,7 @@ def test_good_node_names(name):
     ("name", "told"),
     [
         ("", "must not be empty"),
-        (None, "must be a text"),
+        (None, "must be a string"),
         ("a/b", "contains '/' at position 1"),
         ("my node", "contains ' '"),
         ("1a", "starts with a digit"),
@@ -100,7 +100,7 @@ def test_good_namespaces(namespace):
     [
         ("", "write '/'"),
         ("arm", "write '/arm'"),
-        (None, "must be a text"),
+        (None, "must be a string"),
         ("/arm/", "ends with '/'"),
         ("/a//b", "'//' at position 2"),
         ("/a b", "contains ' '"),
