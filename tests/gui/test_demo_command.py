@@ -159,7 +159,7 @@ def test_without_xvfb_it_says_what_to_install(tmp_path: Path, url: str) -> None:
     [
         (["--seconds", "0"], "--seconds"),
         (["--screenshot", "nowhere/demo.png"], "no such directory"),
-        (["--url", "ros1://robot:11311"], "ros1"),
+        (["--url", "ros1://robot:11311"], "expected dds:// or zenoh://"),
     ],
 )
 def test_bad_options_are_explained(tmp_path: Path, arguments: list[str], named: str) -> None:

@@ -58,6 +58,8 @@ def run(args: argparse.Namespace) -> int:
     """Run the demo; returns 1 when camera or odometry never arrived."""
     if args.seconds is not None and not 1 <= args.seconds <= 86400:
         raise Error(f"--seconds {args.seconds:g}: expected 1 to 86400")
+    if not args.url.lower().startswith(("dds:", "zenoh:")):
+        raise Error(f"--url {args.url}: expected dds:// or zenoh://HOST:PORT")
     # Qt reads this when it is loaded; its media backends report every library they miss.
     rules = [_QUIET, os.environ.get("QT_LOGGING_RULES", "")]
     os.environ["QT_LOGGING_RULES"] = ";".join(filter(None, rules))
