@@ -265,7 +265,7 @@ def test_rate_and_latency_are_not_rounded(running: Any, camera: Any, wait: Any) 
             camera.publish(picture())
             sent.append(time.monotonic())
             due += 1 / 33.3
-            time.sleep(max(0.0, due - time.monotonic()))
+            stop.wait(max(0.0, due - time.monotonic()))
 
     thread = threading.Thread(target=film)
     thread.start()

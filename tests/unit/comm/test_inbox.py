@@ -245,12 +245,16 @@ def test_a_task_that_was_cancelled_leaves_nothing_behind():
 def test_several_threads_wait_and_each_sample_goes_to_one_of_them():
     sub = subscription()
     taken = []
-    threads = [
-        threading.Thread(target=lambda: taken.append(sub.wait(30).sequence)) for _ in range(4)
-    ]
+    begun = threading.Barrier(5)
+
+    def take():
+        begun.wait(30)
+        taken.append(sub.wait(30).sequence)
+
+    threads = [threading.Thread(target=take) for _ in range(4)]
     for thread in threads:
         thread.start()
-    time.sleep(0.02)
+    begun.wait(30)
     for number in range(4):
         deliver(sub, sample(sequence=number))
     for thread in threads:
