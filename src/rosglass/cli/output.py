@@ -107,7 +107,7 @@ def note(text: str) -> None:
 
 def print_json(value: object) -> None:
     """Print a value as strict JSON on several lines; bytes become a list of numbers."""
-    from rosglass.messages.text import finite
+    from rosglass.messages.message import finite
 
     print(json.dumps(finite(value), indent=2, ensure_ascii=False, default=list), flush=True)
 
@@ -134,7 +134,7 @@ def fields(value: Any, limit: int | None = SHOWN) -> Any:
         limit: Elements of an array to keep; None for all. A longer one becomes its first
             elements and a text that says how many there are.
     """
-    from rosglass.messages.text import plain
+    from rosglass.messages.message import plain
 
     if hasattr(value, "_schema__"):
         value = value.to_dict()
@@ -173,7 +173,7 @@ def to_yaml(value: object) -> str:
 
 def to_json(value: object) -> str:
     """Return what :func:`fields` returned as strict JSON, in one line."""
-    from rosglass.messages.text import finite
+    from rosglass.messages.message import finite
 
     return json.dumps(finite(value), ensure_ascii=False, allow_nan=False)
 
@@ -189,7 +189,7 @@ def table(rows: Iterable[Sequence[str]], indent: str = "") -> list[str]:
 
 
 def _cut(value: Any, limit: int) -> Any:
-    from rosglass.messages.text import plain
+    from rosglass.messages.message import plain
 
     if hasattr(value, "_schema__"):
         value = value.to_dict()

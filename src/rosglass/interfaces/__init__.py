@@ -1,4 +1,4 @@
-"""What a type is: interface definitions, where they come from, and their hashes."""
+"""Interface definitions, the library that finds them, and their hashes."""
 
 from __future__ import annotations
 
@@ -16,24 +16,33 @@ from rosglass.interfaces.definition import (
     Value,
 )
 from rosglass.interfaces.derived import service_event
-from rosglass.interfaces.distributions import DISTRIBUTIONS, Distributions
-from rosglass.interfaces.folders import Folders, workspace
 from rosglass.interfaces.hashes import announced_hashes, full_text, md5, rihs01, type_description
 from rosglass.interfaces.idl import parse_idl
 from rosglass.interfaces.library import Library
-from rosglass.interfaces.literals import INTEGER_RANGES
 from rosglass.interfaces.names import adding_definitions, join_name, ros1_name, split_name
 from rosglass.interfaces.parser import (
+    INTEGER_RANGES,
     PRIMITIVES,
     parse,
     parse_action,
     parse_message,
     parse_service,
 )
-from rosglass.interfaces.provider import MemoryProvider, Provider
-from rosglass.interfaces.type_cache import TypeCache, cache_folder
-from rosglass.interfaces.type_descriptions import parse_type_description
-from rosglass.interfaces.type_sources import add_type_sources, type_sources
+from rosglass.interfaces.provider import (
+    DISTRIBUTIONS,
+    Distributions,
+    Folders,
+    MemoryProvider,
+    Provider,
+    workspace,
+)
+from rosglass.interfaces.type_descriptions import (
+    TypeCache,
+    add_type_sources,
+    cache_folder,
+    parse_type_description,
+    type_sources,
+)
 
 __all__ = [
     "DISTRIBUTIONS",

@@ -1,4 +1,4 @@
-"""The same type in the other ROS: names, fields, times; what is lost and what is added.
+"""Corresponding types of ROS 1 and ROS 2: names, fields, times, and what is lost or added.
 
 What differs (ROS 2 design article "Mapping between ROS interface types and DDS", the migration
 guide, and ros1_bridge's rules): ``time`` and ``duration`` are messages in ROS 2, its ``Header`` has
@@ -68,7 +68,7 @@ _FILLER = "structure_needs_at_least_one_member"
 
 @dataclass(frozen=True, slots=True)
 class PairedField:
-    """A field of ROS 1 and its place in ROS 2.
+    """A field in ROS 1 and the corresponding one in ROS 2.
 
     Attributes:
         one: Path of attributes in ROS 1's message, mostly of one name.
@@ -87,7 +87,7 @@ class PairedField:
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """A message of ROS 1 and what it is in ROS 2.
+    """A message type of ROS 1 and the corresponding one of ROS 2.
 
     Attributes:
         one: ROS 1's definition.
@@ -111,7 +111,7 @@ class Pair:
     has_seq: bool = False
 
     def lost(self, ros: int, prefix: str = "") -> Iterator[str]:
-        """Yield the paths of fields that ROS `ros` has and the other has not."""
+        """Yield the paths of fields that only ROS `ros` has."""
         for name in self.only_one if ros == 1 else self.only_two:
             yield prefix + name
         for field in self.fields:
@@ -122,12 +122,12 @@ class Pair:
                 yield from field.inner.lost(ros, f"{prefix}{path}{many}.")
 
 
-#: Pairs by the identities of both definitions, which are kept with them.
+#: Pairs by the ids of both definitions, which the pairs keep alive.
 _Pairs = dict[tuple[int, int], tuple[Definition, Definition, "Pair | None"]]
 
 
 class Counterparts:
-    """Finds the type that a type is in the other ROS, or derives it.
+    """Finds or derives the corresponding type of the other ROS.
 
     Args:
         library: Where the other ROS's types are looked up.
@@ -135,7 +135,7 @@ class Counterparts:
 
     def __init__(self, library: Library) -> None:
         self._library = library
-        #: Nested types are looked up, derived and compared once, however often they occur.
+        #: Caches for nested types, each of which is looked up, derived and compared once.
         self._found: dict[int, tuple[Definition, Pair]] = {}
         self._pairs: _Pairs = {}
 
@@ -187,10 +187,10 @@ class Counterparts:
         ros = 3 - source.ros
         joint = "_" if ros == 2 else ""
         asked = replace(self._derived(source.request), name=f"{source.name}{joint}Request")
-        told = replace(self._derived(source.response), name=f"{source.name}{joint}Response")
-        text = f"{asked.text}---\n{told.text}"
-        found = ServiceDefinition(source.name, ros, asked, told, text, asked.source)
-        first, second = self._match(source.request, asked), self._match(source.response, told)
+        reply = replace(self._derived(source.response), name=f"{source.name}{joint}Response")
+        text = f"{asked.text}---\n{reply.text}"
+        found = ServiceDefinition(source.name, ros, asked, reply, text, asked.source)
+        first, second = self._match(source.request, asked), self._match(source.response, reply)
         assert first is not None
         assert second is not None
         return found, first, second
@@ -232,7 +232,7 @@ class Counterparts:
                 yield self._library.definition(other, ros=3 - ros)
 
     def _derived(self, source: Definition) -> Definition:
-        """Return the definition in the other ROS's words."""
+        """Derive the definition for the other ROS."""
         ros = 3 - source.ros
         nested: dict[str, Definition] = {}
         fields = []
@@ -388,7 +388,7 @@ def _left_out(owner: Definition, field: Field) -> bool:
 
 
 def _legal(name: str) -> str:
-    """Return a field's name as ROS 2 allows it."""
+    """Convert a field's name to one that is valid in ROS 2."""
     return re.sub("__+", "_", name.lower()).strip("_")
 
 
@@ -398,7 +398,7 @@ def _name_in(name: str, theirs: Iterable[str]) -> str:
 
 
 def _names(name: str, ros: int) -> Iterator[str]:
-    """Yield what a type may be called in the other ROS, the likeliest first."""
+    """Yield possible names of a type in the other ROS, the most likely first."""
     package, _, rest = name.partition("/")
     if ros == 1:
         if name in RENAMED:
@@ -417,7 +417,7 @@ def _names(name: str, ros: int) -> Iterator[str]:
 
 
 def _constant(constant: Constant, ros: int) -> Constant:
-    """Return a constant as the other ROS writes it."""
+    """Convert a constant to the other ROS."""
     value = constant.value
     if ros == 1:
         kind = _PRIMITIVES_BACK.get(constant.type, constant.type)

@@ -1,7 +1,7 @@
-"""What a type is: the parsed form of a ``.msg``, ``.srv``, ``.action`` or ``.idl`` definition.
+"""The parsed form of ``.msg``, ``.srv``, ``.action`` and ``.idl`` definitions.
 
 All classes are frozen. Names are always full and in ROS 2's spelling (``pkg/msg/Type``), for
-ROS 1 too; the world a definition belongs to is :attr:`Definition.ros`.
+ROS 1 too; the ROS version of a definition is :attr:`Definition.ros`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Value = bool | int | float | str | tuple[bool | int | float | str, ...]
 
 
 class ArrayKind(Enum):
-    """How many elements a field holds."""
+    """The array kind of a field."""
 
     NONE = "single value"
     FIXED = "fixed array"
@@ -118,7 +118,7 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where a definition came from.
+    """The origin of a definition.
 
     Attributes:
         provider: Name of the provider, e.g. ``rosbags jazzy``, ``workspace /opt/ros/jazzy``,
@@ -156,7 +156,7 @@ class Definition:
     comment: str = ""
 
     def constant(self, name: str) -> Constant:
-        """Return the constant called `name`; raises KeyError with the known names."""
+        """Return the constant `name`; raises KeyError with the known names."""
         for candidate in self.constants:
             if candidate.name == name:
                 return candidate

@@ -84,7 +84,7 @@ def derived_from(name: str, ros: int) -> Iterator[tuple[str, str]]:
 
 
 def derive(owner: InterfaceDefinition, suffix: str) -> InterfaceDefinition | None:
-    """Return the type called `owner`'s name plus `suffix`, None when there is no such type."""
+    """Return the type of `owner` with the name suffix `suffix`; None if there is no such type."""
     if isinstance(owner, ServiceDefinition):
         return _of_service(owner, suffix)
     if isinstance(owner, ActionDefinition):

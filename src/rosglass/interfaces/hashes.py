@@ -1,4 +1,4 @@
-"""md5 sums (ROS 1) and RIHS01 hashes (ROS 2) that peers compare before they talk to each other.
+"""md5 sums (ROS 1) and RIHS01 hashes (ROS 2), by which peers compare types.
 
 md5: ``genmsg/gentools.py``. RIHS01: REP 2016 and ``rosidl_generator_type_description``: the SHA-256
 of the type description as JSON, without default values.
@@ -66,7 +66,7 @@ class NoSuchHashError(UnsupportedError, AttributeError):
 
 
 def check_definition(value: object) -> None:
-    """Raise UnsupportedError when `value` is no definition, such as a type's name."""
+    """Raise UnsupportedError if `value` is not a definition, but for example a type's name."""
     if not isinstance(value, (Definition, ServiceDefinition, ActionDefinition)):
         raise UnsupportedError(
             f"a definition is expected, as Library.definition(name) returns it, not {value!r:.80}"
@@ -146,7 +146,7 @@ def rihs01(definition: InterfaceDefinition) -> str:
 
 
 def announced_hashes(definition: InterfaceDefinition) -> tuple[str, ...]:
-    """Return the hashes by which peers announce a type, its own first.
+    """Return the hashes that peers may announce for a type, its own first.
 
     For a service, ROS 2 nodes over Zenoh announce the service's own hash. Those over DDS announce
     that of its request (and, with replies, of its response): rmw_fastrtps's ``rmw_service.cpp``.
@@ -284,7 +284,7 @@ def _nested(owner: Definition, field: Field, nested: Mapping[str, Definition]) -
 
 
 def full_text(definition: InterfaceDefinition) -> str:
-    """Return the definition with those it needs appended, as ROS 1 connection headers carry it.
+    """Return the definition followed by those that it uses, as in ROS 1 connection headers.
 
     Raises:
         UnsupportedError: `definition` is no definition.

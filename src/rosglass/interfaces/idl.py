@@ -1,4 +1,4 @@
-"""The parser of ``.idl`` definitions: what rosidl takes and writes of OMG IDL 4.2.
+"""The parser of ``.idl`` definitions, for the subset of OMG IDL 4.2 that rosidl supports.
 
 Grammar: https://www.omg.org/spec/IDL/4.2 and
 https://design.ros2.org/articles/idl_interface_definition.html. Written here because the parser in
@@ -14,7 +14,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.errors import DefinitionError
-from rosglass.interfaces.comments import clean_comment
 from rosglass.interfaces.definition import (
     ActionDefinition,
     ArrayKind,
@@ -25,9 +24,15 @@ from rosglass.interfaces.definition import (
     ServiceDefinition,
     Source,
 )
-from rosglass.interfaces.literals import LiteralError, parse_constant, parse_default, unescape
 from rosglass.interfaces.names import check_package_name, check_type_name, join_name
-from rosglass.interfaces.parser import MAX_TEXT
+from rosglass.interfaces.parser import (
+    MAX_TEXT,
+    LiteralError,
+    clean_comment,
+    parse_constant,
+    parse_default,
+    unescape,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -65,7 +70,7 @@ class Token(NamedTuple):
 
 
 class Lexer:
-    """Hands out the tokens of a text, one after the other.
+    """Splits a text into tokens.
 
     Args:
         text: The IDL.
@@ -100,17 +105,17 @@ class Lexer:
         yield Token("end", "end of file", end)
 
     def place(self, token: Token) -> tuple[int, int]:
-        """Return the line and column of a token, from 1."""
+        """Return the line and column of a token, both from 1."""
         line = bisect_right(self._lines, token.offset)
         return line, token.offset - self._lines[line - 1] + 1
 
     def error(self, message: str, token: Token) -> DefinitionError:
-        """Return the error to raise for a token."""
+        """Create the error for a token."""
         return DefinitionError(message, self.file, *self.place(token))
 
     @property
     def token(self) -> Token:
-        """The token that comes next."""
+        """The next token."""
         return self._tokens[self._next]
 
     def take(self, expected: str = "", kind: str = "") -> Token:
@@ -127,14 +132,14 @@ class Lexer:
         return token
 
     def accept(self, text: str) -> bool:
-        """Skip the next token if it is `text`; returns whether it was."""
+        """Consume the next token if it is `text`; return whether it was."""
         if self.token.text != text or self.token.kind in ("string", "char"):
             return False
         self._next += 1
         return True
 
     def strings(self) -> str:
-        """Take adjacent string literals and return their joined value."""
+        """Consume adjacent string literals and return their joined value."""
         parts = []
         while self.token.kind == "string":
             token = self.take()
@@ -168,7 +173,7 @@ _UNSUPPORTED = frozenset(
     {"any", "bitmask", "bitset", "component", "exception", "fixed", "import", "interface", "map"}
     | {"native", "Object", "union", "valuetype", "wchar"}
 )
-#: Annotations that change how a struct is put on the wire, in ways ROS 2 does not use.
+#: Annotations that change the wire format of a struct, which ROS 2 does not support.
 _WIRE_ANNOTATIONS = frozenset(("mutable", "optional"))
 
 _Literal = bool | int | float | str
@@ -233,7 +238,7 @@ def parse_idl(
 
 
 class _Parser:
-    """Reads one file; scoped names are tuples of their parts."""
+    """Parses a file; scoped names are tuples of their parts."""
 
     def __init__(self, lexer: Lexer) -> None:
         self._lexer = lexer
@@ -335,7 +340,7 @@ class _Parser:
         self._lexer.take(";")
 
     def _declarator(self, base: FieldType) -> FieldType:
-        """Apply ``[n]`` after a name."""
+        """Parse ``[n]`` after a name."""
         opening = self._lexer.token
         if not self._lexer.accept("["):
             return base
@@ -464,7 +469,7 @@ class _Parser:
         return value
 
     def _literal(self) -> _Literal:
-        """Take a literal, with a sign if need be, or the name of a constant."""
+        """Parse a literal with an optional sign, or the name of a constant."""
         token = self._lexer.token
         if token.kind == "string":
             return self._lexer.strings()
@@ -530,7 +535,7 @@ class _Parser:
         return _Annotations(clean_comment(comments), unit, default)
 
     def _parameters(self) -> dict[str, tuple[_Literal, Token]]:
-        """Take ``(name=value, ...)`` or ``(value)``, if there is one."""
+        """Parse ``(name=value, ...)`` or ``(value)``, if present."""
         values: dict[str, tuple[_Literal, Token]] = {}
         if not self._lexer.accept("("):
             return values

@@ -1,4 +1,4 @@
-"""The library: looks definitions up in a chain of providers and remembers them."""
+"""The library, which finds definitions in a chain of providers and caches them."""
 
 from __future__ import annotations
 
@@ -15,13 +15,19 @@ from rosglass.errors import (
 )
 from rosglass.interfaces.definition import Definition, ServiceDefinition, parts_of
 from rosglass.interfaces.derived import compose, derive, derived_from
-from rosglass.interfaces.distributions import Distributions
-from rosglass.interfaces.folders import Folders, workspace, workspace_variables
 from rosglass.interfaces.hashes import announced_hashes, check_definition, md5, rihs01
 from rosglass.interfaces.idl import parse_idl
 from rosglass.interfaces.names import KINDS, adding_definitions, join_name, ros1_name, split_name
 from rosglass.interfaces.parser import parse
-from rosglass.interfaces.provider import MemoryProvider, Provider, difference
+from rosglass.interfaces.provider import (
+    Distributions,
+    Folders,
+    MemoryProvider,
+    Provider,
+    difference,
+    workspace,
+    workspace_variables,
+)
 from rosglass.interfaces.resolver import Resolver
 
 if TYPE_CHECKING:
@@ -34,7 +40,7 @@ __all__ = ["Library"]
 
 
 class Versions:
-    """Complete ROS 2 definitions, each under its name and RIHS01 hash.
+    """Resolved ROS 2 definitions by name and RIHS01 hash.
 
     Versions of a type exist side by side: the hash that a peer announces says which one it means.
     The library's lock guards all methods.
@@ -68,7 +74,7 @@ class Versions:
         return type_hash
 
     def find(self, name: str, wanted: str = "") -> InterfaceDefinition | None:
-        """Return a version of a type, or of one that a known service or action implies.
+        """Return a version of a type, or of a type derived from a known service or action.
 
         Args:
             name: Full type name.
@@ -121,10 +127,10 @@ class Versions:
 # ruff: noqa: PTH100, PTH111, PTH112
 
 
-#: ROS 1's md5 sum of those who take any type.
+#: ROS 1's md5 sum for subscribers of any type.
 ANY_HASH = "*"
 
-#: Unknown types of which it is remembered what to say: looking for similar names takes long.
+#: Number of unknown types whose error is cached: finding similar names is slow.
 _MAX_EXPLAINED = 1000
 
 #: Environment variable with the names of preferred providers.
@@ -132,7 +138,7 @@ PREFER_VARIABLE = "ROSGLASS_PREFER_DEFINITIONS"
 
 
 class Library:
-    """Definitions of types, wherever they come from; safe to use from several threads.
+    """Finds the definitions of types; thread-safe.
 
     A type is looked for in definitions received from peers, the sourced workspace, folders added by
     the user, and the distributions' standard sets, in this order. For a type that is not found, the
@@ -179,7 +185,7 @@ class Library:
                 self.prefer(name)
 
     def definition(self, name: str, ros: int = 2, *, hash: str = "") -> InterfaceDefinition:
-        """Return the definition of a type, with everything that it needs.
+        """Return the resolved definition of a type.
 
         Args:
             name: ``pkg/msg/Type``, ``pkg/srv/Type``, ``pkg/action/Type``; ``pkg/Type`` is the
@@ -194,16 +200,16 @@ class Library:
 
         Raises:
             InvalidNameError: `name` is not a type name.
-            TypeNotFoundError: Nobody knows the type; says where it was looked for.
+            TypeNotFoundError: The type is unknown; the message says where it was looked for.
             DefinitionConflictError: Two providers define the type, or one that it needs,
-                differently, or nobody's definition has `hash`.
+                differently, or no definition has `hash`.
             DefinitionError: A definition has an error or needs an unknown type.
         """
         if not isinstance(name, str):
             raise InvalidNameError(f"a type name is a str, got {name!r}")
         loaded = self._loaded.get((ros, name, hash))
         if loaded is None:
-            _check_world(ros)
+            _check_ros(ros)
             with self._lock:
                 try:
                     loaded = self._look_up(name, ros, hash)
@@ -229,7 +235,7 @@ class Library:
         return loaded
 
     def _read_workspace_again(self) -> bool:
-        """Replace the workspace where the environment names another one; return whether it does."""
+        """Replace the workspace if the environment has changed; return whether it has."""
         sourced = workspace_variables(os.environ)
         if sourced == self._sourced or self._workspace not in self._chain:
             return False
@@ -243,7 +249,7 @@ class Library:
         return True
 
     def source(self, name: str, ros: int = 2) -> Source:
-        """Return where the definition of a type came from; errors as in :meth:`definition`."""
+        """Return the origin of a type's definition; errors as in :meth:`definition`."""
         return self.definition(name, ros).source
 
     def names(self, ros: int = 2, kind: str | None = None) -> list[str]:
@@ -256,7 +262,7 @@ class Library:
         Raises:
             UnsupportedError: There is no such kind or version of ROS.
         """
-        _check_world(ros)
+        _check_ros(ros)
         if kind is not None and kind not in KINDS:
             raise UnsupportedError(f"kind must be one of {', '.join(KINDS)}, got {kind!r}")
         with self._lock:
@@ -318,7 +324,7 @@ class Library:
         return definition
 
     def add(self, definition: InterfaceDefinition) -> None:
-        """Add a parsed definition, and those that came along in its ``nested``.
+        """Add a parsed definition, and those in its ``nested``.
 
         Raises:
             DefinitionConflictError: As for :meth:`add_text`.
@@ -335,7 +341,7 @@ class Library:
         """Add a ROS 2 definition that a peer sent, to be found under its hash.
 
         Unlike with :meth:`add`, other definitions of the type are no conflict: this one is used
-        where its hash is asked for and, when nobody else knows the type, for its name alone (the
+        where its hash is requested and, if no provider knows the type, for its name alone (the
         version added last, if there are several).
 
         Args:
@@ -353,7 +359,7 @@ class Library:
             return self._versions.add(definition)
 
     def version(self, name: str, hash: str = "") -> InterfaceDefinition | None:
-        """Return what :meth:`add_version` was given for a name and hash (empty: for a name).
+        """Return a definition added by :meth:`add_version` for a name and hash (empty for any).
 
         Raises:
             InvalidNameError: `name` is not a type name.
@@ -362,7 +368,7 @@ class Library:
             return self._version(name, 2, hash)
 
     def prefer(self, *providers: str) -> None:
-        """Let these providers' definitions win over differing ones, instead of an error.
+        """Prefer the definitions of these providers where providers differ, instead of an error.
 
         Args:
             providers: ``wire`` (received), ``workspace``, ``folders`` or ``distribution``; the
@@ -419,7 +425,7 @@ class Library:
         return None
 
     def _version(self, name: str, ros: int, wanted: str = "") -> InterfaceDefinition | None:
-        """Return what a peer sent, that with a given hash or the last."""
+        """Return the definition that a peer sent with a hash, or last."""
         for full in _full_names(name) if ros == 2 else ():
             found = self._versions.find(full, wanted)
             if found is not None:
@@ -434,7 +440,7 @@ class Library:
     def _find(
         self, name: str, ros: int, chain: list[Provider], *, check: bool
     ) -> InterfaceDefinition | None:
-        """Return the unresolved definition of a full name, given or derived."""
+        """Return the unresolved definition of a full name, from a provider or derived."""
         found = self._choose(name, ros, chain, check=check)
         if found is not None:
             return found
@@ -450,7 +456,7 @@ class Library:
     def _choose(
         self, name: str, ros: int, chain: list[Provider], *, check: bool
     ) -> InterfaceDefinition | None:
-        """Return the first provider's definition; raises when a later one's differs."""
+        """Return the first provider's definition; raises if that of another differs."""
         offers = [(provider, provider.find(name, ros)) for provider in chain]
         offers = [(provider, found) for provider, found in offers if found]
         if not offers:
@@ -482,7 +488,7 @@ class Library:
         return None
 
     def _matching(self, name: str, ros: int, wanted: str) -> InterfaceDefinition:
-        """Return the definition with a given hash, of whichever provider or distribution."""
+        """Return the definition with a hash, of any provider or distribution."""
         sent = self._version(name, ros, wanted)
         if sent is not None:
             return sent
@@ -537,7 +543,7 @@ class Library:
             self._wire.add(definition)
 
     def _not_found(self, name: str, ros: int) -> str:
-        """Explain that a type is unknown, in the same words until something is added."""
+        """Create the error for an unknown type, cached until something is added."""
         text = self._explained.get((name, ros))
         if text is None:
             if len(self._explained) >= _MAX_EXPLAINED:
@@ -576,7 +582,7 @@ def _full_names(name: str) -> list[str]:
     return [f"{package}/{candidate}/{base}" for candidate in ((kind,) if kind else KINDS)]
 
 
-def _check_world(ros: int) -> None:
+def _check_ros(ros: int) -> None:
     if ros not in (1, 2):
         raise UnsupportedError(f"ros must be 1 or 2, got {ros!r}")
 

@@ -19,14 +19,14 @@ __all__ = [
     "split_name",
 ]
 
-#: The kinds of interfaces; also the folders their files lie in and the file extensions.
+#: The kinds of interfaces, which are also the names of folders and file extensions.
 KINDS = ("msg", "srv", "action")
 
-#: Names of types in a text, but no parts of paths.
+#: Type names in a text, but no parts of paths.
 _IN_TEXT = re.compile(
     r"(?<![\w./-])([A-Za-z]\w*)/(?:msg|srv|action)/([A-Za-z]\w*)(?![\w/]|\.(?:msg|srv|action)\b)"
 )
-#: What says where a package is, on a robot of ROS 1 and of ROS 2.
+#: The command that prints the folder of a package, in ROS 1 and ROS 2.
 _FIND = {1: "rospack find", 2: "ros2 pkg prefix --share"}
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ROS1_CONSTANT = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -75,7 +75,7 @@ def split_name(name: str) -> tuple[str, str, str]:
 
 
 def join_name(name: str, default_kind: str = "msg") -> str:
-    """Return `name` in its full form, ``pkg/Type`` becoming ``pkg/<default_kind>/Type``.
+    """Return the full form of a name; ``pkg/Type`` becomes ``pkg/<default_kind>/Type``.
 
     Raises:
         InvalidNameError: `name` is not a type name.
@@ -95,19 +95,19 @@ def ros1_name(name: str) -> str:
 
 
 def spelled_ros1(text: str) -> str:
-    """Return a text with all names of types as ROS 1 spells them: ``pkg/Type``."""
+    """Return a text with all type names in ROS 1's form, ``pkg/Type``."""
     return _IN_TEXT.sub(r"\1/\2", text)
 
 
 def check_package_name(name: str, ros: int) -> str:
-    """Return what is wrong with a package name, empty when it is legal."""
+    """Return why a package name is invalid; empty if it is valid."""
     if ros == 1:
         return "" if _IDENTIFIER.fullmatch(name) else _identifier_fault("package", name)
     return "" if _ROS2_LOWER.fullmatch(name) else f"package name {name!r} must {_ROS2_RULE}"
 
 
 def check_type_name(name: str, ros: int) -> str:
-    """Return what is wrong with a message, service or action name, empty when it is legal."""
+    """Return why a message, service or action name is invalid; empty if it is valid."""
     if ros == 1:
         return "" if _IDENTIFIER.fullmatch(name) else _identifier_fault("type", name)
     if _ROS2_TYPE.fullmatch(name):
@@ -116,14 +116,14 @@ def check_type_name(name: str, ros: int) -> str:
 
 
 def check_field_name(name: str, ros: int) -> str:
-    """Return what is wrong with a field name, empty when it is legal."""
+    """Return why a field name is invalid; empty if it is valid."""
     if ros == 1:
         return "" if _IDENTIFIER.fullmatch(name) else _identifier_fault("field", name)
     return "" if _ROS2_LOWER.fullmatch(name) else f"field name {name!r} must {_ROS2_RULE}"
 
 
 def check_constant_name(name: str, ros: int) -> str:
-    """Return what is wrong with a constant's name, empty when it is legal."""
+    """Return why a constant's name is invalid; empty if it is valid."""
     if ros == 1:
         return "" if _ROS1_CONSTANT.fullmatch(name) else _identifier_fault("constant", name)
     if _ROS2_UPPER.fullmatch(name):
@@ -139,7 +139,7 @@ def _identifier_fault(what: str, name: str) -> str:
 
 
 def adding_definitions(name: str, ros: int) -> str:
-    """Return what to do, in words, about a type that only the robot's workspace has.
+    """Return advice for a type that only the robot's workspace has.
 
     Args:
         name: Its name, with the package.

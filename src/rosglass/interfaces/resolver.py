@@ -1,4 +1,4 @@
-"""Resolving: finding every message type that a definition needs, and refusing hostile ones."""
+"""Resolving definitions: finding all message types that they use, within limits."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ _NONE, _FIXED = ArrayKind.NONE, ArrayKind.FIXED
 
 
 class Extent:
-    """How much there is in a message, field by field.
+    """The size of a message type, summed over its fields.
 
     Attributes:
         depth: Levels of messages, itself included.
@@ -107,7 +107,7 @@ class Extent:
             raise _error(owner, field, self._beyond(owner.name))
 
     def _beyond(self, name: str) -> str:
-        """Say which limit is exceeded."""
+        """Describe which limit is exceeded."""
         if self.depth > MAX_DEPTH:
             return f"types nest deeper than {MAX_DEPTH} levels"
         if self.size > MAX_FIXED_SIZE:
@@ -120,7 +120,7 @@ class Extent:
 
 
 class Resolver:
-    """Resolves definitions and remembers the results.
+    """Resolves definitions, and caches the results.
 
     Args:
         find: Returns the unresolved definition of a full message name; raises what it likes when
@@ -134,11 +134,11 @@ class Resolver:
         self._chain: list[str] = []
 
     def known(self, name: str) -> Definition | None:
-        """Return the resolved definition of a message, None when it was not needed yet."""
+        """Return the resolved definition of a message, None if it was not used yet."""
         return self._done.get(name)
 
     def resolve(self, definition: InterfaceDefinition) -> InterfaceDefinition:
-        """Return `definition` with ``nested`` complete, its messages' too.
+        """Return the definition with ``nested`` complete, also in its messages.
 
         Raises:
             CyclicTypeError: A type contains itself.

@@ -1,19 +1,27 @@
-"""Reading type descriptions, as ROS 2 nodes send them over ``~/get_type_description``.
+"""Type descriptions of ROS 2 nodes (REP 2016), their texts, and the cache of received types.
 
-REP 2016 and ``type_description_interfaces/msg/TypeDescription``: the inverse of
-:func:`rosglass.interfaces.type_description`. A description has all that the wire format and the
-RIHS01 hash depend on, but neither constants nor comments: see
-:mod:`rosglass.interfaces.type_sources`.
+``type_description_interfaces/msg/TypeDescription`` has all that the wire format and the RIHS01 hash
+depend on, but neither constants nor comments. ``TypeSource`` has the text of each type, which no
+hash covers: a text is used only if its fields equal those of the description. Types without text
+are written as ``.msg``.
 """
+
+# pathlib takes longer to import than the first definition to load.
+# ruff: noqa: PTH100, PTH103, PTH105, PTH108, PTH111, PTH117, PTH118, PTH123
 
 from __future__ import annotations
 
 import logging
+import os
+import re
+import sys
+import threading
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from rosglass.errors import DefinitionError, InvalidNameError
+from rosglass.errors import DefinitionError, Error, InvalidNameError
 from rosglass.interfaces.definition import (
     ActionDefinition,
     ArrayKind,
@@ -22,21 +30,300 @@ from rosglass.interfaces.definition import (
     FieldType,
     ServiceDefinition,
     Source,
+    parts_of,
 )
-from rosglass.interfaces.literals import LiteralError, parse_default
+from rosglass.interfaces.derived import derive, derived_from
+from rosglass.interfaces.hashes import announced_hashes, type_description
+from rosglass.interfaces.idl import parse_idl
 from rosglass.interfaces.names import (
     check_field_name,
     check_package_name,
     check_type_name,
     split_name,
 )
+from rosglass.interfaces.parser import MAX_TEXT, LiteralError, parse, parse_default
 from rosglass.interfaces.resolver import MAX_TYPES, Resolver
-from rosglass.interfaces.writing import message_text
 
 if TYPE_CHECKING:
-    from rosglass.interfaces.definition import InterfaceDefinition, Value
+    from collections.abc import Iterable, Iterator
 
-__all__ = ["parse_type_description"]
+    from rosglass.interfaces.definition import Constant, InterfaceDefinition, Value
+
+__all__ = [
+    "CACHE_VARIABLE",
+    "TypeCache",
+    "add_type_sources",
+    "cache_folder",
+    "message_text",
+    "parse_type_description",
+    "type_sources",
+]
+
+
+_ESCAPES = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"}
+
+
+def message_text(definition: Definition) -> str:
+    """Return `definition` as a ROS 2 ``.msg`` file would say it, comments and constants included.
+
+    Parsing the text gives the same fields, defaults and constants.
+    """
+    head = definition.comment
+    members: list[Constant | Field] = [*definition.constants, *definition.fields]
+    # A head comment that touches the first member is that member's, too.
+    shared = bool(head and members and _begins(members[0].comment, head))
+    touching = shared and "\n" not in _own(members[0].comment, head)
+    lines = list(_comment(head))
+    if head and not touching:
+        lines.append("")
+
+    def write(member: Constant | Field, code: str) -> None:
+        own = _own(member.comment, head)
+        if touching and member is members[0]:
+            lines.append(f"{code}  # {own}" if own else code)
+        else:
+            lines.extend((*_comment(own), code))
+
+    for constant in definition.constants:
+        write(constant, f"{constant.type} {constant.name}={_value(constant.value)}")
+    if definition.constants and definition.fields:
+        lines.append("")
+    for field in definition.fields:
+        default = "" if field.default is None else f" {_value(field.default)}"
+        write(field, f"{_type(field.type)} {field.name}{default}")
+    return "\n".join(lines)
+
+
+def _begins(comment: str, head: str) -> bool:
+    """Return whether a member's comment begins with the message's, which touches it."""
+    return f"{comment}\n".startswith(f"{head}\n")
+
+
+def _own(comment: str, head: str) -> str:
+    """Return a member's comment without that of the message, which stands at the beginning."""
+    return comment[len(head) :].lstrip("\n") if head and _begins(comment, head) else comment
+
+
+def _comment(text: str) -> Iterator[str]:
+    return (f"# {line}".rstrip() for line in text.splitlines())
+
+
+def _type(kind: FieldType) -> str:
+    if not kind.is_compound:
+        return str(kind)
+    package, folder, base = split_name(kind.name)
+    short = f"{package}/{base}" if folder == "msg" else kind.name
+    return str(kind).replace(kind.name, short, 1)
+
+
+def _value(value: Value) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(_value(element) for element in value)}]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if not isinstance(value, str):
+        return repr(value)
+    return f'"{"".join(_character(sign) for sign in value)}"'
+
+
+def _character(sign: str) -> str:
+    known = _ESCAPES.get(sign)
+    return known or (sign if sign.isprintable() else f"\\U{ord(sign):08x}")
+
+
+#: The encoding of types that have no text of their own: requests, goals and the like.
+_IMPLICIT = "implicit"
+_FILE_KINDS = ("msg", "srv", "action")
+# What Python prints of bytes, line by line.
+_ESCAPED = re.compile(r"(?:[ -\[\]-~]|\\[\\'\"tnr]|\\x[0-9a-f]{2})*")
+_ESCAPE = re.compile(rb"\\(x..|.)")
+_CONTROLS = {b"t": b"\t", b"n": b"\n", b"r": b"\r"}
+
+
+def type_sources(definition: InterfaceDefinition) -> list[dict[str, str]]:
+    """Return the texts of a definition and of those that it uses, as dicts of ``TypeSource``.
+
+    Args:
+        definition: A resolved ROS 2 definition.
+
+    Raises:
+        UnsupportedError: `definition` is a ROS 1 one, or no definition.
+    """
+    described = type_description(definition)
+    names = [part["type_name"] for part in described["referenced_type_descriptions"]]
+    messages = {
+        name: nested for part in parts_of(definition) for name, nested in part.nested.items()
+    }
+    sources = [_source(definition)]
+    for name in names:
+        message = messages.get(name)
+        sources.append(_record(name, _IMPLICIT, "") if message is None else _source(message))
+    return sources
+
+
+def _source(definition: InterfaceDefinition) -> dict[str, str]:
+    name, text = definition.name, definition.text.partition("\n===")[0]
+    kind = name.split("/")[1]
+    for encoding in (kind, "idl"):
+        with suppress(Error):
+            parsed = _parse(name, encoding, text)
+            if _fields(parsed) == _fields(definition):
+                return _record(name, encoding, text)
+    if isinstance(definition, Definition) and kind == "msg":
+        return _record(name, kind, message_text(definition))
+    return _record(name, _IMPLICIT, "")
+
+
+def _record(name: str, encoding: str, text: str) -> dict[str, str]:
+    return {"type_name": name, "encoding": encoding, "raw_file_contents": text}
+
+
+def _fields(definition: InterfaceDefinition) -> list[tuple[Field, ...]]:
+    return [part.fields for part in parts_of(definition)]
+
+
+def _parse(name: str, encoding: str, text: str, provider: str = "text") -> InterfaceDefinition:
+    file = f"<{name} from {provider}>"
+    if encoding == "idl":
+        return parse_idl(text, name, file=file, provider=provider)
+    return parse(text, name, file=file, provider=provider)
+
+
+def add_type_sources(
+    definition: InterfaceDefinition,
+    sources: Iterable[Mapping[str, Any]],
+    *,
+    verbatim: bool = False,
+) -> InterfaceDefinition:
+    """Return a definition with the constants, comments and defaults of its texts.
+
+    A text that cannot be read, or is about something else, is left out: then its type stays as
+    described.
+
+    Args:
+        definition: As :func:`rosglass.interfaces.parse_type_description` returns it.
+        sources: The texts.
+        verbatim: Whether the texts are as people wrote them. rosidl's generator sends them with
+            tabs, quotes and everything beyond ASCII escaped, and cuts off as many characters at
+            the end as that adds (seen in Iron to Kilted); this is undone.
+    """
+    texts = _Texts(definition.source.provider, sources, verbatim)
+    parts = parts_of(definition)
+    found, whole = texts.interface(definition.name)
+    written = parts_of(found) if type(found) is type(definition) and found else (None,) * len(parts)
+    merged = {
+        part.name: _merged(part, text, whole) for part, text in zip(parts, written, strict=True)
+    }
+    for part in parts:
+        for name, inner in part.nested.items():
+            if name not in merged:
+                text, whole = texts.interface(name)
+                merged[name] = _merged(inner, text, whole)
+    resolver = Resolver(lambda name, _owner, _field: merged[name])
+    done = [resolver.message(merged[part.name]) for part in parts]
+    if isinstance(definition, Definition):
+        return done[0]
+    together = _text(found, done)
+    if isinstance(definition, ServiceDefinition):
+        return replace(definition, request=done[0], response=done[1], text=together)
+    return replace(definition, goal=done[0], result=done[1], feedback=done[2], text=together)
+
+
+def _text(found: InterfaceDefinition | None, parts: list[Definition]) -> str:
+    """Return the text of a service or action, as sent if it is complete, or else composed."""
+    if found is not None and _fields(found) == [part.fields for part in parts]:
+        return found.text
+    return "\n---\n".join(message_text(part) for part in parts)
+
+
+def _merged(described: Definition, written: InterfaceDefinition | None, whole: bool) -> Definition:
+    """Return the description with the additions of a text."""
+    if not isinstance(written, Definition):
+        return described
+    pairs = list(zip(described.fields, written.fields, strict=False))
+    missing = described.fields[len(written.fields) :]
+    fits = len(written.fields) <= len(described.fields) and not (missing and whole)
+    if not fits or not all(_same(ours, theirs) for ours, theirs in pairs):
+        return described
+    merged = replace(
+        described,
+        fields=(*written.fields, *missing),
+        constants=written.constants,
+        comment=written.comment,
+        text=written.text,
+    )
+    return merged if whole else replace(merged, text=message_text(merged))
+
+
+class _Texts:
+    """The texts received with a description."""
+
+    def __init__(self, provider: str, sources: Iterable[Mapping[str, Any]], verbatim: bool) -> None:
+        self._provider, self._verbatim = provider, verbatim
+        self._known: dict[str, tuple[str, str]] = {}
+        for source in sources:
+            values = [source.get(key) for key in ("type_name", "encoding", "raw_file_contents")]
+            name, encoding, text = (value if isinstance(value, str) else "" for value in values)
+            if encoding in (*_FILE_KINDS, "idl") and len(text) <= MAX_TEXT:
+                self._known.setdefault(name, (encoding, text))
+
+    def interface(self, name: str) -> tuple[InterfaceDefinition | None, bool]:
+        """Return what the text of a type says, and whether that is all of it.
+
+        A request, goal or the like is part of the text of its service or action, where that came
+        along.
+        """
+        found, whole = self._read(name)
+        if found is None:
+            for owner, suffix in derived_from(name, 2):
+                outer, whole = self._read(owner)
+                found = None if outer is None else derive(outer, suffix)
+                if found is not None:
+                    break
+        return found, whole
+
+    def _read(self, name: str) -> tuple[InterfaceDefinition | None, bool]:
+        encoding, text = self._known.get(name, ("", ""))
+        text = text.rstrip("\0")
+        if not encoding:
+            return None, True
+        restored, whole = (text, True) if self._verbatim else _restore(text)
+        with suppress(Error):
+            return _parse(name, encoding, restored, self._provider), whole
+        return None, True
+
+
+def _same(ours: Field, theirs: Field) -> bool:
+    return ours.name == theirs.name and _described(ours.type) == _described(theirs.type)
+
+
+def _described(kind: FieldType) -> FieldType:
+    return replace(kind, name="uint8") if kind.name == "char" else kind
+
+
+def _restore(text: str) -> tuple[str, bool]:
+    """Undo what rosidl's generator does to texts.
+
+    rosidl_generator_c's ``idl__description.c.em`` prints each line as Python's ``repr`` of bytes
+    and gives the string the length of the original: where something was escaped, the end is lost.
+
+    Returns:
+        The text, and whether its end is there; without its last, broken line otherwise.
+    """
+    if "\\" not in text:
+        return text, True
+    lines = text.split("\n")[:-1]
+    if not all(_ESCAPED.fullmatch(line) for line in lines):
+        return text, True
+    with suppress(UnicodeDecodeError):
+        return _ESCAPE.sub(_unescape, "\n".join(lines).encode()).decode(), False
+    return text, True
+
+
+def _unescape(match: re.Match[bytes]) -> bytes:
+    code = match.group(1)
+    return bytes([int(code[1:], 16)]) if len(code) > 1 else _CONTROLS.get(code, code)
+
 
 _log = logging.getLogger("rosglass.interfaces")
 
@@ -59,7 +346,7 @@ _FOREIGN = {
 }
 _PLACEHOLDER = "structure_needs_at_least_one_member"
 _MAX_COUNT = 2**32 - 1
-#: Fields that a description may have in all; real ones stay below a thousand.
+#: Number of fields of a description in total; real ones have less than a thousand.
 _MAX_FIELDS = 50_000
 
 _SERVICE = {"request_message": "_Request", "response_message": "_Response"}
@@ -69,7 +356,7 @@ _ACTION = {"goal": "_Goal", "result": "_Result", "feedback": "_Feedback"}
 def parse_type_description(
     description: Mapping[str, Any], *, provider: str = "description"
 ) -> InterfaceDefinition:
-    """Make a definition of a type description.
+    """Create a definition from a type description.
 
     Args:
         description: ``type_description`` and ``referenced_type_descriptions``, as in the message
@@ -106,7 +393,7 @@ def parse_type_description(
 
 
 def _has_parts(main: Definition, members: Mapping[str, str]) -> bool:
-    """Return whether a description is that of a service or action, not of a message."""
+    """Return whether a description is that of a service or action."""
     types = {field.name: field.type for field in main.fields}
     return all(types.get(name) == FieldType(main.name + suffix) for name, suffix in members.items())
 
@@ -141,7 +428,7 @@ def _referenced(
 
 
 class _Reader:
-    """Reads individual descriptions, and counts their fields."""
+    """Reads individual descriptions, with a limit of fields."""
 
     def __init__(self, provider: str) -> None:
         self._provider = provider
@@ -232,7 +519,7 @@ def _check_count(count: int, wanted: bool, what: str, where: str, label: str) ->
 
 
 def _default(field: Mapping[str, Any], kind: FieldType, where: str, label: str) -> Value | None:
-    """Return the default value, written as Python prints it (rosidl's generator does)."""
+    """Parse a default value in Python syntax, as rosidl's generator writes it."""
     text: str = _get(field, "default_value", str, where, label)
     if not text:
         return None
@@ -258,3 +545,133 @@ def _get(part: object, key: str, kind: type[Any], where: str, label: str = "<des
     if wrong or not isinstance(value, kind) or isinstance(value, bool):
         raise DefinitionError(f"{where} has no proper {key}: {value!r:.80}", label)
     return value
+
+
+#: Environment variable with the cache's folder, or ``off``.
+CACHE_VARIABLE = "ROSGLASS_TYPE_CACHE"
+_OFF = ("off", "0", "no", "false", "none")
+_HASH = re.compile(r"RIHS[0-9]{2}_[0-9a-f]{64}")
+#: The errors of reading a file with any content.
+_RUBBISH = (Error, ValueError, TypeError, LookupError, AttributeError, RecursionError)
+#: Size limits in bytes of an entry and of all entries.
+_MAX_ENTRY = 8 << 20
+_MAX_TOTAL = 64 << 20
+
+
+def cache_folder() -> str:
+    """Return the folder of the cache; empty if it is disabled.
+
+    ``ROSGLASS_TYPE_CACHE`` if it is set, otherwise where the system keeps such things:
+    ``rosglass/types`` in ``XDG_CACHE_HOME`` or ``~/.cache`` (Linux), ``~/Library/Caches`` (macOS),
+    ``%LOCALAPPDATA%`` (Windows).
+    """
+    chosen = os.environ.get(CACHE_VARIABLE, "").strip()
+    if chosen.lower() in _OFF:
+        return ""
+    if chosen:
+        return os.path.abspath(os.path.expanduser(chosen))
+    home = os.path.expanduser("~")
+    if sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA") or os.path.join(home, "AppData", "Local")
+    elif sys.platform == "darwin":
+        base = os.path.join(home, "Library", "Caches")
+    else:
+        base = os.environ.get("XDG_CACHE_HOME", "")
+        # The specification says that relative paths count as unset.
+        base = base if os.path.isabs(base) else os.path.join(home, ".cache")
+    return os.path.join(base, "rosglass", "types")
+
+
+class TypeCache:
+    """A cache with one file per definition, named by its hash; errors are ignored.
+
+    Args:
+        folder: Where the files are; empty for a cache that keeps nothing. Made when needed.
+    """
+
+    def __init__(self, folder: str) -> None:
+        self.folder = folder
+        self._has_warned = False
+
+    def get(self, name: str, type_hash: str) -> InterfaceDefinition | None:
+        """Return the definition of a type with a hash, None if it is not in the cache."""
+        path = self._path(type_hash)
+        if not path:
+            return None
+        try:
+            with open(path, encoding="utf-8") as file:
+                text = file.read(_MAX_ENTRY)
+        except (OSError, ValueError):
+            return None
+        try:
+            return _read(text, name, type_hash)
+        except _RUBBISH as error:
+            # It is useless, whatever wrote it.
+            _log.warning("%s is no definition of %s and is removed: %s", path, name, error)
+            with suppress(OSError):
+                os.unlink(path)
+            return None
+
+    def put(self, definition: InterfaceDefinition, type_hash: str) -> None:
+        """Keep a definition under the hash that a robot announced for it.
+
+        Old entries make room: all together take 64 MB at most.
+        """
+        path = self._path(type_hash)
+        if not path:
+            return
+        entry = {
+            "type_name": definition.name,
+            "source": definition.source.provider,
+            "type_description": type_description(definition),
+            "type_sources": type_sources(definition),
+        }
+        import json  # noqa: PLC0415 - its 2 ms would be spent by all who load a definition
+
+        data = json.dumps(entry, indent=1).encode()
+        if len(data) > _MAX_ENTRY:
+            return
+        try:
+            os.makedirs(self.folder, mode=0o700, exist_ok=True)
+            self._make_room(len(data))
+            # Other processes see either the whole file or none.
+            part = f"{path}.{os.getpid()}.{threading.get_ident()}"
+            with open(part, "wb") as file:
+                file.write(data)
+            os.replace(part, path)
+        except (OSError, ValueError) as error:
+            if not self._has_warned:
+                self._has_warned = True
+                _log.info("definitions from robots are not kept in %s: %s", self.folder, error)
+
+    def _path(self, type_hash: str) -> str:
+        if not (self.folder and _HASH.fullmatch(type_hash)):
+            return ""
+        return os.path.join(self.folder, f"{type_hash}.json")
+
+    def _make_room(self, size: int) -> None:
+        entries = []
+        with os.scandir(self.folder) as found:
+            for entry in found:
+                with suppress(OSError):
+                    about = entry.stat()
+                    entries.append((about.st_mtime, about.st_size, entry.path))
+        total = size + sum(entry[1] for entry in entries)
+        for _, taken, path in sorted(entries):
+            if total <= _MAX_TOTAL:
+                return
+            with suppress(OSError):
+                os.unlink(path)
+            total -= taken
+
+
+def _read(text: str, name: str, type_hash: str) -> InterfaceDefinition:
+    import json  # noqa: PLC0415 - as above
+
+    entry = json.loads(text)
+    provider = f"cache, from {entry['source'].removeprefix('wire ')}"
+    described = parse_type_description(entry["type_description"], provider=provider)
+    definition = add_type_sources(described, entry["type_sources"], verbatim=True)
+    if definition.name != name or type_hash not in announced_hashes(definition):
+        raise DefinitionError(f"it is {definition.name}, with another hash", "<cache>")
+    return definition

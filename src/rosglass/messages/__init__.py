@@ -1,11 +1,10 @@
-"""What a message is: lazy trees over received bytes, and the codecs behind them."""
+"""Messages: lazy trees over received bytes, their types, and the codecs."""
 
 from rosglass.messages.loading import ActionType, ServiceType, default_library, load
 from rosglass.messages.message import Message, type_of
-from rosglass.messages.opaque import OpaqueType
 from rosglass.messages.sequences import MessageSequence
 from rosglass.messages.translation import ActionTranslation, ServiceTranslation, Translation
-from rosglass.messages.types import Constants, MessageType
+from rosglass.messages.types import Constants, MessageType, OpaqueType
 
 __all__ = [
     "ActionTranslation",

@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import ConversionError
 from rosglass.interfaces.definition import ArrayKind
-from rosglass.messages.message import Message, plain_class
-from rosglass.messages.runtime import hint, number_type
+from rosglass.messages.message import Message, plain_class, to_dict
 from rosglass.messages.schema import Kind
-from rosglass.messages.text import to_dict
+from rosglass.messages.source import hint, number_type
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,19 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import FieldPathError
 from rosglass.messages import layout
-from rosglass.messages.access import column_type, resolve
 from rosglass.messages.emit_read import Reader
 from rosglass.messages.layout import START, Cursor
-from rosglass.messages.runtime import number_type
+from rosglass.messages.message import column_type, resolve_path
 from rosglass.messages.schema import Kind
-from rosglass.messages.source import Source, unpacker
+from rosglass.messages.source import Source, number_type, unpacker
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.messages.access import Step
     from rosglass.messages.codec import Codec
     from rosglass.messages.layout import Wire
+    from rosglass.messages.message import Step
     from rosglass.messages.schema import Member, Schema
 
     Route = list[tuple[Member, Step | None]]
@@ -50,7 +49,7 @@ def path_function(
     Raises:
         FieldPathError: A path does not exist in the type.
     """
-    targets = [(f"r{i}", resolve(codec.schema, path), path) for i, path in enumerate(paths)]
+    targets = [(f"r{i}", resolve_path(codec.schema, path), path) for i, path in enumerate(paths)]
     source = Source()
     with source.block("try:"):
         if not _constant_offsets(codec, source, targets, other):

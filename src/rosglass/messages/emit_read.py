@@ -1,21 +1,337 @@
-"""Generates code that decodes bytes into messages."""
+"""Generates code that steps through bytes: the common ground of decoding and of field paths.
+
+Read :meth:`Skipper.skip_member` as the specification of both formats: numbers are collected into
+runs that one :mod:`struct` call unpacks, strings are a count and that many bytes (CDR counts and
+sends a final NUL), sequences are a count and their elements.
+"""
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 from rosglass.messages import layout
-from rosglass.messages.emit_skip import Skipper, is_shared
-from rosglass.messages.runtime import number_type, read_wide
+from rosglass.messages.layout import Cursor, Knowledge
 from rosglass.messages.schema import Kind
-from rosglass.messages.source import Source, iterator
+from rosglass.messages.source import (
+    MAX_EMPTY,
+    Source,
+    iterator,
+    number_type,
+    read_wide,
+    too_short,
+    unpacker,
+)
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from contextlib import AbstractContextManager
+
     from rosglass.messages.codec import Codec
     from rosglass.messages.schema import Member, Schema
 
-__all__ = ["Reader"]
+__all__ = ["Reader", "Skipper", "is_shared"]
+
+
+_NEAR = 256
+#: Fields, at every depth, up to which a nested message's code is repeated in each function that
+#: needs it: that is quicker than a call.
+_MOST_INLINE = 200
+
+
+def is_shared(schema: Schema, source: Source) -> bool:
+    """Return whether a nested message is left to a function of its own, which all others call.
+
+    What is generated for a type then grows with its definition, not with its messages.
+    """
+    return bool(schema.members) and (schema.extent.fields > _MOST_INLINE or source.is_full)
+
+
+class Skipper:
+    """Emits steps through a buffer called ``b``.
+
+    Attributes:
+        source: Where the code goes.
+        cursor: Where in the buffer the code has got to.
+    """
+
+    def __init__(self, codec: Codec, source: Source, cursor: Cursor) -> None:
+        self.codec, self.wire = codec, codec.wire
+        self.source, self.cursor = source, cursor
+        #: Numbers to be unpacked together: target, format character, size.
+        self.run: list[tuple[str, str, int]] = []
+        #: Whether the end was not yet proved to lie within the buffer.
+        self.unproved = False
+
+    def number(self, target: str, code: str, size: int) -> None:
+        """Unpack one number into `target` ('' for none); it joins the current run."""
+        self.run.append((target, code, size))
+
+    def flush(self) -> None:
+        """Unpack the numbers collected so far."""
+        while self.run:
+            if self.wire.aligned:
+                self.cursor.align(self.source, self.run[0][2], self.var)
+            taken, layouts = self.plan_run()
+            run, self.run = self.run[:taken], self.run[taken:]
+            targets = ", ".join(target for target, _, _ in run if target)
+            if len(layouts) == 1:
+                fmt, size = layouts[0]
+                if targets:
+                    self._unpack(targets, fmt, self.cursor.at())
+                self.cursor.advance(size)
+                self.unproved = not targets
+                continue
+            # Known modulo 4 only, with 8-byte numbers ahead: one prepared layout for each case.
+            var, offset = self.var, self.cursor.at()
+            residue = self.cursor.known.residue
+            case = f"({offset} - {residue}) & 4" if residue else f"({offset}) & 4"
+            for head, (fmt, size) in zip((f"if {case}:", "else:"), layouts, strict=True):
+                with self.source.block(head):
+                    if targets:
+                        self._unpack(targets, fmt, offset)
+                    self.source.line(f"{var} = {self.cursor.at(size)}")
+            end = Knowledge(8, (residue + layouts[0][1]) % 8)
+            self.cursor.move(var, end)
+            self.unproved = not targets
+
+    def _unpack(self, targets: str, fmt: str, offset: str) -> None:
+        if offset.isdigit() and int(offset) <= _NEAR:
+            # Padding at the start of the layout is quicker than an argument.
+            fmt, offset = f"{fmt[0]}{offset}x{fmt[1:]}", ""
+        function = self.source.bind(unpacker(fmt), "u")
+        comma = "" if "," in targets else ","
+        at = f", {offset}" if offset else ""
+        self.source.line(f"{targets}{comma} = {function}(b{at})")
+
+    def plan_run(self) -> tuple[int, list[tuple[str, int]]]:
+        """Return how many numbers fit one call, and the layout for each possible residue."""
+        known = self.cursor.known
+        starts = [known.residue]
+        if not self.wire.aligned:
+            modulus = 1
+        else:
+            modulus = known.modulus
+            if modulus == 4 and any(size == 8 for _, _, size in self.run):
+                modulus, starts = 8, [known.residue, known.residue + 4]
+        taken = len(self.run)
+        if self.wire.aligned:
+            for index, (_, _, size) in enumerate(self.run):
+                if size > modulus:
+                    taken = index
+                    break
+        layouts = []
+        for start in starts:
+            fmt, position = [self.wire.order], start
+            for target, code, size in self.run[:taken]:
+                pad = -position % size if self.wire.aligned else 0
+                fmt.append("x" * pad + (code if target else "x" * size))
+                position += pad + size
+            layouts.append(("".join(fmt), position - start))
+        return taken, layouts
+
+    @property
+    def var(self) -> str:
+        """The local that holds the offset once it is not constant any more."""
+        return self.cursor.var or "o"
+
+    # -- arrays ----------------------------------------------------------------------------------
+
+    def count(self, member: Member) -> str:
+        """Read the element count of an array, or return the fixed one."""
+        if member.fixed_count is not None:
+            self.flush()
+            return str(member.fixed_count)
+        count = self.source.fresh("n")
+        self.number(count, "I", 4)
+        self.flush()
+        return count
+
+    def check_count(self, least: int, count: str) -> None:
+        """Refuse counts that the rest of the buffer cannot hold, before looping or allocating."""
+        if count.isdigit():
+            return
+        short = self.source.bind(too_short, "short")
+        if least:
+            times = f"{count} * {least}" if least > 1 else count
+            self.source.line(f"if {times} > len(b) - ({self.cursor.at()}): {short}()")
+        else:
+            self.source.line(f"if {count} > {MAX_EMPTY}: {short}()")
+
+    def elements_start(self, size: int, count: str) -> str:
+        """Return the offset of the first element; CDR pads only when there is one."""
+        pad = self.cursor.padding(size)
+        if pad == 0:
+            return self.cursor.at()
+        if count.isdigit():
+            self.cursor.align(self.source, size, self.var)
+            return self.cursor.at()
+        start = self.source.fresh("s")
+        self.source.line(
+            f"{start} = {self.cursor.aligned(size)} if {count} else {self.cursor.at()}"
+        )
+        return start
+
+    def pass_elements(self, step: int, size: int, align: int, count: str, start: str) -> None:
+        """Move behind `count` elements, `step` bytes apart, the last one `size` bytes long."""
+        if count.isdigit():
+            self.cursor.advance(step * (int(count) - 1) + size)
+            return
+        known = layout.after_elements(self.cursor.known, align, step, size)
+        var = self.var
+        times = f" * {step}" if step != 1 else ""
+        # No padding after the last element.
+        tail = f" - ({step - size} if {count} else 0)" if step != size else ""
+        self.source.line(f"{var} = {start} + {count}{times}{tail}")
+        self.cursor.move(var, known)
+
+    def first_align(self, schema: Schema) -> int:
+        """Return the alignment of an element's first byte."""
+        return layout.align_of(schema.members[0], self.wire) if schema.members else 1
+
+    def pass_stride(self, schema: Schema, stride: tuple[int, int], count: str, start: str) -> None:
+        """Move behind `count` messages of constant (stride, size)."""
+        step, size = stride
+        self.pass_elements(step, size, self.first_align(schema), count, start)
+        self.unproved = True
+
+    @contextmanager
+    def loop(self, head: str, step: Callable[[Knowledge], Knowledge]) -> Iterator[None]:
+        """Emit a loop; `step` says what its body does to what is known of the position."""
+        self.flush()
+        var = self.var
+        self.settle(var)
+        known = self.cursor.known.repeated(step) if self.wire.aligned else layout.ANYWHERE
+        self.cursor.move(var, known)
+        unproved = self.unproved
+        with self.source.block(head):
+            yield
+            self.settle(var)
+        self.cursor.move(var, known)
+        self.unproved = self.unproved or unproved
+
+    def text_loop(self, head: str, member: Member) -> AbstractContextManager[None]:
+        """Emit a loop whose body passes one string."""
+        return self.loop(head, lambda known: layout.after_text(known, self.wire, member.wide))
+
+    def schema_loop(self, head: str, schema: Schema) -> AbstractContextManager[None]:
+        """Emit a loop whose body passes one message."""
+        return self.loop(head, lambda known: layout.after_schema(known, self.wire, schema))
+
+    def settle(self, var: str) -> None:
+        """Make the variable hold the present offset."""
+        self.flush()
+        if self.cursor.at() != var:
+            self.source.line(f"{var} = {self.cursor.at()}")
+            self.cursor.move(var, self.cursor.known)
+
+    # -- stepping over ---------------------------------------------------------------------------
+
+    def skip(self, schema: Schema) -> None:
+        """Step over a message."""
+        self.flush()
+        if is_shared(schema, self.source):
+            passed = self.source.bind(self.codec.of(schema).skipper, "pass_one")
+            var, known = self.var, self.cursor.known
+            self.source.line(f"{var} = {passed}(b, {self.cursor.at()})")
+            self.cursor.move(var, layout.after_schema(known, self.wire, schema))
+        else:
+            self.skip_members(schema)
+        self.unproved = True
+
+    def skip_members(self, schema: Schema) -> None:
+        """Step over the fields of a message."""
+        if not schema.members and self.wire.aligned:
+            self.cursor.advance(1)
+        for member in schema.members:
+            self.skip_member(member)
+
+    def skip_member(self, member: Member) -> None:
+        """Step over a field."""
+        self.flush()
+        self.unproved = True
+        if not member.is_array:
+            if member.number is not None:
+                if self.wire.aligned:
+                    self.cursor.align(self.source, member.number.size, self.var)
+                self.cursor.advance(member.number.size)
+            elif member.kind is Kind.TEXT:
+                self.skip_text(member)
+            else:
+                assert member.struct is not None
+                self.skip(member.struct)
+            return
+        count = self.count(member)
+        self.unproved = True
+        if member.number is not None:
+            start = self.elements_start(member.number.size, count)
+            size = member.number.size
+            self.pass_elements(size, size, size, count, start)
+        elif member.kind is Kind.TEXT:
+            self.check_count(4, count)
+            with self.text_loop(f"for _ in range({count}):", member):
+                self.skip_text(member)
+        else:
+            assert member.struct is not None
+            self.check_count(layout.min_size(member.struct, self.wire), count)
+            self.skip_elements(member.struct, count)
+
+    def skip_text(self, member: Member) -> None:
+        """Step over one string."""
+        self.number("n", "I", 4)
+        self.flush()
+        var = self.var
+        width = self.wire.wide if member.wide else 1
+        times = f" * {width}" if width != 1 else ""
+        if width == 4:
+            # Not any four bytes are a character: reading would refuse them.
+            self.source.line(f"s = {self.cursor.at()}")
+            self.source.line(f"{var} = s + n{times}")
+            check = self.source.bind(read_wide, "wide")
+            self.source.line(f"{check}(b, s, {var}, {width}, {self.wire.big})")
+        else:
+            self.source.line(f"{var} = n{times} + {self.cursor.at()}")
+        self.cursor.move(var, self.cursor.known.many(width))
+        self.unproved = True
+
+    def skip_elements(self, schema: Schema, count: str) -> None:
+        """Step over the elements of an array of messages."""
+        stride = layout.constant_stride(schema, self.wire)
+        if stride is not None:
+            start = self.elements_start(self.first_align(schema), count)
+            self.pass_stride(schema, stride, count, start)
+        elif layout.min_size(schema, self.wire):
+            with self.schema_loop(f"for _ in range({count}):", schema):
+                self.skip(schema)
+        self.unproved = True
+
+    def to_element(self, schema: Schema, index: str) -> None:
+        """Move from the start of an array to its element `index`."""
+        stride = layout.constant_stride(schema, self.wire)
+        if stride is None:
+            if index != "0":
+                with self.schema_loop(f"for _ in range({index}):", schema):
+                    self.skip(schema)
+            return
+        # Whether or not there are elements: an index was checked before.
+        self.cursor.align(self.source, self.first_align(schema), self.var)
+        step = stride[0]
+        if index.isdigit():
+            self.cursor.advance(step * int(index))
+        else:
+            var = self.var
+            self.source.line(f"{var} = {self.cursor.at()} + {index} * {step}")
+            self.cursor.move(var, self.cursor.known.many(step))
+
+    def prove(self) -> None:
+        """Emit the check that everything read so far lay within the buffer, if it is needed."""
+        self.flush()
+        if self.unproved:
+            short = self.source.bind(too_short, "short")
+            self.source.line(f"if {self.cursor.at()} > len(b): {short}()")
+            self.unproved = False
+
 
 #: Nested messages of up to this many values are filled with their parent, bigger ones on demand.
 INLINE_LEAVES = 16

@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.messages import layout
 from rosglass.messages.conversion import array_packer, as_bool, as_float, as_int
-from rosglass.messages.emit_skip import is_shared
+from rosglass.messages.emit_read import is_shared
 from rosglass.messages.layout import ANYWHERE, START, Cursor, Knowledge
-from rosglass.messages.runtime import MAX_EMPTY, as_list, odd, own, write_wide
 from rosglass.messages.schema import Kind
 from rosglass.messages.sequences import same_bytes
-from rosglass.messages.source import Source, packer
+from rosglass.messages.source import MAX_EMPTY, Source, as_list, odd, own, packer, write_wide
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

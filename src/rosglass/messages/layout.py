@@ -1,4 +1,4 @@
-"""How schemas lie on the wire: sizes, alignment, and what is known of an offset beforehand.
+"""The wire layout of schemas: sizes, alignment, and what is known about offsets in advance.
 
 CDR (XCDR1, OMG DDSI-RTPS 2.3 section 10 and CORBA 3.0 section 15.3) aligns every primitive to its
 own size, counted from the byte after the 4-byte encapsulation header. ROS 1 does not align.
@@ -55,7 +55,7 @@ class Wire:
 
     @property
     def title(self) -> str:
-        """Its name for people."""
+        """Its name in error texts."""
         return f"{self.name}{' big endian' * self.big}{' view' * self.view}"
 
 
@@ -366,7 +366,7 @@ class Cursor:
         pad = self.padding(align)
         if pad is None:
             before = source.take_last(f"{self.var} = ") if self.var == var else None
-            # One step with the sum that led here, if nobody else needs to see that.
+            # One step with the previous sum, if nothing else uses that.
             at = self.copy()
             if before is not None:
                 at.var, _, constant = before.rpartition(" + ")

@@ -1,4 +1,4 @@
-"""Finding types by name: services and actions too, each kept once per library."""
+"""Finding message, service and action types by name, cached for each library."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["ActionType", "ServiceType", "default_library", "load"]
 
 
 class _Interface:
-    """What types made of several messages have in common."""
+    """The common base of types with several messages."""
 
     parts: dict[str, MessageType]
 
@@ -119,7 +119,7 @@ _default: list[Library] = []
 
 
 def default_library() -> Library:
-    """Return the library that :func:`load` uses unless given another; made on first use."""
+    """Return the shared library, created on first use."""
     with _lock:
         if not _default:
             _default.append(interfaces.Library())
@@ -129,7 +129,7 @@ def default_library() -> Library:
 def load(
     name: str, ros: int = 2, library: Library | None = None, *, hash: str = ""
 ) -> MessageType | ServiceType | ActionType:
-    """Return the type called `name`.
+    """Return the type `name`.
 
     Args:
         name: ``pkg/msg/Type`` or ``pkg/Type`` (also ``srv`` and ``action``).

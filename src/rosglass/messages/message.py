@@ -7,14 +7,16 @@ costs. Nested messages of some size and arrays of messages stay shells of their 
 
 from __future__ import annotations
 
+import math
+import re
 import time
+from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rosglass.errors import DecodeError, FieldPathError
-from rosglass.messages import access, text
-from rosglass.messages.runtime import hint
+from rosglass.errors import ConversionError, DecodeError, Error, FieldPathError
 from rosglass.messages.schema import Kind
+from rosglass.messages.source import hint, number_type
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -25,10 +27,31 @@ if TYPE_CHECKING:
     from rosglass.messages.schema import Member, Schema
     from rosglass.messages.types import MessageType
 
-__all__ = ["Message", "NoSuchFieldError", "plain_class", "touch", "type_of"]
+__all__ = [
+    "Message",
+    "NoSuchFieldError",
+    "Step",
+    "column_type",
+    "find_member",
+    "finite",
+    "get_path",
+    "parse_path",
+    "plain",
+    "plain_class",
+    "resolve_path",
+    "set_path",
+    "short",
+    "to_dict",
+    "to_json",
+    "to_yaml",
+    "touch",
+    "type_of",
+    "writable",
+]
 
-_PATIENCE = 0.1
-#: Fields from which on a message does not get a function for each field that is read first.
+
+_FILL_TIMEOUT_S = 0.1
+#: Number of fields from which no function is compiled for the field that is read first.
 _MANY_FIELDS = 64
 
 
@@ -71,7 +94,7 @@ class Message:
         # Reached for unknown names, and for slots another thread is just about to fill.
         schema = self._schema__
         if any(name == member.attr for member in schema.members):
-            deadline = time.monotonic() + _PATIENCE
+            deadline = time.monotonic() + _FILL_TIMEOUT_S
             while time.monotonic() < deadline:
                 time.sleep(0.00005)
                 try:
@@ -87,14 +110,14 @@ class Message:
         member = self._schema__.by_name.get(path)
         if member is not None:
             return getattr(self, member.attr)
-        return access.get(self, path)
+        return get_path(self, path)
 
     def __setitem__(self, path: str, value: Any) -> None:
         member = self._schema__.by_name.get(path)
         if member is not None:
             setattr(self, member.attr, value)
         else:
-            access.put(self, path, value)
+            set_path(self, path, value)
 
     def __iter__(self) -> Iterator[str]:
         return (member.name for member in self._schema__.members)
@@ -113,7 +136,7 @@ class Message:
         Raises:
             FieldPathError: There is no such field, or it is no numeric array.
         """
-        return access.writable(self, path)
+        return writable(self, path)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the message as a dict of wire field names.
@@ -121,7 +144,7 @@ class Message:
         Nested messages become dicts, arrays of messages lists of dicts; numeric arrays stay the
         numpy arrays they are. ``encode`` turns it into the same bytes again.
         """
-        return text.to_dict(self)
+        return to_dict(self)
 
     def to_json(self, indent: int | None = None) -> str:
         """Return the message as JSON.
@@ -130,11 +153,11 @@ class Message:
         ``"Infinity"`` and ``"-Infinity"``, as in protobuf's JSON mapping; bytes of strings that
         are not UTF-8, and surrogates that are no pair, become U+FFFD.
         """
-        return text.to_json(self, indent)
+        return to_json(self, indent)
 
     def to_yaml(self) -> str:
         """Return the message as YAML, each numeric array in one line."""
-        return text.to_yaml(self)
+        return to_yaml(self)
 
     def copy(self) -> Message:
         """Return a deep copy, detached from the received bytes; its arrays are writable."""
@@ -160,7 +183,7 @@ class Message:
         return _restore, (kind, kind.encode(self))
 
     def __repr__(self) -> str:
-        return text.short(self)
+        return short(self)
 
 
 def _restore(kind: MessageType, data: bytes) -> Message:
@@ -232,7 +255,7 @@ def _same_value(member: Member, one: Any, other: Any) -> bool:
 
 
 class Stamp:
-    """What times and durations of both worlds have on top of their two fields."""
+    """The additional properties of times and durations, in ROS 1 and ROS 2."""
 
     __slots__ = ()
     _schema__: ClassVar[Schema]
@@ -305,11 +328,11 @@ def shell_class(
 
 
 def _first_access(attr: str, compile_fill: Callable[[Any, str], Callable[[Any], Any]]) -> property:
-    """Return the property of a shell's field; the code behind it is made when it is first used."""
+    """Return the property of a shell's field, whose code is compiled when it is first used."""
 
     def get(message: Message) -> Any:
         shell = type(message)
-        if shell._fill__ is None:  # another thread was quicker
+        if shell._fill__ is None:  # another thread has decoded it
             return getattr(message, attr)
         if len(shell._schema__.members) > _MANY_FIELDS:
             touch(message)
@@ -326,9 +349,350 @@ def _first_access(attr: str, compile_fill: Callable[[Any, str], Callable[[Any], 
 
 
 def await_fill(message: Message, shell: type[Message]) -> None:
-    """Wait until the thread that was quicker to decode `message` has made it a plain object."""
-    deadline = time.monotonic() + _PATIENCE
+    """Wait until another thread has decoded a message and made it a plain object."""
+    deadline = time.monotonic() + _FILL_TIMEOUT_S
     while type(message) is shell:
         if time.monotonic() > deadline:
             raise DecodeError(message._schema__.name, "decoding was interrupted; decode again")
         time.sleep(0.00005)
+
+
+#: One step of a path: a field name, an index, or a slice (``[*]`` is ``slice(None)``).
+Step = str | int | slice
+
+_TOKEN = re.compile(
+    r"(?P<dot>\.?)(?P<name>[A-Za-z_]\w*)"
+    r"|\[(?P<index>[+-]?\d+)\]"
+    r"|\[(?P<star>\*)\]"
+    r"|\[(?P<start>[+-]?\d+)?:(?P<stop>[+-]?\d+)?(?::(?P<step>[+-]?\d+)?)?\]"
+)
+
+
+@lru_cache(maxsize=1024)
+def parse_path(path: str) -> tuple[Step, ...]:
+    """Split a path into its steps.
+
+    Raises:
+        FieldPathError: It is not of the form ``name.name[3].name[*]``.
+    """
+    if not isinstance(path, str):
+        raise FieldPathError(f"a field path is a str such as 'pose.position.x', got {path!r}")
+    steps: list[Step] = []
+    place = 0
+    while place < len(path):
+        match = _TOKEN.match(path, place)
+        if match is None or (bool(steps) != bool(match["dot"]) and match["name"]):
+            raise FieldPathError(
+                f"field path {path!r} is malformed at character {place + 1}; "
+                "write it like 'poses[2].position.x', 'ranges[1:5]' or 'markers[*].id'"
+            )
+        place = match.end()
+        if match["name"]:
+            steps.append(match["name"])
+        elif match["index"]:
+            steps.append(int(match["index"]))
+        elif match["star"]:
+            steps.append(slice(None))
+        else:
+            parts = (match["start"], match["stop"], match["step"])
+            cut = slice(*(None if part is None else int(part) for part in parts))
+            if cut.step == 0:
+                raise FieldPathError(f"field path {path!r}: a slice's step cannot be 0")
+            steps.append(cut)
+    if not steps:
+        raise FieldPathError("a field path cannot be empty")
+    return tuple(steps)
+
+
+def find_member(schema: Schema, name: str, path: str) -> Member:
+    """Return the member `name`; raises FieldPathError with the nearest name."""
+    member = schema.by_name.get(name)
+    if member is None:
+        names = [known.name for known in schema.members]
+        raise FieldPathError(
+            f"field path {path!r}: {schema.name} has no field {name!r}; {hint(name, names)}"
+        )
+    return member
+
+
+def resolve_path(schema: Schema, path: str) -> list[tuple[Member, Step | None]]:
+    """Check a path against a schema; return (member, index or slice) for each field on it.
+
+    Raises:
+        FieldPathError: The path does not exist in the type.
+    """
+    found: list[tuple[Member, Step | None]] = []
+    inside: Schema | None = schema
+    open_array = False
+    for step in parse_path(path):
+        if isinstance(step, str):
+            if open_array:
+                raise FieldPathError(
+                    f"field path {path!r}: {found[-1][0].name!r} is an array; "
+                    f"write {found[-1][0].name}[0] or {found[-1][0].name}[*]"
+                )
+            if inside is None:
+                raise FieldPathError(
+                    f"field path {path!r}: {found[-1][0].name!r} is a "
+                    f"{found[-1][0].field.type.name} and has no fields"
+                )
+            member = find_member(inside, step, path)
+            found.append((member, None))
+            inside, open_array = member.struct, member.is_array
+        else:
+            if not open_array:
+                what = found[-1][0].name if found else "the message"
+                raise FieldPathError(f"field path {path!r}: {what!r} is not an array")
+            member = found[-1][0]
+            if isinstance(step, int) and member.fixed_count is not None:
+                _check_index(step, member.fixed_count, path)
+            found[-1] = (member, step)
+            open_array = False
+    return found
+
+
+def column_type(rest: list[tuple[Member, Step | None]]) -> Any:
+    """Return the numpy type of a column whose elements a route leads to, None for other values."""
+    number, step = rest[-1][0].number, rest[-1][1]
+    if number is None or (rest[-1][0].is_array and not isinstance(step, int)):
+        return None
+    if any(isinstance(step, slice) for _, step in rest):
+        return None  # a column of columns, each as long as it likes
+    return bool if number.python is bool else number_type(number.dtype, "<")
+
+
+def _check_index(index: int, count: int, path: str) -> None:
+    if not -count <= index < count:
+        raise FieldPathError(
+            f"field path {path!r}: index {index} is out of range, the array holds {count}"
+        )
+
+
+def get_path(message: Message, path: str) -> Any:
+    """Return the value at a path; after a slice of messages, those of all elements."""
+    route = resolve_path(message._schema__, path)
+    try:
+        return _follow(message, route, path)
+    except (AttributeError, TypeError) as error:
+        raise _astray(error, path) from None
+
+
+def _astray(error: Exception, path: str) -> Exception:
+    # Assigned values are not checked before they are encoded.
+    if isinstance(error, Error):
+        return error
+    return FieldPathError(f"field path {path!r} meets an assigned value of the wrong kind: {error}")
+
+
+def _follow(message: Any, route: list[tuple[Member, Step | None]], path: str) -> Any:
+    value = message
+    for place, (member, step) in enumerate(route):
+        value = getattr(value, member.attr)
+        if isinstance(step, int):
+            _check_index(step, len(value), path)
+            value = value[step]
+            if member.number is not None:
+                value = value.item() if hasattr(value, "item") else value
+        elif isinstance(step, slice):
+            value = value[step]
+            rest = route[place + 1 :]
+            if rest and member.kind is Kind.STRUCT:
+                found = [_follow(element, rest, path) for element in value]
+                leaf = column_type(rest)
+                return found if leaf is None else import_module("numpy").array(found, leaf)
+    return value
+
+
+def set_path(message: Message, path: str, value: Any) -> None:
+    """Set what a path leads to; an array still in the received bytes is copied first.
+
+    Raises:
+        FieldPathError: The path leads nowhere.
+        ConversionError: A number does not fit its array; other values are checked when encoding.
+    """
+    route = resolve_path(message._schema__, path)
+    try:
+        _put(message, route, path, value)
+    except ConversionError as error:
+        name = message._schema__.name
+        raise ConversionError(error.path, error.value, error.expected, name) from None
+    except (AttributeError, TypeError) as error:
+        raise _astray(error, path) from None
+
+
+def _put(message: Message, route: list[tuple[Member, Step | None]], path: str, value: Any) -> None:
+    target: Any = message
+    for place, (member, step) in enumerate(route):
+        final = place + 1 == len(route)
+        if final and step is None:
+            setattr(target, member.attr, value)
+            return
+        holder = target
+        target = getattr(target, member.attr)
+        if step is None:
+            continue
+        if isinstance(step, int):
+            _check_index(step, len(target), path)
+        elif not final:
+            raise FieldPathError(f"field path {path!r}: only the last step can be a slice to set")
+        if final:
+            if member.number is not None:
+                target = _own(holder, member)
+                count = len(range(len(target))[step]) if isinstance(step, slice) else 1
+                value = _conversion().elements(member, step, count, value, path)
+            target[step] = value
+        else:
+            target = target[step]
+
+
+def writable(message: Message, path: str) -> np.ndarray:
+    """Return the numeric array at a path, copied if it is in the received bytes."""
+    route = resolve_path(message._schema__, path)
+    member, step = route[-1]
+    if not member.is_array or member.number is None or step is not None:
+        raise FieldPathError(f"field path {path!r} does not lead to a numeric array")
+    holder = _follow(message, route[:-1], path)
+    if isinstance(holder, list):
+        raise FieldPathError(f"field path {path!r} leads to several arrays")
+    array: np.ndarray = _own(holder, member)
+    return array
+
+
+def _own(holder: Any, member: Member) -> Any:
+    array = getattr(holder, member.attr)
+    flags = getattr(array, "flags", None)
+    if flags is None:  # what was assigned to the field
+        array = _conversion().numbers(member, array, member.name)
+    elif flags.writeable:
+        return array
+    else:
+        array = array.copy()
+    setattr(holder, member.attr, array)
+    return array
+
+
+def _conversion() -> Any:
+    # It makes messages, which need this module.
+    return import_module("rosglass.messages.conversion")
+
+
+_SHOWN = 6
+_LONGEST = 60
+#: The characters for bytes that are not UTF-8, and for half pairs in a ``wstring``.
+_SURROGATE = re.compile("[\ud800-\udfff]")
+
+
+def to_dict(message: Message) -> dict[str, Any]:
+    """Return the message as nested dicts; numeric arrays stay what they are."""
+    return {
+        member.name: _dict_value(member, getattr(message, member.attr))
+        for member in message._schema__.members
+    }
+
+
+def _dict_value(member: Member, value: Any) -> Any:
+    if member.kind is not Kind.STRUCT:
+        number = member.number
+        single = isinstance(value, (bytes, bytearray)) and len(value) == 1 and not member.is_array
+        if single and number is not None and number.name == "byte":
+            return int.from_bytes(value, "little", signed=number.low != 0)
+        return value
+    if member.is_array:
+        return [to_dict(element) if hasattr(element, "_schema__") else element for element in value]
+    return to_dict(value) if hasattr(value, "_schema__") else value
+
+
+def plain(value: Any) -> Any:
+    """Return a value of :func:`to_dict` with lists for arrays and readable strings."""
+    if isinstance(value, dict):
+        return {key: plain(inner) for key, inner in value.items()}
+    if isinstance(value, str):
+        return _SURROGATE.sub("\N{REPLACEMENT CHARACTER}", value)
+    if isinstance(value, (bytes, bytearray, memoryview)):
+        return list(value)
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [plain(inner) for inner in value]
+    return value
+
+
+def to_json(message: Message, indent: int | None = None) -> str:
+    """Return the message as strict JSON."""
+    dumped: str = import_module("json").dumps(
+        finite(plain(to_dict(message))), indent=indent, ensure_ascii=False, allow_nan=False
+    )
+    return dumped
+
+
+def finite(value: Any) -> Any:
+    """Return a value of :func:`plain` with strings for numbers that JSON does not support."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+    if isinstance(value, dict):
+        return {key: finite(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [finite(inner) for inner in value]
+    return value
+
+
+def to_yaml(message: Message) -> str:
+    """Return the message as YAML; lists of numbers take one line."""
+    yaml = import_module("yaml")
+
+    class Dumper(yaml.SafeDumper):  # type: ignore[misc, name-defined]
+        pass
+
+    def represent_list(dumper: Any, items: list[Any]) -> Any:
+        flow = not any(isinstance(item, (dict, list, str)) for item in items)
+        return dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=flow)
+
+    Dumper.add_representer(list, represent_list)
+    dumped: str = yaml.dump(
+        plain(to_dict(message)),
+        Dumper=Dumper,
+        sort_keys=False,
+        default_flow_style=False,
+        allow_unicode=True,
+        width=2**31,
+    )
+    return dumped
+
+
+def short(message: Message) -> str:
+    """Return the type and fields in one line, with long arrays and strings truncated."""
+    try:
+        return message._schema__.name + _fields(message)
+    except DecodeError as error:
+        return f"{message._schema__.name}(<{error}>)"
+
+
+def _fields(message: Message) -> str:
+    parts = []
+    for member in message._schema__.members:
+        try:
+            value = getattr(message, member.attr)
+        except AttributeError:
+            parts.append(f"{member.name}=<deleted>")
+            continue
+        parts.append(f"{member.name}={_short_value(member, value)}")
+    return f"({', '.join(parts)})"
+
+
+def _short_value(member: Member, value: Any) -> str:
+    if not member.is_array:
+        if hasattr(value, "_schema__"):
+            return _fields(value)
+        return _cut(repr(value))
+    if not hasattr(value, "__len__") or isinstance(value, str):
+        return _cut(repr(value))
+    count = len(value)
+    few = value[: _SHOWN if count > _SHOWN else count]
+    few = few.tolist() if hasattr(few, "tolist") else list(few)
+    shown = [_fields(item) if hasattr(item, "_schema__") else _cut(repr(item)) for item in few]
+    more = [f"... {count} in all"] if count > _SHOWN else []
+    return f"[{', '.join(shown + more)}]"
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."

@@ -1,4 +1,4 @@
-"""A definition, resolved: every member with its Python attribute, its kind and its nested schema.
+"""Schemas: resolved definitions with the Python attribute, kind and nested schema of each member.
 
 Schemas are interned by structure: two definitions that say the same (comments aside) share one
 schema, hence one Python class, wherever they came from.
@@ -29,7 +29,7 @@ _PRIVATE = ("_buffer__", "_fill__", "_offset__", "_root__", "_schema__")
 
 
 class Kind(Enum):
-    """What one element of a member is."""
+    """The kind of a member's elements."""
 
     NUMBER = "number"
     TEXT = "text"
@@ -132,7 +132,7 @@ class Member:
 
     @property
     def is_array(self) -> bool:
-        """Whether the member holds several elements."""
+        """Whether the member is an array."""
         return self.array is not ArrayKind.NONE
 
     @property
@@ -142,7 +142,7 @@ class Member:
 
 
 class Schema:
-    """A message type, ready for the codecs.
+    """A message type for the codecs.
 
     Attributes:
         definition: What it was made from.
@@ -174,7 +174,7 @@ class Schema:
         return f"<Schema {self.name} (ROS {self.ros})>"
 
     def cached(self, key: Hashable, make: Callable[[], Any]) -> Any:
-        """Return what is cached under `key`, making it once."""
+        """Return the cached object for `key`, created when it is first used."""
         try:
             return self.cache[key]
         except KeyError:
@@ -191,7 +191,7 @@ class Schema:
 
 
 _interned: weakref.WeakValueDictionary[Hashable, Schema] = weakref.WeakValueDictionary()
-#: Held for a look at `_interned` only: resolving a large type holds up no other thread.
+#: Guards `_interned` only, so that resolving a large type blocks no other thread.
 _intern_lock = threading.Lock()
 
 
@@ -279,7 +279,7 @@ def _struct(
 
 
 def _intern(definition: Definition, members: tuple[Member, ...], extent: Extent) -> Schema:
-    """Return the schema with these members: one that there is, or a new one."""
+    """Return the existing schema with these members, or a new one."""
     key = (
         definition.ros,
         definition.name,

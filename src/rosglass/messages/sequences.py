@@ -1,4 +1,4 @@
-"""Arrays of messages: lists that decode their elements when they are asked for them."""
+"""Arrays of messages: lists that decode their elements when they are used."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ class MessageSequence(MutableSequence["Message"]):
 
 
 def same_bytes(value: Any, schema: Schema, size: int, big: bool) -> memoryview | None:
-    """Return the bytes of elements that nobody has looked at, if they are what is to be written.
+    """Return the received bytes of untouched elements, if they can be written unchanged.
 
     Args:
         value: The array.

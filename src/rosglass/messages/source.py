@@ -1,17 +1,35 @@
-"""Writing Python functions as text, and making them functions that debuggers can show."""
+"""Generated Python functions: their source text, compiled so that debuggers can show it."""
 
 from __future__ import annotations
 
 import itertools
 import struct
+from collections.abc import MutableSequence, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from rosglass.interfaces.resolver import MAX_EMPTY
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-__all__ = ["Source", "iterator", "packer", "unpacker"]
+    import numpy as np
+
+__all__ = [
+    "MAX_EMPTY",
+    "Source",
+    "TooShortError",
+    "iterator",
+    "number_type",
+    "packer",
+    "read_wide",
+    "too_short",
+    "unpacker",
+    "write_wide",
+]
+
 
 _numbers = itertools.count(1)
 
@@ -40,7 +58,7 @@ _MANY_LINES, _DEEP = 1000, 10
 
 
 class Source:
-    """The text of one function and the objects its names stand for."""
+    """The text of a function and the objects that its names refer to."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -52,7 +70,7 @@ class Source:
 
     @property
     def is_full(self) -> bool:
-        """Whether what can be a function of its own should be one."""
+        """Whether further code should go into functions of its own."""
         return len(self.lines) > _MANY_LINES or self._depth > _DEEP
 
     def line(self, text: str) -> None:
@@ -79,7 +97,7 @@ class Source:
         self._depth -= 1
 
     def bind(self, value: Any, hint: str) -> str:
-        """Return the name that stands for `value` in the text, made from `hint`."""
+        """Return the name of `value` in the text, derived from `hint`."""
         name = self.names.get(id(value))
         if name is None:
             name = hint if hint not in self.globals else f"{hint}_{len(self.globals)}"
@@ -94,7 +112,7 @@ class Source:
     def compile(self, head: str, title: str) -> Any:
         """Return the function ``def head: lines``; `title` names it in tracebacks."""
         text = "\n".join((f"def {head}:", *self.lines, ""))
-        # Not in angle brackets: for such names nobody would ask the loader.
+        # Not in angle brackets: the loader is not used for such names.
         filename = f"rosglass generated: {title}, {next(_numbers)}"
         self.globals.update(__name__="rosglass.messages.generated", __loader__=_Loader(text))
         exec(compile(text, filename, "exec"), self.globals)
@@ -102,7 +120,7 @@ class Source:
 
 
 class _Loader:
-    """Hands the text of generated code to tracebacks and debuggers (PEP 302's ``get_source``)."""
+    """Provides the text of generated code to tracebacks and debuggers (PEP 302, ``get_source``)."""
 
     def __init__(self, text: str) -> None:
         self._text = text
@@ -110,3 +128,74 @@ class _Loader:
     def get_source(self, _name: str) -> str:
         """Return the text."""
         return self._text
+
+
+class TooShortError(Exception):
+    """The buffer ends too early; generated code raises it, callers see a DecodeError."""
+
+
+def too_short() -> NoReturn:
+    """Raise TooShortError, as an expression."""
+    raise TooShortError
+
+
+class OddValueError(Exception):
+    """A value needs the slow conversion; generated code raises it, callers never see it."""
+
+
+def odd() -> NoReturn:
+    """Raise OddValueError, as an expression."""
+    raise OddValueError
+
+
+def own(value: Any, cls: type) -> None:
+    """Check that a value is a message of the class, or a shell of it."""
+    if not isinstance(value, cls):
+        raise OddValueError
+
+
+def as_list(value: Any) -> list[Any]:
+    """Return the elements of an array field that is not a list."""
+    if isinstance(value, (tuple, MutableSequence)) and not isinstance(value, bytearray):
+        return list(value)
+    raise OddValueError
+
+
+@lru_cache(maxsize=64)
+def number_type(dtype: str, order: str) -> np.dtype:
+    """Return the numpy type with its byte order; the machine's own is numpy's singleton."""
+    found: np.dtype = import_module("numpy").dtype(order + dtype)
+    return found
+
+
+def hint(name: Any, known: Sequence[str]) -> str:
+    """Return a hint for an unknown field name."""
+    near = (
+        import_module("difflib").get_close_matches(name, known, 1) if isinstance(name, str) else []
+    )
+    return f"did you mean {near[0]!r}?" if near else f"it has: {', '.join(known) or 'no fields'}"
+
+
+def read_wide(buffer: bytes | memoryview, start: int, end: int, width: int, big: bool) -> str:
+    """Decode the code units of a ``wstring``: UTF-16, or one unit in 4 bytes (ROS 2's nodes)."""
+    raw = buffer[start:end]
+    if len(raw) < end - start:
+        too_short()
+    order = "be" if big else "le"
+    if width == 2:
+        return str(raw, f"utf-16-{order}", "surrogatepass")
+    text = str(raw, f"utf-32-{order}", "surrogatepass")
+    # Units beyond the BMP arrive as surrogate pairs, each in 4 bytes.
+    return text.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "surrogatepass")
+
+
+def write_wide(text: str, width: int, big: bool) -> tuple[bytes, int]:
+    """Encode a ``wstring``; return its bytes and the number of its UTF-16 code units."""
+    order = "be" if big else "le"
+    units = text.encode(f"utf-16-{order}", "surrogatepass")
+    count = len(units) // 2
+    if width == 4:
+        zero = bytes(2)
+        parts = (units[i : i + 2] for i in range(0, len(units), 2))
+        units = b"".join(zero + unit if big else unit + zero for unit in parts)
+    return units, count

@@ -1,4 +1,4 @@
-"""Messages of one ROS in the other's words: by their bytes, or field by field where that must be.
+"""Translation of messages between ROS 1 and ROS 2: by their bytes where possible, or by fields.
 
 Where both have the same fields in the same order, the bytes are read as the other ROS's message at
 once: in ROS 1's wire format the two differ in ``Header.seq`` only. Whatever is alike goes through
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 __all__ = ["ActionTranslation", "ServiceTranslation", "Translation"]
 
 _WIRES = {1: "ros1", 2: "cdr"}
-#: ``Header.seq`` of the messages that we make for ROS 1; publishers there number them as they like.
+#: ``Header.seq`` of messages for ROS 1, where publishers set it as they like.
 _SEQ = bytes(4)
-#: Bytes of a message from which on a slice of it is no copy.
+#: Size of a message in bytes from which a view is used instead of a slice.
 _BIG = 1 << 16
 #: ROS 1's levels of log messages and ROS 2's (rosgraph_msgs/Log, rcl_interfaces/msg/Log).
 _LEVELS = ((1, 10), (2, 20), (4, 30), (8, 40), (16, 50))
@@ -48,7 +48,7 @@ _TIME_RANGES = {
 
 
 class Translation:
-    """Turns one type's messages into those of the other ROS.
+    """Translates the messages of a type to the other ROS.
 
     The target is the other ROS's own type where it has one whose fields correspond, so that its
     nodes understand it; otherwise a type derived from the source's definition.
@@ -141,7 +141,7 @@ class Translation:
 
 
 class ServiceTranslation:
-    """Turns the requests and responses of a service into those of the other ROS.
+    """Translates the requests and responses of a service to the other ROS.
 
     Args:
         source: The service's type where it is offered, of either ROS.
@@ -174,7 +174,7 @@ class ServiceTranslation:
 
 
 class ActionTranslation:
-    """Turns the goals, results and feedback of an action into those of the other ROS.
+    """Translates the goals, results and feedback of an action to the other ROS.
 
     Args:
         source: The action's type where it is offered, of either ROS.
@@ -185,7 +185,7 @@ class ActionTranslation:
         type: The type in the other ROS, where goals are sent.
         derived: Whether it was derived; see :class:`Translation`.
         goal: From what is sent there to what the server takes.
-        result: From the server's results to what is told there.
+        result: From the server's results to the client's.
         feedback: The same for feedback.
 
     Raises:
@@ -254,7 +254,7 @@ def _builder(pair: Pair, ros: int, source: Schema, target: Schema) -> _Convert:
 
 
 def _careful(steps: list[_Step], ros: int, target: Schema, log: bool) -> _Convert:
-    """Return what builds messages whose fields are elsewhere, or have to be made up."""
+    """Return the builder of messages whose fields are moved or derived."""
 
     def build(message: Any) -> Any:
         made, step = target.type.create(), None
@@ -278,13 +278,13 @@ def _careful(steps: list[_Step], ros: int, target: Schema, log: bool) -> _Conver
 
 
 def _inside(name: str, error: ConversionError) -> ConversionError:
-    """Return an error of a field as that of the message around it."""
+    """Return the error of a nested field with the path in its message."""
     joint = "." if error.path and not error.path.startswith("[") else ""
     return ConversionError(f"{name}{joint}{error.path}", error.value, error.expected)
 
 
 def _wrapper(field: PairedField, ros: int, target: Schema) -> _Convert:
-    """Return what turns std_msgs/Time into builtin_interfaces/msg/Time, or back."""
+    """Return the conversion between std_msgs/Time and builtin_interfaces/msg/Time."""
     name, kind = field.one[0], field.type_one.name
     if ros == 1:
         forth = _time(kind, 1, target)
@@ -309,7 +309,7 @@ def _step(field: PairedField, ros: int, source: Schema, target: Schema) -> _Step
 
 
 def _converter(field: PairedField, ros: int, ours: Member, theirs: Member) -> _Convert | None:
-    """Return what turns a field's value into the other ROS's; None for what stays as it is."""
+    """Return the conversion of a field's value; None if it is unchanged."""
     if field.type_one.name in _TIME_NAMES:
         assert theirs.struct is not None
         convert = _time(field.type_one.name, ros, theirs.struct)
@@ -343,7 +343,7 @@ def _member(schema: Schema, path: tuple[str, ...]) -> tuple[tuple[str, ...], Mem
 
 
 def _each(convert: _Convert, alike: Schema | None) -> _Convert:
-    """Return what converts an array of messages; those that are `alike` keep their bytes."""
+    """Return the conversion of an array of messages; those that are `alike` keep their bytes."""
 
     def each(values: Any) -> Any:
         if alike is not None and isinstance(values, MessageSequence) and values._items is None:
@@ -371,8 +371,8 @@ def _time(kind: str, ros: int, target: Schema) -> _Convert:
         if not (low <= seconds <= high and least <= rest <= most):
             for name, part, (bottom, top) in zip(names, (seconds, rest), ranges, strict=True):
                 if not bottom <= part <= top:
-                    told = f"from {bottom} to {top}, as ROS {3 - ros} has it"
-                    raise ConversionError(name, part, told)
+                    expected = f"from {bottom} to {top}, as in ROS {3 - ros}"
+                    raise ConversionError(name, part, expected)
         made = cls()
         setattr(made, first, seconds)
         setattr(made, second, rest)
@@ -382,7 +382,7 @@ def _time(kind: str, ros: int, target: Schema) -> _Convert:
 
 
 def _octets(target: Member) -> _Convert:
-    """Return what turns signed bytes into unsigned ones, or back: the bits stay."""
+    """Return the conversion between signed and unsigned bytes with the same bits."""
     number = target.number
     assert number is not None
     signed = bool(number.low)
@@ -420,7 +420,7 @@ def _starts_with_seq(pair: Pair) -> bool:
 def _time_checks(
     pair: Pair, schema: Schema, before: tuple[str, ...] = ()
 ) -> list[Callable[[Any], bool]]:
-    """Return what says whether the times of ROS 2's message mean the same in ROS 1's bits."""
+    """Return the check whether times of a ROS 2 message have the same bits in ROS 1."""
     found = []
     for field in pair.fields:
         path = (*before, *(schema.by_name[name].attr for name in field.two))

@@ -1,18 +1,26 @@
-"""Types: what a message, service or action is, and the way between its values and its bytes."""
+"""Message types, which decode, encode and create messages, and types without definition."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from rosglass import interfaces
-from rosglass.errors import DecodeError, DefinitionError, Error, UnsupportedError
+from rosglass.errors import (
+    DecodeError,
+    DefinitionError,
+    Error,
+    InvalidNameError,
+    TypeNotFoundError,
+    UnsupportedError,
+)
 from rosglass.interfaces.definition import Definition
+from rosglass.interfaces.names import join_name, split_name
 from rosglass.interfaces.resolver import Resolver
-from rosglass.messages.codec import Codec, codec_of
+from rosglass.messages.codec import Codec, codec_of, encapsulation_error
 from rosglass.messages.conversion import convert
-from rosglass.messages.diagnosis import encapsulation_error
 from rosglass.messages.emit_path import path_function
 from rosglass.messages.layout import Wire, leaves
 from rosglass.messages.schema import Schema, schema_of
@@ -23,7 +31,8 @@ if TYPE_CHECKING:
     from rosglass.interfaces.definition import Field
     from rosglass.messages.message import Message
 
-__all__ = ["Constants", "MessageType", "portable"]
+__all__ = ["Constants", "MessageType", "OpaqueType", "portable"]
+
 
 _WIRES = {
     (name, big, wide, view): Wire(name, big, wide, view)
@@ -55,7 +64,7 @@ class Constants(dict[str, Any]):
 
 
 class MessageType:
-    """A message type: decodes, encodes and makes its messages.
+    """A message type, which decodes, encodes and creates its messages.
 
     Attributes:
         definition: The definition it was made from.
@@ -85,7 +94,7 @@ class MessageType:
 
     @classmethod
     def from_text(cls, name: str, text: str, ros: int = 2) -> MessageType:
-        """Return the type that a text defines, all it needs included after ``===`` lines.
+        """Create the type from a text, which includes all types that it uses after ``===`` lines.
 
         Raises:
             DefinitionError: The text breaks a rule, or needs a type it does not contain.
@@ -133,7 +142,7 @@ class MessageType:
 
     @property
     def type_hash(self) -> str:
-        """What peers tell versions of the type apart by: RIHS01, in ROS 1 the md5 sum."""
+        """The hash by which peers compare versions of the type: RIHS01, or md5 in ROS 1."""
         return self.md5 if self.ros == 1 else self.rihs01
 
     @property
@@ -222,7 +231,7 @@ class MessageType:
         return message
 
     def _bytes(self, buffer: Any) -> bytes | memoryview:
-        """Return what can be kept: bytes, or a read-only view of some."""
+        """Return bytes, or a read-only view of some, which can be kept."""
         if type(buffer) is bytes:
             return buffer
         try:
@@ -242,7 +251,7 @@ class MessageType:
         return wire
 
     def _codec_for(self, data: bytes | memoryview, wire: str | None, wide: int | None) -> Codec:
-        """Return the codec for received bytes: their header tells the byte order."""
+        """Return the codec for received bytes, by the byte order in their header."""
         name = self._wire_name(wire)
         big = name == "cdr" and _encapsulation(self.name, data)
         if wide is None and self._schema.has_wide:
@@ -270,7 +279,7 @@ class MessageType:
         return min(fitting, key=lambda found: found[0])[1] if fitting else 4
 
     def decode_small(self, buffers: Sequence[bytes | memoryview]) -> list[Message] | None:
-        """Return many small messages of ROS 1 at once, decoded: that takes less than leaving it.
+        """Decode many small messages of ROS 1 at once, which is faster than lazy messages.
 
         None when they, or the type, are such that :meth:`decode` is better for each: big, damaged,
         or with much in them.
@@ -282,7 +291,7 @@ class MessageType:
             read = self._at_once = self._codec("ros1", False, _width(None)).reader
         try:
             return list(map(read, buffers)) if len(buffers[0]) <= _SMALL else None
-        except Exception:  # whoever reads the fields shall be told
+        except Exception:  # reading the fields raises the error
             return None
 
     def decode_all(
@@ -475,7 +484,7 @@ class MessageType:
 
 
 def _untouched(value: Any, codec: Codec) -> bytes | memoryview | None:
-    """Return the bytes of a shell that was received through `codec` and never looked into."""
+    """Return the bytes of a shell that was received by `codec` and never decoded."""
     root = getattr(value, "_root__", None)
     if root is not codec and (root is None or root.plain is not codec):
         return None
@@ -483,7 +492,7 @@ def _untouched(value: Any, codec: Codec) -> bytes | memoryview | None:
 
 
 def _encapsulation(type_name: str, data: bytes | memoryview) -> bool:
-    """Return whether a CDR message is big endian; raises DecodeError for what we cannot read."""
+    """Return whether a CDR message is big endian; raises DecodeError if it is unsupported."""
     if len(data) < 4 or data[0] or data[1] > 1:
         raise encapsulation_error(type_name, data)
     return not data[1]
@@ -502,3 +511,97 @@ def portable(definition: Definition) -> Definition:
 
 
 Schema.make_type = MessageType._of_schema
+
+
+_HASHES = {1: re.compile(r"[0-9a-f]{32}"), 2: re.compile(r"RIHS[0-9]{2}_[0-9a-f]{64}")}
+_WRITE = {1: "32 hexadecimal digits (an md5 sum)", 2: "RIHS01_ and 64 hexadecimal digits"}
+
+
+class OpaqueType(MessageType):
+    """A message type without definition, for topics that are passed on as bytes.
+
+    Whatever needs the definition (decoding, encoding, fields) raises TypeNotFoundError with the
+    reason why there is none.
+
+    Args:
+        name: ``pkg/msg/Type``.
+        type_hash: RIHS01 hash (ROS 1: md5 sum), as the robot announces it; empty to announce none.
+        reason: Why there is no definition.
+        text: What the robot sent in place of a definition, to be passed on; ROS 1 only.
+        ros: 1 or 2.
+
+    Attributes:
+        reason: As given.
+        text: As given.
+
+    Raises:
+        InvalidNameError: `name` is no message type's name, or `type_hash` no hash.
+        UnsupportedError: There is no such ROS.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        type_hash: str = "",
+        reason: str = "only its name was given",
+        *,
+        text: str = "",
+        ros: int = 2,
+    ) -> None:
+        if ros not in _HASHES:
+            raise UnsupportedError(f"{name}: there is ROS 1 and ROS 2, not {ros!r}")
+        if split_name(name)[1] not in ("", "msg", "action"):
+            raise InvalidNameError(f"{name!r} is no message type; write pkg/msg/Type")
+        if not isinstance(type_hash, str) or (type_hash and not _HASHES[ros].fullmatch(type_hash)):
+            raise InvalidNameError(
+                f"{type_hash!r:.90} is no type hash of {name}; write {_WRITE[ros]}, or nothing"
+            )
+        self.name, self.ros, self.wire = join_name(name), ros, "cdr" if ros == 2 else "ros1"
+        self.reason, self.text = reason, text
+        self._hash = type_hash
+
+    @property
+    def md5(self) -> str:
+        """ROS 1's md5 sum as given; empty if there is none."""
+        return self._hash if self.ros == 1 else ""
+
+    @property
+    def rihs01(self) -> str:
+        """ROS 2's type hash as given; empty if there is none."""
+        return self._hash if self.ros == 2 else ""
+
+    def __repr__(self) -> str:
+        return f"<OpaqueType {self.name}>"
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, OpaqueType):
+            return False
+        return (self.name, self.ros, self._hash) == (other.name, other.ros, other._hash)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self._hash))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(OpaqueType, text=self.text, ros=self.ros), (
+            self.name,
+            self._hash,
+            self.reason,
+        )
+
+    def decode_small(self, buffers: Sequence[bytes | memoryview]) -> None:
+        """Return None: nothing can be decoded."""
+
+    def _codec_for(self, *_: Any) -> NoReturn:
+        raise self._unknown()
+
+    def __getattr__(self, name: str) -> Any:
+        # All that a definition gives is made from attributes that an opaque type does not have.
+        if name.startswith("__"):
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        raise self._unknown()
+
+    def _unknown(self) -> TypeNotFoundError:
+        return TypeNotFoundError(
+            f"there is no definition of {self.name}, so that its messages are only bytes: "
+            f"{self.reason}"
+        )

@@ -49,7 +49,7 @@ def locate(place: str | os.PathLike[str]) -> Path:
     package, _, rest = text.removeprefix(_PACKAGE).partition("/")
     if not package:
         raise QmlError(f"{text}: expected package://name/path")
-    from rosglass.interfaces.folders import workspace  # noqa: PLC0415 - few need it
+    from rosglass.interfaces.provider import workspace  # noqa: PLC0415 - few need it
 
     folder = workspace(os.environ).package(package)
     if not folder:

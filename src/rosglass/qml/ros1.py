@@ -38,7 +38,7 @@ from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rosglass.interfaces.folders import Folders
+    from rosglass.interfaces.provider import Folders
     from rosglass.qml.session import Session
 
 
@@ -127,7 +127,7 @@ class Package(QtCore.QObject):
 
     def _look(self, search: Callable[[Folders], _T], otherwise: _T, *, again: bool = False) -> _T:
         """Return the packages in the folders, searched once per state of the environment."""
-        from rosglass.interfaces.folders import (  # noqa: PLC0415 - few need it
+        from rosglass.interfaces.provider import (  # noqa: PLC0415 - few need it
             workspace,
             workspace_variables,
         )

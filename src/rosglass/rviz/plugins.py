@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error
-from rosglass.interfaces.folders import workspace
+from rosglass.interfaces.provider import workspace
 from rosglass.qt import QtCore, Signal
 from rosglass.rviz.property_values import shown
 from rosglass.rviz.watch import Hook

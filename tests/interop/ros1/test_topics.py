@@ -8,7 +8,7 @@ import pytest
 from waiting import eventually
 
 import rosglass
-from rosglass.messages.text import plain
+from rosglass.messages.message import plain
 
 INF = float("inf")
 HEADER = {"seq": 7, "stamp": {"secs": 4294967295, "nsecs": 999999999}, "frame_id": "base_länk"}

@@ -188,7 +188,7 @@ def test_old_entries_make_room(cache: TypeCache, monkeypatch: pytest.MonkeyPatch
     definitions = [sent(text=f"uint8[{n + 1}] state") for n in range(6)]
     cache.put(definitions[0], rihs01(definitions[0]))
     size = only_file(cache).stat().st_size
-    monkeypatch.setattr("rosglass.interfaces.type_cache._MAX_TOTAL", int(size * 3.5))
+    monkeypatch.setattr("rosglass.interfaces.type_descriptions._MAX_TOTAL", int(size * 3.5))
     for age, definition in enumerate(definitions):
         cache.put(definition, rihs01(definition))
         path = Path(cache.folder, f"{rihs01(definition)}.json")

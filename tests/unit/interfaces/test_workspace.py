@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from rosglass.errors import DefinitionConflictError, DefinitionError, TypeNotFoundError
-from rosglass.interfaces import Definition, Library, ServiceDefinition, folders, md5
+from rosglass.interfaces import Definition, Library, ServiceDefinition, md5, provider
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -270,7 +270,7 @@ def test_too_many_folders(
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    monkeypatch.setattr(folders, "_MAX_FOLDERS", 5)
+    monkeypatch.setattr(provider, "_MAX_FOLDERS", 5)
     root = write({f"d{n}/x": "" for n in range(9)})
     library.add_path(root)
     with caplog.at_level(logging.WARNING), pytest.raises(TypeNotFoundError):

@@ -29,7 +29,7 @@ from rosglass.interfaces import (
     parse_type_description,
     type_description,
 )
-from rosglass.interfaces.type_sources import add_type_sources, type_sources
+from rosglass.interfaces.type_descriptions import add_type_sources, type_sources
 from rosglass.messages import Message, MessageType, Translation, load
 from rosglass.wires.dds.type_lookup import describe_struct
 from rosglass.wires.tcpros.announced_types import AnnouncedTypes
