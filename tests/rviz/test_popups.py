@@ -258,7 +258,7 @@ def test_popup_follows_a_moving_frame(hand: Any, app: Any, master: str, caplog: 
             assert popup.problem == ""
         live = there_is_grey(popup)
     # The robot is gone, and its transforms stay as they were.
-    hand.wait(lambda: popup.problem == "where the frame 'popup_test' is was not told for 3 s")
+    hand.wait(lambda: popup.problem == "the frame 'popup_test' was not updated for 3 s")
     assert popup.content.isVisible()
     assert (live, there_is_grey(popup)) == (False, True)
     hand.wait.frames(3)
@@ -370,7 +370,7 @@ def test_qml_popup_is_half_seen_while_its_place_is_old(
 
     hand.wait(lambda: root.property("seen") == 1)
     hand.wait(lambda: root.property("seen") == 0.5)
-    assert root.property("problem") == "where the frame 'old_link' is was not told for 3 s"
+    assert root.property("problem") == "the frame 'old_link' was not updated for 3 s"
     assert caplog.text.count("AnchoredPopup: where the frame 'old_link' is") == 1
     # It can be operated all the same.
     seen = Camera(app.window).project((0, 0, 0))

@@ -53,7 +53,7 @@ def __getattr__(name: str) -> object:
     if name not in _HOMES:
         raise AttributeError(f"module 'rosglass.rviz' has no attribute {name!r}")
     if "rosglass.qt" not in sys.modules and find_spec("rviz") is not None:
-        # RViz's Qt; where there is no RViz, its absence is told, not that of Qt 5.
+        # RViz's Qt; without RViz, the error is about RViz, not about Qt 5.
         os.environ.setdefault("ROSGLASS_QT", "pyside2")
     with InterruptsDeferred():
         value: object = getattr(import_module(f"rosglass.rviz.{_HOMES[name]}"), name)

@@ -27,7 +27,7 @@ _log = logging.getLogger("rosglass.rviz")
 
 
 class Access(QtCore.QObject):
-    """What an interface can ask of RViz; ``Application.rviz``.
+    """The seam to the 3D view: what interfaces can read, change and follow; ``Application.rviz``.
 
     Parts are made when they are first asked for. Used in the GUI thread.
 
@@ -86,17 +86,17 @@ class Access(QtCore.QObject):
 
     @cached_property
     def view(self) -> View:
-        """The camera, moved."""
+        """The camera."""
         return View(self.window, self.frames)
 
     @cached_property
     def views(self) -> Views:
-        """The kinds of views, and those that are saved."""
+        """The types of views, and the saved ones."""
         return Views(self.window)
 
     @cached_property
     def picker(self) -> Picker:
-        """What is under a pixel, and pictures."""
+        """Points under pixels, and screenshots."""
         return Picker(self.window)
 
     @cached_property
@@ -166,7 +166,7 @@ class Access(QtCore.QObject):
         return self._rate
 
     def close(self) -> None:
-        """Let go of what follows RViz and the robot; safe to call twice."""
+        """Stop following RViz and the robot; safe to call twice."""
         self._timer.stop()
         for name, part in list(self.__dict__.items()):
             if name in ("displays", "frames"):

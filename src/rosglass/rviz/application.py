@@ -46,12 +46,12 @@ __all__ = ["Application"]
 _log = logging.getLogger("rosglass.rviz")
 #: rviz::RenderSystem::disableAntiAliasing(), before the first window.
 _NO_ANTI_ALIASING = "_ZN4rviz12RenderSystem19disableAntiAliasingEv"
-#: Seconds after which a program ends that was told to, whatever RViz is doing.
-_PATIENCE = 1.7
-#: Milliseconds that overlays have to ask for a node of a name of their own.
-_LONGEST_WITHOUT_NODE = 2000
-#: Milliseconds between two looks whether somebody has shut RViz's node down.
-_LOOK = 300
+#: Seconds after which the process ends once it was asked to, whatever RViz is doing.
+_EXIT_TIMEOUT_S = 1.7
+#: Milliseconds that overlays have to name their node.
+_NODE_DELAY_MS = 2000
+#: Milliseconds between checks whether RViz's node was shut down.
+_CHECK_PERIOD_MS = 300
 
 
 class Application(Handle):
@@ -98,7 +98,7 @@ class Application(Handle):
         RosArgumentError: One of `ros_arguments` is not valid.
         Error: A file is missing or broken, a name or an address is not valid, this is not the main
             thread, or there is an RViz in this process already.
-        KeyboardInterrupt: Ctrl-C was pressed meanwhile.
+        KeyboardInterrupt: Ctrl-C was pressed.
     """
 
     _made = False
@@ -128,8 +128,8 @@ class Application(Handle):
             raise Error("there was an RViz in this process: its renderer cannot be started again")
         if url and not url.startswith("ros1:"):
             raise Error(f"RViz is a program of ROS 1: expected its master, ros1://..., got {url}")
-        told = Arguments.parse(ros_arguments)
-        options = Ros1Options.parse(url or "ros1://", os.environ, told)
+        remappings = Arguments.parse(ros_arguments)
+        options = Ros1Options.parse(url or "ros1://", os.environ, remappings)
         options.namespace(None)
         if name:
             validate_node_name(name)
@@ -149,10 +149,10 @@ class Application(Handle):
         self._closed = self._running = self._fullscreen = False
         self._fullscreen = fullscreen
         received: list[int] = []
-        with QuitOnSignal(received.append, _PATIENCE, keep_handlers=True):
+        with QuitOnSignal(received.append, _EXIT_TIMEOUT_S, keep_handlers=True):
             answers = wait_for_master(options.master, timeout, lambda: bool(received))
             if answers:
-                name_node(name or told.name, options)
+                name_node(name or remappings.name, options)
                 Application._made = True
                 if not anti_aliasing:
                     cpp_function("librviz", _NO_ANTI_ALIASING)()
@@ -181,21 +181,21 @@ class Application(Handle):
         #: Their entries in RViz's Displays panel.
         self.entries = Entries(self.window, self.overlays, self.session, self._import_paths)
         self._menu = OverlayMenu(self.window, self.entries)
-        #: RViz's camera, moved.
+        #: RViz's camera.
         self.view = self.rviz.view
-        #: The keys that move it.
+        #: Keyboard navigation.
         self.view_keys = ViewKeys(self.window, self.view, self.overlays)
-        #: How robots move it.
+        #: The ROS topics and services of the camera.
         self.view_services = ViewServices(self.view, self.session, self.node_name)
-        #: The settings of both in RViz's Displays panel.
+        #: The view controller's entry in the Displays panel.
         self.view_entry = ViewEntry(self.window, self.entries, self.view, self.view_services)
         #: Whether the master of RViz is there.
         self.master = MasterWatch(options.master)
         self.master.problem_changed.connect(self._show_problem)
         self._problem: Any = None
         self._timer = QtCore.QTimer()
-        self._timer.timeout.connect(self._look_at_node)
-        self._timer.start(_LOOK)
+        self._timer.timeout.connect(self._check_node)
+        self._timer.start(_CHECK_PERIOD_MS)
         self.window.closing.connect(self._on_closing)
         if fixed_frame:
             self.fixed_frame = fixed_frame
@@ -207,7 +207,7 @@ class Application(Handle):
 
     @property
     def fixed_frame(self) -> str:
-        """The frame that RViz shows everything in; one that does not exist is told by RViz."""
+        """RViz's fixed frame; RViz reports one that does not exist in its status."""
         return str(self.window.manager.getFixedFrame())
 
     @fixed_frame.setter
@@ -288,13 +288,13 @@ class Application(Handle):
             The exit code: 0, what :meth:`quit` was given, 130 after Ctrl-C, 143 after SIGTERM.
         """
         self.show()
-        QtCore.QTimer.singleShot(_LONGEST_WITHOUT_NODE, self.connect)
+        QtCore.QTimer.singleShot(_NODE_DELAY_MS, self.connect)
         self._running = True
-        with QuitOnSignal(lambda number: self.quit(128 + number), _PATIENCE):
+        with QuitOnSignal(lambda number: self.quit(128 + number), _EXIT_TIMEOUT_S):
             code = run_event_loop(self.qt)
             self._running = False
             if end_process:
-                end_process_within(_PATIENCE, code)
+                end_process_within(_EXIT_TIMEOUT_S, code)
             self.close()
         return code
 
@@ -350,7 +350,7 @@ class Application(Handle):
             # RViz itself is still handling the event.
             QtCore.QTimer.singleShot(0, self.close)
 
-    def _look_at_node(self) -> None:
+    def _check_node(self) -> None:
         if roscpp.is_running():
             return
         self._timer.stop()

@@ -28,14 +28,14 @@ if TYPE_CHECKING:
 
 __all__ = ["Display", "Displays", "Status", "status_of"]
 
-#: Milliseconds between looks at what no signal tells.
-_PERIOD = 200
+#: Milliseconds between checks of what RViz has no signal for.
+_PERIOD_MS = 200
 _LONGEST = 1000
 _SIGNALS = ("displayAdded(rviz::Display*)", "displayRemoved(rviz::Display*)")
 
 
 class Status(NamedTuple):
-    """How a display is, by its own account."""
+    """The status of a display."""
 
     #: ``ok``, ``warn`` or ``error``.
     level: str
@@ -64,18 +64,18 @@ class Display:
         self.handle: Any = handle
         #: The class, e.g. ``rviz/Grid``.
         self.class_id = str(handle.getClassId())
-        self._told = self._read()
+        self._state = self._read()
 
     def _read(self) -> tuple[str, bool, Status]:
         if self.handle is None:
-            return self._told
+            return self._state
         handle = self.handle
         return str(handle.getName()), bool(handle.isEnabled()), status_of(handle)
 
     def refresh(self) -> bool:
-        """Remember how it is now; returns whether it was another way."""
-        before, self._told = self._told, self._read()
-        return before != self._told
+        """Read its state; return whether it has changed."""
+        before, self._state = self._state, self._read()
+        return before != self._state
 
     @property
     def exists(self) -> bool:
@@ -182,7 +182,7 @@ class Displays(Watched):
         window: RViz.
     """
 
-    #: RViz's own status is another: the fixed frame is not known, for instance.
+    #: RViz's own status has changed, e.g. to an unknown fixed frame.
     status_changed = Signal()
 
     def __init__(self, window: Window) -> None:
@@ -192,9 +192,9 @@ class Displays(Watched):
         self._status = status_of(self._root)
         self._groups: set[int] = set()
         self._match()
-        self._told = list(self._items)
+        self._known = list(self._items)
         self._timer = QtCore.QTimer(self)
-        self._timer.setInterval(_PERIOD)
+        self._timer.setInterval(_PERIOD_MS)
         self._timer.timeout.connect(self.settle)
         self._timer.start()
 
@@ -302,21 +302,20 @@ class Displays(Watched):
         wrapped.deleteLater()
 
     def settle_panel(self) -> None:
-        """Have RViz's panels hide and show what they were told to.
+        """Deliver what is queued for RViz's panels.
 
-        They do so later, and crash by properties whose display was removed in between.
+        They hide and show properties later, and crash if a display was removed in between.
         """
         event = int(QtCore.QEvent.Type.MetaCall)
         for tree in self._window.widget.findChildren(QtWidgets.QTreeView):
             QtCore.QCoreApplication.sendPostedEvents(tree, event)
 
     def _rest(self) -> Callable[[], None]:
-        status, told = self.status, self._status
-        self._status = status
-        return self.status_changed.emit if status != told else lambda: None
+        before, self._status = self._status, self.status
+        return self.status_changed.emit if self._status != before else lambda: None
 
     def close(self) -> None:
-        """Look no longer at what changes; safe to call twice."""
+        """Stop checking for changes; safe to call twice."""
         self._timer.stop()
 
     def _match(self) -> None:
@@ -336,7 +335,7 @@ class Displays(Watched):
 
 
 def _walk(group: Any) -> Iterator[tuple[Any, bool]]:
-    """Iterate over a group and the displays in it, and tell which are groups."""
+    """Iterate over a group and the displays in it, each with whether it is a group."""
     yield group, True
     for index in range(group.numDisplays()):
         inner = group.getGroupAt(index)

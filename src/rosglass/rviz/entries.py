@@ -36,7 +36,7 @@ __all__ = [
     "camera_icon",
     "display_class",
     "overlay_icon",
-    "tell_status",
+    "set_status",
 ]
 
 
@@ -125,11 +125,11 @@ def _classes() -> tuple[Any, Any]:
 
 
 def display_class() -> Any:
-    """Return our kind of RViz's display; its `entry` is told to save and load."""
+    """Return our class of RViz's display, whose `entry` saves and loads."""
     return _classes()[0]
 
 
-def tell_status(display: Any, row: str, level: int, text: str) -> None:
+def set_status(display: Any, row: str, level: int, text: str) -> None:
     """Show a line below a display's status: 0 for what is fine, 1 for a warning, 2 for an error."""
     core = pyqt()
     core.QMetaObject.invokeMethod(
@@ -164,7 +164,7 @@ class Entry(QtCore.QObject):
         self._import_paths = import_paths
         #: Called when its check box, or that of a group it is in, was clicked, when it is to show
         #: something else, and when RViz has deleted it. No signal: PySide2 takes entries that have
-        #: gone for ones that it can still tell to disconnect.
+        #: gone for ones that it can still disconnect.
         self.touched: Callable[[], object] = _nothing
         #: Called when it has another name; with itself.
         self.renamed: Callable[[Entry], object] = _nothing
@@ -247,7 +247,7 @@ class Entry(QtCore.QObject):
     # The overlay.
 
     def ensure(self) -> None:
-        """Make the overlay that the entry stands for; what prevents it is told as its status."""
+        """Make the overlay of the entry; an error becomes its status."""
         if self.overlay is not None or self._failed or not self.alive:
             return
         name = str(self.display.getName())
@@ -318,7 +318,7 @@ class Entry(QtCore.QObject):
         properties.configChanged.connect(self._on_config)
         self._show_registered()
         self._show_problem(overlay.problem)
-        # One whose file has errors has told them.
+        # One whose file has errors has reported them.
         if isinstance(overlay, QmlOverlay) and not overlay.loaded and not overlay.problem:
             try:
                 overlay.load()
@@ -346,7 +346,7 @@ class Entry(QtCore.QObject):
         return overlay
 
     def close(self) -> None:
-        """Let go of RViz's display, which is for others to take away; once, after :meth:`drop`."""
+        """Release RViz's display, which the caller removes; once, after :meth:`drop`."""
         self._own_tree.close()
         shown, own = self._watches
         # Those of a display that is gone have ended with it.
@@ -407,7 +407,7 @@ class Entry(QtCore.QObject):
     def status(self, row: str, level: int, text: str) -> None:
         """Show a line below the entry's status."""
         if self.alive:
-            tell_status(self.display, row, level, text)
+            set_status(self.display, row, level, text)
 
     def _show_problem(self, problem: str) -> None:
         self.status("Overlay", _OK, "OK")
@@ -444,7 +444,7 @@ class Entry(QtCore.QObject):
 
 
 def _nothing(*_: Any) -> None:
-    """Be told what nobody follows."""
+    """Ignore a change."""
 
 
 class Entries(QtCore.QObject):
@@ -497,7 +497,7 @@ class Entries(QtCore.QObject):
         return next((entry for entry in self._entries if entry.overlay is overlay), None)
 
     def add_qml(self, file: str, name: str = "") -> Entry:
-        """Put an entry for a QML file into the panel; what is wrong with it is told there."""
+        """Add an entry for a QML file to the panel, which shows its errors."""
         entry = self._make(QML_CLASS)
         entry.own.properties["Path"].set(file)
         entry.display.setName(name or QtCore.QFileInfo(file).completeBaseName())
@@ -587,7 +587,7 @@ class Entries(QtCore.QObject):
         """Give an overlay of the program's an entry: one that waits for it, or a new one."""
         if overlay not in self._programs:
             self._programs.append(overlay)
-            # A file may have one of a class that nobody has registered.
+            # A file may have one of a class that is not registered.
             self._replace_all()
         class_id = QML_CLASS if isinstance(overlay, QmlOverlay) else class_id_of(type(overlay))
         for entry in self._entries:
@@ -655,7 +655,7 @@ class Entries(QtCore.QObject):
             self._stack.remove(overlay)
 
     def _look(self) -> None:
-        """See what no signal tells: groups that are switched, placeholders without a panel."""
+        """Notice what has no signal: groups that are switched, placeholders without a panel."""
         for entry in self._entries if not self._closed else ():
             overlay = entry.overlay
             enabled = entry.alive and bool(entry.display.isEnabled())

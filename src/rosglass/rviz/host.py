@@ -1,4 +1,4 @@
-"""RViz's and Ogre's own bindings: the one place that imports them, and converts their objects.
+"""RViz's and Ogre's bindings: the only module that imports them, and converts their objects.
 
 RViz's bindings are made for PyQt5, our interfaces for PySide2; both use the same Qt, and an object
 of one is wrapped anew for the other (reference: docs/architecture.md, section 6).
@@ -46,13 +46,13 @@ def require_rviz() -> None:
 
 
 def _load(name: str) -> ModuleType:
-    with _telling(name):
+    with _advising(name):
         return importlib.import_module(name)
 
 
 @contextlib.contextmanager
-def _telling(name: str) -> Iterator[None]:
-    """Tell what to do where something cannot be loaded."""
+def _advising(name: str) -> Iterator[None]:
+    """Turn an ImportError into what to install."""
     try:
         yield
     except ImportError as error:
@@ -71,7 +71,7 @@ def rviz() -> Any:
     found = PathFinder.find_spec(_BINDINGS, list(places))
     if found is None or found.loader is None or _BINDINGS in sys.modules:
         return _load("rviz").bindings
-    with _telling("rviz"):
+    with _advising("rviz"):
         made = importlib.util.module_from_spec(found)
         sys.modules[_BINDINGS] = made
         found.loader.exec_module(made)

@@ -84,7 +84,7 @@ def scaled(event: Any, factor: float) -> Any:
         return event
     made = make(event, factor)
     if isinstance(event, QtGui.QInputEvent):
-        # QML tells from it how fast something is flicked.
+        # QML computes the speed of a flick from it.
         made.setTimestamp(event.timestamp())
     return made
 
@@ -174,7 +174,7 @@ _MAKERS: dict[Any, Callable[[Any, float], Any]] = {
 
 
 _NONE = QtCore.Qt.NoButton
-#: The mouse may be let go, and fingers lifted, without a word to RViz's window from then on.
+#: Events after which RViz's window may miss the release of buttons and fingers.
 _LOSING = frozenset({_E.WindowDeactivate, _E.WindowBlocked, _E.Hide})
 #: Milliseconds after which it is noticed that the mouse went away without a word.
 _LOOK_AROUND = 100
@@ -185,7 +185,7 @@ class Owner(enum.Enum):
 
     RVIZ = 1
     #: It went with an overlay, or belongs to what lies below a modal popup.
-    NOBODY = 2
+    NONE = 2
 
 
 class Input(QtCore.QObject):  # type: ignore[misc]
@@ -256,7 +256,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
     def forget(self, overlay: Overlay) -> None:
         """End everything that an overlay has of the mouse and the keys."""
         if self._owner is overlay:
-            self._owner = Owner.NOBODY
+            self._owner = Owner.NONE
             self._leave(overlay)
         if self._touched is overlay:
             self._touched = None
@@ -285,7 +285,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
                 watched.removeEventFilter(self)
 
     def eventFilter(self, watched: Any, event: Any) -> bool:  # noqa: N802 - Qt's name
-        """Return whether an event is for an overlay, and RViz is to hear nothing of it."""
+        """Return whether an overlay takes an event, and RViz must not get it."""
         if not is_alive(self._panel):
             return False
         if watched is not self._panel:
@@ -342,13 +342,13 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         if self._owner is None:
             overlay, open_to_rviz = self._offer(event)
             if overlay is not None and overlay not in self._stack.topmost_first():
-                self._owner = Owner.NOBODY
+                self._owner = Owner.NONE
             elif overlay is not None:
                 self._owner = overlay
                 self._stack.clicked(overlay)
                 self.focus(overlay)
             else:
-                self._owner = Owner.RVIZ if open_to_rviz else Owner.NOBODY
+                self._owner = Owner.RVIZ if open_to_rviz else Owner.NONE
                 if open_to_rviz:
                     self.focus(None)
                     self.hover(None)
@@ -404,7 +404,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             self._look_around.stop()
 
     def _look(self) -> None:
-        """Notice that the mouse is elsewhere: RViz's view is not told when it leaves it."""
+        """Notice that the mouse has left RViz's view, which gets no event for that."""
         over = QtWidgets.QApplication.widgetAt(QtGui.QCursor.pos())
         if self._owner is None and over is not self._panel:
             self.hover(None)
@@ -472,7 +472,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         self._dragged = None if event.type() == _E.Drop else over
         if before is not None and before is not over:
             self._deliver(before, QtGui.QDragLeaveEvent())
-        # Only who lets it enter hears of it when it comes to a place that wants it.
+        # Qt sends moves only to a widget that has accepted DragEnter.
         event.setAccepted(over is not None or event.type() in (_E.DragEnter, _E.DragLeave))
         return True
 
@@ -489,14 +489,14 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         return focused.is_modal
 
     def _focus_event(self, event: Any) -> bool:
-        told = [event.type() == _E.FocusIn]
+        changes = [event.type() == _E.FocusIn]
         if event.reason() == QtCore.Qt.PopupFocusReason:
             # A menu has all of the mouse and the keys while it is open: what is held must end, but
             # Qt Quick could not be given the keys back when it closes.
-            told = [] if told[0] else [False, True]
-            if told:
+            changes = [] if changes[0] else [False, True]
+            if changes:
                 self._lose()
-        for focus in told:
+        for focus in changes:
             if self._focused is not None:
                 with guarded(self._focused, "getting or losing the keys"):
                     self._focused.set_focus(focus)
@@ -505,9 +505,9 @@ class Input(QtCore.QObject):  # type: ignore[misc]
     # What happens around
 
     def _lose(self) -> None:
-        """End what is pressed: nobody may ever tell that it is released."""
+        """End what is pressed: its release may never arrive."""
         if self._owner is not None and not isinstance(self._owner, Owner):
-            owner, self._owner = self._owner, Owner.NOBODY
+            owner, self._owner = self._owner, Owner.NONE
             self._leave(owner)
         touched, self._touched = self._touched, None
         if touched is not None:
@@ -525,7 +525,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
 
 
 def _moved(event: Any) -> Any:
-    """Return the move that tells what is below the mouse after a release."""
+    """Return the mouse move that updates hovering after a release."""
     made = QtGui.QMouseEvent(
         _E.MouseMove,
         event.localPos(),

@@ -45,7 +45,7 @@ class Layer:
     """One texture, shown by panels over the whole 3D view.
 
     Made and used in the GUI thread, between two frames of RViz. Ogre owns what is made, and it is
-    let go by :meth:`close`.
+    released by :meth:`close`.
 
     Args:
         name: For Ogre's messages.
@@ -275,7 +275,7 @@ def _use_own_context() -> None:
     """Make Ogre's OpenGL context current: windows of Qt leave theirs, or none, when they go."""
     root = ogre().Root.getSingleton()
     system = root.getRenderSystem()
-    # Ogre takes its own to be current still, unless it has used that of another window meanwhile.
+    # Ogre takes its own to be current still, unless it has used another window's since.
     for name in _WINDOWS:
         system._setRenderTarget(root.getRenderTarget(name))
 

@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 __all__ = ["LostScreen"]
 
 _log = logging.getLogger("rosglass.rviz")
-#: Seconds that saying goodbye may take, and how long the thread waits that has called ``exit()``.
-_PATIENCE, _PAUSE = 1.5, 4
-#: Seconds that an X server which ends may take from the first window to the last connection.
-_LAST_BREATH = 0.3
+#: Seconds that unregistering may take, and that the thread waits which has called ``exit()``.
+_UNREGISTER_TIMEOUT_S, _EXIT_PAUSE_S = 1.5, 4
+#: Seconds that an X server may take to end, from its first window to its last connection.
+_SERVER_END_S = 0.3
 _EXIT_CODE = 1
 #: xproto.h: XCB_CW_EVENT_MASK, XCB_EVENT_MASK_STRUCTURE_NOTIFY, XCB_DESTROY_NOTIFY.
 _EVENT_MASK, _STRUCTURE, _DESTROYED = 1 << 11, 1 << 17, 17
@@ -67,7 +67,7 @@ _IoErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 
 
 class _Connection:
-    """A connection of its own to the X server, which tells of destroyed windows."""
+    """A separate connection to the X server, which reports destroyed windows."""
 
     def __init__(self) -> None:
         xcb = ctypes.CDLL("libxcb.so.1")
@@ -82,7 +82,7 @@ class _Connection:
         return bool(self._xcb.xcb_connection_has_error(self._given))
 
     def watch(self, window: int) -> None:
-        """Have a window's end told."""
+        """Subscribe to the destruction of a window."""
         mask = ctypes.c_uint32(_STRUCTURE)
         self._xcb.xcb_change_window_attributes(
             self._given, ctypes.c_uint32(window), ctypes.c_uint32(_EVENT_MASK), ctypes.byref(mask)
@@ -107,12 +107,12 @@ class LostScreen(Handle):
 
     Args:
         windows: The X server's numbers of the windows that RViz cannot do without.
-        goodbyes: What is to be done before, in threads of their own; not waited for any longer
+        unregister: What is to be done before, in threads of their own; not waited for any longer
             than a second and a half.
     """
 
-    def __init__(self, windows: Sequence[int], goodbyes: Sequence[Callable[[], object]]) -> None:
-        self._windows, self._goodbyes = set(windows), list(goodbyes)
+    def __init__(self, windows: Sequence[int], unregister: Sequence[Callable[[], object]]) -> None:
+        self._windows, self._unregister = set(windows), list(unregister)
         self._connection = _Connection()
         for window in windows:
             self._connection.watch(window)
@@ -121,7 +121,7 @@ class LostScreen(Handle):
         self._reader, self._writer = os.pipe()
         # The thread that calls exit() may be any, and in the midst of anything: it wakes ours by
         # closing the pipe, and waits for the end. All of that is C's: Python may be gone by then.
-        self._pause = _Time(_PAUSE, 0)
+        self._pause = _Time(_EXIT_PAUSE_S, 0)
         libc = ctypes.CDLL(None)
         before_exit = libc["__cxa_atexit"]
         before_exit(libc.nanosleep, ctypes.byref(self._pause), None)
@@ -145,7 +145,7 @@ class LostScreen(Handle):
         if gone:
             self._end()
         if self._ending:
-            time.sleep(_PAUSE)
+            time.sleep(_EXIT_PAUSE_S)
 
     def close(self) -> None:
         """Watch no more; safe to call twice. RViz's windows may go from now on."""
@@ -158,7 +158,7 @@ class LostScreen(Handle):
         self._set_io_error(ctypes.c_void_p(self._io_error_before))
         self._pause.seconds = 0
         os.write(self._writer, b".")
-        self._thread.join(_PATIENCE)
+        self._thread.join(_UNREGISTER_TIMEOUT_S)
         self._connection.close()
 
     def _run(self) -> None:
@@ -190,11 +190,11 @@ class LostScreen(Handle):
         with self._lock:
             ending, self._ending = self._ending, True
         if ending:
-            time.sleep(_PAUSE)
+            time.sleep(_EXIT_PAUSE_S)
         text = _BROKEN if broken or self._breaks() else _WINDOW
         text = text.format(display=os.environ.get("DISPLAY", ""))
-        until = time.monotonic() + _PATIENCE
-        steps = [lambda: _log.error("%s", text), *self._goodbyes]
+        until = time.monotonic() + _UNREGISTER_TIMEOUT_S
+        steps = [lambda: _log.error("%s", text), *self._unregister]
         threads = [threading.Thread(target=step, daemon=True) for step in steps]
         for thread in threads:
             thread.start()
@@ -206,7 +206,7 @@ class LostScreen(Handle):
 
     def _breaks(self) -> bool:
         """Return whether a window is gone because the X server ends."""
-        until = time.monotonic() + _LAST_BREATH
+        until = time.monotonic() + _SERVER_END_S
         while time.monotonic() < until:
             with self._lock:
                 self._connection.destroyed()

@@ -1,4 +1,4 @@
-"""The ROS master of an RViz: waiting for it, and telling when it is gone."""
+"""The ROS master of RViz: waiting for it, and noticing that it was lost or replaced."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 __all__ = ["MasterWatch", "wait_for_master"]
 
 _log = logging.getLogger("rosglass.rviz")
-#: Seconds between two questions to the master, and how long it may take to answer.
-_WAITING, _WATCHING, _TIMEOUT = 0.25, 2.0, 2.0
-#: Milliseconds after which a window says what is waited for.
-_PATIENCE = 700
-#: Where roscore is found unless it is told otherwise.
+#: Seconds between requests to the master while waiting for it and later, and its timeout.
+_WAIT_PERIOD_S, _WATCH_PERIOD_S, _TIMEOUT_S = 0.25, 2.0, 2.0
+#: Milliseconds after which a window shows that RViz waits.
+_WINDOW_DELAY_MS = 700
+#: The default port of roscore.
 _PORT = 11311
 
 
@@ -49,20 +49,20 @@ class _Asker:
         while not self._end.is_set():
             answer: Any
             try:
-                answer = call_node(self._uri, "getPid", "/rviz", timeout=_TIMEOUT)
+                answer = call_node(self._uri, "getPid", "/rviz", timeout=_TIMEOUT_S)
             except Error as error:
                 answer = error
-            self._executor.post(lambda answer=answer: self._tell(answer))  # type: ignore[misc]
+            self._executor.post(lambda answer=answer: self._deliver(answer))  # type: ignore[misc]
             self._end.wait(self._every)
 
-    def _tell(self, answer: Any) -> None:
+    def _deliver(self, answer: Any) -> None:
         if not self._end.is_set():
             self._answered(answer)
 
     def close(self) -> None:
         """Ask no more; safe to call twice."""
         self._end.set()
-        self._thread.join(_TIMEOUT / 4)
+        self._thread.join(_TIMEOUT_S / 4)
         self._executor.close()
 
 
@@ -104,10 +104,10 @@ def wait_for_master(uri: str, timeout: float | None, ended: Callable[[], bool]) 
     def look() -> None:
         if ended():
             finish(False)
-        elif problems and not window and time.monotonic() - started > _PATIENCE / 1000:
+        elif problems and not window and time.monotonic() - started > _WINDOW_DELAY_MS / 1000:
             window.append(_waiting_window(uri, problems[-1], lambda: finish(False)))
 
-    asker = _Asker(uri, _WAITING, on_answer)
+    asker = _Asker(uri, _WAIT_PERIOD_S, on_answer)
     timer = QtCore.QTimer()
     timer.timeout.connect(look)
     timer.start(50)
@@ -161,7 +161,7 @@ class MasterWatch(QtCore.QObject):
         self.number = -1
         #: Whether another one took its place, which knows nothing of this RViz.
         self.replaced = False
-        self._asker = _Asker(uri, _WATCHING, self.on_answer)
+        self._asker = _Asker(uri, _WATCH_PERIOD_S, self.on_answer)
 
     @property
     def problem(self) -> str:

@@ -1,4 +1,4 @@
-"""Where a camera is that looks at a point, as RViz's views tell it, in 3D and from above."""
+"""The geometry of RViz's views: a camera that looks at a point, in 3D or from above."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ class Orbit(NamedTuple):
         return self._replace(focus=focus, yaw=self.yaw + turn)
 
     def is_near(self, other: Orbit) -> bool:
-        """Return whether nobody would see a difference: RViz keeps 32 bits of each number."""
+        """Return whether the two look the same: RViz keeps 32 bits of each number."""
         return (
             max(abs(n) for n in self.focus - other.focus) <= 1e-6 * max(1.0, self.distance)
             and abs(self.distance / other.distance - 1) <= 1e-6

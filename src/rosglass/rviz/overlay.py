@@ -49,7 +49,7 @@ class Overlay(QtCore.QObject):
     """Something drawn over RViz's 3D view, which may take part of its mouse and keys.
 
     Derive from it to draw with anything: give :meth:`draw` and, where it is to be operated,
-    :meth:`deliver`. Everything runs in the GUI thread; what raises is told in the log, and RViz
+    :meth:`deliver`. Everything runs in the GUI thread; errors are logged, and RViz
     goes on.
 
     Args:
@@ -149,7 +149,7 @@ class Overlay(QtCore.QObject):
             self.problem_changed.emit(problem)
 
     def attach(self, window: Window) -> None:
-        """Be told over which RViz it is shown, before anything else happens to it."""
+        """Called first, with the RViz that it is shown over."""
 
     def _missing(self, method: str) -> str:
         return f"overlay {self.name}: its class {type(self).__name__} has to give {method}"
@@ -186,10 +186,10 @@ class Overlay(QtCore.QObject):
         return False
 
     def leave(self) -> None:
-        """Be told that the mouse is over it no longer, and a press has ended without effect."""
+        """Called when the mouse has left it, and a press has ended without effect."""
 
     def set_focus(self, focus: bool) -> None:
-        """Be told that keys come here from now on, or no longer."""
+        """Called when it gets or loses the keyboard focus."""
 
     def cursor(self) -> QtGui.QCursor | None:
         """Return the mouse's shape over it now; None where it is RViz's."""
@@ -259,8 +259,8 @@ def _own_id(kind: type[Any]) -> str:
 
 
 _log = logging.getLogger("rosglass.rviz")
-#: Names by which a function may know the overlay that it was written for, the most telling first.
-_OWN = ("self", "overlay", "panel", "popup", "dialog", "root", "widget")
+#: Names of variables that may hold the overlay that a function belongs to, the best first.
+_OWNER_NAMES = ("self", "overlay", "panel", "popup", "dialog", "root", "widget")
 
 
 @contextlib.contextmanager
@@ -273,22 +273,22 @@ def guarded(overlay: Overlay, doing: str) -> Iterator[None]:
     """
     last = ""
 
-    def tell(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+    def report(kind: type[BaseException], error: BaseException, trace: Any) -> None:
         nonlocal last
-        # A menu that is open runs everything else meanwhile.
+        # An open menu runs an event loop of its own, with everything else in it.
         owner = _owner(trace) or overlay
         text = f"{_what(kind, error, trace)} (while {doing})"
         if text != last:
-            _tell(owner, text, (kind, error, trace))
+            _report(owner, text, (kind, error, trace))
         last = text
 
     before = sys.excepthook
     # Qt's bindings hand to it what is raised in virtual functions and slots.
-    sys.excepthook = tell
+    sys.excepthook = report
     try:
         yield
     except Exception as error:
-        tell(type(error), error, error.__traceback__)
+        report(type(error), error, error.__traceback__)
     finally:
         sys.excepthook = before
 
@@ -296,33 +296,33 @@ def guarded(overlay: Overlay, doing: str) -> Iterator[None]:
 def log_what_is_raised() -> Callable[[], None]:
     """Keep PyQt5 from aborting the process when something raises in a slot or virtual function.
 
-    It is the problem of the overlay that it belongs to, where the traceback tells. A hook that the
-    program has of its own hears of everything, too.
+    It becomes the problem of the overlay that the traceback points to. A hook of the program's own
+    is called as well.
 
     Returns:
         Ends it.
     """
     before = sys.excepthook
 
-    def tell(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+    def report(kind: type[BaseException], error: BaseException, trace: Any) -> None:
         owner = _owner(trace)
         if owner is not None:
-            _tell(owner, _what(kind, error, trace), (kind, error, trace))
+            _report(owner, _what(kind, error, trace), (kind, error, trace))
         if before is not sys.__excepthook__:
             before(kind, error, trace)
         elif owner is None:
             _log.error("%s", _what(kind, error, trace), exc_info=(kind, error, trace))
 
-    sys.excepthook = tell
+    sys.excepthook = report
 
     def end() -> None:
-        if sys.excepthook is tell:
+        if sys.excepthook is report:
             sys.excepthook = before
 
     return end
 
 
-def _tell(overlay: Overlay, text: str, raised: Any) -> None:
+def _report(overlay: Overlay, text: str, raised: Any) -> None:
     # What is drawn anew raises anew with each frame, and a timer each time.
     level = logging.DEBUG if text == overlay.problem else logging.ERROR
     _log.log(level, "overlay %s: %s", overlay.name, text, exc_info=raised)
@@ -344,7 +344,7 @@ def _owner(trace: TracebackType | None) -> Overlay | None:
     found: Overlay | None = None
     while trace is not None and threading.current_thread() is threading.main_thread():
         known = trace.tb_frame.f_locals
-        for name in _OWN:
+        for name in _OWNER_NAMES:
             owner = _overlay_of(known.get(name))
             if owner is not None:
                 found = owner

@@ -89,7 +89,7 @@ def _classes(file: str) -> list[ElementTree.Element]:
     try:
         return list(ElementTree.parse(file).getroot().iter("class"))
     except (OSError, ElementTree.ParseError):
-        # RViz tells it in its log.
+        # RViz logs it.
         return []
 
 
@@ -97,8 +97,8 @@ class Watched(QtCore.QObject):
     """All tools, or all displays, of an RViz.
 
     Derived from: :meth:`_match` brings :attr:`_items` up to date, and :meth:`_rest` says what else
-    there is to tell. Signals are sent when RViz has done with what it was doing, so that whoever
-    hears them may add and remove items again.
+    has changed. Signals are emitted once RViz has finished what it was doing, so that slots may
+    add and remove items.
 
     Args:
         window: RViz.
@@ -116,7 +116,7 @@ class Watched(QtCore.QObject):
         self._window = window
         #: Each has `handle`, None once it is gone, `exists`, and `refresh()`.
         self._items: list[Any] = []
-        self._told: list[Any] = []
+        self._known: list[Any] = []
         self._scheduled = False
         self._hook = Hook(self._on_change)
 
@@ -126,27 +126,27 @@ class Watched(QtCore.QObject):
         return list(self._items)
 
     def settle(self) -> None:
-        """Tell what has changed since it was told last."""
+        """Emit signals for what has changed since the last call."""
         self._scheduled = False
         self._match()
-        before, self._told = self._told, list(self._items)
-        tell_rest = self._rest()
+        before, self._known = self._known, list(self._items)
+        emit_rest = self._rest()
         for item in before:
             if not item.exists:
                 self.removed.emit(item)
-        for item in self._told:
+        for item in self._known:
             if item not in before:
                 self.added.emit(item)
             elif item.refresh():
                 self.changed.emit(item)
-        tell_rest()
+        emit_rest()
 
     def _match(self) -> None:
         """Drop at once what RViz is about to delete, before its place goes to another object."""
         raise NotImplementedError(f"{type(self).__name__} has to give _match()")
 
     def _rest(self) -> Callable[[], None]:
-        """Take note of what has changed beside the items; return what tells it."""
+        """Read what else may change beside the items; return what emits its signals."""
         raise NotImplementedError(f"{type(self).__name__} has to give _rest()")
 
     def _on_change(self) -> None:

@@ -135,9 +135,9 @@ class Popup(WidgetOverlay):
         self._follow_nothing()
         self._tracker, self._trackers = tracker, trackers
         tracker.positionChanged.connect(lambda at: self._go(at.x(), at.y()))
-        tracker.problemChanged.connect(self._tell_lost)
+        tracker.problemChanged.connect(self._show_lost)
         tracker.staleChanged.connect(self._look_whether_old)
-        self._tell_lost()
+        self._show_lost()
         at: Any = tracker.position
         self._go(at.x(), at.y())
 
@@ -150,17 +150,17 @@ class Popup(WidgetOverlay):
         tracker, self._tracker = self._tracker, None
         if tracker is not None and self._trackers is not None:
             self._trackers.remove(tracker)
-            self._tell_lost()
+            self._show_lost()
 
-    def _tell_lost(self) -> None:
-        # What else is wrong with it stays told.
+    def _show_lost(self) -> None:
+        # Other problems stay.
         before, self._lost = self._lost, str(self._tracker.problem) if self._tracker else ""
         if self.problem in ("", before):
             self.tell_problem(self._lost)
 
     def _look_whether_old(self) -> None:
         if self._tracker is not None and self._tracker.stale:
-            # Popups have no entry in the panel that would tell it.
+            # Popups have no entry in the panel that would show it.
             _log.warning("popup %s: %s", self.name, self._tracker.problem)
         self._put()
 
@@ -212,7 +212,7 @@ class _Base(QtWidgets.QWidget):  # type: ignore[misc]
         content.setAutoFillBackground(True)
 
     def event(self, event: Any) -> bool:
-        """Follow sizes, and tell of presses."""
+        """Follow sizes, and notice presses."""
         kind = event.type()
         if kind in (QtCore.QEvent.Resize, QtCore.QEvent.LayoutRequest, QtCore.QEvent.Show):
             self._put()
@@ -277,7 +277,7 @@ class MoveBar(QtWidgets.QLabel):  # type: ignore[misc]
             self.popup.move(self._start[0] + way.x(), self._start[1] + way.y())
 
     def mouseReleaseEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
-        """Let go of it."""
+        """Stop dragging."""
         del event
         self._from = None
 

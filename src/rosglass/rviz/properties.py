@@ -46,7 +46,7 @@ _INT32 = (-(2**31), 2**31 - 1)
 #: What RViz keeps as text with its parts between semicolons, and the names of the parts.
 _PARTS = {"rviz::VectorProperty": "xyz", "rviz::QuaternionProperty": "xyzw"}
 _COLOUR = "rviz::ColorProperty"
-#: What tells how a display is, and cannot be changed.
+#: The status of a display, which cannot be changed.
 _STATUS = ("rviz::StatusList", "rviz::StatusProperty")
 
 
@@ -279,11 +279,11 @@ class Sources:
 
     Args:
         session: The session.
-        tell: Shows a text to who edits, e.g. in RViz's status bar.
+        notify: Shows a text to the user, e.g. in RViz's status bar.
     """
 
-    def __init__(self, session: Session, tell: Callable[[str], Any]) -> None:
-        self._session, self._tell = session, tell
+    def __init__(self, session: Session, notify: Callable[[str], Any]) -> None:
+        self._session, self._notify = session, notify
         self._link: TfLink | None = None
         self._linked: Any = None
 
@@ -321,7 +321,7 @@ class Sources:
                 self._link = TfLink.join(self._session, node, "/", self)
 
     def edit(self, model: RegisteredProperty, value: Any) -> None:
-        """Change a property for who has chosen a value; a refused one is told."""
+        """Set a property to what the user has chosen; report a value that it refuses."""
         try:
             if not model.readOnly:
                 model.set(value)
@@ -329,9 +329,9 @@ class Sources:
             self.complain(f"{'/'.join(model.path)}: {error}")
 
     def complain(self, text: str) -> None:
-        """Tell who edits what is wrong."""
+        """Log a mistake of the user, and show it."""
         _log.warning("property %s", text)
-        self._tell(text)
+        self._notify(text)
 
     def close(self) -> None:
         """Receive frames no longer; safe to call twice."""
@@ -521,7 +521,7 @@ class PropertyView:
     Args:
         model: The property.
         above: RViz's property that it stands below.
-        sources: What choosers offer, and who is told of refused edits.
+        sources: What choosers offer; reports refused edits.
     """
 
     def __init__(self, model: RegisteredProperty, above: Any, sources: Sources) -> None:
@@ -695,7 +695,7 @@ class PropertyTree:
 
 
 def take_out(item: Any) -> None:
-    """Take a property out of RViz's tree, and have it end once nobody uses it any more."""
+    """Take a property out of RViz's tree, and delete it once it is not used any more."""
     if not _is_deleted(item):
         above = item.getParent()
         if above is not None:

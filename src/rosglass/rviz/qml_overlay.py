@@ -46,14 +46,14 @@ __all__ = ["QmlInput", "QmlOverlay", "Scene"]
 
 
 class _Control(QtQuick.QQuickRenderControl):  # type: ignore[misc]
-    """Tells Qt Quick which window its scene is seen in: only there, items get keys."""
+    """A render control that names the window of its scene: items get keys only there."""
 
     panel: Any = None
     _apart = False
 
     @contextmanager
     def apart(self) -> Iterator[None]:
-        """Be seen nowhere meanwhile: a scene would be drawn in units of a window, not in pixels."""
+        """Name no window: the scene would be drawn in units of the window, not in pixels."""
         self._apart = True
         try:
             yield
@@ -112,7 +112,7 @@ class Scene(QtCore.QObject):
         if is_alive(self._item):
             self._item.setParentItem(None)
         self._item = item
-        # PySide2 takes it for gone as soon as nobody in Python knows what it was put into.
+        # PySide2 deletes it once Python holds no reference to what it was put into.
         self._content = self.window.contentItem()
         item.setParentItem(self._content)
         item.setSize(self._units)
@@ -131,7 +131,7 @@ class Scene(QtCore.QObject):
         content = self.window.contentItem()
         content.setTransformOrigin(QtQuick.QQuickItem.TopLeft)
         content.setScale(self.factor)
-        # No window system tells the window its size, of which the popups of Controls ask this item.
+        # Popups of Controls take their size from this item, which no window system sets.
         content.setSize(self._units)
         if is_alive(self._item):
             self._item.setSize(self._units)
@@ -174,7 +174,7 @@ _KEPT = 0.25
 class QmlInput:
     """Input of a QQuickWindow, for the class that has ``_window`` and ``_ratio``.
 
-    Qt tells by ``accepted`` whether an item took a button, a key or the wheel. It does not for
+    Qt reports by ``accepted`` whether an item took a button, a key or the wheel. It does not for
     hovering, for what pointer handlers wait for, and for touch, so the items are asked.
     """
 
@@ -202,7 +202,7 @@ class QmlInput:
         if kind == _E.TouchBegin and not _takes_touch(window, at):
             return False
         if kind == _E.MouseButtonDblClick:
-            # A window gets the second press as such before it hears that it is a double click.
+            # A window gets the second press as a press first, then as a double click.
             taken = self._deliver(_pressing(event), at)
             return self._deliver(event, at) or taken if taken else False
         return self._deliver(event, at)
@@ -231,24 +231,24 @@ class QmlInput:
         return taken
 
     def leave(self) -> None:
-        """End hovering, and let go without effect of what is pressed."""
+        """End hovering, and cancel what is pressed."""
         window = self._window
         if not is_alive(window):
             return
         if self._held or self._touch is not None:
-            self._let_go()
+            self._cancel()
         if not is_alive(window):
             return
         Qt5Core.QCoreApplication.sendEvent(window, Qt5Core.QEvent(_E.Leave))
         if self._shown_in() is not None:
             self._shown_in().unsetCursor()
 
-    def _let_go(self) -> None:
-        """Have nothing pressed any more: items hear that it was cancelled."""
+    def _cancel(self) -> None:
+        """Release what is pressed: items see a cancelled press."""
         window, content = self._window, self._window.contentItem()
         held, self._held = self._held, Qt5Core.Qt.NoButton
         touch, self._touch = self._touch, None
-        # Handlers do not mind whether their item is enabled. A TapHandler lets go of what is
+        # Handlers ignore whether their item is enabled. A TapHandler releases what is
         # released elsewhere, any other one of an event that comes while it is disabled itself.
         disabled = [h for h in _all_handlers(content) if not _is_tap(h) and h.property("enabled")]
         content.setEnabled(False)
@@ -475,7 +475,7 @@ class QmlOverlay(QmlInput, Overlay):
         self._users: list[QmlOverlay] = session.shared.setdefault(_USERS, [])
         self._users.append(self)
         self._live.due.connect(self.reload)
-        self._live.script_ended.connect(self._tell_script_ended)
+        self._live.script_ended.connect(self._on_script_ended)
 
     @property
     def root(self) -> Any:
@@ -569,15 +569,15 @@ class QmlOverlay(QmlInput, Overlay):
         self._not_drawn = ""
         self.tell_problem("")
         # Films, and pictures of items, are no items that could be found.
-        self._tell_not_drawn(root, lambda: need_in_file(self.file, self.engine.importPathList()))
+        self._warn_not_drawn(root, lambda: need_in_file(self.file, self.engine.importPathList()))
 
     def _rest(self) -> None:
-        """Hold no picture, and tell of what is not drawn that was made since; popups, too."""
+        """Release the picture, and warn of what was made since and is not drawn; popups, too."""
         self._scene.rest()
         if not self._not_drawn and is_alive(self._window):
-            self._tell_not_drawn(self._window.contentItem())
+            self._warn_not_drawn(self._window.contentItem())
 
-    def _tell_not_drawn(self, item: Any, otherwise: Callable[[], str] = str) -> None:
+    def _warn_not_drawn(self, item: Any, otherwise: Callable[[], str] = str) -> None:
         if choice.renderer != "software":
             return
         need = need_in_items(item, self.file) or otherwise()
@@ -602,7 +602,7 @@ class QmlOverlay(QmlInput, Overlay):
             self._errors.hide()
         self.changed.emit()
 
-    def _tell_script_ended(self, text: str) -> None:
+    def _on_script_ended(self, text: str) -> None:
         if self._closed or self._error:
             return
         self.tell_problem(text)

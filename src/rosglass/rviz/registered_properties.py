@@ -149,7 +149,7 @@ class RegisteredProperty(QtCore.QObject):
                 self.set(kind.default)
 
     def restore(self, saved: Any) -> None:
-        """Take the value that a file has for it; one that does not fit is told in the log."""
+        """Take its value from a file; log one that does not fit."""
         own = saved.get("Value") if self.properties and isinstance(saved, dict) else saved
         if isinstance(saved, dict) and "Value" in saved and self.kind.HOLDS_OTHERS:
             own = saved["Value"]

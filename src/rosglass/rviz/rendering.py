@@ -71,7 +71,7 @@ def keep_context() -> Iterator[None]:
 
 
 class Offscreen:
-    """An OpenGL context that draws where nobody sees it, for all scenes of the process.
+    """An offscreen OpenGL context for all scenes of the process.
 
     Raises:
         UnsupportedError: This screen has no OpenGL that Qt can use.
@@ -99,7 +99,7 @@ class Offscreen:
 
     @contextlib.contextmanager
     def current(self) -> Iterator[None]:
-        """Make it the current context meanwhile; may be nested.
+        """Make it the current context; may be nested.
 
         Raises:
             UnsupportedError: The graphics driver has lost it.
@@ -196,10 +196,10 @@ class Renderer(Protocol):
         """Return how the window looks; see :meth:`Scene.draw`."""
 
     def rest(self) -> None:
-        """Let the last picture go: it may be long until the next one."""
+        """Release the last picture: the next one may be long in coming."""
 
     def stop(self) -> None:
-        """Let everything go."""
+        """Release everything."""
 
 
 class OpenGLRenderer:
@@ -247,7 +247,7 @@ class OpenGLRenderer:
         return ratio
 
     def draw(self) -> NDArray[np.uint32]:
-        """Render into a buffer, and read all of it: Qt Quick does not tell what has changed."""
+        """Render into a buffer, and read all of it: Qt Quick does not say what has changed."""
         height, width = self._shape
         with self._gl.current():
             self._control.polishItems()
@@ -255,7 +255,7 @@ class OpenGLRenderer:
             with self._control.apart():
                 self._control.render()
             started = time.perf_counter()
-            # Not before: QML that waits for an answer may have it let go meanwhile.
+            # Not before: QML that waits for an answer may release it while rendering.
             if self._pixels is None:
                 self._pixels = np.empty(self._shape, np.uint32)
             self._buffer.bind()
@@ -265,11 +265,11 @@ class OpenGLRenderer:
         return self._pixels[::-1]
 
     def rest(self) -> None:
-        """Let the last picture go."""
+        """Release the last picture."""
         self._pixels = None
 
     def stop(self) -> None:
-        """Let the buffer and what the scene has in OpenGL go."""
+        """Release the buffer and the scene's OpenGL resources."""
         with self._gl.current():
             self._control.invalidate()
             self._drop_buffer()
@@ -318,7 +318,7 @@ class SoftwareRenderer:
 
     @contextmanager
     def _in_pixels(self) -> Iterator[None]:
-        """Have the window as large as its picture meanwhile, for that is what is drawn of it."""
+        """Give the window the size of its picture: only that is drawn."""
         if self._units == self._pixels:
             yield
             return
@@ -332,11 +332,11 @@ class SoftwareRenderer:
             self._window.blockSignals(blocked)
 
     def rest(self) -> None:
-        """Let the last picture go."""
+        """Release the last picture."""
         self._image = None
 
     def stop(self) -> None:
-        """Let what the scene has in memory go."""
+        """Release the scene's resources."""
         self._control.invalidate()
         self._image = None
 
@@ -356,7 +356,7 @@ class OverlayRendererChoice(RendererChoice):
 
         Raises:
             Error: There is no such renderer, or Qt has chosen another one already.
-            UnsupportedError: Qt is told to use its RHI, which overlays cannot.
+            UnsupportedError: QSG_RHI asks for Qt's RHI, which overlays cannot use.
         """
         if os.environ.get("QSG_RHI", "0") not in ("", "0"):
             raise UnsupportedError("overlays cannot be drawn by Qt's RHI; unset QSG_RHI")

@@ -67,12 +67,12 @@ def is_initialized() -> bool:
 
 
 def is_running() -> bool:
-    """Return whether nobody has shut the node down, as another one of its name does."""
+    """Return whether the node has not been shut down, as by another one of its name."""
     return bool(cpp_function("libroscpp", "_ZN3ros2okEv", ctypes.c_bool)())
 
 
 def initialize(name: str, arguments: Sequence[str]) -> None:
-    """Say what RViz's node is to be; nothing is told to the master yet.
+    """Set up RViz's node; the master gets no request yet.
 
     Args:
         name: Its base name; must be valid, for roscpp would end the process.
@@ -92,7 +92,7 @@ def node_name() -> str:
 
 
 def set_log_level(level: int) -> None:
-    """Let RViz write what it logs from a level of Python's logging on."""
+    """Set the level of RViz's log to one of Python's logging."""
     cpp_function("librosconsole", "_ZN3ros7console10initializeEv")()
     set_level = cpp_function("librosconsole", _SET_LEVEL)
     cpp_level = next((ours for theirs, ours in _LEVELS if level <= theirs), _FATAL)
@@ -101,7 +101,7 @@ def set_log_level(level: int) -> None:
 
 
 def shut_down() -> None:
-    """End RViz's node: it says goodbye to the master."""
+    """End RViz's node: it unregisters from the master."""
     cpp_function("libroscpp", "_ZN3ros8shutdownEv")()
 
 
@@ -113,7 +113,7 @@ def name_node(name: str, options: Ros1Options) -> None:
 
     Args:
         name: Its name; empty for ``rviz`` with what makes it unique.
-        options: Its master, and what else it is told.
+        options: Its master, and other options.
     """
     # Plugins of RViz may ask for it, too.
     os.environ["ROS_MASTER_URI"] = options.master
@@ -123,11 +123,11 @@ def name_node(name: str, options: Ros1Options) -> None:
 
 
 def shared_arguments(options: Ros1Options) -> list[str]:
-    """Return what was told to both nodes, for each has a name of its own."""
-    told = options.arguments
-    words = [f"{old}:={new}" for old, new in told.rules]
-    words += [f"_{key}:={value}" for key, value in told.parameters.items()]
-    words += [f"__ns:={told.namespace}"] if told.namespace else []
+    """Return the arguments for both nodes, without the name."""
+    remappings = options.arguments
+    words = [f"{old}:={new}" for old, new in remappings.rules]
+    words += [f"_{key}:={value}" for key, value in remappings.parameters.items()]
+    words += [f"__ns:={remappings.namespace}"] if remappings.namespace else []
     words += [f"__hostname:={options.address}"] if options.address else []
     return words
 

@@ -205,7 +205,7 @@ class Stack(QtCore.QObject):
         if not is_alive(panel) or not panel.isVisible() or panel.window().isMinimized():
             return
         width, height, ratio = self._window.view_size()
-        # QML that waits for an answer has RViz's timer go off meanwhile.
+        # While QML waits for an answer, RViz's timer fires.
         if not width or not height or self._drawing:
             return
         # What is drawn may have overlays come and go, itself included.

@@ -83,7 +83,7 @@ def covered_tiles(pixels: NDArray[np.uint32]) -> NDArray[np.bool_]:
 def update_covered(
     covered: NDArray[np.bool_], pixels: NDArray[np.uint32], rects: list[Rect]
 ) -> None:
-    """Bring what :func:`covered_tiles` told of a picture up to date where it has changed since."""
+    """Update the result of :func:`covered_tiles` where the picture has changed since."""
     for first, last in {(rect.top // TILE, -(-rect.bottom // TILE)) for rect in rects}:
         covered[first:last] = covered_tiles(pixels[first * TILE : last * TILE])
 

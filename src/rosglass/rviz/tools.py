@@ -25,7 +25,7 @@ _FAILED = ("N4rviz10FailedToolE", "N4rviz13FailedDisplayE")
 
 
 class Tool:
-    """One tool; what it tells stays readable once it is removed. Made by :class:`Tools` only."""
+    """One tool; its members stay readable once it is removed. Made by :class:`Tools` only."""
 
     def __init__(self, owner: Tools, handle: Any) -> None:
         self._owner = owner
@@ -41,7 +41,7 @@ class Tool:
         self.refresh()
 
     def refresh(self) -> bool:
-        """Read what may change; returns whether it has."""
+        """Read what may change; return whether it has."""
         before = (self._name, self._description)
         if self.handle is not None:
             self._name = str(self.handle.getName())
@@ -118,11 +118,11 @@ class Tools(Watched):
         super().__init__(window)
         self._manager = window.manager.getToolManager()
         self._items: list[Tool]
-        self._told_current: Tool | None = None
+        self._known_current: Tool | None = None
         signals = ("toolAdded(Tool*)", "toolRemoved(Tool*)", "toolChanged(Tool*)")
         self._hook.watch(self._manager, *signals, "toolRefreshed(Tool*)")
         self._match()
-        self._told, self._told_current = list(self._items), self.current
+        self._known, self._known_current = list(self._items), self.current
 
     @property
     def classes(self) -> list[str]:
@@ -190,9 +190,8 @@ class Tools(Watched):
         self.settle()
 
     def _rest(self) -> Callable[[], None]:
-        current, told = self.current, self._told_current
-        self._told_current = current
-        return self.selected.emit if current is not told else lambda: None
+        before, self._known_current = self._known_current, self.current
+        return self.selected.emit if self._known_current is not before else lambda: None
 
     def _handle(self, tool: Tool) -> Any:
         if tool.handle is None or tool not in self._items:
@@ -212,7 +211,7 @@ class Tools(Watched):
 
 
 def failure(handle: Any, class_id: str, base: str) -> str:
-    """Return why RViz has made a stand-in only; empty when it has made what was wanted.
+    """Return why RViz could not load a tool or display; empty if it has.
 
     Args:
         handle: A tool or a display.

@@ -42,10 +42,10 @@ class Frames(QtCore.QObject):
 
     Args:
         session: Whose node receives them.
-        window: Tells which frame is the fixed one.
+        window: RViz, which knows the fixed frame.
     """
 
-    #: The frames are received now, or no longer.
+    #: Frames are received now, or no longer.
     available_changed = Signal()
 
     def __init__(self, session: Session, window: Window) -> None:
@@ -53,7 +53,7 @@ class Frames(QtCore.QObject):
         self._session, self._window = session, window
         self._link: TfLink | None = None
         self._node: Node | None = None
-        #: What was told of what is missing, and when.
+        #: Explanations of missing frames, and when each was made.
         self._explained: dict[tuple[str, str, str], tuple[float, str]] = {}
         session.node_changed.connect(self._follow)
         self._follow()
@@ -69,7 +69,7 @@ class Frames(QtCore.QObject):
         return str(self._window.manager.getFixedFrame())
 
     def steady(self) -> float:
-        """Return seconds by which ages are told; see :meth:`Session.steady`."""
+        """Return the seconds that ages are measured in; see :meth:`Session.steady`."""
         return self._session.steady()
 
     def locate(self, frame: str, time: Time | None = None) -> Transform:
@@ -82,7 +82,7 @@ class Frames(QtCore.QObject):
         Raises:
             Error: The frame is not known, or nothing connects the two; the message says which.
         """
-        from rosglass.tf import Transform  # noqa: PLC0415 - only once somebody asks
+        from rosglass.tf import Transform  # noqa: PLC0415 - only when it is needed
 
         frame, fixed = frame.lstrip("/"), self.fixed.lstrip("/")
         if frame in ("", FIXED_FRAME, fixed):
@@ -99,10 +99,10 @@ class Frames(QtCore.QObject):
             raise type(error)(self._explanation(frame, fixed, error)) from None
 
     def _explanation(self, frame: str, fixed: str, error: TransformException) -> str:
-        """Return :meth:`_explain`'s text of the last second: who follows a frame asks each time."""
+        """Return :meth:`_explain`'s text of the last second: it is asked for once per frame."""
         case, now = (frame, fixed, str(error)), time.monotonic()
-        told, text = self._explained.get(case, (-math.inf, ""))
-        if now - told > _FRESH:
+        made, text = self._explained.get(case, (-math.inf, ""))
+        if now - made > _FRESH:
             text = self._explain(frame, fixed, error)
             if len(self._explained) > _CASES:
                 self._explained.clear()
@@ -110,7 +110,7 @@ class Frames(QtCore.QObject):
         return text
 
     def _explain(self, frame: str, fixed: str, error: TransformException) -> str:
-        """Return what is wrong; it may be the fixed frame, which who asked has not named."""
+        """Return what is wrong; it may be the fixed frame, which the caller has not named."""
         known = [] if self._link is None else sorted(self._link.buffer.tree())
         if not fixed:
             return f"RViz has no fixed frame, in which {frame!r} could be placed; choose one"
@@ -126,7 +126,7 @@ class Frames(QtCore.QObject):
         return f"the frame {frame!r} cannot be placed in RViz's fixed frame {fixed!r}: {error}"
 
     def close(self) -> None:
-        """Let the transforms go; safe to call twice."""
+        """Stop receiving transforms; safe to call twice."""
         link, self._link, self._node = self._link, None, None
         if link is not None:
             link.leave(self)
@@ -144,7 +144,7 @@ class Frames(QtCore.QObject):
 
 #: Units and metres below which a change is none.
 _THRESHOLD = 0.01
-#: Seconds without a newer transform after which a frame that has moved is told to be old.
+#: Seconds without a newer transform after which a frame that has moved is stale.
 _OLD = DEFAULT_TIMEOUT_MS / 1000
 _NAN = (math.nan, math.nan, math.nan)
 
@@ -153,7 +153,7 @@ class Tracker(QtCore.QObject):
     """A point of the scene, followed on the 3D view. Made by :class:`Trackers` only.
 
     Args:
-        owner: Tells it when to look.
+        owner: Updates it.
         point: x, y, z in metres.
         frame: Whose; empty for the fixed frame.
         scale: Returns how many units of the widget with the 3D view one unit of `position` is.
@@ -199,18 +199,17 @@ class Tracker(QtCore.QObject):
             at, stamp = self._owner.seen(self._point, self._frame, self._scale())
             stale = self._is_old(stamp)
             if stale:
-                problem = f"where the frame {self._frame!r} is was not told for {_OLD:g} s"
+                problem = f"the frame {self._frame!r} was not updated for {_OLD:g} s"
         except Error as error:
             problem = str(error)
-        told = self._stale
-        self._stale = stale
+        before, self._stale = self._stale, stale
         if _differ(at, self._position):
             self._position = at
             self.positionChanged.emit(QtGui.QVector3D(*at))
         if problem != self._problem:
             self._problem = problem
             self.problemChanged.emit()
-        if stale != told:
+        if stale != before:
             self.staleChanged.emit()
 
     def _is_old(self, stamp: int) -> bool:
@@ -303,7 +302,7 @@ class Trackers:
         """
         made = Tracker(self, point_of(point), "", scale, runtime)
         if self._camera is not None:
-            # Nobody may have asked for it for a while.
+            # It may not have been used for a while.
             self._camera.update()
         made.use_frame(frame)
         self._trackers.append(made)
@@ -331,7 +330,7 @@ class Trackers:
         The time is 0 for what does not move.
 
         Raises:
-            Error: Nobody knows where the frame is.
+            Error: The frame is unknown.
         """
         if self._camera is None:
             self._camera = Camera(self._window)
@@ -345,7 +344,7 @@ class Trackers:
         return (found.x / scale, found.y / scale, found.depth), stamp
 
     def steady(self) -> float:
-        """Return seconds by which ages are told; see :meth:`Session.steady`."""
+        """Return the seconds that ages are measured in; see :meth:`Session.steady`."""
         return self._frames().steady()
 
     def _before_frame(self) -> None:

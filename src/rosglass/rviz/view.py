@@ -107,7 +107,7 @@ class _Setting(Generic[_T]):
 
 
 class ViewSettings:
-    """How the camera is moved, and by whom besides the mouse.
+    """Settings of the view controller.
 
     Attributes are read and set::
 
@@ -152,7 +152,7 @@ class ViewSettings:
         max=1000.0,
     )
     topics = _Setting(
-        "bool", "Enable Topics", True, "Whether robots are told the mode and the tracked frame."
+        "bool", "Enable Topics", True, "Whether the mode and the tracked frame are published."
     )
     services = _Setting(
         "bool", "Enable Services", True, "Whether robots may move the camera by services."
@@ -202,7 +202,7 @@ class ViewSettings:
         """Take what a file has; what it does not have is as a program has set it, or as at first.
 
         Args:
-            saved: Values by name, which may be text; one that does not fit is told in the log.
+            saved: Values by name, which may be text; one that does not fit is logged.
         """
         for setting in vars(ViewSettings).values():
             if isinstance(setting, _Setting):
@@ -233,7 +233,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
     ),
     FLAT: ("X", "Y", "Scale", "Angle"),
 }
-#: Radians, of RViz's perspective views unless they are told otherwise.
+#: Radians, RViz's default for perspective views.
 _FIELD_OF_VIEW = math.pi / 4
 
 
@@ -308,7 +308,7 @@ class CurrentView(QtCore.QObject):
             self._set_all(ORBIT, *where.focus, where.distance, yaw, pitch)
 
     def close(self) -> None:
-        """Let go of what is RViz's."""
+        """Release RViz's properties."""
         self._properties.clear()
 
     def _from_above(self, x: float, y: float) -> Orbit:
@@ -343,8 +343,8 @@ class CurrentView(QtCore.QObject):
 
     def _changed(self) -> None:
         self._properties.clear()
-        # RViz's panels are told later which properties are hidden, by their addresses, and crash
-        # when another view has come by then and this one is gone.
+        # RViz's panels get queued calls with addresses of hidden properties, and crash if this view
+        # was replaced by another one before.
         for child in self._window.widget.findChildren(QtWidgets.QTreeView):
             if child.metaObject().className() == "rviz::PropertyTreeWidget":
                 Qt5Core.QCoreApplication.sendPostedEvents(child, Qt5Core.QEvent.MetaCall)
@@ -395,8 +395,8 @@ class ViewMode(enum.IntEnum):
     MODE_2D = 1
 
 
-class _Way(NamedTuple):
-    """A movement: from where, to where, since when, and whether 2D is shown at its end."""
+class _Movement(NamedTuple):
+    """A movement of the camera, and whether 2D is shown at its end."""
 
     start: Orbit
     goal: Orbit
@@ -407,9 +407,9 @@ class _Way(NamedTuple):
 class View(QtCore.QObject):
     """Moves the camera: to places, between 2D and 3D, along with a frame.
 
-    Places are in metres. A movement ends when somebody else moves the camera, e.g. by the mouse;
-    tracking ends when somebody else shifts it, and goes on when it is turned or zoomed only. Other
-    views of RViz's (FPS, ThirdPersonFollower) make place for ``rviz/Orbit`` with the first
+    Places are in metres. A movement ends when the camera is moved otherwise, e.g. by the mouse;
+    tracking ends when the camera is shifted otherwise, and continues when it is only turned or
+    zoomed. Other views (FPS, ThirdPersonFollower) are replaced by ``rviz/Orbit`` at the first
     movement.
 
     Args:
@@ -434,7 +434,7 @@ class View(QtCore.QObject):
         self._offset: Point | None = Point(0.0, 0.0, 0.0)
         #: Where the tracked frame was last, its yaw as far as the camera has turned with it.
         self._base: Place | None = None
-        self._way: _Way | None = None
+        self._movement: _Movement | None = None
         #: What 3D returns to.
         self._pitch = _START.pitch
         #: What RViz's properties were after our last change; None where it does not matter.
@@ -444,14 +444,14 @@ class View(QtCore.QObject):
         self._last_frame = time.monotonic()
         self._closed = False
         window.before_frame.connect(self._step)
-        window.config_loading.connect(self._let_go)
+        window.config_loading.connect(self._stop)
         window.closing.connect(self.close)
         self._current.changed.connect(self._view_changed)
 
     @property
     def mode(self) -> ViewMode:
         """2D, straight from above and without perspective, or 3D."""
-        flat = self._current.kind == FLAT if self._way is None else self._way.flat
+        flat = self._current.kind == FLAT if self._movement is None else self._movement.flat
         return ViewMode.MODE_2D if flat else ViewMode.MODE_3D
 
     @property
@@ -461,8 +461,8 @@ class View(QtCore.QObject):
 
     @property
     def is_moving(self) -> bool:
-        """Whether a movement is under way."""
-        return self._way is not None
+        """Whether the camera is moving."""
+        return self._movement is not None
 
     @property
     def problem(self) -> str:
@@ -513,7 +513,7 @@ class View(QtCore.QObject):
             place = Point(place.x, place.y, now.eye.z)
         goal = now._replace(focus=now.focus + (place - now.eye))
         self._hold(goal, stop_tracking)
-        self._set_off(goal, animate, flat=flat)
+        self._start(goal, animate, flat=flat)
 
     def move_eye_and_focus(
         self,
@@ -544,7 +544,7 @@ class View(QtCore.QObject):
             )
         goal = Orbit.between(start, end, self._end_of_movement().yaw)
         self._hold(goal, stop_tracking)
-        self._set_off(goal, animate, flat=False)
+        self._start(goal, animate, flat=False)
 
     def set_mode(self, mode: ViewMode | int, *, animate: bool = True) -> None:
         """Switch between 2D and 3D.
@@ -565,10 +565,10 @@ class View(QtCore.QObject):
         if flat:
             self._pitch = now.pitch
         pitch = STEEPEST if flat else self._pitch
-        self._set_off(now._replace(pitch=pitch), animate, flat=flat)
+        self._start(now._replace(pitch=pitch), animate, flat=flat)
 
     def track(self, frame: str) -> None:
-        """Have the camera follow a frame, and turn with it.
+        """Follow a frame with the camera, and turn with it.
 
         Args:
             frame: Its name; empty to follow none.
@@ -584,14 +584,14 @@ class View(QtCore.QObject):
             return
         self._tracked, self._base = frame, None
         self._offset = Point(0.0, 0.0, 0.0)
-        self._tell_problem("")
+        self._set_problem("")
         self.tracked_frame_changed.emit()
 
     def reset(self) -> None:
         """Show the fixed frame's origin in 3D from (4, 0, 3), and follow nothing."""
-        self._let_go()
+        self._stop()
         self._write(_START, ORBIT)
-        self._tell_mode()
+        self._emit_mode()
 
     def nudge(self, ahead: float, left: float) -> None:
         """Shift the view in the plane of x and y, as the keys do it; ends movement and tracking.
@@ -603,16 +603,16 @@ class View(QtCore.QObject):
         Raises:
             Error: They are not finite, or lead too far away.
         """
-        self._let_go()
+        self._stop()
         now = self._current.read()
         x, y, _ = now.focus + Point(-ahead, -left, 0.0).turned(now.yaw)
         focus = self._in_fixed((x, y, now.focus.z), "")
         self._write(now._replace(focus=focus), self._kind())
 
     def close(self) -> None:
-        """Leave the camera to RViz; safe to call twice."""
+        """Stop moving the camera; safe to call twice."""
         self._closed = True
-        self._way, self._tracked = None, ""
+        self._movement, self._tracked = None, ""
         self._current.close()
 
     # Movements
@@ -627,65 +627,65 @@ class View(QtCore.QObject):
             except Error:
                 self._offset = None
 
-    def _set_off(self, goal: Orbit, animate: bool, *, flat: bool) -> None:
+    def _start(self, goal: Orbit, animate: bool, *, flat: bool) -> None:
         start, self._base = self._current.read(), None
         if not animate or not self.settings.animation_duration:
             self._arrive(goal, flat=flat)
             return
         if not (flat and self._current.kind == FLAT):
             self._write(start, ORBIT)
-        self._way = _Way(start, goal, time.monotonic(), flat)
+        self._movement = _Movement(start, goal, time.monotonic(), flat)
         self._left_at, self._fixed = self._current.state, self._frames.fixed
-        self._tell_mode()
+        self._emit_mode()
 
     def _arrive(self, goal: Orbit, *, flat: bool) -> None:
-        self._way = None
+        self._movement = None
         self._write(goal, FLAT if flat else ORBIT)
-        self._tell_mode()
+        self._emit_mode()
 
-    def _let_go(self) -> None:
-        """End movement and tracking."""
-        self._way = None
+    def _stop(self) -> None:
+        """Stop movement and tracking."""
+        self._movement = None
         self.track("")
 
     def _step(self) -> None:
         now = time.monotonic()
         passed, self._last_frame = now - self._last_frame, now
-        if self._closed or (self._way is None and not self._tracked):
+        if self._closed or (self._movement is None and not self._tracked):
             self._left_at = None
             return
         try:
-            self._notice_others()
-            if self._way is not None:
-                self._go_on(now)
+            self._end_if_moved()
+            if self._movement is not None:
+                self._advance(now)
             elif self._tracked:
                 self._follow(min(self.settings.tracking_gain * passed, 1.0))
         except (AttributeError, RuntimeError, TypeError):
             # As when another version of RViz names the properties of its views another way.
             _log.exception("RViz's camera cannot be moved")
-            self._let_go()
-        self._tell_mode()
+            self._stop()
+        self._emit_mode()
 
-    def _go_on(self, now: float) -> None:
+    def _advance(self, now: float) -> None:
         if self._tracked:
-            self._go_along()
-        way = self._way
-        assert way is not None
+            self._carry()
+        movement = self._movement
+        assert movement is not None
         duration = self.settings.animation_duration
-        progress = (now - way.began) / duration if duration else 1.0
+        progress = (now - movement.began) / duration if duration else 1.0
         if progress >= 1:
-            self._arrive(way.goal, flat=way.flat)
+            self._arrive(movement.goal, flat=movement.flat)
         else:
-            self._write(way.start.towards(way.goal, ease(progress)), self._kind())
+            self._write(movement.start.towards(movement.goal, ease(progress)), self._kind())
 
-    def _go_along(self) -> None:
-        """Have start and goal of a movement go along with the tracked frame."""
-        place, way = self._find_tracked(), self._way
-        if place is None or way is None:
+    def _carry(self) -> None:
+        """Carry start and goal of a movement along with the tracked frame."""
+        place, movement = self._find_tracked(), self._movement
+        if place is None or movement is None:
             return
         before, self._base = self._base or place, place
-        start, goal = way.start.carried(before, place), way.goal.carried(before, place)
-        self._way = way._replace(start=start, goal=goal)
+        start, goal = movement.start.carried(before, place), movement.goal.carried(before, place)
+        self._movement = movement._replace(start=start, goal=goal)
 
     def _follow(self, part: float) -> None:
         place = self._find_tracked()
@@ -706,41 +706,41 @@ class View(QtCore.QObject):
         try:
             place = self._place_of(self._tracked)
         except Error as error:
-            # Told once: what is missing may be said in other words with each frame.
-            self._tell_problem(self._problem or str(error))
+            # Reported once: the words of the reason may differ with each frame.
+            self._set_problem(self._problem or str(error))
             return None
-        self._tell_problem("")
+        self._set_problem("")
         return place
 
-    def _notice_others(self) -> None:
-        """End what somebody else has put an end to since the last frame."""
+    def _end_if_moved(self) -> None:
+        """End movement or tracking where the camera was moved otherwise since the last frame."""
         before, now = self._left_at, self._current.state
         fixed, self._fixed = self._fixed, self._frames.fixed
         self._left_at = now
         if before is None or (before == now and fixed == self._fixed):
             return
-        self._way = None
+        self._movement = None
         if fixed == self._fixed and before[:2] == now[:2] and _is_shifted(before, now):
             self.track("")
         elif fixed == self._fixed and before[1] != now[1]:
-            # Somebody has RViz itself follow a frame.
+            # RViz itself follows a frame now.
             self.track("")
 
     def _view_changed(self, by_us: bool) -> None:
         if by_us or self._closed:
             return
-        self._way = self._left_at = None
+        self._movement = self._left_at = None
         if self._current.kind not in (ORBIT, FLAT):
             self.track("")
-        self._tell_mode()
+        self._emit_mode()
 
-    def _tell_mode(self) -> None:
+    def _emit_mode(self) -> None:
         mode = self.mode
         if mode is not self._last_mode:
             self._last_mode = mode
             self.mode_changed.emit()
 
-    def _tell_problem(self, problem: str) -> None:
+    def _set_problem(self, problem: str) -> None:
         if problem != self._problem:
             self._problem = problem
             if problem:
@@ -772,7 +772,7 @@ class View(QtCore.QObject):
         return Place(Point(*transform.translation), yaw)
 
     def _end_of_movement(self) -> Orbit:
-        return self._current.read() if self._way is None else self._way.goal
+        return self._current.read() if self._movement is None else self._movement.goal
 
     def _kind(self) -> str:
         return FLAT if self._current.kind == FLAT else ORBIT
@@ -807,7 +807,7 @@ class Views(QtCore.QObject):
     def __init__(self, window: Window) -> None:
         super().__init__()
         self._manager = window.manager.getViewManager()
-        self._told = (self.kind, self.saved)
+        self._known = (self.kind, self.saved)
         self._scheduled = False
         self._hook = Hook(self._on_change)
         self._hook.watch(self._manager, "currentChanged()", "configChanged()")
@@ -878,12 +878,12 @@ class Views(QtCore.QObject):
         self.settle()
 
     def settle(self) -> None:
-        """Tell what has changed since it was told last."""
+        """Emit signals for what has changed since the last call."""
         self._scheduled = False
-        (kind, saved), self._told = self._told, (self.kind, self.saved)
-        if kind != self._told[0]:
+        (kind, saved), self._known = self._known, (self.kind, self.saved)
+        if kind != self._known[0]:
             self.kind_changed.emit()
-        if saved != self._told[1]:
+        if saved != self._known[1]:
             self.saved_changed.emit()
 
     def _hint(self, kind: object) -> str:

@@ -13,7 +13,7 @@ from rosglass.comm.qos import QoS
 from rosglass.errors import Error, ServiceError
 from rosglass.qt import QtCore, Signal, Slot, is_alive
 from rosglass.ros1.names import expand, split
-from rosglass.rviz.entries import camera_icon, display_class, tell_status
+from rosglass.rviz.entries import camera_icon, display_class, set_status
 from rosglass.rviz.host import pyqt
 from rosglass.rviz.properties import PropertyTree, given_to_rviz, quiet, take_out
 from rosglass.rviz.property_values import plain_config
@@ -74,13 +74,13 @@ class ViewKeys(QtCore.QObject):
         window.closing.connect(self.close)
 
     def close(self) -> None:
-        """Leave the keys to RViz; safe to call twice."""
+        """Stop handling keys; safe to call twice."""
         self._held.clear()
         if is_alive(self._panel):
             self._panel.removeEventFilter(self)
 
     def eventFilter(self, watched: Any, event: Any) -> bool:
-        """Return whether a key is ours, and RViz is to hear nothing of it."""
+        """Return whether a key moves the camera, and RViz must not get it."""
         del watched
         kind = event.type()
         if kind in (_E.FocusOut, _E.Hide, _E.WindowDeactivate):
@@ -160,7 +160,7 @@ _PACKAGE = "hector_rviz_plugins"
 
 
 class ViewServices(QtCore.QObject):
-    """Lets robots move the camera, and tells them what it does.
+    """The topics and services by which robots follow and move the camera.
 
     Topics ``tracked_frame`` and ``view_mode``, both latched; services ``move_eye``,
     ``move_eye_and_focus``, ``set_view_mode`` and ``set_tracked_frame``. What cannot be done is an
@@ -198,8 +198,8 @@ class ViewServices(QtCore.QObject):
         self._closed = False
         session.node_changed.connect(self._node_changed)
         session.connection_changed.connect(self._connection_changed)
-        view.mode_changed.connect(self._tell_mode)
-        view.tracked_frame_changed.connect(self._tell_frame)
+        view.mode_changed.connect(self._publish_mode)
+        view.tracked_frame_changed.connect(self._publish_frame)
         self._settings.properties.edited.connect(self._on_edited)
         self._node_changed()
 
@@ -244,10 +244,10 @@ class ViewServices(QtCore.QObject):
             self._open()
 
     def _connection_changed(self) -> None:
-        """Tell that others have ended the node, and what was made from it with it."""
+        """Report that the node was shut down by others, with what was made from it."""
         if self._node is not None and self._session.state == "failed" and not self._closed:
             self._shut()
-            self._tell_problem(self._session.detail)
+            self._set_problem(self._session.detail)
 
     def _shut(self) -> None:
         self._generation += 1
@@ -263,13 +263,13 @@ class ViewServices(QtCore.QObject):
         self._shut()
         node, generation, wanted = self._node, self._generation, self._wanted
         if node is None or not (wanted.topics or wanted.services):
-            self._tell_problem("")
+            self._set_problem("")
             return
         if wanted.wrong:
-            self._tell_problem(wanted.wrong)
+            self._set_problem(wanted.wrong)
             return
         if node.wire != "ros1":
-            self._tell_problem(f"{node.url}: the services of the camera are of ROS 1")
+            self._set_problem(f"{node.url}: the services of the camera are of ROS 1")
             return
         made = self._making = _Made()
 
@@ -278,12 +278,12 @@ class ViewServices(QtCore.QObject):
                 return
             self._making = None
             if isinstance(result, Error):
-                self._tell_problem(str(result))
+                self._set_problem(str(result))
             else:
                 self._handles, self._publishers = made.handles, made.publishers
-                self._tell_problem("")
-                self._tell_mode()
-                self._tell_frame()
+                self._set_problem("")
+                self._publish_mode()
+                self._publish_frame()
                 self.opened.emit()
 
         self._session.background(lambda: self._make(node, wanted, made), done)
@@ -345,10 +345,10 @@ class ViewServices(QtCore.QObject):
     def _set_tracked_frame(self, request: Any) -> None:
         self._view.track(request.frame)
 
-    def _tell_mode(self) -> None:
+    def _publish_mode(self) -> None:
         self._publish("view_mode", mode=int(self._view.mode))
 
-    def _tell_frame(self) -> None:
+    def _publish_frame(self) -> None:
         self._publish("tracked_frame", data=self._view.tracked_frame)
 
     def _publish(self, topic: str, **fields: Any) -> None:
@@ -359,7 +359,7 @@ class ViewServices(QtCore.QObject):
             except Error as error:
                 _log.warning("%s/%s: %s", self.namespace, topic, error)
 
-    def _tell_problem(self, problem: str) -> None:
+    def _set_problem(self, problem: str) -> None:
         if problem != self._problem:
             self._problem = problem
             if problem:
@@ -509,11 +509,11 @@ class ViewEntry(QtCore.QObject):
         window.closing.connect(self.close)
         window.before_frame.connect(self._look)
         entries.replaced.connect(self._settle)
-        services.problem_changed.connect(self._tell)
-        services.opened.connect(self._tell)
-        view.problem_changed.connect(self._tell)
-        view.tracked_frame_changed.connect(self._tell)
-        view.mode_changed.connect(self._tell)
+        services.problem_changed.connect(self._update)
+        services.opened.connect(self._update)
+        view.problem_changed.connect(self._update)
+        view.tracked_frame_changed.connect(self._update)
+        view.mode_changed.connect(self._update)
         entries.welcome(VIEW_CLASS, self._make)
 
     @property
@@ -541,7 +541,7 @@ class ViewEntry(QtCore.QObject):
         entry = _Entry(self._view, self._now, self._entries)
         self._shown.append(entry)
         self._action.setChecked(True)
-        self._tell()
+        self._update()
         return entry
 
     def _on_action(self, *_: Any) -> None:
@@ -549,7 +549,7 @@ class ViewEntry(QtCore.QObject):
 
     @Slot()
     def _look(self) -> None:
-        """See what RViz has deleted, which no signal tells to Python."""
+        """Notice what RViz has deleted, for which Python gets no signal."""
         gone = [entry for entry in self._shown if not entry.alive]
         for entry in gone:
             self._shown.remove(entry)
@@ -586,7 +586,7 @@ class ViewEntry(QtCore.QObject):
         self._view.set_mode(ViewMode.MODE_2D if flat else ViewMode.MODE_3D)
 
     @Slot()
-    def _tell(self, *_: Any) -> None:
+    def _update(self, *_: Any) -> None:
         services, view = self._services, self._view
         self._frame.set(view.tracked_frame)
         self._flat.set(view.mode is ViewMode.MODE_2D)
@@ -598,4 +598,4 @@ class ViewEntry(QtCore.QObject):
                 ("Tracked Frame", view.problem, follows),
             ):
                 if entry.alive:
-                    tell_status(entry.display, row, _WARN if problem else _OK, problem or fine)
+                    set_status(entry.display, row, _WARN if problem else _OK, problem or fine)

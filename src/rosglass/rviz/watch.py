@@ -1,4 +1,4 @@
-"""Signals of RViz's C++ objects, whose arguments Python cannot be given; and what they are."""
+"""RViz's C++ objects: signals whose arguments Python cannot get, and their classes."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Hook(QtCore.QObject):
 
 
 def address(item: Any) -> int:
-    """Return what tells an object of RViz from every other one that exists now."""
+    """Return the address of an object of RViz, unique among those that exist now."""
     return int(pyqt("sip").unwrapinstance(item))
 
 
@@ -53,7 +53,7 @@ def is_a(item: Any, kind: str) -> bool:
 
 
 def type_name(item: Any) -> str:
-    """Return the C++ class of an object of RViz that may not tell it by :func:`class_of`.
+    """Return the C++ class of an object of RViz that :func:`class_of` may not know.
 
     Returns:
         As compilers write it, e.g. ``N4rviz10FailedToolE``.
@@ -83,7 +83,7 @@ class AfterEvent:
     def ask(self) -> None:
         """Have it called."""
         if self._token is None:
-            # Python must not let go of it while C++ deletes it.
+            # Python must hold it while C++ deletes it.
             token = self._token = QtCore.QObject()
             token.destroyed.connect(self._on_destroyed)
             token.deleteLater()

@@ -38,7 +38,7 @@ _MOST_RECTS = 12
 class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
     """A view of a scene that is seen nowhere, though Qt takes it for visible.
 
-    Only a visible view hears which part of an item has changed: the scene's own signal names the
+    Only a visible view learns which part of an item has changed: the scene's own signal names the
     whole item, here the widget that fills everything.
 
     Args:
@@ -241,7 +241,7 @@ class StyleSheet(QtCore.QObject):  # type: ignore[misc]
         Args:
             source: See :func:`read_style_sheet`.
             watch: Whether to read the file anew when it changes.
-            strict: Whether to raise what is wrong, instead of telling it.
+            strict: Whether to raise errors instead of reporting them.
 
         Raises:
             Error: Only if `strict`.
@@ -250,7 +250,7 @@ class StyleSheet(QtCore.QObject):  # type: ignore[misc]
         self._stop_watching()
         self._read(strict=strict)
         if watch and self._path is not None:
-            # Editors replace the file; its folder tells of that.
+            # Editors replace the file, which changes its folder.
             self._watcher = QtCore.QFileSystemWatcher([str(self._path), str(self._path.parent)])
             self._watcher.fileChanged.connect(self._soon)
             self._watcher.directoryChanged.connect(self._soon)
@@ -287,7 +287,7 @@ _E = QtCore.QEvent
 #: A widget with this dynamic property, or below one, leaves the wheel to what is below.
 IGNORE_WHEEL = "IgnoreWheelEvents"
 _OTHERS = frozenset({_E.Wheel, _E.ContextMenu, _E.ToolTip, _E.DragLeave})
-#: Classes of Qt that hear of the wish for a menu, and have none.
+#: Classes of Qt that get context menu events, and have no menu.
 _WITHOUT_MENU = (QtWidgets.QWidget, QtWidgets.QAbstractScrollArea, QtWidgets.QMainWindow)
 _INPUT_METHOD = frozenset({_E.InputMethod, _E.InputMethodQuery})
 
@@ -319,7 +319,7 @@ class WidgetOverlay(Overlay):
         super().__init__(name or own, **options)
         #: The widget that fills the view.
         self.root: Any = made
-        # By it, what a widget raises at any time is told as the problem of the right one.
+        # Errors of a widget are reported as the problem of this overlay.
         made.rosglass_overlay = weakref.ref(self)
         made.setAttribute(QtCore.Qt.WA_TranslucentBackground)
         self._buttons = QtCore.Qt.NoButton
@@ -331,7 +331,7 @@ class WidgetOverlay(Overlay):
         self._view = _HiddenView(self._scene)
         self._canvas = Canvas(self._scene, made)
         self._canvas.stale.connect(self.changed)
-        # Not the scene's `changed`: if anybody hears that, Qt takes all of an item for stale.
+        # Not the scene's `changed`: once that is connected, Qt takes all of an item for stale.
         self._canvas.stale.connect(self._look_after_popups)
         self._proxy = self._scene.addWidget(made)
         # Otherwise all of it is painted whatever has changed.
@@ -352,7 +352,7 @@ class WidgetOverlay(Overlay):
     def style_sheet(self) -> str:
         """What it looks like: a ``.qss`` file, a ``package://`` URL, or the style sheet itself.
 
-        What cannot be read is told in the log and as :attr:`problem`, and changes nothing.
+        A sheet that cannot be read is logged, becomes the :attr:`problem`, and changes nothing.
         """
         return self._style.source
 
@@ -459,7 +459,7 @@ class WidgetOverlay(Overlay):
         return None if shown is None else shown.widget().focusWidget() or shown.widget()
 
     def _remember_keys(self, opened: bool) -> None:
-        """Know who had the keys before a popup: Qt gives them to nobody when it has closed."""
+        """Remember the focus before a popup opens: Qt does not restore it."""
         if not opened:
             self._had_keys = self._with_keys() or self._had_keys
 
@@ -473,7 +473,7 @@ class WidgetOverlay(Overlay):
             self._view.move(seen - at.toPoint())
 
     def leave(self) -> None:
-        """End hovering, and let go without effect of what is pressed."""
+        """End hovering, and cancel what is pressed."""
         if not is_alive(self._scene):
             return
         viewport = self._view.viewport()
@@ -572,7 +572,7 @@ class _HiddenView(QtWidgets.QGraphicsView):  # type: ignore[misc]
         """Take the size of the scene, and so its coordinates."""
         size = units.size().toSize()
         self.resize(size)
-        # Nobody lays out what is hidden.
+        # Qt does not lay out what is hidden.
         self.viewport().resize(size)
 
     def give(self, event: Any) -> bool:

@@ -142,7 +142,7 @@ class Window(QtCore.QObject):
 
     Args:
         config: The ``.rviz`` file; empty for RViz's default one.
-        splash: Show RViz's splash screen meanwhile.
+        splash: Show RViz's splash screen while it starts.
 
     Raises:
         Error: The file is missing or is no config of RViz.
@@ -156,7 +156,7 @@ class Window(QtCore.QObject):
     config_loaded = Signal(str)
     #: RViz is in full screen now, or no longer.
     fullscreen_changed = Signal(bool)
-    #: The window was closed, or is taken down: the last moment to let go of what is RViz's.
+    #: The window was closed, or is being destroyed: the last moment to release what is RViz's.
     closing = Signal()
 
     def __init__(self, config: str | os.PathLike[str] = "", *, splash: bool = False) -> None:
@@ -185,7 +185,7 @@ class Window(QtCore.QObject):
         #: Whether there is nothing but the 3D view in the window.
         self.bare = BareView(self.widget)
         self.menu("&Panels").addAction(self.bare.action)
-        self._close_watch = _CloseWatch(self.bare, self._tell_closing)
+        self._close_watch = _CloseWatch(self.bare, self._emit_closing)
         self.widget.installEventFilter(self._close_watch)
         self._connect(self._wrapped, "preUpdate()", self.before_frame.emit)
         self._connect(self._wrapped, "statusUpdate(QString)", self._on_status)
@@ -282,13 +282,13 @@ class Window(QtCore.QObject):
                 bar.addMenu(found)
             else:
                 bar.insertMenu(help_menu.menuAction(), found)
-        # PySide2 takes the menu for gone as soon as nobody in Python knows it.
+        # PySide2 deletes the menu once Python holds no reference to it.
         self._menus[_plain(title)] = found
         return found
 
     def close(self) -> None:
         """Take the window down, without asking for unsaved changes; safe to call twice."""
-        self._tell_closing()
+        self._emit_closing()
         self.widget.hide()
 
     def destroy(self) -> None:
@@ -297,9 +297,9 @@ class Window(QtCore.QObject):
         if not sip.isdeleted(self.frame):
             sip.delete(self.frame)
 
-    def _tell_closing(self) -> None:
-        told, self._closing = self._closing, True
-        if not told:
+    def _emit_closing(self) -> None:
+        before, self._closing = self._closing, True
+        if not before:
             self.closing.emit()
 
     def _on_fullscreen(self, fullscreen: bool) -> None:
@@ -357,7 +357,7 @@ def _plain(title: str) -> str:
 
 
 class _CloseWatch(QtCore.QObject):
-    """Tells when a window was closed, and not when the user said no to that.
+    """Calls back when a window was closed, and not when the user has cancelled that.
 
     Args:
         bare: What is hidden must be seen when RViz saves its config.
