@@ -11,10 +11,10 @@ from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
 from rosglass.rviz.camera import Picker
 from rosglass.rviz.displays_access import Displays
+from rosglass.rviz.host import Hook
 from rosglass.rviz.tools import Tools
 from rosglass.rviz.trackers import Frames, Trackers
 from rosglass.rviz.view import View, Views
-from rosglass.rviz.watch import Hook
 from rosglass.rviz.window import config_file
 
 if TYPE_CHECKING:

@@ -21,9 +21,8 @@ from rosglass.ros1.options import Ros1Options
 from rosglass.ros1.remapping_arguments import Arguments
 from rosglass.rviz import roscpp
 from rosglass.rviz.access import Access
-from rosglass.rviz.cpp import cpp_function
 from rosglass.rviz.entries import Entries, OverlayMenu
-from rosglass.rviz.host import require_rviz
+from rosglass.rviz.host import cpp_function, require_rviz
 from rosglass.rviz.lost_screen import LostScreen
 from rosglass.rviz.master import MasterWatch, wait_for_master
 from rosglass.rviz.overlay import log_what_is_raised
@@ -179,7 +178,9 @@ class Application(Handle):
         #: The overlays, the lowest first.
         self.overlays = Stack(self.window)
         #: Their entries in RViz's Displays panel.
-        self.entries = Entries(self.window, self.overlays, self.session, self._import_paths)
+        self.entries = Entries(
+            self.window, self.overlays, self.session, self.rviz.frames, self._import_paths
+        )
         self._menu = OverlayMenu(self.window, self.entries)
         #: RViz's camera.
         self.view = self.rviz.view

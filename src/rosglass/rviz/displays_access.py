@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
-from rosglass.rviz.host import as_pyside
+from rosglass.rviz.host import address, as_pyside, class_of
 from rosglass.rviz.plugins import DISPLAY, Watched, declared, require_class_id
 from rosglass.rviz.properties import (
     child_properties,
@@ -19,7 +19,6 @@ from rosglass.rviz.properties import (
 from rosglass.rviz.property_values import shown
 from rosglass.rviz.qt5 import QtWidgets
 from rosglass.rviz.tools import failure
-from rosglass.rviz.watch import address, class_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -10,15 +10,14 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import Error, QmlError
 from rosglass.qml.modules import locate
 from rosglass.qt import QtCore, Signal, Slot, is_alive
-from rosglass.rviz.host import pyqt, rviz
+from rosglass.rviz.host import AfterEvent, pyqt, rviz
 from rosglass.rviz.overlay import QML_CLASS, REFERENCE_QML_CLASS, SCALES, class_id_of, maker_of
-from rosglass.rviz.properties import PropertyTree, Sources, given_to_rviz, quiet, take_out
+from rosglass.rviz.properties import Choices, PropertyTree, given_to_rviz, quiet, take_out
 from rosglass.rviz.property_values import from_config, plain_config, to_config
 from rosglass.rviz.qml_overlay import QmlOverlay
 from rosglass.rviz.qt5 import QtWidgets
 from rosglass.rviz.registered_properties import RegisteredProperties
 from rosglass.rviz.rendering import choice
-from rosglass.rviz.watch import AfterEvent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
     from rosglass.qml.session import Session
     from rosglass.rviz.overlay import Overlay
     from rosglass.rviz.stack import Stack
+    from rosglass.rviz.trackers import Frames
     from rosglass.rviz.window import Window
 
 __all__ = [
@@ -148,7 +148,7 @@ class Entry(QtCore.QObject):
     Args:
         class_id: RViz's name for what it is.
         session: The node that QML talks through.
-        sources: What choosers of properties offer.
+        choices: What choosers of properties offer.
         import_paths: Further folders with QML modules.
     """
 
@@ -156,11 +156,11 @@ class Entry(QtCore.QObject):
         self,
         class_id: str,
         session: Session,
-        sources: Sources,
+        choices: Choices,
         import_paths: Sequence[Path] = (),
     ) -> None:
         super().__init__()
-        self.class_id, self._session, self._sources = class_id, session, sources
+        self.class_id, self._session, self._choices = class_id, session, choices
         self._import_paths = import_paths
         #: Called when its check box, or that of a group it is in, was clicked, when it is to show
         #: something else, and when RViz has deleted it. No signal: PySide2 takes entries that have
@@ -187,7 +187,7 @@ class Entry(QtCore.QObject):
         )
         self.own = RegisteredProperties(self)
         self._fill()
-        self._own_tree = PropertyTree(self.own, self.display, sources)
+        self._own_tree = PropertyTree(self.own, self.display, choices)
         self._holder: Any = None
         renamed = quiet()(lambda _name: self.renamed(self))
         shown = [
@@ -396,7 +396,7 @@ class Entry(QtCore.QObject):
             _, held = _classes()
             about = "What the overlay itself has declared to be set by you."
             self._holder = given_to_rviz(held(_CONFIGURATION, None, about, self.display))
-            self._tree = PropertyTree(overlay.properties, self._holder, self._sources)
+            self._tree = PropertyTree(overlay.properties, self._holder, self._choices)
 
     # Status.
 
@@ -457,6 +457,7 @@ class Entries(QtCore.QObject):
         window: RViz.
         stack: The overlays.
         session: The node that QML talks through.
+        frames: The robot's frames.
         import_paths: Further folders with QML modules.
     """
 
@@ -464,13 +465,20 @@ class Entries(QtCore.QObject):
     replaced = Signal()
 
     def __init__(
-        self, window: Window, stack: Stack, session: Session, import_paths: Sequence[Path] = ()
+        self,
+        window: Window,
+        stack: Stack,
+        session: Session,
+        frames: Frames,
+        import_paths: Sequence[Path] = (),
     ) -> None:
         super().__init__()
         self._window, self._stack, self._session = window, stack, session
         self._import_paths = import_paths
         #: What choosers of properties offer.
-        self.sources = Sources(session, lambda text: window.widget.statusBar().showMessage(text))
+        self.choices = Choices(
+            session, frames, lambda text: window.widget.statusBar().showMessage(text)
+        )
         self._entries: list[Entry] = []
         #: Overlays that the program has brought, which outlive the displays of a config file.
         self._programs: list[Overlay] = []
@@ -525,7 +533,6 @@ class Entries(QtCore.QObject):
         if self._closed:
             return
         self._closed = True
-        self.sources.close()
         for entry in list(self._entries):
             self.remove(entry)
 
@@ -634,7 +641,7 @@ class Entries(QtCore.QObject):
         return name
 
     def _make(self, class_id: str) -> Entry:
-        entry = Entry(class_id, self._session, self.sources, self._import_paths)
+        entry = Entry(class_id, self._session, self.choices, self._import_paths)
         self._entries.append(entry)
         entry.touched, entry.renamed = self._schedule, self._rename
         entry.edited = quiet()(self._window.manager.notifyConfigChanged)

@@ -1,28 +1,48 @@
-"""RViz's and Ogre's bindings: the only module that imports them, and converts their objects.
+"""RViz's, Ogre's and Qt 5's bindings: the only module that imports them and converts their objects.
 
 RViz's bindings are made for PyQt5, our interfaces for PySide2; both use the same Qt, and an object
-of one is wrapped anew for the other (reference: docs/architecture.md, section 6).
+of one is wrapped anew for the other (reference: docs/architecture.md, section 6). Functions without
+bindings are called by their names in the C++ library (Itanium C++ ABI).
 """
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import importlib
 import importlib.util
 import sys
 from functools import cache
 from importlib.machinery import PathFinder
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.errors import UnsupportedError
-from rosglass.qt import BINDING, QtCore
+from rosglass.qt import BINDING, QtCore, Slot
+from rosglass.rviz.qt5 import QtCore as Qt5Core
 from rosglass.rviz.requirements import PACKAGES, require_bindings
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from types import ModuleType
 
-__all__ = ["as_pyqt", "as_pyside", "ogre", "ogre_overlay", "pyqt", "require_rviz", "rviz"]
+__all__ = [
+    "AfterEvent",
+    "Hook",
+    "address",
+    "as_pyqt",
+    "as_pyside",
+    "class_of",
+    "cpp_function",
+    "is_a",
+    "ogre",
+    "ogre_overlay",
+    "pyqt",
+    "require_rviz",
+    "rviz",
+    "type_name",
+]
+
 
 _T = TypeVar("_T", bound=QtCore.QObject)
 _BINDINGS = "rviz.librviz_sip"
@@ -118,3 +138,118 @@ def as_pyqt(item: QtCore.QObject, kind: Any) -> Any:
     """
     shiboken = importlib.import_module("shiboken2")
     return pyqt("sip").wrapinstance(int(shiboken.getCppPointer(item)[0]), kind)
+
+
+@cache
+def _library(name: str) -> ctypes.CDLL:
+    """Return a library that RViz has loaded.
+
+    Raises:
+        UnsupportedError: It has not.
+    """
+    for line in Path("/proc/self/maps").read_text().splitlines():
+        file = line.split(maxsplit=5)[-1]
+        if Path(file).name.startswith(f"{name}.so"):
+            return ctypes.CDLL(file)
+    raise UnsupportedError(f"RViz's bindings come without {name}: they are none of RViz 1")
+
+
+def cpp_function(library: str, symbol: str, result: Any = None) -> Any:
+    """Return a function.
+
+    Args:
+        library: Its library, such as ``librviz``.
+        symbol: Its name there.
+        result: The type in ctypes of what it returns; None for nothing.
+
+    Raises:
+        UnsupportedError: This RViz has it not.
+    """
+    try:
+        found = _library(library)[symbol]
+    except AttributeError:
+        raise UnsupportedError(
+            f"{library} has no {symbol}: it was built for another C++ library than GNU's"
+        ) from None
+    found.restype = result
+    return found
+
+
+class Hook(QtCore.QObject):
+    """Calls a function for signals, at once, without their arguments.
+
+    Args:
+        call: Called in the middle of whatever RViz does: it may look, and must change nothing.
+    """
+
+    def __init__(self, call: Callable[[], None]) -> None:
+        super().__init__()
+        self._call = call
+
+    def watch(self, sender: Any, *signals: str) -> None:
+        """Call for signals of an object, from RViz's bindings, from now on."""
+        wrapped = as_pyside(sender, QtCore.QObject)
+        for signal in signals:
+            Qt5Core.QObject.connect(wrapped, Qt5Core.SIGNAL(signal), self, Qt5Core.SLOT("_on()"))
+
+    @Slot()
+    def _on(self) -> None:
+        self._call()
+
+
+def address(item: Any) -> int:
+    """Return the address of an object of RViz, unique among those that exist now."""
+    return int(pyqt("sip").unwrapinstance(item))
+
+
+def class_of(item: Any) -> str:
+    """Return the C++ class of an object of RViz, e.g. ``rviz::GridDisplay``."""
+    return str(as_pyside(item, QtCore.QObject).metaObject().className())
+
+
+def is_a(item: Any, kind: str) -> bool:
+    """Return whether an object of RViz is of a C++ class, or of one derived from it."""
+    return bool(as_pyside(item, QtCore.QObject).inherits(kind))
+
+
+def type_name(item: Any) -> str:
+    """Return the C++ class of an object of RViz that :func:`class_of` may not know.
+
+    Returns:
+        As compilers write it, e.g. ``N4rviz10FailedToolE``.
+    """
+    # Itanium C++ ABI, section 2.5.2 "Virtual Table Components" and 2.9.5 "RTTI Layout".
+    word = ctypes.sizeof(ctypes.c_void_p)
+    table = ctypes.c_void_p.from_address(address(item)).value or 0
+    info = ctypes.c_void_p.from_address(table - word).value or 0
+    name: bytes = ctypes.c_char_p.from_address(info + word).value or b""
+    return name.decode()
+
+
+class AfterEvent:
+    """Calls a function once RViz is done with the event that it is handling.
+
+    RViz handles other events while it loads a file or duplicates displays, timers included, and
+    then goes on. Only what is deleted later waits for so long.
+
+    Args:
+        call: The function; called once, however often it was asked for until it has returned.
+    """
+
+    def __init__(self, call: Callable[[], None]) -> None:
+        self._call = call
+        self._token: QtCore.QObject | None = None
+
+    def ask(self) -> None:
+        """Have it called."""
+        if self._token is None:
+            # Python must hold it while C++ deletes it.
+            token = self._token = QtCore.QObject()
+            token.destroyed.connect(self._on_destroyed)
+            token.deleteLater()
+
+    def _on_destroyed(self, *_: Any) -> None:
+        try:
+            self._call()
+        finally:
+            self._token = None

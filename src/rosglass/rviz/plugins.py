@@ -12,8 +12,8 @@ from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.interfaces.provider import workspace
 from rosglass.qt import QtCore, Signal
+from rosglass.rviz.host import Hook
 from rosglass.rviz.property_values import shown
-from rosglass.rviz.watch import Hook
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -13,22 +13,21 @@ import numpy as np
 from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.qt import QtGui, is_alive
-from rosglass.rviz.host import pyqt, rviz
+from rosglass.rviz.host import class_of, is_a, pyqt, rviz
 from rosglass.rviz.property_values import shown
 from rosglass.rviz.registered_properties import RegisteredProperty
-from rosglass.rviz.watch import class_of, is_a
+from rosglass.rviz.trackers import FIXED_FRAME
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from rosglass.qml.session import Session
-    from rosglass.qml.tf_buffer import TfLink
     from rosglass.rviz.registered_properties import RegisteredProperties
+    from rosglass.rviz.trackers import Frames
 
 __all__ = [
-    "FIXED_FRAME",
+    "Choices",
     "PropertyTree",
-    "Sources",
     "child_properties",
     "describe_properties",
     "find_property",
@@ -270,22 +269,19 @@ def _same(now: Any, wanted: Any) -> bool:
 
 
 _log = logging.getLogger("rosglass.rviz")
-#: As RViz's own displays call the fixed frame.
-FIXED_FRAME = "<Fixed Frame>"
 
 
-class Sources:
-    """Asks a session's node; knows nothing while there is none.
+class Choices:
+    """What the editors of properties offer, and where they report mistakes.
 
     Args:
-        session: The session.
+        session: Whose node knows the topics; there are none without a node.
+        frames: The robot's frames.
         notify: Shows a text to the user, e.g. in RViz's status bar.
     """
 
-    def __init__(self, session: Session, notify: Callable[[str], Any]) -> None:
-        self._session, self._notify = session, notify
-        self._link: TfLink | None = None
-        self._linked: Any = None
+    def __init__(self, session: Session, frames: Frames, notify: Callable[[str], Any]) -> None:
+        self._session, self._frames, self._notify = session, frames, notify
 
     def topics(self, type_name: str) -> list[str]:
         """Return the topics of a type, of all types where it is empty."""
@@ -304,63 +300,46 @@ class Sources:
         return sorted(name for name, kinds in names.items() if not wanted or wanted in kinds)
 
     def frames(self, *, fixed: bool) -> list[str]:
-        """Return the frames that are known, before them the fixed one if that is asked for."""
-        self.listen()
-        known = sorted(self._link.buffer.tree()) if self._link is not None else []
+        """Return the known frames, after the fixed frame if that is wanted."""
+        buffer = self._frames.buffer
+        known = sorted(buffer.tree()) if buffer is not None else []
         return [FIXED_FRAME, *known] if fixed else known
 
-    def listen(self) -> None:
-        """Begin to receive frames, for a chooser that is to be opened."""
-        node = self._session.node
-        if node is not self._linked:
-            self.close()
-            self._linked = node
-            if node is not None:
-                from rosglass.qml.tf_buffer import TfLink  # noqa: PLC0415 - brings in the transforms
-
-                self._link = TfLink.join(self._session, node, "/", self)
-
-    def edit(self, model: RegisteredProperty, value: Any) -> None:
+    def set_property(self, model: RegisteredProperty, value: Any) -> None:
         """Set a property to what the user has chosen; report a value that it refuses."""
         try:
             if not model.readOnly:
                 model.set(value)
         except Error as error:
-            self.complain(f"{'/'.join(model.path)}: {error}")
+            self.report(f"{'/'.join(model.path)}: {error}")
 
-    def complain(self, text: str) -> None:
+    def report(self, text: str) -> None:
         """Log a mistake of the user, and show it."""
         _log.warning("property %s", text)
         self._notify(text)
 
-    def close(self) -> None:
-        """Receive frames no longer; safe to call twice."""
-        link, self._link, self._linked = self._link, None, None
-        if link is not None:
-            link.leave(self)
 
-
-def make_editor(model: RegisteredProperty, parent: Any, sources: Sources) -> Any:
+def make_editor(model: RegisteredProperty, parent: Any, choices: Choices) -> Any:
     """Return the widget that edits a property; None where RViz's own will do.
 
     Args:
         model: The property.
         parent: The widget that it is shown in.
-        sources: What choosers offer.
+        choices: What choosers offer.
     """
     kind, options = model.kind.NAME, model.kind.options
     if kind == "int":
         return _spin_box(model, parent)
     if kind == "enum":
-        return _combo_box(parent, list(options["choices"]), sources, model, editable=False)
+        return _combo_box(parent, list(options["choices"]), choices, model, editable=False)
     if kind == "topic":
-        offered = sources.topics(options.get("messageType", ""))
-        return _combo_box(parent, offered, sources, model, editable=True)
+        offered = choices.topics(options.get("messageType", ""))
+        return _combo_box(parent, offered, choices, model, editable=True)
     if kind == "frame":
-        offered = sources.frames(fixed=options.get("includeFixedFrame", False))
-        return _combo_box(parent, offered, sources, model, editable=True)
+        offered = choices.frames(fixed=options.get("includeFixedFrame", False))
+        return _combo_box(parent, offered, choices, model, editable=True)
     if kind in {"color", "path"}:
-        return _line_with_button()(model, parent, sources)
+        return _line_with_button()(model, parent, choices)
     return None
 
 
@@ -374,7 +353,7 @@ def _spin_box(model: RegisteredProperty, parent: Any) -> Any:
 
 
 def _combo_box(
-    parent: Any, offered: list[str], sources: Sources, model: RegisteredProperty, *, editable: bool
+    parent: Any, offered: list[str], choices: Choices, model: RegisteredProperty, *, editable: bool
 ) -> Any:
     box = pyqt("QtWidgets").QComboBox(parent)
     box.setFrame(False)
@@ -385,7 +364,7 @@ def _combo_box(
         box.setEditText(str(model.get()))
 
     def choose(text: str) -> None:
-        sources.edit(model, text)
+        choices.set_property(model, text)
 
     box.textActivated.connect(choose)
     return box
@@ -398,7 +377,7 @@ def _line_with_button() -> Any:
     class LineWithButton(widgets.QLineEdit):  # type: ignore[name-defined,misc]
         """A text, and a button that opens a dialog to choose it with."""
 
-        def __init__(self, model: RegisteredProperty, parent: Any, sources: Sources) -> None:
+        def __init__(self, model: RegisteredProperty, parent: Any, choices: Choices) -> None:
             super().__init__(parent)
             self.setFrame(False)
             action = self.addAction(
@@ -410,7 +389,7 @@ def _line_with_button() -> Any:
             window = self.window()
             # The dialog takes the focus, which ends this editor.
             action.triggered.connect(
-                lambda: core.QTimer.singleShot(0, lambda: _choose(model, window, sources))
+                lambda: core.QTimer.singleShot(0, lambda: _choose(model, window, choices))
             )
 
     return LineWithButton
@@ -423,20 +402,20 @@ def _colour_icon(model: RegisteredProperty) -> Any:
     return gui.QIcon(picture)
 
 
-def _choose(model: RegisteredProperty, window: Any, sources: Sources) -> None:
+def _choose(model: RegisteredProperty, window: Any, choices: Choices) -> None:
     widgets = pyqt("QtWidgets")
     if model.kind.NAME == "color":
         gui = pyqt("QtGui")
         dialog = widgets.QColorDialog(gui.QColor(model.kind.saved(model.get())), window)
         dialog.setOption(widgets.QColorDialog.ShowAlphaChannel)
         dialog.colorSelected.connect(
-            lambda colour: sources.edit(model, colour.name(gui.QColor.HexArgb))
+            lambda colour: choices.set_property(model, colour.name(gui.QColor.HexArgb))
         )
     else:
         dialog = widgets.QFileDialog(window, model.path[-1], str(model.get()))
         dialog.setFileMode(widgets.QFileDialog.ExistingFile)
         dialog.setNameFilter(model.kind.options.get("filter", "All files (*)"))
-        dialog.fileSelected.connect(lambda file: sources.edit(model, file))
+        dialog.fileSelected.connect(lambda file: choices.set_property(model, file))
     dialog.setAttribute(pyqt().Qt.WA_DeleteOnClose)
     dialog.open()
 
@@ -504,7 +483,7 @@ def _classes() -> tuple[Any, Any]:
         @quiet()
         def createEditor(self, parent: Any, option: Any) -> Any:
             view = self.view
-            made = make_editor(view.model, parent, view.sources) if view is not None else None
+            made = make_editor(view.model, parent, view.choices) if view is not None else None
             return bindings.Property.createEditor(self, parent, option) if made is None else made
 
     class Check(_Shown, bindings.BoolProperty):  # type: ignore[name-defined,misc]
@@ -521,11 +500,11 @@ class PropertyView:
     Args:
         model: The property.
         above: RViz's property that it stands below.
-        sources: What choosers offer; reports refused edits.
+        choices: What choosers offer; reports refused edits.
     """
 
-    def __init__(self, model: RegisteredProperty, above: Any, sources: Sources) -> None:
-        self.model, self.sources = model, sources
+    def __init__(self, model: RegisteredProperty, above: Any, choices: Choices) -> None:
+        self.model, self.choices = model, choices
         item, check = _classes()
         kind = item if model.kind.NAME != "bool" else check
         about = model.description
@@ -575,7 +554,7 @@ class PropertyView:
             if not model.readOnly:
                 model.set(value)
         except Error as error:
-            self.sources.complain(f"{'/'.join(model.path)}: {error}")
+            self.choices.report(f"{'/'.join(model.path)}: {error}")
         self._show()
 
     def _show(self) -> None:
@@ -623,11 +602,11 @@ class PropertyTree:
     Args:
         owner: Whose properties.
         above: RViz's property that they stand below.
-        sources: See :class:`PropertyView`.
+        choices: See :class:`PropertyView`.
     """
 
-    def __init__(self, owner: RegisteredProperties, above: Any, sources: Sources) -> None:
-        self._owner, self._above, self._sources = owner, above, sources
+    def __init__(self, owner: RegisteredProperties, above: Any, choices: Choices) -> None:
+        self._owner, self._above, self._choices = owner, above, choices
         self._views: dict[RegisteredProperty, PropertyView] = {}
         self._watched: dict[RegisteredProperty, Any] = {}
         self._added, self._gone = quiet()(self._on_registered), quiet()(self._on_unregistered)
@@ -681,7 +660,7 @@ class PropertyTree:
             view = self._views.get(found.container) if found.container is not None else None
             above = view.item if view is not None else self._above
             if (found.container is None or view is not None) and not _is_deleted(above):
-                self._views[found] = PropertyView(found, above, self._sources)
+                self._views[found] = PropertyView(found, above, self._choices)
                 for below in found.properties.values():
                     self._show(below)
 

@@ -1,6 +1,5 @@
 """Properties that an interface registers, shown in its entry of the Displays panel."""
 # ruff: noqa: N815 - the names of slots, signals and properties are QML's
-# ruff: noqa: N802 N815 - the names of slots, signals and properties are QML's
 
 from __future__ import annotations
 
@@ -169,15 +168,27 @@ class RegisteredProperty(QtCore.QObject):
 _COMMON = ("description", "readOnly", "hidden")
 
 
-def _slot(most: int) -> Callable[[Any], Any]:
-    """Make a method callable from QML with up to `most` arguments of any kind."""
+def _registering(name: str, kind: str, *order: str) -> Any:
+    """Return the function that registers properties of a kind, for QML and Python.
 
-    def decorate(function: Any) -> Any:
-        for count in range(most + 1):
-            function = Slot(*[QJSValue] * count, result=QtCore.QObject)(function)
-        return function
+    Args:
+        name: Its name.
+        kind: See :attr:`RegisteredProperty.kindName`.
+        order: The arguments after the name of the property.
+    """
+    names = ("name", *order) if "description" in order else ("name", *order, "description")
 
-    return decorate
+    def call(self: RegisteredProperties, *arguments: Any, **options: Any) -> Any:
+        with errors_to_js(self.runtime, f"rviz.{name}", *arguments):
+            given = [to_python(argument) for argument in arguments]
+            return self.register(kind, **_named(names, given, options))
+        return None
+
+    call.__name__ = name
+    # A parent may come first, options come last, and one too many is an error of ours.
+    for count in range(len(names) + 4):
+        call = Slot(*[QJSValue] * count, result=QtCore.QObject)(call)
+    return call
 
 
 class RegisteredProperties(QtCore.QObject):
@@ -242,79 +253,36 @@ class RegisteredProperties(QtCore.QObject):
 
     # Registering.
 
-    @_slot(4)
-    def registerPropertyContainer(self, *arguments: Any, **options: Any) -> Any:
-        """Return a property that has no value, below which others stand."""
-        return self._call("registerPropertyContainer", "container", (), arguments, options)
-
-    @_slot(5)
-    def registerBoolProperty(self, *arguments: Any, **options: Any) -> Any:
-        """Return a check box."""
-        return self._call("registerBoolProperty", "bool", ("default",), arguments, options)
-
-    @_slot(8)
-    def registerIntProperty(self, *arguments: Any, **options: Any) -> Any:
-        """Return a whole number; after the description `min` and `max`, or options."""
-        order = ("default", "description", "min", "max")
-        return self._call("registerIntProperty", "int", order, arguments, options)
-
-    @_slot(8)
-    def registerFloatProperty(self, *arguments: Any, **options: Any) -> Any:
-        """Return a number; after the description `min` and `max`, or options."""
-        order = ("default", "description", "min", "max")
-        return self._call("registerFloatProperty", "float", order, arguments, options)
-
-    @_slot(5)
-    def registerStringProperty(self, *arguments: Any, **options: Any) -> Any:
-        """Return a text."""
-        return self._call("registerStringProperty", "string", ("default",), arguments, options)
-
-    @_slot(6)
-    def registerEnumProperty(self, *arguments: Any, **options: Any) -> Any:
-        """Return one of the texts `choices`, which come after the default."""
-        order = ("default", "choices")
-        return self._call("registerEnumProperty", "enum", order, arguments, options)
-
-    @_slot(5)
-    def registerColorProperty(self, *arguments: Any, **options: Any) -> Any:
-        """Return a colour."""
-        return self._call("registerColorProperty", "color", ("default",), arguments, options)
-
-    @_slot(5)
-    def registerVectorProperty(self, *arguments: Any, **options: Any) -> Any:
-        """Return a vector of x, y and z."""
-        return self._call("registerVectorProperty", "vector", ("default",), arguments, options)
-
-    @_slot(5)
-    def registerQuaternionProperty(self, *arguments: Any, **options: Any) -> Any:
-        """Return a quaternion of x, y, z and w."""
-        order = ("default",)
-        return self._call("registerQuaternionProperty", "quaternion", order, arguments, options)
-
-    @_slot(6)
-    def registerRosTopicProperty(self, *arguments: Any, **options: Any) -> Any:
-        """Return the name of a topic of the type `messageType`, which comes after the default."""
-        order = ("default", "messageType")
-        return self._call("registerRosTopicProperty", "topic", order, arguments, options)
-
-    @_slot(6)
-    def registerTfFrameProperty(self, *arguments: Any, **options: Any) -> Any:
-        """Return the name of a frame; `includeFixedFrame` comes after the description."""
-        order = ("default", "description", "includeFixedFrame")
-        return self._call("registerTfFrameProperty", "frame", order, arguments, options)
-
-    def _call(
-        self,
-        function: str,
-        kind: str,
-        order: tuple[str, ...],
-        arguments: tuple[Any, ...],
-        options: dict[str, Any],
-    ) -> RegisteredProperty | None:
-        names = ("name", *order) if "description" in order else ("name", *order, "description")
-        with errors_to_js(self.runtime, f"rviz.{function}", *arguments):
-            return self.register(kind, **_named(names, [to_python(a) for a in arguments], options))
-        return None
+    #: A property without a value, below which others stand.
+    registerPropertyContainer = _registering("registerPropertyContainer", "container")
+    #: A check box.
+    registerBoolProperty = _registering("registerBoolProperty", "bool", "default")
+    #: A whole number.
+    registerIntProperty = _registering(
+        "registerIntProperty", "int", "default", "description", "min", "max"
+    )
+    #: A number.
+    registerFloatProperty = _registering(
+        "registerFloatProperty", "float", "default", "description", "min", "max"
+    )
+    #: A text.
+    registerStringProperty = _registering("registerStringProperty", "string", "default")
+    #: One of the texts `choices`.
+    registerEnumProperty = _registering("registerEnumProperty", "enum", "default", "choices")
+    #: A colour.
+    registerColorProperty = _registering("registerColorProperty", "color", "default")
+    #: A vector of x, y and z.
+    registerVectorProperty = _registering("registerVectorProperty", "vector", "default")
+    #: A quaternion of x, y, z and w.
+    registerQuaternionProperty = _registering("registerQuaternionProperty", "quaternion", "default")
+    #: The name of a topic of the type `messageType`.
+    registerRosTopicProperty = _registering(
+        "registerRosTopicProperty", "topic", "default", "messageType"
+    )
+    #: The name of a frame.
+    registerTfFrameProperty = _registering(
+        "registerTfFrameProperty", "frame", "default", "description", "includeFixedFrame"
+    )
 
     def register(
         self,

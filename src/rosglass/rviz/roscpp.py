@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import anonymous_name
 from rosglass.errors import InvalidNameError
-from rosglass.rviz.cpp import cpp_function
+from rosglass.rviz.host import cpp_function
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.qt import Signal
-from rosglass.rviz.host import pyqt
+from rosglass.rviz.host import address, pyqt, type_name
 from rosglass.rviz.overlay import QML_CLASS, REFERENCE_QML_CLASS
 from rosglass.rviz.plugins import DISPLAY, TOOL, Watched, declared, require_class_id
 from rosglass.rviz.qt5 import QtGui
-from rosglass.rviz.watch import address, type_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -17,7 +17,7 @@ from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
 from rosglass.ros1.names import expand
 from rosglass.rviz.camera import Camera
-from rosglass.rviz.host import as_pyside
+from rosglass.rviz.host import Hook, as_pyside
 from rosglass.rviz.orbit import NEAREST, STEEPEST, Orbit, Place, Point, ease, shortest_turn
 from rosglass.rviz.plugins import VIEW, declared
 from rosglass.rviz.property_values import shown
@@ -25,7 +25,6 @@ from rosglass.rviz.qt5 import QtCore as Qt5Core
 from rosglass.rviz.qt5 import QtWidgets
 from rosglass.rviz.registered_properties import RegisteredProperties
 from rosglass.rviz.trackers import FIXED_FRAME
-from rosglass.rviz.watch import Hook
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -446,7 +446,7 @@ class _Entry:
             "Without this entry, it is as at first."
         )
         self._trees = [
-            PropertyTree(owner, self.display, entries.sources)
+            PropertyTree(owner, self.display, entries.choices)
             for owner in (now, view.settings.properties)
         ]
 
@@ -579,7 +579,7 @@ class ViewEntry(QtCore.QObject):
         try:
             self._view.track(frame)
         except Error as error:
-            self._entries.sources.complain(f"Tracked Frame: {error}")
+            self._entries.choices.report(f"Tracked Frame: {error}")
             self._frame.set(self._view.tracked_frame)
 
     def _flatten(self, flat: bool) -> None:

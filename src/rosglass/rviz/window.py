@@ -15,10 +15,9 @@ from rosglass.comm.text_files import check_yaml
 from rosglass.errors import Error
 from rosglass.qml.modules import locate, near
 from rosglass.qt import QtCore, Signal, is_alive
-from rosglass.rviz.host import as_pyside, pyqt, rviz
+from rosglass.rviz.host import AfterEvent, as_pyside, pyqt, rviz
 from rosglass.rviz.qt5 import QtCore as Qt5Core
 from rosglass.rviz.qt5 import QtWidgets
-from rosglass.rviz.watch import AfterEvent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
