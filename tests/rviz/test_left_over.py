@@ -145,7 +145,7 @@ def test_modules_that_rviz_does_not_use_are_not_loaded(app: Any) -> None:
 import sys
 from rosglass.rviz import Application, QmlOverlay
 from rosglass.rviz.host import require_rviz, rviz
-from rosglass.rviz.properties import quiet
+from rosglass.rviz.properties import log_errors
 from rosglass.qt import QtCore, Signal
 
 class Sender(QtCore.QObject):
@@ -153,7 +153,7 @@ class Sender(QtCore.QObject):
 
 require_rviz()
 sender = Sender()
-quiet()(sender.sent.emit)()
+log_errors()(sender.sent.emit)()
 kinds = ("PyQt5.", "PySide2.Qt", "python_qt")
 print(*sorted(name for name in sys.modules if name.startswith(kinds)))
 bindings = rviz()

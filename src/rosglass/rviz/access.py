@@ -143,7 +143,7 @@ class Access(QtCore.QObject):
 
         def load() -> None:
             try:
-                self.displays.settle_panel()
+                self.displays.flush_panels()
                 self.window.load_config(path)
             except Error as error:
                 _log.error("rviz.loadConfig: %s", error)

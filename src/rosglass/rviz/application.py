@@ -25,7 +25,7 @@ from rosglass.rviz.entries import Entries, OverlayMenu
 from rosglass.rviz.host import cpp_function, require_rviz
 from rosglass.rviz.lost_screen import LostScreen
 from rosglass.rviz.master import MasterWatch, wait_for_master
-from rosglass.rviz.overlay import log_what_is_raised
+from rosglass.rviz.overlay import log_uncaught_errors
 from rosglass.rviz.qml_overlay import QmlOverlay
 from rosglass.rviz.qt5 import QtGui, QtWidgets
 from rosglass.rviz.rendering import choice
@@ -144,7 +144,7 @@ class Application(Handle):
         #: The Qt application.
         self.qt: Any = _qt_application(arguments)
         warn_on_terminal(LocationFormatter())
-        self._unhook = log_what_is_raised()
+        self._unhook = log_uncaught_errors()
         self._closed = self._running = self._fullscreen = False
         self._fullscreen = fullscreen
         received: list[int] = []
@@ -171,7 +171,7 @@ class Application(Handle):
         )
         self.session.killed.connect(self._on_killed)
         self._screen = LostScreen(self.window.ids, [roscpp.shut_down, self._close_node])
-        self.window.before_frame.connect(self._screen.look)
+        self.window.before_frame.connect(self._screen.check)
         #: RViz's tools, displays, views and camera.
         self.rviz = Access(self.window, self.session)
         self.session.shared[ACCESS] = self.rviz

@@ -98,7 +98,7 @@ class Display:
     @name.setter
     def name(self, name: str) -> None:
         self.require().setName(_plain_name(name))
-        self._owner.settle()
+        self._owner.emit_changes()
 
     @property
     def enabled(self) -> bool:
@@ -112,7 +112,7 @@ class Display:
     @enabled.setter
     def enabled(self, enabled: bool) -> None:
         self.require().setEnabled(enabled)
-        self._owner.settle()
+        self._owner.emit_changes()
 
     @property
     def status(self) -> Status:
@@ -150,7 +150,7 @@ class Display:
         """
         found = find_property(self.require(), path, self.name)
         write_property(found, value, f"{self.name}/{path}")
-        self._owner.settle()
+        self._owner.emit_changes()
 
     def remove(self) -> None:
         """Remove it from RViz.
@@ -190,11 +190,11 @@ class Displays(Watched):
         self._items: list[Display]
         self._status = status_of(self._root)
         self._groups: set[int] = set()
-        self._match()
+        self._sync_items()
         self._known = list(self._items)
         self._timer = QtCore.QTimer(self)
         self._timer.setInterval(_PERIOD_MS)
-        self._timer.timeout.connect(self.settle)
+        self._timer.timeout.connect(self.emit_changes)
         self._timer.start()
 
     @property
@@ -230,7 +230,7 @@ class Displays(Watched):
         """
         names = path if isinstance(path, str) else "/".join(map(str, path))
         write_property(self._find_property(names), value, names[:120])
-        self.settle()
+        self.emit_changes()
 
     def options(self) -> list[dict[str, Any]]:
         """Return RViz's global options, as `describe_properties` does."""
@@ -274,13 +274,13 @@ class Displays(Watched):
         handle = self._window.manager.createDisplay(class_id, shown, enabled)
         text = failure(handle, class_id, DISPLAY)
         if text:
-            self._take(handle)
-            self.settle()
+            self._delete(handle)
+            self.emit_changes()
             raise Error(f"no display was added: {text}")
-        self._match()
+        self._sync_items()
         at = address(handle)
         made = next(display for display in self._items if display.at == at)
-        self.settle()
+        self.emit_changes()
         return made
 
     def remove(self, display: Display) -> None:
@@ -289,18 +289,18 @@ class Displays(Watched):
         Raises:
             Error: It was removed before.
         """
-        self._take(display.require())
-        self.settle()
+        self._delete(display.require())
+        self.emit_changes()
 
-    def _take(self, handle: Any) -> None:
-        self.settle_panel()
+    def _delete(self, handle: Any) -> None:
+        self.flush_panels()
         wrapped = as_pyside(handle, QtCore.QObject)
         # As RViz's own panel does it: displays may have sent signals from other threads.
         handle.disconnect()
         handle.getParent().takeChild(handle)
         wrapped.deleteLater()
 
-    def settle_panel(self) -> None:
+    def flush_panels(self) -> None:
         """Deliver what is queued for RViz's panels.
 
         They hide and show properties later, and crash if a display was removed in between.
@@ -309,7 +309,7 @@ class Displays(Watched):
         for tree in self._window.widget.findChildren(QtWidgets.QTreeView):
             QtCore.QCoreApplication.sendPostedEvents(tree, event)
 
-    def _rest(self) -> Callable[[], None]:
+    def _sync_status(self) -> Callable[[], None]:
         before, self._status = self._status, self.status
         return self.status_changed.emit if self._status != before else lambda: None
 
@@ -317,7 +317,7 @@ class Displays(Watched):
         """Stop checking for changes; safe to call twice."""
         self._timer.stop()
 
-    def _match(self) -> None:
+    def _sync_items(self) -> None:
         known = {display.at: display for display in self._items}
         found, groups = [], set()
         for handle, is_group in _walk(self._root):

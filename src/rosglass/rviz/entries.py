@@ -12,7 +12,13 @@ from rosglass.qml.modules import locate
 from rosglass.qt import QtCore, Signal, Slot, is_alive
 from rosglass.rviz.host import AfterEvent, pyqt, rviz
 from rosglass.rviz.overlay import QML_CLASS, REFERENCE_QML_CLASS, SCALES, class_id_of, maker_of
-from rosglass.rviz.properties import Choices, PropertyTree, given_to_rviz, quiet, take_out
+from rosglass.rviz.properties import (
+    Choices,
+    PropertyTree,
+    log_errors,
+    owned_by_rviz,
+    remove_from_tree,
+)
 from rosglass.rviz.property_values import from_config, plain_config, to_config
 from rosglass.rviz.qml_overlay import QmlOverlay
 from rosglass.rviz.qt5 import QtWidgets
@@ -104,19 +110,19 @@ def _classes() -> tuple[Any, Any]:
     class Display(bindings.DisplayGroup):  # type: ignore[name-defined,misc]
         entry: Any = None
 
-        @quiet()
+        @log_errors()
         def save(self, config: Any) -> None:
             bindings.Display.save(self, config)
             if self.entry is not None:
                 self.entry.save(config)
 
-        @quiet()
+        @log_errors()
         def load(self, config: Any) -> None:
             bindings.Display.load(self, config)
             if self.entry is not None:
                 self.entry.load(config)
 
-        @quiet(core.Qt.ItemFlags())
+        @log_errors(core.Qt.ItemFlags())
         def getViewFlags(self, column: int) -> Any:
             # Nothing can be dropped into it.
             return bindings.DisplayGroup.getViewFlags(self, column) & ~core.Qt.ItemIsDropEnabled
@@ -171,13 +177,13 @@ class Entry(QtCore.QObject):
         #: Called when something that RViz does not see, and its file would keep, is another now.
         self.edited: Callable[[], object] = _nothing
         self.overlay: Overlay | None = None
-        self._failed, self._taken_file = "", ""
+        self._failed, self._shown_file = "", ""
         self._registered: dict[str, Any] = {}
         self._config: dict[str, Any] = {}
         self._tree: PropertyTree | None = None
         display, _ = _classes()
         #: RViz's display.
-        self.display: Any = given_to_rviz(display())
+        self.display: Any = owned_by_rviz(display())
         self.display.entry = self
         self.display.setClassId(class_id)
         self.display.setIcon(overlay_icon())
@@ -186,14 +192,14 @@ class Entry(QtCore.QObject):
             + ("A QML file." if self.is_qml else f"Of the class {class_id}.")
         )
         self.own = RegisteredProperties(self)
-        self._fill()
+        self._register_properties()
         self._own_tree = PropertyTree(self.own, self.display, choices)
         self._holder: Any = None
-        renamed = quiet()(lambda _name: self.renamed(self))
+        renamed = log_errors()(lambda _name: self.renamed(self))
         shown = [
-            (self.display.changed, quiet()(lambda *_: self.touched())),
+            (self.display.changed, log_errors()(lambda *_: self.touched())),
             (self.display.objectNameChanged, renamed),
-            (self.display.destroyed, quiet()(lambda *_: self.touched())),
+            (self.display.destroyed, log_errors()(lambda *_: self.touched())),
         ]
         for signal, slot in shown:
             signal.connect(slot)
@@ -217,7 +223,7 @@ class Entry(QtCore.QObject):
         """The QML file, as it was given."""
         return str(self.own.properties["Path"].get()) if self.is_qml else ""
 
-    def _fill(self) -> None:
+    def _register_properties(self) -> None:
         own = self.own
         if self.is_qml:
             about = "The QML file; package://name/path for one in a ROS package."
@@ -246,7 +252,7 @@ class Entry(QtCore.QObject):
 
     # The overlay.
 
-    def ensure(self) -> None:
+    def make_overlay(self) -> None:
         """Make the overlay of the entry; an error becomes its status."""
         if self.overlay is not None or self._failed or not self.alive:
             return
@@ -258,13 +264,13 @@ class Entry(QtCore.QObject):
             make = maker_of(self.class_id)
             if self.is_qml:
                 paths = self._import_paths
-                self.take(QmlOverlay(self.file, self._session, name, import_paths=paths))
+                self.attach(QmlOverlay(self.file, self._session, name, import_paths=paths))
             elif make is None:
                 advice = f"its class {self.class_id} is unknown; rosglass.rviz.register() it"
                 self._failed = f"the program has shown no overlay {name!r} yet, and {advice}"
                 self.status(self._row, _WARN, self._failed)
             else:
-                self.take(make(name))
+                self.attach(make(name))
         except Exception as error:
             self._failed = str(error) or repr(error)
             self.status(self._row, _ERROR, self._failed)
@@ -277,7 +283,7 @@ class Entry(QtCore.QObject):
     @property
     def outdated(self) -> bool:
         """Whether its overlay shows another file than it is to show."""
-        return self.overlay is not None and self.file != self._taken_file
+        return self.overlay is not None and self.file != self._shown_file
 
     def shows(self, file: Path) -> bool:
         """Whether a file is what it is to show."""
@@ -291,13 +297,13 @@ class Entry(QtCore.QObject):
         self._failed = ""
         self.touched()
 
-    def take(self, overlay: Overlay) -> None:
+    def attach(self, overlay: Overlay) -> None:
         """Show an overlay as this entry, with what was saved for it.
 
         Args:
             overlay: As yet without an entry; one of QML may be loaded already or not.
         """
-        self.overlay, self._taken_file = overlay, self.file
+        self.overlay, self._shown_file = overlay, self.file
         if hasattr(overlay, "style_sheet") and "Style Sheet" not in self.own.properties:
             about = "A .qss file, a package:// URL of one, or a style sheet itself."
             self.own.register(
@@ -325,7 +331,7 @@ class Entry(QtCore.QObject):
             except Error as error:
                 overlay.tell_problem(str(error))
 
-    def drop(self) -> Overlay | None:
+    def detach(self) -> Overlay | None:
         """Return the overlay, which is no longer this entry's, and keep what it had saved."""
         overlay, self.overlay = self.overlay, None
         if overlay is None:
@@ -342,7 +348,7 @@ class Entry(QtCore.QObject):
         tree, self._tree = self._tree, None
         if tree is not None:
             tree.close()
-            take_out(self._holder)
+            remove_from_tree(self._holder)
         return overlay
 
     def close(self) -> None:
@@ -359,7 +365,7 @@ class Entry(QtCore.QObject):
         if self.alive:
             self.display.entry = None
 
-    def reflect(self, overlay: Overlay) -> None:
+    def copy_from(self, overlay: Overlay) -> None:
         """Take the numbers of an overlay that a program has made, before :meth:`take`."""
         if isinstance(overlay, QmlOverlay):
             self.own.properties["Path"].set(str(overlay.file))
@@ -395,7 +401,7 @@ class Entry(QtCore.QObject):
         if overlay is not None and overlay.properties.properties and self._tree is None:
             _, held = _classes()
             about = "What the overlay itself has declared to be set by you."
-            self._holder = given_to_rviz(held(_CONFIGURATION, None, about, self.display))
+            self._holder = owned_by_rviz(held(_CONFIGURATION, None, about, self.display))
             self._tree = PropertyTree(overlay.properties, self._holder, self._choices)
 
     # Status.
@@ -481,19 +487,19 @@ class Entries(QtCore.QObject):
         )
         self._entries: list[Entry] = []
         #: Overlays that the program has brought, which outlive the displays of a config file.
-        self._programs: list[Overlay] = []
+        self._program_overlays: list[Overlay] = []
         #: As the panel has shown them last; what came since may belong between others.
         self._order: list[Overlay] = []
         self._new = False
-        self._guests: dict[str, Callable[[], Any]] = {}
-        self._held = False
+        self._other_classes: dict[str, Callable[[], Any]] = {}
+        self._loading = False
         self._scheduled = self._settling = self._closed = False
         self._watched: set[int] = set()
         # RViz's panel handles other events while it duplicates displays, too.
-        self._look_again = AfterEvent(self._replace_placeholders)
+        self._after_event = AfterEvent(self._replace_placeholders)
         stack.changed.connect(self._schedule)
-        window.before_frame.connect(self._look)
-        window.config_loading.connect(self._hold)
+        window.before_frame.connect(self._check_displays)
+        window.config_loading.connect(self._on_config_loading)
         self._replace_placeholders()
 
     def __iter__(self) -> Iterator[Entry]:
@@ -513,20 +519,20 @@ class Entries(QtCore.QObject):
         self._settle()
         return entry
 
-    def welcome(self, class_id: str, make: Callable[[], Any]) -> None:
+    def register_class(self, class_id: str, make: Callable[[], Any]) -> None:
         """Have placeholders of a class be replaced by what is no overlay.
 
         Args:
             class_id: The class.
             make: Returns an object with a `display`, which has that object as its `entry`.
         """
-        self._guests[class_id] = make
+        self._other_classes[class_id] = make
         self._replace_placeholders()
 
     def remove(self, entry: Entry) -> None:
         """Take an entry and its overlay away."""
-        self._forget(entry)
-        take_out(entry.display)
+        self._remove_entry(entry)
+        remove_from_tree(entry.display)
 
     def close(self) -> None:
         """Leave RViz's panel as it is, and follow nothing any longer; safe to call twice."""
@@ -547,34 +553,34 @@ class Entries(QtCore.QObject):
     @Slot()
     def _settle(self) -> None:
         self._scheduled = False
-        if self._closed or self._settling or self._held:
+        if self._closed or self._settling or self._loading:
             return
         self._settling = True
         try:
-            quiet()(self._bring_about)()
+            log_errors()(self._synchronize)()
         finally:
             self._settling = False
 
-    def _bring_about(self) -> None:
+    def _synchronize(self) -> None:
         self._watch_panel()
         shown = list(self._stack)
         for entry in list(self._entries):
             overlay = entry.overlay
             if not entry.alive:
-                self._forget(entry)
+                self._remove_entry(entry)
             elif overlay is not None and overlay not in shown:
                 self.remove(entry)
             elif entry.outdated:
-                self._let_go(entry.drop())
+                self._remove_overlay(entry.detach())
         known = {id(entry.overlay) for entry in self._entries}
         for overlay in list(self._stack):
             if id(overlay) not in known and not overlay.is_popup:
-                self._enter(overlay)
+                self._add_entry(overlay)
         for entry in list(self._entries):
             self._show(entry)
-        self._follow_panel()
+        self._apply_panel_order()
 
-    def _follow_panel(self) -> None:
+    def _apply_panel_order(self) -> None:
         """Have overlays lie above each other as the panel shows them, once the user moves any."""
         order = [
             display.entry.overlay
@@ -590,22 +596,22 @@ class Entries(QtCore.QObject):
             self._window.manager.notifyConfigChanged()
         self._new = False
 
-    def _enter(self, overlay: Overlay) -> None:
+    def _add_entry(self, overlay: Overlay) -> None:
         """Give an overlay of the program's an entry: one that waits for it, or a new one."""
-        if overlay not in self._programs:
-            self._programs.append(overlay)
+        if overlay not in self._program_overlays:
+            self._program_overlays.append(overlay)
             # A file may have one of a class that is not registered.
             self._replace_all()
         class_id = QML_CLASS if isinstance(overlay, QmlOverlay) else class_id_of(type(overlay))
         for entry in self._entries:
             if entry.overlay is None and self._waits_for(entry, overlay, class_id):
-                self._untouched(partial(entry.take, overlay))
+                self._unmodified(partial(entry.attach, overlay))
                 return
         entry = self._make(class_id)
         entry.display.setName(overlay.name)
-        entry.reflect(overlay)
+        entry.copy_from(overlay)
         self._window.manager.addDisplay(entry.display, overlay.visible)
-        entry.take(overlay)
+        entry.attach(overlay)
 
     @staticmethod
     def _waits_for(entry: Entry, overlay: Overlay, class_id: str) -> bool:
@@ -619,7 +625,7 @@ class Entries(QtCore.QObject):
         """Have an overlay be seen or not as its entry says; make it when it is seen first."""
         enabled = bool(entry.display.isEnabled())
         if entry.overlay is None and enabled:
-            self._untouched(entry.ensure)
+            self._unmodified(entry.make_overlay)
         overlay = entry.overlay
         if overlay is None:
             return
@@ -644,24 +650,24 @@ class Entries(QtCore.QObject):
         entry = Entry(class_id, self._session, self.choices, self._import_paths)
         self._entries.append(entry)
         entry.touched, entry.renamed = self._schedule, self._rename
-        entry.edited = quiet()(self._window.manager.notifyConfigChanged)
+        entry.edited = log_errors()(self._window.manager.notifyConfigChanged)
         return entry
 
-    def _forget(self, entry: Entry) -> None:
+    def _remove_entry(self, entry: Entry) -> None:
         if entry in self._entries:
             self._entries.remove(entry)
-            overlay = entry.drop()
+            overlay = entry.detach()
             entry.close()
-            self._let_go(overlay)
+            self._remove_overlay(overlay)
 
-    def _let_go(self, overlay: Overlay | None) -> None:
+    def _remove_overlay(self, overlay: Overlay | None) -> None:
         if overlay is not None:
-            if overlay in self._programs:
-                self._programs.remove(overlay)
+            if overlay in self._program_overlays:
+                self._program_overlays.remove(overlay)
             overlay.visible = False
             self._stack.remove(overlay)
 
-    def _look(self) -> None:
+    def _check_displays(self) -> None:
         """Notice what has no signal: groups that are switched, placeholders without a panel."""
         for entry in self._entries if not self._closed else ():
             overlay = entry.overlay
@@ -675,14 +681,14 @@ class Entries(QtCore.QObject):
     # Config files.
 
     @Slot()
-    def _hold(self) -> None:
+    def _on_config_loading(self) -> None:
         """Take the program's overlays out of the displays that RViz is about to delete."""
-        self._held = self._new = True
-        self._look_again.ask()
+        self._loading = self._new = True
+        self._after_event.ask()
         for entry in list(self._entries):
-            if entry.overlay in self._programs:
+            if entry.overlay in self._program_overlays:
                 self._entries.remove(entry)
-                entry.drop()
+                entry.detach()
                 entry.close()
 
     # Placeholders.
@@ -696,19 +702,19 @@ class Entries(QtCore.QObject):
             address = int(pyqt("sip").unwrapinstance(model))
             if address not in self._watched:
                 self._watched.add(address)
-                model.rowsInserted.connect(quiet()(lambda *_: self._look_again.ask()))
+                model.rowsInserted.connect(log_errors()(lambda *_: self._after_event.ask()))
 
     def _replace_placeholders(self) -> None:
         if not self._closed:
-            quiet()(self._replace_all)()
+            log_errors()(self._replace_all)()
             self.replaced.emit()
-            self._held = False
+            self._loading = False
             self._schedule()
 
     def _replace_all(self) -> None:
         for display in list(self._displays()):
             if getattr(display, "entry", None) is None and self._is_ours(display):
-                self._untouched(partial(self._replace, display))
+                self._unmodified(partial(self._replace, display))
 
     def _displays(self, group: Any = None) -> Iterator[Any]:
         """Iterate over the displays in the order of the panel, those in groups included."""
@@ -725,7 +731,7 @@ class Entries(QtCore.QObject):
         placeholder.save(config)
         above, row = placeholder.getParent(), placeholder.rowNumberInParent()
         class_id = str(placeholder.getClassId())
-        guest = self._guests.get(class_id)
+        guest = self._other_classes.get(class_id)
         entry = self._make(class_id) if guest is None else guest()
         entry.display.setName(placeholder.getName())
         manager = self._window.manager
@@ -738,7 +744,7 @@ class Entries(QtCore.QObject):
             choice.expect(entry.file)
         placeholder.deleteLater()
 
-    def _untouched(self, do: Callable[[], None]) -> None:
+    def _unmodified(self, do: Callable[[], None]) -> None:
         """Do what changes nothing that the user would have to save."""
         modified = self._window.modified
         do()
@@ -747,8 +753,10 @@ class Entries(QtCore.QObject):
 
     def _is_ours(self, display: Any) -> bool:
         class_id = str(display.getClassId())
-        programs = (class_id_of(type(o)) for o in self._programs if not isinstance(o, QmlOverlay))
-        ours = {QML_CLASS, REFERENCE_QML_CLASS, *self._guests, *programs}
+        programs = (
+            class_id_of(type(o)) for o in self._program_overlays if not isinstance(o, QmlOverlay)
+        )
+        ours = {QML_CLASS, REFERENCE_QML_CLASS, *self._other_classes, *programs}
         return class_id in ours or maker_of(class_id) is not None
 
 
@@ -769,7 +777,7 @@ class OverlayMenu(QtCore.QObject):
         self._dialog: Any = None
         menu = window.menu("&Overlays")
         self._add = menu.addAction("&Add QML overlay...")
-        self._choose = quiet()(lambda *_: self._open())
+        self._choose = log_errors()(lambda *_: self._open())
         self._add.triggered.connect(self._choose)
         self._lists = [
             self._list(menu, "&Reload", self._reload, lambda entry: entry.is_qml),
@@ -789,10 +797,10 @@ class OverlayMenu(QtCore.QObject):
                     # An ampersand would mark a key.
                     name = str(entry.display.getName()).replace("&", "&&")
                     chosen = part.addAction(name)
-                    chosen.triggered.connect(quiet()(lambda *_, entry=entry: act(entry)))
+                    chosen.triggered.connect(log_errors()(lambda *_, entry=entry: act(entry)))
             part.setEnabled(bool(part.actions()))
 
-        filled = quiet()(fill)
+        filled = log_errors()(fill)
         menu.aboutToShow.connect(filled)
         return part, filled
 
@@ -800,7 +808,7 @@ class OverlayMenu(QtCore.QObject):
         dialog = QtWidgets.QFileDialog(self._window.widget, "Add QML overlay", "", _FILTER)
         dialog.setFileMode(QtWidgets.QFileDialog.ExistingFile)
         dialog.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.fileSelected.connect(quiet()(self._entries.add_qml))
+        dialog.fileSelected.connect(log_errors()(self._entries.add_qml))
         self._dialog = dialog
         dialog.open()
 

@@ -233,7 +233,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         stack.changed.connect(self._overlays_changed)
         self._look_around = QtCore.QTimer()
         self._look_around.setInterval(_LOOK_AROUND)
-        self._look_around.timeout.connect(self._look)
+        self._look_around.timeout.connect(self._update_hover)
 
     @property
     def focused(self) -> Overlay | None:
@@ -291,7 +291,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         if watched is not self._panel:
             minimized = event.type() == _E.WindowStateChange and watched.isMinimized()
             if event.type() in _LOSING or minimized:
-                self._lose()
+                self._cancel_input()
             return False
         route = self.routes.get(event.type())
         # Without overlays, RViz is as if this were not here.
@@ -403,7 +403,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         else:
             self._look_around.stop()
 
-    def _look(self) -> None:
+    def _update_hover(self) -> None:
         """Notice that the mouse has left RViz's view, which gets no event for that."""
         over = QtWidgets.QApplication.widgetAt(QtGui.QCursor.pos())
         if self._owner is None and over is not self._panel:
@@ -495,7 +495,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             # Qt Quick could not be given the keys back when it closes.
             changes = [] if changes[0] else [False, True]
             if changes:
-                self._lose()
+                self._cancel_input()
         for focus in changes:
             if self._focused is not None:
                 with guarded(self._focused, "getting or losing the keys"):
@@ -504,7 +504,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
 
     # What happens around
 
-    def _lose(self) -> None:
+    def _cancel_input(self) -> None:
         """End what is pressed: its release may never arrive."""
         if self._owner is not None and not isinstance(self._owner, Owner):
             owner, self._owner = self._owner, Owner.NONE

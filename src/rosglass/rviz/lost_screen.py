@@ -138,7 +138,7 @@ class LostScreen(Handle):
         self._thread.start()
         atexit.register(self.close)
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Look whether all is there; does not return if not. To be called before drawing."""
         with self._lock:
             gone = not self._closed and self._windows & self._connection.destroyed()
@@ -168,7 +168,7 @@ class LostScreen(Handle):
         while not self._closed:
             woken = dict(poll.poll())
             exiting = self._reader in woken and not os.read(self._reader, 1)
-            self.look()
+            self.check()
             with self._lock:
                 broken = not self._closed and self._connection.is_broken
             if broken or exiting:

@@ -35,7 +35,7 @@ __all__ = [
     "Overlay",
     "class_id_of",
     "guarded",
-    "log_what_is_raised",
+    "log_uncaught_errors",
     "maker_of",
     "register",
 ]
@@ -277,7 +277,7 @@ def guarded(overlay: Overlay, doing: str) -> Iterator[None]:
         nonlocal last
         # An open menu runs an event loop of its own, with everything else in it.
         owner = _owner(trace) or overlay
-        text = f"{_what(kind, error, trace)} (while {doing})"
+        text = f"{_describe(kind, error, trace)} (while {doing})"
         if text != last:
             _report(owner, text, (kind, error, trace))
         last = text
@@ -293,7 +293,7 @@ def guarded(overlay: Overlay, doing: str) -> Iterator[None]:
         sys.excepthook = before
 
 
-def log_what_is_raised() -> Callable[[], None]:
+def log_uncaught_errors() -> Callable[[], None]:
     """Keep PyQt5 from aborting the process when something raises in a slot or virtual function.
 
     It becomes the problem of the overlay that the traceback points to. A hook of the program's own
@@ -307,11 +307,11 @@ def log_what_is_raised() -> Callable[[], None]:
     def report(kind: type[BaseException], error: BaseException, trace: Any) -> None:
         owner = _owner(trace)
         if owner is not None:
-            _report(owner, _what(kind, error, trace), (kind, error, trace))
+            _report(owner, _describe(kind, error, trace), (kind, error, trace))
         if before is not sys.__excepthook__:
             before(kind, error, trace)
         elif owner is None:
-            _log.error("%s", _what(kind, error, trace), exc_info=(kind, error, trace))
+            _log.error("%s", _describe(kind, error, trace), exc_info=(kind, error, trace))
 
     sys.excepthook = report
 
@@ -329,7 +329,7 @@ def _report(overlay: Overlay, text: str, raised: Any) -> None:
     overlay.tell_problem(text)
 
 
-def _what(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> str:
+def _describe(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> str:
     try:
         frames = traceback.extract_tb(trace)
     except RecursionError:

@@ -96,9 +96,9 @@ def _classes(file: str) -> list[ElementTree.Element]:
 class Watched(QtCore.QObject):
     """All tools, or all displays, of an RViz.
 
-    Derived from: :meth:`_match` brings :attr:`_items` up to date, and :meth:`_rest` says what else
-    has changed. Signals are emitted once RViz has finished what it was doing, so that slots may
-    add and remove items.
+    A base class: :meth:`_sync_items` brings :attr:`_items` up to date, and :meth:`_sync_rest` says
+    what else has changed. Signals are emitted once RViz has finished what it was doing, so that
+    slots may add and remove items.
 
     Args:
         window: RViz.
@@ -125,12 +125,12 @@ class Watched(QtCore.QObject):
         """The items in RViz's order."""
         return list(self._items)
 
-    def settle(self) -> None:
+    def emit_changes(self) -> None:
         """Emit signals for what has changed since the last call."""
         self._scheduled = False
-        self._match()
+        self._sync_items()
         before, self._known = self._known, list(self._items)
-        emit_rest = self._rest()
+        emit_rest = self._sync_rest()
         for item in before:
             if not item.exists:
                 self.removed.emit(item)
@@ -141,16 +141,16 @@ class Watched(QtCore.QObject):
                 self.changed.emit(item)
         emit_rest()
 
-    def _match(self) -> None:
+    def _sync_items(self) -> None:
         """Drop at once what RViz is about to delete, before its place goes to another object."""
-        raise NotImplementedError(f"{type(self).__name__} has to give _match()")
+        raise NotImplementedError(f"{type(self).__name__} has to give _sync_items()")
 
-    def _rest(self) -> Callable[[], None]:
+    def _sync_rest(self) -> Callable[[], None]:
         """Read what else may change beside the items; return what emits its signals."""
-        raise NotImplementedError(f"{type(self).__name__} has to give _rest()")
+        raise NotImplementedError(f"{type(self).__name__} has to give _sync_rest()")
 
     def _on_change(self) -> None:
-        self._match()
+        self._sync_items()
         if not self._scheduled:
             self._scheduled = True
-            QtCore.QTimer.singleShot(0, self.settle)
+            QtCore.QTimer.singleShot(0, self.emit_changes)

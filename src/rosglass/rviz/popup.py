@@ -69,7 +69,7 @@ class Popup(WidgetOverlay):
         **options: Any,
     ) -> None:
         made = make_widget(content, name)
-        base = _Base(made, self._put, self._pressed_beside)
+        base = _PopupWidget(made, self._put, self._pressed_beside)
         self._veil = _Veil(base)
         #: The widget.
         self.content: Any = made
@@ -115,8 +115,8 @@ class Popup(WidgetOverlay):
         """
         if not (math.isfinite(x) and math.isfinite(y)):
             raise Error(f"popup {self.name}: ({x:g}, {y:g}) is no place")
-        self._follow_nothing()
-        self._go(x, y)
+        self._stop_following()
+        self._move_to_point(x, y)
 
     def follow(
         self, trackers: Trackers, point: Sequence[float] = (0, 0, 0), frame: str = ""
@@ -132,21 +132,21 @@ class Popup(WidgetOverlay):
             Error: It is no point.
         """
         tracker = trackers.add(point, frame, lambda: self.scale)
-        self._follow_nothing()
+        self._stop_following()
         self._tracker, self._trackers = tracker, trackers
-        tracker.positionChanged.connect(lambda at: self._go(at.x(), at.y()))
+        tracker.positionChanged.connect(lambda at: self._move_to_point(at.x(), at.y()))
         tracker.problemChanged.connect(self._show_lost)
-        tracker.staleChanged.connect(self._look_whether_old)
+        tracker.staleChanged.connect(self._check_stale)
         self._show_lost()
         at: Any = tracker.position
-        self._go(at.x(), at.y())
+        self._move_to_point(at.x(), at.y())
 
     def close(self) -> None:
         """Delete the widgets."""
-        self._follow_nothing()
+        self._stop_following()
         super().close()
 
-    def _follow_nothing(self) -> None:
+    def _stop_following(self) -> None:
         tracker, self._tracker = self._tracker, None
         if tracker is not None and self._trackers is not None:
             self._trackers.remove(tracker)
@@ -158,13 +158,13 @@ class Popup(WidgetOverlay):
         if self.problem in ("", before):
             self.tell_problem(self._lost)
 
-    def _look_whether_old(self) -> None:
+    def _check_stale(self) -> None:
         if self._tracker is not None and self._tracker.stale:
             # Popups have no entry in the panel that would show it.
             _log.warning("popup %s: %s", self.name, self._tracker.problem)
         self._put()
 
-    def _go(self, x: float, y: float) -> None:
+    def _move_to_point(self, x: float, y: float) -> None:
         self._place, self._free = (x, y), False
         self._put()
 
@@ -199,7 +199,7 @@ class Popup(WidgetOverlay):
             self.dismissed.emit()
 
 
-class _Base(QtWidgets.QWidget):  # type: ignore[misc]
+class _PopupWidget(QtWidgets.QWidget):  # type: ignore[misc]
     """What fills the view around a popup's content."""
 
     def __init__(self, content: Any, put: Callable[[], None], pressed: Callable[[], None]) -> None:

@@ -31,11 +31,11 @@ __all__ = [
     "child_properties",
     "describe_properties",
     "find_property",
-    "given_to_rviz",
+    "log_errors",
     "make_editor",
-    "quiet",
+    "owned_by_rviz",
     "read_property",
-    "take_out",
+    "remove_from_tree",
     "write_property",
 ]
 
@@ -420,7 +420,7 @@ def _choose(model: RegisteredProperty, window: Any, choices: Choices) -> None:
     dialog.open()
 
 
-def quiet(otherwise: Any = None) -> Callable[[Any], Any]:
+def log_errors(otherwise: Any = None) -> Callable[[Any], Any]:
     """Make a function that C++ calls log what it raises, and return something else instead."""
 
     def decorate(function: Any) -> Any:
@@ -438,7 +438,7 @@ def quiet(otherwise: Any = None) -> Callable[[Any], Any]:
     return decorate
 
 
-def given_to_rviz(item: Any) -> Any:
+def owned_by_rviz(item: Any) -> Any:
     """Return a property whose end is RViz's to decide, with the property that it stands below."""
     pyqt("sip").transferto(item, None)
     return item
@@ -467,7 +467,7 @@ def _classes() -> tuple[Any, Any]:
         return found
 
     class Item(_Shown, bindings.Property):  # type: ignore[name-defined,misc]
-        @quiet()
+        @log_errors()
         def getViewData(self, column: int, role: int) -> Any:
             view = self.view
             if view is not None and column == 1 and role == core.Qt.DecorationRole:
@@ -476,18 +476,18 @@ def _classes() -> tuple[Any, Any]:
                     return swatch
             return bindings.Property.getViewData(self, column, role)
 
-        @quiet(core.Qt.ItemFlags())
+        @log_errors(core.Qt.ItemFlags())
         def getViewFlags(self, column: int) -> Any:
             return flags(self, bindings.Property, column)
 
-        @quiet()
+        @log_errors()
         def createEditor(self, parent: Any, option: Any) -> Any:
             view = self.view
             made = make_editor(view.model, parent, view.choices) if view is not None else None
             return bindings.Property.createEditor(self, parent, option) if made is None else made
 
     class Check(_Shown, bindings.BoolProperty):  # type: ignore[name-defined,misc]
-        @quiet(core.Qt.ItemFlags())
+        @log_errors(core.Qt.ItemFlags())
         def getViewFlags(self, column: int) -> Any:
             return flags(self, bindings.BoolProperty, column)
 
@@ -510,22 +510,24 @@ class PropertyView:
         about = model.description
         name = model.path[-1]
         #: RViz's property.
-        self.item: Any = given_to_rviz(kind(name, _for_rviz(model), about, above))
+        self.item: Any = owned_by_rviz(kind(name, _for_rviz(model), about, above))
         self.item.view = self
         self._parts: dict[str, Any] = {}
         self._busy = False
         self._show_about()
         if hasattr(model.kind, "parts"):
             for part, number in model.kind.parts(model.get()).items():
-                self._parts[part] = given_to_rviz(item(part, number, "", self.item))
-        self.item.changed.connect(quiet()(lambda: self._edited(self.item, None)))
+                self._parts[part] = owned_by_rviz(item(part, number, "", self.item))
+        self.item.changed.connect(log_errors()(lambda: self._edited(self.item, None)))
         for part, below in self._parts.items():
-            below.changed.connect(quiet()(lambda part=part, below=below: self._edited(below, part)))
+            below.changed.connect(
+                log_errors()(lambda part=part, below=below: self._edited(below, part))
+            )
         self._watches = [
             (model.valueChanged, lambda _value: self._show()),
             (model.aboutChanged, self._show_about),
         ]
-        self._watches = [(signal, quiet()(slot)) for signal, slot in self._watches]
+        self._watches = [(signal, log_errors()(slot)) for signal, slot in self._watches]
         for signal, slot in self._watches:
             signal.connect(slot)
 
@@ -609,7 +611,10 @@ class PropertyTree:
         self._owner, self._above, self._choices = owner, above, choices
         self._views: dict[RegisteredProperty, PropertyView] = {}
         self._watched: dict[RegisteredProperty, Any] = {}
-        self._added, self._gone = quiet()(self._on_registered), quiet()(self._on_unregistered)
+        self._added, self._gone = (
+            log_errors()(self._on_registered),
+            log_errors()(self._on_unregistered),
+        )
         owner.registered.connect(self._added)
         owner.unregistered.connect(self._gone)
         for found in owner.all():
@@ -637,7 +642,7 @@ class PropertyTree:
             self._leave(found)
 
     def _enter(self, found: RegisteredProperty) -> None:
-        watch = self._watched[found] = quiet()(lambda: self._show(found))
+        watch = self._watched[found] = log_errors()(lambda: self._show(found))
         found.aboutChanged.connect(watch)
         self._show(found)
 
@@ -670,10 +675,10 @@ class PropertyTree:
         view = self._views.pop(found, None)
         if view is not None:
             view.close()
-            take_out(view.item)
+            remove_from_tree(view.item)
 
 
-def take_out(item: Any) -> None:
+def remove_from_tree(item: Any) -> None:
     """Take a property out of RViz's tree, and delete it once it is not used any more."""
     if not _is_deleted(item):
         above = item.getParent()

@@ -187,7 +187,7 @@ class QmlInput:
     _held = Qt5Core.Qt.NoButton
     #: Where the fingers are that went down on an item, for the window's events.
     _touch: _Touch | None = None
-    _hoverable: Sequence[_Shown] = ()
+    _hoverable: Sequence[_VisibleItem] = ()
     _listed = 0.0
 
     def deliver(self, event: Any) -> bool:
@@ -203,7 +203,7 @@ class QmlInput:
             return False
         if kind == _E.MouseButtonDblClick:
             # A window gets the second press as a press first, then as a double click.
-            taken = self._deliver(_pressing(event), at)
+            taken = self._deliver(_as_press(event), at)
             return self._deliver(event, at) or taken if taken else False
         return self._deliver(event, at)
 
@@ -290,7 +290,7 @@ class QmlInput:
         return any(shown.has(at) for shown in self._hoverable)
 
 
-class _Shown(NamedTuple):
+class _VisibleItem(NamedTuple):
     """An item, and those around it beyond which it is not seen."""
 
     item: Any
@@ -340,7 +340,7 @@ def _send(receiver: Any, event: Any) -> bool:
     return bool(event.isAccepted())
 
 
-def _pressing(event: Any) -> Any:
+def _as_press(event: Any) -> Any:
     made = QtGui.QMouseEvent(
         _E.MouseButtonPress,
         event.localPos(),
@@ -355,16 +355,16 @@ def _pressing(event: Any) -> Any:
     return made
 
 
-def _shown(window: Any) -> Iterator[_Shown]:
+def _shown(window: Any) -> Iterator[_VisibleItem]:
     """Iterate over all items that are shown."""
-    waiting = [_Shown(item, ()) for item in window.contentItem().childItems()]
+    waiting = [_VisibleItem(item, ()) for item in window.contentItem().childItems()]
     while waiting:
         shown = waiting.pop()
         item, clips = shown
         if item.isVisible():
             yield shown
             inside = (*clips, item) if item.clip() else clips
-            waiting += [_Shown(child, inside) for child in item.childItems()]
+            waiting += [_VisibleItem(child, inside) for child in item.childItems()]
 
 
 def _all_handlers(item: Any) -> Iterator[Any]:
@@ -468,7 +468,7 @@ class QmlOverlay(QmlInput, Overlay):
         self._look = Qt5Core.QTimer()
         self._look.setSingleShot(True)
         self._look.setInterval(_LOOK)
-        self._look.timeout.connect(self._rest)
+        self._look.timeout.connect(self._on_idle)
         self._errors = ErrorView(self.engine, PANEL)
         self.arranged.connect(self._fit_errors)
         self._closed = self._loading = False
@@ -571,7 +571,7 @@ class QmlOverlay(QmlInput, Overlay):
         # Films, and pictures of items, are no items that could be found.
         self._warn_not_drawn(root, lambda: need_in_file(self.file, self.engine.importPathList()))
 
-    def _rest(self) -> None:
+    def _on_idle(self) -> None:
         """Release the picture, and warn of what was made since and is not drawn; popups, too."""
         self._scene.rest()
         if not self._not_drawn and is_alive(self._window):

@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
     from rosglass.rviz.window import Window
 
-__all__ = ["Stack", "Tidying"]
+__all__ = ["MemoryCleaner", "Stack"]
 
 
 #: Milliseconds after which an overlay that came has been drawn, and one that went is gone.
 _WAIT = 3000
 
 
-class Tidying(QtCore.QObject):
+class MemoryCleaner(QtCore.QObject):
     """Gives memory back a little later, once for all that has happened until then."""
 
     def __init__(self) -> None:
@@ -34,23 +34,23 @@ class Tidying(QtCore.QObject):
         self._timer = QtCore.QTimer(self)
         self._timer.setSingleShot(True)
         self._timer.setInterval(_WAIT)
-        self._timer.timeout.connect(self._tidy)
+        self._timer.timeout.connect(self._clean)
 
-    def came(self) -> None:
+    def overlay_added(self) -> None:
         """Give back what an overlay needed only to come."""
         if not self._timer.isActive():
             self._timer.start()
 
-    def went(self) -> None:
+    def overlay_removed(self) -> None:
         """Give back all that an overlay had: its parts refer to each other.
 
         Left to Python, that takes hundreds of overlays, by which memory is in pieces.
         """
         self._gone = True
-        self.came()
+        self.overlay_added()
 
     @Slot()
-    def _tidy(self) -> None:
+    def _clean(self) -> None:
         gone, self._gone = self._gone, False
         if gone:
             gc.collect()
@@ -87,7 +87,7 @@ class Stack(QtCore.QObject):
         self._arranged: list[Drawing] = []
         self._drawing = False
         self._later: list[Callable[[], None]] = []
-        self._tidying = Tidying()
+        self._cleaner = MemoryCleaner()
         window.before_frame.connect(self._before_frame)
         #: Who gets the mouse and the keys.
         self.input = Input(window, self)
@@ -109,7 +109,7 @@ class Stack(QtCore.QObject):
         overlay.arranged.connect(self._arrange)
         overlay.renewed.connect(self.input.forget)
         self._arrange()
-        self._tidying.came()
+        self._cleaner.overlay_added()
 
     def remove(self, overlay: Overlay) -> None:
         """Take an overlay away and close it; does nothing when it is not there."""
@@ -127,7 +127,7 @@ class Stack(QtCore.QObject):
                 else:
                     # It may be handling the very event that had it removed.
                     self.input.after_event(lambda: _close(overlay))
-                self._tidying.went()
+                self._cleaner.overlay_removed()
                 self.changed.emit()
                 return
 
@@ -150,11 +150,11 @@ class Stack(QtCore.QObject):
 
     def to_front(self, overlay: Overlay) -> None:
         """Put an overlay above all others of its kind, popups or not."""
-        self._to_end(overlay, -1, max)
+        self._move_to_end(overlay, -1, max)
 
     def to_back(self, overlay: Overlay) -> None:
         """Put an overlay below all others of its kind, popups or not."""
-        self._to_end(overlay, 0, min)
+        self._move_to_end(overlay, 0, min)
 
     def put_in_order(self, overlays: Sequence[Overlay]) -> None:
         """Have overlays of equal `z` lie above each other as they are given, the lowest first.
@@ -169,7 +169,7 @@ class Stack(QtCore.QObject):
             self._entries[at] = entry
         self._arrange()
 
-    def _to_end(self, overlay: Overlay, end: int, outermost: Callable[..., int]) -> None:
+    def _move_to_end(self, overlay: Overlay, end: int, outermost: Callable[..., int]) -> None:
         alike = [e for e in self._arranged if e.overlay.is_popup == overlay.is_popup]
         entry = next((e for e in alike if e.overlay is overlay), None)
         if entry is None:

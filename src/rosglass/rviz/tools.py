@@ -120,7 +120,7 @@ class Tools(Watched):
         self._known_current: Tool | None = None
         signals = ("toolAdded(Tool*)", "toolRemoved(Tool*)", "toolChanged(Tool*)")
         self._hook.watch(self._manager, *signals, "toolRefreshed(Tool*)")
-        self._match()
+        self._sync_items()
         self._known, self._known_current = list(self._items), self.current
 
     @property
@@ -148,7 +148,7 @@ class Tools(Watched):
             Error: It was removed.
         """
         self._manager.setCurrentTool(self._handle(tool))
-        self.settle()
+        self.emit_changes()
 
     def add(self, class_id: str) -> Tool:
         """Add a tool.
@@ -162,9 +162,9 @@ class Tools(Watched):
         made = next(tool for tool in reversed(self._items) if tool.handle is not None)
         if text:
             self._manager.removeTool(self._manager.numTools() - 1)
-            self.settle()
+            self.emit_changes()
             raise Error(f"no tool was added: {text}")
-        self.settle()
+        self.emit_changes()
         return made
 
     def ask_for_new(self) -> None:
@@ -181,14 +181,14 @@ class Tools(Watched):
         """
         self._handle(tool)
         self._manager.removeTool(self._items.index(tool))
-        self.settle()
+        self.emit_changes()
 
     def remove_all(self) -> None:
         """Remove every tool: the mouse does nothing in the 3D view until one is added."""
         self._manager.removeAll()
-        self.settle()
+        self.emit_changes()
 
-    def _rest(self) -> Callable[[], None]:
+    def _sync_current(self) -> Callable[[], None]:
         before, self._known_current = self._known_current, self.current
         return self.selected.emit if self._known_current is not before else lambda: None
 
@@ -197,7 +197,7 @@ class Tools(Watched):
             raise Error(f"the tool {tool.name} was removed")
         return tool.handle
 
-    def _match(self) -> None:
+    def _sync_items(self) -> None:
         manager = self._manager
         handles = [manager.getTool(index) for index in range(manager.numTools())]
         known = {address(tool.handle): tool for tool in self._items}

@@ -191,12 +191,12 @@ class Tracker(QtCore.QObject):
         """Whether it moves with a frame of the robot."""
         return bool(self._frame)
 
-    def look(self) -> None:
+    def update(self) -> None:
         """Find out where it is seen now."""
         at, problem = _NAN, ""
         stale = bool(self._frame)
         try:
-            at, stamp = self._owner.seen(self._point, self._frame, self._scale())
+            at, stamp = self._owner.locate(self._point, self._frame, self._scale())
             stale = self._is_old(stamp)
             if stale:
                 problem = f"the frame {self._frame!r} was not updated for {_OLD:g} s"
@@ -231,7 +231,7 @@ class Tracker(QtCore.QObject):
         if new != self._point:
             self._point = new
             self.pointChanged.emit()
-            self.look()
+            self.update()
 
     def use_frame(self, frame: str) -> None:
         """Have the point mean another frame's; empty for the fixed frame.
@@ -244,7 +244,7 @@ class Tracker(QtCore.QObject):
         if frame != self._frame:
             self._frame, self._newest = frame, None
             self.frameChanged.emit()
-            self.look()
+            self.update()
 
     def _set_point(self, point: Any) -> None:
         with errors_to_js(self._runtime, "tracker.point", point):
@@ -306,7 +306,7 @@ class Trackers:
             self._camera.update()
         made.use_frame(frame)
         self._trackers.append(made)
-        made.look()
+        made.update()
         return made
 
     def remove(self, tracker: Tracker) -> None:
@@ -322,7 +322,7 @@ class Trackers:
         """Return how many are followed."""
         return len(self._trackers)
 
-    def seen(
+    def locate(
         self, point: tuple[float, float, float], frame: str, scale: float
     ) -> tuple[tuple[float, float, float], int]:
         """Return where a point is seen and how far away, and the time of that in nanoseconds.
@@ -356,7 +356,7 @@ class Trackers:
             scale = tracker._scale()
             if moved or tracker.follows_frame or self._scales.get(tracker) != scale:
                 self._scales[tracker] = scale
-                tracker.look()
+                tracker.update()
         self._scales = {t: s for t, s in self._scales.items() if t in self._trackers}
 
 

@@ -831,7 +831,7 @@ class Views(QtCore.QObject):
             )
         if kind != self.kind:
             self._manager.setCurrentViewControllerType(kind)
-        self.settle()
+        self.emit_changes()
 
     @property
     def saved(self) -> list[str]:
@@ -853,7 +853,7 @@ class Views(QtCore.QObject):
             self._manager.takeAt(self.saved.index(name)).deleteLater()
         self._manager.copyCurrentToList()
         self._manager.getViewAt(self._manager.getNumViews() - 1).setName(name)
-        self.settle()
+        self.emit_changes()
 
     def show(self, name: str | int) -> None:
         """Show a saved view.
@@ -865,7 +865,7 @@ class Views(QtCore.QObject):
             Error: There is none of this name.
         """
         self._manager.setCurrentFrom(self._manager.getViewAt(self._index(name)))
-        self.settle()
+        self.emit_changes()
 
     def remove(self, name: str | int) -> None:
         """Remove a saved view; see :meth:`show`.
@@ -874,9 +874,9 @@ class Views(QtCore.QObject):
             Error: There is none of this name.
         """
         self._manager.takeAt(self._index(name)).deleteLater()
-        self.settle()
+        self.emit_changes()
 
-    def settle(self) -> None:
+    def emit_changes(self) -> None:
         """Emit signals for what has changed since the last call."""
         self._scheduled = False
         (kind, saved), self._known = self._known, (self.kind, self.saved)
@@ -904,4 +904,4 @@ class Views(QtCore.QObject):
     def _on_change(self) -> None:
         if not self._scheduled:
             self._scheduled = True
-            QtCore.QTimer.singleShot(0, self.settle)
+            QtCore.QTimer.singleShot(0, self.emit_changes)

@@ -15,7 +15,7 @@ from rosglass.qt import QtCore, Signal, Slot, is_alive
 from rosglass.ros1.names import expand, split
 from rosglass.rviz.entries import camera_icon, display_class, set_status
 from rosglass.rviz.host import pyqt
-from rosglass.rviz.properties import PropertyTree, given_to_rviz, quiet, take_out
+from rosglass.rviz.properties import PropertyTree, log_errors, owned_by_rviz, remove_from_tree
 from rosglass.rviz.property_values import plain_config
 from rosglass.rviz.qt5 import QtCore as Qt5Core
 from rosglass.rviz.registered_properties import RegisteredProperties
@@ -66,7 +66,7 @@ class ViewKeys(QtCore.QObject):
         self._window, self._view, self._overlays = window, view, overlays
         self._panel = window.panel
         self._settings = view.settings
-        self._held: set[int] = set()
+        self._loading: set[int] = set()
         self._twice = False
         self._last_step = 0.0
         self._panel.installEventFilter(self)
@@ -75,7 +75,7 @@ class ViewKeys(QtCore.QObject):
 
     def close(self) -> None:
         """Stop handling keys; safe to call twice."""
-        self._held.clear()
+        self._loading.clear()
         if is_alive(self._panel):
             self._panel.removeEventFilter(self)
 
@@ -84,11 +84,11 @@ class ViewKeys(QtCore.QObject):
         del watched
         kind = event.type()
         if kind in (_E.FocusOut, _E.Hide, _E.WindowDeactivate):
-            self._held.clear()
+            self._loading.clear()
         if kind not in (_E.KeyPress, _E.KeyRelease, _E.ShortcutOverride) or not self._settings.keys:
             return False
         if self._is_elsewhere():
-            self._held.clear()
+            self._loading.clear()
             return False
         if _is_toggle(event):
             if kind == _E.ShortcutOverride:
@@ -110,16 +110,16 @@ class ViewKeys(QtCore.QObject):
         if key not in _ARROWS:
             return False
         if not pressed:
-            ours = key in self._held
+            ours = key in self._loading
             if not event.isAutoRepeat():
-                self._held.discard(key)
+                self._loading.discard(key)
             return ours
         if event.modifiers() & ~(_Qt.ShiftModifier | _Qt.KeypadModifier):
             return False
         self._twice = bool(event.modifiers() & _Qt.ShiftModifier)
-        if not self._held:
+        if not self._loading:
             self._last_step = time.monotonic()
-        self._held.add(key)
+        self._loading.add(key)
         return True
 
     def _is_elsewhere(self) -> bool:
@@ -131,16 +131,16 @@ class ViewKeys(QtCore.QObject):
         self._view.set_mode(ViewMode.MODE_3D if flat else ViewMode.MODE_2D)
 
     def _step(self) -> None:
-        if not self._held:
+        if not self._loading:
             return
         now = time.monotonic()
         passed, self._last_step = min(now - self._last_step, _LONGEST_STEP), now
         if self._is_elsewhere() or not self._settings.keys:
             # Who has the keys now gets to know when they are released.
-            self._held.clear()
+            self._loading.clear()
             return
-        ahead = sum(_ARROWS[key][0] for key in self._held)
-        left = sum(_ARROWS[key][1] for key in self._held)
+        ahead = sum(_ARROWS[key][0] for key in self._loading)
+        left = sum(_ARROWS[key][1] for key in self._loading)
         length = math.hypot(ahead, left)
         if not length or not passed:
             return
@@ -148,7 +148,7 @@ class ViewKeys(QtCore.QObject):
         try:
             self._view.nudge(ahead * metres, left * metres)
         except Error as error:
-            self._held.clear()
+            self._loading.clear()
             _log.warning("%s", error)
 
 
@@ -187,7 +187,7 @@ class ViewServices(QtCore.QObject):
         self._view, self._session = view, session
         self._settings = view.settings
         self._rviz = split(node_name)
-        self._wanted = self._asked_for()
+        self._wanted = self._read_settings()
         self._problem = ""
         self._node: Node | None = None
         self._generation = 0
@@ -222,9 +222,9 @@ class ViewServices(QtCore.QObject):
         """Withdraw them; safe to call twice."""
         if not self._closed:
             self._closed = True
-            self._shut()
+            self._close_handles()
 
-    def _asked_for(self) -> _Wanted:
+    def _read_settings(self) -> _Wanted:
         settings, (above, name) = self._settings, self._rviz
         try:
             namespace = expand(settings.namespace, name, above).rstrip("/")
@@ -233,7 +233,7 @@ class ViewServices(QtCore.QObject):
         return _Wanted(settings.topics, settings.services, namespace, "")
 
     def _on_edited(self) -> None:
-        wanted = self._asked_for()
+        wanted = self._read_settings()
         if wanted != self._wanted and not self._closed:
             self._wanted = wanted
             self._open()
@@ -246,10 +246,10 @@ class ViewServices(QtCore.QObject):
     def _connection_changed(self) -> None:
         """Report that the node was shut down by others, with what was made from it."""
         if self._node is not None and self._session.state == "failed" and not self._closed:
-            self._shut()
+            self._close_handles()
             self._set_problem(self._session.detail)
 
-    def _shut(self) -> None:
+    def _close_handles(self) -> None:
         self._generation += 1
         handles, self._handles, self._publishers = self._handles, [], {}
         making, self._making = self._making, None
@@ -260,7 +260,7 @@ class ViewServices(QtCore.QObject):
             self._session.background(lambda: _close_all(making.handles))
 
     def _open(self) -> None:
-        self._shut()
+        self._close_handles()
         node, generation, wanted = self._node, self._generation, self._wanted
         if node is None or not (wanted.topics or wanted.services):
             self._set_problem("")
@@ -304,7 +304,7 @@ class ViewServices(QtCore.QObject):
                     node.create_service_server(
                         f"{wanted.namespace}/{name}",
                         f"{_PACKAGE}/srv/{kind}",
-                        _refusing(answer),
+                        _raising_service_errors(answer),
                         executor=self._session.executor,
                     )
                 )
@@ -384,7 +384,7 @@ class _Made:
         self.publishers: dict[str, Publisher] = {}
 
 
-def _refusing(answer: Callable[[Message], None]) -> Callable[[Message], None]:
+def _raising_service_errors(answer: Callable[[Message], None]) -> Callable[[Message], None]:
     """Have what a callback cannot do be an answer, not a fault of ours."""
 
     def call(request: Message) -> None:
@@ -417,13 +417,13 @@ def _class() -> Any:
     base, core = display_class(), pyqt()
 
     class Display(base):  # type: ignore[misc,valid-type]
-        @quiet()
+        @log_errors()
         def getViewData(self, column: int, role: int) -> Any:
             if column == 1 and role == core.Qt.CheckStateRole:
                 return None
             return base.getViewData(self, column, role)
 
-        @quiet(core.Qt.ItemFlags())
+        @log_errors(core.Qt.ItemFlags())
         def getViewFlags(self, column: int) -> Any:
             return base.getViewFlags(self, column) & ~core.Qt.ItemIsUserCheckable
 
@@ -436,7 +436,7 @@ class _Entry:
     def __init__(self, view: View, now: RegisteredProperties, entries: Entries) -> None:
         self._settings = view.settings
         #: RViz's display.
-        self.display: Any = given_to_rviz(_class()())
+        self.display: Any = owned_by_rviz(_class()())
         self.display.entry = self
         self.display.setClassId(VIEW_CLASS)
         self.display.setName(_NAME)
@@ -491,30 +491,30 @@ class ViewEntry(QtCore.QObject):
         self._shown: list[_Entry] = []
         self._loading = self._loaded = False
         #: What no file keeps.
-        self._now = RegisteredProperties()
+        self._shown_state = RegisteredProperties()
         about = "What the camera follows and turns with; empty for nothing."
-        self._frame = self._now.register("frame", "Tracked Frame", description=about)
+        self._frame = self._shown_state.register("frame", "Tracked Frame", description=about)
         about = "Whether it is seen straight from above, without perspective."
-        self._flat = self._now.register("bool", "2D Mode", description=about)
+        self._flat = self._shown_state.register("bool", "2D Mode", description=about)
         self._frame.valueChanged.connect(self._track)
-        self._flat.valueChanged.connect(self._flatten)
+        self._flat.valueChanged.connect(self._set_2d)
         menu = window.menu("&Overlays")
         self._action = menu.addAction("&View controller")
         self._action.setCheckable(True)
         self._action.setToolTip("Settings of the camera, among the displays")
-        self._choose = quiet()(self._on_action)
+        self._choose = log_errors()(self._on_action)
         self._action.triggered.connect(self._choose)
         window.config_loading.connect(self._on_loading)
         window.config_loaded.connect(self._on_loaded)
         window.closing.connect(self.close)
-        window.before_frame.connect(self._look)
-        entries.replaced.connect(self._settle)
+        window.before_frame.connect(self._check_deleted)
+        entries.replaced.connect(self._reset_without_entry)
         services.problem_changed.connect(self._update)
         services.opened.connect(self._update)
         view.problem_changed.connect(self._update)
         view.tracked_frame_changed.connect(self._update)
         view.mode_changed.connect(self._update)
-        entries.welcome(VIEW_CLASS, self._make)
+        entries.register_class(VIEW_CLASS, self._make)
 
     @property
     def shown(self) -> bool:
@@ -527,7 +527,7 @@ class ViewEntry(QtCore.QObject):
             self._window.manager.addDisplay(self._make().display, True)
         elif not shown:
             self.close()
-            self._settle()
+            self._reset_without_entry()
         self._action.setChecked(shown)
 
     def close(self) -> None:
@@ -535,10 +535,10 @@ class ViewEntry(QtCore.QObject):
         shown, self._shown = self._shown, []
         for entry in shown:
             entry.close()
-            take_out(entry.display)
+            remove_from_tree(entry.display)
 
     def _make(self) -> _Entry:
-        entry = _Entry(self._view, self._now, self._entries)
+        entry = _Entry(self._view, self._shown_state, self._entries)
         self._shown.append(entry)
         self._action.setChecked(True)
         self._update()
@@ -548,14 +548,14 @@ class ViewEntry(QtCore.QObject):
         self.shown = not self.shown
 
     @Slot()
-    def _look(self) -> None:
+    def _check_deleted(self) -> None:
         """Notice what RViz has deleted, for which Python gets no signal."""
         gone = [entry for entry in self._shown if not entry.alive]
         for entry in gone:
             self._shown.remove(entry)
             entry.close()
         if gone and not self._loading:
-            self._settle()
+            self._reset_without_entry()
 
     @Slot()
     def _on_loading(self) -> None:
@@ -566,7 +566,7 @@ class ViewEntry(QtCore.QObject):
         self._loaded = True
 
     @Slot()
-    def _settle(self) -> None:
+    def _reset_without_entry(self) -> None:
         """Have the settings be as without an entry if there is none, once a file is loaded."""
         if self._loading and not self._loaded:
             return
@@ -582,7 +582,7 @@ class ViewEntry(QtCore.QObject):
             self._entries.choices.report(f"Tracked Frame: {error}")
             self._frame.set(self._view.tracked_frame)
 
-    def _flatten(self, flat: bool) -> None:
+    def _set_2d(self, flat: bool) -> None:
         self._view.set_mode(ViewMode.MODE_2D if flat else ViewMode.MODE_3D)
 
     @Slot()

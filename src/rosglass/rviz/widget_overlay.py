@@ -252,10 +252,10 @@ class StyleSheet(QtCore.QObject):  # type: ignore[misc]
         if watch and self._path is not None:
             # Editors replace the file, which changes its folder.
             self._watcher = QtCore.QFileSystemWatcher([str(self._path), str(self._path.parent)])
-            self._watcher.fileChanged.connect(self._soon)
-            self._watcher.directoryChanged.connect(self._soon)
+            self._watcher.fileChanged.connect(self._read_later)
+            self._watcher.directoryChanged.connect(self._read_later)
 
-    def _soon(self, path: str) -> None:
+    def _read_later(self, path: str) -> None:
         del path
         self._pause.start()
 
@@ -324,7 +324,7 @@ class WidgetOverlay(Overlay):
         made.setAttribute(QtCore.Qt.WA_TranslucentBackground)
         self._buttons = QtCore.Qt.NoButton
         self._at: Any = None
-        self._had_keys: Any = None
+        self._focus_before: Any = None
         self._opened = self._focused = False
         self._panel: Any = None
         self._scene = QtWidgets.QGraphicsScene()
@@ -332,7 +332,7 @@ class WidgetOverlay(Overlay):
         self._canvas = Canvas(self._scene, made)
         self._canvas.stale.connect(self.changed)
         # Not the scene's `changed`: once that is connected, Qt takes all of an item for stale.
-        self._canvas.stale.connect(self._look_after_popups)
+        self._canvas.stale.connect(self._update_popups)
         self._proxy = self._scene.addWidget(made)
         # Otherwise all of it is painted whatever has changed.
         self._proxy.setFlag(QtWidgets.QGraphicsItem.ItemUsesExtendedStyleOption)
@@ -403,18 +403,18 @@ class WidgetOverlay(Overlay):
         if kind not in MOUSE and kind not in DRAG and kind not in _OTHERS:
             return False
         if kind == _E.ContextMenu and event.reason() == QtGui.QContextMenuEvent.Keyboard:
-            return self._menu_by_key(event)
+            return self._open_menu_by_key(event)
         at = position(event)
         if at is not None:
             self._at = at
-            self._view.put_under(event, at)
+            self._view.align_with_screen(event, at)
         if kind == _E.Wheel and _has(self._widget_at(at), _ignores_wheel):
             return False
         opened = bool(self._popups())
         if kind in PRESS and not opened:
             _focus_clicked(self._widget_at(at))
-        self._remember_keys(opened)
-        taken = self._view.give(event)
+        self._remember_focus(opened)
+        taken = self._view.send(event)
         if not is_alive(self._scene):
             return taken
         if kind in PRESS:
@@ -427,25 +427,25 @@ class WidgetOverlay(Overlay):
             self._buttons = event.buttons() if taken or kind not in PRESS else self._buttons
         if kind == _E.MouseMove and event.buttons() == QtCore.Qt.NoButton:
             # Qt closes what has popped up when the mouse leaves the scene.
-            taken = opened or _has(self._widget_at(at), _minds_mouse)
+            taken = opened or _has(self._widget_at(at), _handles_hover)
         return taken
 
     def _deliver_key(self, event: Any) -> bool:
-        receiver = self._with_keys()
-        self._remember_keys(bool(self._popups()))
+        receiver = self._focus_widget()
+        self._remember_focus(bool(self._popups()))
         event.setAccepted(False)
         if event.type() in (_E.KeyPress, _E.KeyRelease):
-            self._put_under_keys(receiver)
+            self._align_with_focus(receiver)
             QtCore.QCoreApplication.sendEvent(self._scene, event)
         elif receiver is not None:
             QtCore.QCoreApplication.sendEvent(receiver, event)
         return bool(event.isAccepted())
 
-    def _menu_by_key(self, event: Any) -> bool:
-        receiver = self._with_keys()
+    def _open_menu_by_key(self, event: Any) -> bool:
+        receiver = self._focus_widget()
         if receiver is None:
             return False
-        self._put_under_keys(receiver)
+        self._align_with_focus(receiver)
         at = receiver.inputMethodQuery(QtCore.Qt.ImCursorRectangle)
         at = at.center() if isinstance(at, QtCore.QRect) else receiver.rect().center()
         made = QtGui.QContextMenuEvent(event.reason(), at, receiver.mapToGlobal(at))
@@ -453,17 +453,17 @@ class WidgetOverlay(Overlay):
         QtCore.QCoreApplication.sendEvent(receiver, made)
         return bool(made.isAccepted())
 
-    def _with_keys(self) -> Any:
+    def _focus_widget(self) -> Any:
         """Return the widget that gets the keys; None where none does."""
         shown = _as_widget(self._scene.focusItem())
         return None if shown is None else shown.widget().focusWidget() or shown.widget()
 
-    def _remember_keys(self, opened: bool) -> None:
+    def _remember_focus(self, opened: bool) -> None:
         """Remember the focus before a popup opens: Qt does not restore it."""
         if not opened:
-            self._had_keys = self._with_keys() or self._had_keys
+            self._focus_before = self._focus_widget() or self._focus_before
 
-    def _put_under_keys(self, receiver: Any) -> None:
+    def _align_with_focus(self, receiver: Any) -> None:
         """Have what a widget opens by a key, e.g. a menu, stand beside it."""
         if receiver is not None and is_alive(self._panel):
             shown = receiver.window().graphicsProxyWidget()
@@ -508,16 +508,16 @@ class WidgetOverlay(Overlay):
         embedded = [w for w in opened if w.graphicsProxyWidget() is not None]
         return [w for w in embedded if w.graphicsProxyWidget().scene() is self._scene]
 
-    def _look_after_popups(self, *_: Any) -> None:
+    def _update_popups(self, *_: Any) -> None:
         """Keep them inside the 3D view; give the keys back to who had them when none is open."""
         popups = self._popups()
         opened, self._opened = self._opened, bool(popups)
         if popups:
             self._fit(popups)
-        elif opened and self._focused and is_alive(self._had_keys):
-            holder = self._with_keys()
+        elif opened and self._focused and is_alive(self._focus_before):
+            holder = self._focus_widget()
             if holder is None or holder.window() is not self.root:
-                self._had_keys.setFocus(QtCore.Qt.PopupFocusReason)
+                self._focus_before.setFocus(QtCore.Qt.PopupFocusReason)
 
     def _fit(self, popups: list[Any]) -> None:
         # Qt has made them fit to the screen.
@@ -549,7 +549,7 @@ class WidgetOverlay(Overlay):
         self._style.close()
         if is_alive(self._scene):
             self._canvas.stale.disconnect(self.changed)
-            self._canvas.stale.disconnect(self._look_after_popups)
+            self._canvas.stale.disconnect(self._update_popups)
             self._canvas.setScene(None)
             self._canvas.deleteLater()
             self._view.setScene(None)
@@ -575,7 +575,7 @@ class _HiddenView(QtWidgets.QGraphicsView):  # type: ignore[misc]
         # Qt does not lay out what is hidden.
         self.viewport().resize(size)
 
-    def give(self, event: Any) -> bool:
+    def send(self, event: Any) -> bool:
         """Return whether something in the scene takes an event."""
         event.setAccepted(False)
         if event.type() in DRAG or event.type() == _E.DragLeave:
@@ -585,7 +585,7 @@ class _HiddenView(QtWidgets.QGraphicsView):  # type: ignore[misc]
             QtCore.QCoreApplication.sendEvent(self.viewport(), event)
         return bool(event.isAccepted())
 
-    def put_under(self, event: Any, at: Any) -> None:
+    def align_with_screen(self, event: Any, at: Any) -> None:
         """Stand where an event on the screen is at a place of the view: Qt asks the screen."""
         kind = event.type()
         if kind in MOUSE:
@@ -682,7 +682,7 @@ def _ignores_wheel(widget: Any) -> bool:
     return bool(widget.property(IGNORE_WHEEL))
 
 
-def _minds_mouse(widget: Any) -> bool:
+def _handles_hover(widget: Any) -> bool:
     return bool(
         widget.hasMouseTracking()
         or widget.testAttribute(QtCore.Qt.WA_Hover)

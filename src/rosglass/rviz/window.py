@@ -72,13 +72,13 @@ class BareView(QtCore.QObject):
         hidden = self._on or self._window.isFullScreen()
         self._window.statusBar().setVisible(warning or not hidden)
 
-    def again(self) -> None:
+    def hide_again(self) -> None:
         """Hide what RViz has brought back, now and once it is done with what it does."""
         self._hide()
         QtCore.QTimer.singleShot(0, self._hide)
 
     @contextmanager
-    def lifted(self) -> Iterator[None]:
+    def showing_everything(self) -> Iterator[None]:
         """Show everything for a moment: RViz saves what is shown."""
         on = self.on
         self.on = False
@@ -167,7 +167,7 @@ class Window(QtCore.QObject):
         self.frame: Any = bindings.VisualizationFrame()
         if not splash:
             self.frame.setSplashPath("")
-        with _without_noise():
+        with _with_stand_in_package():
             self.frame.initialize(file)
         #: RViz's ``VisualizationManager``.
         self.manager: Any = self.frame.getManager()
@@ -247,7 +247,7 @@ class Window(QtCore.QObject):
         folder = Path(file).parent
         if not folder.is_dir():
             raise Error(f"{file}: RViz could not save its config: there is no folder {folder}")
-        with self.bare.lifted():
+        with self.bare.showing_everything():
             saved = self.frame.saveDisplayConfig(file)
         if not saved:
             raise Error(f"{file}: RViz could not save its config: {self.frame.getErrorMessage()}")
@@ -308,7 +308,7 @@ class Window(QtCore.QObject):
         elif self._filled:
             self._filled = False
             self.widget.setGeometry(self._normal)
-        self.bare.again()
+        self.bare.hide_again()
         self.fullscreen_changed.emit(fullscreen)
 
     def _fill_screen(self) -> None:
@@ -331,13 +331,13 @@ class Window(QtCore.QObject):
     def _on_config(self, path: str) -> None:
         self._config = path
         loading, self._loading = self._loading, False
-        self.bare.again()
+        self.bare.hide_again()
         if loading:
             self.config_loaded.emit(path)
 
 
 @contextlib.contextmanager
-def _without_noise() -> Iterator[None]:
+def _with_stand_in_package() -> Iterator[None]:
     """Keep RViz from complaining that it does not find a package which it can do without."""
     before = os.environ.get(_PATHS)
     stand_in = str(Path(__file__).with_name("media_export"))
@@ -372,7 +372,7 @@ class _CloseWatch(QtCore.QObject):
         if event.type() != QtCore.QEvent.Type.Close or self._asking:
             return False
         self._asking = True
-        with self._bare.lifted():
+        with self._bare.showing_everything():
             QtCore.QCoreApplication.sendEvent(watched, event)
         self._asking = False
         if event.isAccepted():
