@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
 from rosglass.rviz.camera import Picker
-from rosglass.rviz.displays_access import Displays
+from rosglass.rviz.displays import Displays
 from rosglass.rviz.host import Hook
 from rosglass.rviz.tools import Tools
 from rosglass.rviz.trackers import Frames, Trackers

@@ -1,6 +1,7 @@
 """The object ``rviz`` that QML over RViz finds, one for each overlay, and the objects below it.
 
-They know the 3D view by :class:`rosglass.rviz.access.Access` alone (docs/architecture.md, 6).
+They know the 3D view by :class:`rosglass.rviz.access.Access` alone:
+docs/architecture.md, section 6, says what another 3D view has to implement.
 """
 # ruff: noqa: N802 N815 - the names of slots, properties and signals are QML's
 

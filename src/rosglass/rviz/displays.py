@@ -1,4 +1,4 @@
-"""RViz's displays: which there are, how they are, their properties; adding and removing them."""
+"""RViz's displays: their list, status and properties; adding and removing them."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rosglass.rviz.window import Window
 
 __all__ = ["Display", "Displays", "Status", "status_of"]
+
 
 #: Milliseconds between checks of what RViz has no signal for.
 _PERIOD_MS = 200
