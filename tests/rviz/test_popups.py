@@ -262,7 +262,7 @@ def test_popup_follows_a_moving_frame(hand: Any, app: Any, master: str, caplog: 
     assert popup.content.isVisible()
     assert (live, there_is_grey(popup)) == (False, True)
     hand.wait.frames(3)
-    assert caplog.text.count("popup Robot: where the frame 'popup_test' is") == 1
+    assert caplog.text.count("popup Robot: the frame 'popup_test' was not") == 1
     # It can be operated all the same.
     clicked: list[str] = []
     popup.content.clicked.connect(lambda *_: clicked.append(popup.name))
@@ -371,7 +371,7 @@ def test_qml_popup_is_half_seen_while_its_place_is_old(
     hand.wait(lambda: root.property("seen") == 1)
     hand.wait(lambda: root.property("seen") == 0.5)
     assert root.property("problem") == "the frame 'old_link' was not updated for 3 s"
-    assert caplog.text.count("AnchoredPopup: where the frame 'old_link' is") == 1
+    assert caplog.text.count("AnchoredPopup: the frame 'old_link' was not") == 1
     # It can be operated all the same.
     seen = Camera(app.window).project((0, 0, 0))
     hand.click(seen.x, seen.y)
