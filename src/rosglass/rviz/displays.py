@@ -310,7 +310,7 @@ class Displays(Watched):
         for tree in self._window.widget.findChildren(QtWidgets.QTreeView):
             QtCore.QCoreApplication.sendPostedEvents(tree, event)
 
-    def _sync_status(self) -> Callable[[], None]:
+    def _sync_rest(self) -> Callable[[], None]:
         before, self._status = self._status, self.status
         return self.status_changed.emit if self._status != before else lambda: None
 

@@ -188,7 +188,7 @@ class Tools(Watched):
         self._manager.removeAll()
         self.emit_changes()
 
-    def _sync_current(self) -> Callable[[], None]:
+    def _sync_rest(self) -> Callable[[], None]:
         before, self._known_current = self._known_current, self.current
         return self.selected.emit if self._known_current is not before else lambda: None
 
