@@ -271,7 +271,7 @@ class Application(Handle):
         self._fullscreen = False
 
     def connect(self) -> None:
-        """Ask for a node of the name of RViz's and ``_overlays``, if no overlay has asked for one.
+        """Connect as RViz's node name with ``_overlays``, unless an overlay has named the node.
 
         :meth:`run` does it after two seconds: robots reach the camera by it.
         """
@@ -300,7 +300,7 @@ class Application(Handle):
         return code
 
     def quit(self, code: int = 0) -> None:
-        """Have :meth:`run` return, without asking for unsaved changes; from any thread."""
+        """Make :meth:`run` return, without asking about unsaved changes; thread-safe."""
         self.session.executor.post(lambda: QtCore.QCoreApplication.exit(code))
 
     def screenshot(self, file: str | os.PathLike[str]) -> None:
@@ -315,7 +315,7 @@ class Application(Handle):
         self.rviz.picker.screenshot(file, window=True)
 
     def close(self) -> None:
-        """Take RViz and its overlays down, and close the node; safe to call twice."""
+        """Close RViz, its overlays and the node; safe to call twice."""
         if self._closed:
             return
         self._closed = True
@@ -378,7 +378,7 @@ class Application(Handle):
 
 
 def _qt_application(arguments: Sequence[str]) -> Any:
-    """Return the process's Qt application, made if need be.
+    """Return the Qt application of the process, made if there is none.
 
     Raises:
         UnsupportedError: There is no display that RViz can draw on.
@@ -404,7 +404,7 @@ def _qt_application(arguments: Sequence[str]) -> Any:
 
 
 def _master_url(options: Ros1Options) -> str:
-    """Return a URL of the master that says, where one can, which it is."""
+    """Return the master's URL, with a name instead of an address where there is one."""
     master = options.master.removeprefix("http://")
     return "ros1://" if "/" in master else f"ros1://{master}"
 
@@ -415,7 +415,7 @@ def _check_frame(frame: str) -> None:
 
 
 def _attempt(step: Callable[[], object]) -> None:
-    """Do a step of the end: what would be left of RViz otherwise crashes the process."""
+    """Run a step of closing; log its errors, because half an RViz crashes the process."""
     try:
         step()
     except Exception:

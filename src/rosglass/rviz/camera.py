@@ -71,7 +71,7 @@ class Camera:
         return float(x), float(y), float(z)
 
     def update(self) -> bool:
-        """Read where the camera is now; returns whether anything is seen elsewhere than before."""
+        """Read the camera; return whether the projection has changed."""
         viewport = ogre().Root.getSingleton().getRenderTarget(_TARGET).getViewport(0)
         camera = viewport.getCamera()
         self._eye = _numbers(camera.getDerivedPosition())
@@ -143,7 +143,7 @@ def _point(point: Sequence[float]) -> NDArray[np.float64]:
 
 
 class Picker:
-    """Draws the 3D view once more, and looks at the result; takes some milliseconds.
+    """Picks points and takes pictures, by drawing the 3D view once more; takes some milliseconds.
 
     Args:
         window: RViz.

@@ -84,7 +84,7 @@ class Display:
 
     @property
     def at(self) -> int:
-        """Where in memory RViz has it; 0 once it is gone."""
+        """Its address in memory; 0 once it is gone."""
         return 0 if self.handle is None else address(self.handle)
 
     @property
@@ -117,7 +117,7 @@ class Display:
 
     @property
     def status(self) -> Status:
-        """How it is; an error once it is gone."""
+        """Its status; an error once it is gone."""
         return self._read()[2] if self.exists else Status("error", f"{self.name} was removed")
 
     def properties(self) -> list[dict[str, Any]]:
@@ -205,7 +205,7 @@ class Displays(Watched):
 
     @property
     def status(self) -> Status:
-        """How RViz itself is, e.g. whether it knows the fixed frame."""
+        """RViz's own status, e.g. whether the fixed frame is known."""
         return status_of(self._root)
 
     def find(self, name: str) -> Display | None:
@@ -247,7 +247,7 @@ class Displays(Watched):
         return find_property(self._root, names, "RViz")
 
     def _require_first(self, path: str) -> None:
-        """Raise an Error where nothing in the panel has the first name of a path."""
+        """Raise an Error if nothing in the panel has the first name of a path."""
         first, _, below = path.partition("/")
         displays = [display.name for display in self._items]
         known = [*(str(c.getName()) for c in child_properties(self._root)), *displays]

@@ -48,20 +48,20 @@ __all__ = [
 
 @cache
 def overlay_icon() -> Any:
-    """Return a pane over a view."""
+    """Return the icon of overlays, a pane over a view."""
     rect = pyqt().QRectF
     return _icon(lambda painter: painter.drawRoundedRect(rect(2, 2, 24, 20), 3, 3), 9, 11, 21, 19)
 
 
 @cache
 def camera_icon() -> Any:
-    """Return a camera."""
+    """Return the icon of the view controller, a camera."""
     lens = [pyqt().QPointF(x, y) for x, y in ((17, 16), (29, 8), (29, 24))]
     return _icon(lambda painter: painter.drawPolygon(*lens), 2, 8, 19, 16)
 
 
 def _icon(draw_grey: Callable[[Any], None], *blue: float) -> Any:
-    """Return something grey with a blue pane before it.
+    """Return an icon: something grey behind a blue pane.
 
     Args:
         draw_grey: Draws it, within 32x32 pixels.
@@ -96,15 +96,15 @@ _ATTRIBUTES = {
 
 @cache
 def _classes() -> tuple[Any, Any]:
-    """Return our kind of RViz's display, and of the property that holds the registered ones."""
+    """Return our classes of RViz's display, and of the property above registered ones."""
     bindings, core = rviz(), pyqt()
 
     class Held(bindings.Property):  # type: ignore[name-defined,misc]
         def load(self, config: Any) -> None:
-            """The entry knows the types of what is in it."""
+            """Do nothing: the entry loads it."""
 
         def save(self, config: Any) -> None:
-            """The entry writes it."""
+            """Do nothing: the entry saves it."""
 
     # A plain display cannot be derived from in Python.
     class Display(bindings.DisplayGroup):  # type: ignore[name-defined,misc]
@@ -136,7 +136,7 @@ def display_class() -> Any:
 
 
 def set_status(display: Any, row: str, level: int, text: str) -> None:
-    """Show a line below a display's status: 0 for what is fine, 1 for a warning, 2 for an error."""
+    """Set a line of a display's status; the level is 0 for ok, 1 for a warning, 2 for an error."""
     core = pyqt()
     core.QMetaObject.invokeMethod(
         display,
@@ -149,7 +149,7 @@ def set_status(display: Any, row: str, level: int, text: str) -> None:
 
 
 class Entry(QtCore.QObject):
-    """One entry, with its overlay as soon as there is one.
+    """One entry of the Displays panel, and its overlay once there is one.
 
     Args:
         class_id: RViz's name for what it is.
@@ -277,28 +277,28 @@ class Entry(QtCore.QObject):
 
     @property
     def waiting(self) -> bool:
-        """Whether there can be no overlay as it is."""
+        """Whether it has no overlay because of an error, or without a file."""
         return self.overlay is None and (bool(self._failed) or (self.is_qml and not self.file))
 
     @property
     def outdated(self) -> bool:
-        """Whether its overlay shows another file than it is to show."""
+        """Whether its overlay shows another file than Path says."""
         return self.overlay is not None and self.file != self._shown_file
 
     def shows(self, file: Path) -> bool:
-        """Whether a file is what it is to show."""
+        """Return whether a file is its Path."""
         try:
             return self.is_qml and locate(self.file) == locate(file)
         except QmlError:
             return False
 
     def retry(self) -> None:
-        """Forget why there was no overlay."""
+        """Try again to make its overlay."""
         self._failed = ""
         self.touched()
 
     def attach(self, overlay: Overlay) -> None:
-        """Show an overlay as this entry, with what was saved for it.
+        """Connect an overlay with this entry, and restore what was saved for it.
 
         Args:
             overlay: As yet without an entry; one of QML may be loaded already or not.
@@ -332,7 +332,7 @@ class Entry(QtCore.QObject):
                 overlay.tell_problem(str(error))
 
     def detach(self) -> Overlay | None:
-        """Return the overlay, which is no longer this entry's, and keep what it had saved."""
+        """Disconnect the overlay, return it, and keep what it would save."""
         overlay, self.overlay = self.overlay, None
         if overlay is None:
             return None
@@ -352,7 +352,7 @@ class Entry(QtCore.QObject):
         return overlay
 
     def close(self) -> None:
-        """Release RViz's display, which the caller removes; once, after :meth:`drop`."""
+        """Release RViz's display, which the caller removes; once, after :meth:`detach`."""
         self._own_tree.close()
         shown, own = self._watches
         # Those of a display that is gone have ended with it.
@@ -366,7 +366,7 @@ class Entry(QtCore.QObject):
             self.display.entry = None
 
     def copy_from(self, overlay: Overlay) -> None:
-        """Take the numbers of an overlay that a program has made, before :meth:`take`."""
+        """Copy the values of an overlay that a program has made, before :meth:`attach`."""
         if isinstance(overlay, QmlOverlay):
             self.own.properties["Path"].set(str(overlay.file))
         for name, attribute in _ATTRIBUTES.items():
@@ -396,7 +396,7 @@ class Entry(QtCore.QObject):
             self.display.setEnabled(overlay.visible)
 
     def _show_registered(self, _found: object = None) -> None:
-        """Show what the overlay has registered, as soon as that is anything."""
+        """Show the registered properties of the overlay, once there are any."""
         overlay = self.overlay
         if overlay is not None and overlay.properties.properties and self._tree is None:
             _, held = _classes()
@@ -411,7 +411,7 @@ class Entry(QtCore.QObject):
         return "Qml" if self.is_qml else "Overlay"
 
     def status(self, row: str, level: int, text: str) -> None:
-        """Show a line below the entry's status."""
+        """Set a line of the entry's status."""
         if self.alive:
             set_status(self.display, row, level, text)
 
@@ -433,7 +433,7 @@ class Entry(QtCore.QObject):
         to_config(config.mapMakeChild(_CONFIG), free)
 
     def load(self, config: Any) -> None:
-        """Take what a ``.rviz`` file has."""
+        """Restore the entry from RViz's ``Config``."""
         found = plain_config(config)
         own = {name: found[name] for name in self.own.properties if name in found}
         if "Style Sheet" in found:
@@ -454,7 +454,7 @@ def _nothing(*_: Any) -> None:
 
 
 class Entries(QtCore.QObject):
-    """Gives each overlay an entry in the panel, and each entry of a config file its overlay.
+    """Keeps one entry per overlay in the panel, and one overlay per entry of a config file.
 
     RViz makes a placeholder of each display whose class it cannot load, which keeps what the file
     has for it; ours take the places of those that are overlays.
@@ -503,7 +503,7 @@ class Entries(QtCore.QObject):
         self._replace_placeholders()
 
     def __iter__(self) -> Iterator[Entry]:
-        """Iterate over the entries, in the order in which they came."""
+        """Iterate over the entries in the order of their creation."""
         return iter(list(self._entries))
 
     def of(self, overlay: Overlay) -> Entry | None:
@@ -520,7 +520,7 @@ class Entries(QtCore.QObject):
         return entry
 
     def register_class(self, class_id: str, make: Callable[[], Any]) -> None:
-        """Have placeholders of a class be replaced by what is no overlay.
+        """Register a class of displays that are no overlays; their placeholders are replaced.
 
         Args:
             class_id: The class.
@@ -530,12 +530,12 @@ class Entries(QtCore.QObject):
         self._replace_placeholders()
 
     def remove(self, entry: Entry) -> None:
-        """Take an entry and its overlay away."""
+        """Remove an entry and its overlay."""
         self._remove_entry(entry)
         remove_from_tree(entry.display)
 
     def close(self) -> None:
-        """Leave RViz's panel as it is, and follow nothing any longer; safe to call twice."""
+        """Remove all entries; safe to call twice."""
         if self._closed:
             return
         self._closed = True
@@ -581,7 +581,7 @@ class Entries(QtCore.QObject):
         self._apply_panel_order()
 
     def _apply_panel_order(self) -> None:
-        """Have overlays lie above each other as the panel shows them, once the user moves any."""
+        """Stack overlays in the order of the panel, once the user has moved any."""
         order = [
             display.entry.overlay
             for display in self._displays()
@@ -597,7 +597,7 @@ class Entries(QtCore.QObject):
         self._new = False
 
     def _add_entry(self, overlay: Overlay) -> None:
-        """Give an overlay of the program's an entry: one that waits for it, or a new one."""
+        """Connect an overlay of the program with an entry that waits for it, or a new one."""
         if overlay not in self._program_overlays:
             self._program_overlays.append(overlay)
             # A file may have one of a class that is not registered.
@@ -622,7 +622,7 @@ class Entries(QtCore.QObject):
         return entry.class_id == class_id
 
     def _show(self, entry: Entry) -> None:
-        """Have an overlay be seen or not as its entry says; make it when it is seen first."""
+        """Show or hide an overlay as its entry says; make it when it is first shown."""
         enabled = bool(entry.display.isEnabled())
         if entry.overlay is None and enabled:
             self._unmodified(entry.make_overlay)
@@ -682,7 +682,7 @@ class Entries(QtCore.QObject):
 
     @Slot()
     def _on_config_loading(self) -> None:
-        """Take the program's overlays out of the displays that RViz is about to delete."""
+        """Disconnect the program's overlays from the displays that RViz is about to delete."""
         self._loading = self._new = True
         self._after_event.ask()
         for entry in list(self._entries):
@@ -694,7 +694,7 @@ class Entries(QtCore.QObject):
     # Placeholders.
 
     def _watch_panel(self) -> None:
-        """Follow the panel's tree, which there may be another one of since the last config."""
+        """Follow the panel's tree, which a config may have replaced."""
         for view in self._window.frame.findChildren(pyqt("QtWidgets").QTreeView):
             model = view.model()
             if model is None or model.metaObject().className() != "rviz::PropertyTreeModel":
@@ -745,7 +745,7 @@ class Entries(QtCore.QObject):
         placeholder.deleteLater()
 
     def _unmodified(self, do: Callable[[], None]) -> None:
-        """Do what changes nothing that the user would have to save."""
+        """Call a function without marking RViz as modified."""
         modified = self._window.modified
         do()
         if not modified:
@@ -764,7 +764,7 @@ _FILTER = "QML files (*.qml);;All files (*)"
 
 
 class OverlayMenu(QtCore.QObject):
-    """Fills the menu; the lists in it are made when they are opened.
+    """The menu Overlays; its lists are filled when they are opened.
 
     Args:
         window: RViz.

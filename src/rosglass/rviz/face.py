@@ -73,7 +73,7 @@ class Face(QtCore.QObject):
         self._held: QJSValue | None = spell_checked(runtime, self)
 
     def release(self) -> None:
-        """Give it to JavaScript, which may hold it for longer than its model exists."""
+        """Give ownership to JavaScript, which may hold it for longer than its model exists."""
         self.setParent(None)
         self.runtime.keep(self)
         # JavaScript collects only what it has known.
@@ -342,7 +342,7 @@ def _of_kind(kind: type, wanted: str, parameter: str) -> Callable[[Any], Any]:
 
 
 def text(wanted: str = "a text", parameter: str = "") -> Callable[[Any], str]:
-    """Return what takes a string.
+    """Return a converter for strings.
 
     Args:
         wanted: What it is to be, for the error.
@@ -352,12 +352,12 @@ def text(wanted: str = "a text", parameter: str = "") -> Callable[[Any], str]:
 
 
 def switch(parameter: str = "") -> Callable[[Any], bool]:
-    """Return what takes true or false; see :func:`text`."""
+    """Return a converter for true and false; see :func:`text`."""
     return _of_kind(bool, "true or false", parameter)
 
 
 def point(parameter: str = "") -> Callable[[Any], tuple[float, float, float]]:
-    """Return what takes a point; see :func:`point_of` and :func:`text`."""
+    """Return a converter for points; see :func:`point_of` and :func:`text`."""
     return lambda value: point_of(value, parameter)
 
 
@@ -383,7 +383,7 @@ def point_of(value: Any, parameter: str = "") -> tuple[float, float, float]:
 
 
 def property_path(example: str) -> Callable[[Any], str | list[str]]:
-    """Return what takes the path of a property, a string or a list of names.
+    """Return a converter for the path of a property, a string or a list of names.
 
     Args:
         example: Such a path, for the error.
@@ -403,7 +403,7 @@ class _Keywords(dict[str, Any]):
 
 
 def options(**kinds: type) -> Callable[[Any], dict[str, Any]]:
-    """Return what takes an object with options, by :func:`passing` keywords for the method.
+    """Return a converter for an object with options; :func:`passing` makes keywords of them.
 
     Args:
         kinds: The kind of each option, `str` or `bool`.

@@ -176,7 +176,7 @@ def cpp_function(library: str, symbol: str, result: Any = None) -> Any:
 
 
 class Hook(QtCore.QObject):
-    """Calls a function for signals, at once, without their arguments.
+    """Calls a function for each signal of an RViz object, at once, without its arguments.
 
     Args:
         call: Called in the middle of whatever RViz does: it may look, and must change nothing.
@@ -187,7 +187,7 @@ class Hook(QtCore.QObject):
         self._call = call
 
     def watch(self, sender: Any, *signals: str) -> None:
-        """Call for signals of an object, from RViz's bindings, from now on."""
+        """Connect signals of an object of RViz's bindings."""
         wrapped = as_pyside(sender, QtCore.QObject)
         for signal in signals:
             Qt5Core.QObject.connect(wrapped, Qt5Core.SIGNAL(signal), self, Qt5Core.SLOT("_on()"))
@@ -241,7 +241,7 @@ class AfterEvent:
         self._token: QtCore.QObject | None = None
 
     def ask(self) -> None:
-        """Have it called."""
+        """Schedule the call."""
         if self._token is None:
             # Python must hold it while C++ deletes it.
             token = self._token = QtCore.QObject()

@@ -50,7 +50,7 @@ FAR_OUTSIDE = QtCore.QPointF(-1e5, -1e5)
 
 
 def release_outside(button: Any, left: Any) -> Any:
-    """Return a release for nothing.
+    """Return a mouse release far outside of everything.
 
     Args:
         button: What goes up.
@@ -181,7 +181,7 @@ _LOOK_AROUND = 100
 
 
 class Owner(enum.Enum):
-    """Who has the mouse until its buttons are up, other than an overlay."""
+    """The owner of the mouse until its buttons are up, other than an overlay."""
 
     RVIZ = 1
     #: It went with an overlay, or belongs to what lies below a modal popup.
@@ -241,7 +241,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         return self._focused
 
     def focus(self, overlay: Overlay | None) -> None:
-        """Have an overlay get the keys, or RViz."""
+        """Give the keyboard focus to an overlay, or to RViz."""
         before, self._focused = self._focused, overlay
         self._panel.setAttribute(QtCore.Qt.WA_InputMethodEnabled, overlay is not None)
         if overlay is not None and not self._panel.hasFocus():
@@ -254,7 +254,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
                     which.set_focus(which is overlay)
 
     def forget(self, overlay: Overlay) -> None:
-        """End everything that an overlay has of the mouse and the keys."""
+        """Take mouse, touch and focus away from an overlay."""
         if self._owner is overlay:
             self._owner = Owner.NONE
             self._leave(overlay)
@@ -271,7 +271,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             self.focus(None)
 
     def after_event(self, call: Callable[[], None]) -> None:
-        """Call when no overlay handles an event any more; at once if none does."""
+        """Call a function once no overlay handles an event."""
         if self._depth:
             self._later.append(call)
         else:
@@ -391,7 +391,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             self._leave(owner)
 
     def hover(self, overlay: Overlay | None) -> None:
-        """Let the pointer be over an overlay, or over none, and leave the one before."""
+        """Set the overlay that the mouse is over, and leave the one before."""
         before, self._hovered = self._hovered, overlay
         if before is not None and before is not overlay:
             self._leave(before)
@@ -428,7 +428,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         return self._owner is not Owner.RVIZ
 
     def _offer_to_owner(self, event: Any) -> bool:
-        """Handle what only follows from where the mouse is, or from what has the keys."""
+        """Offer an event to the overlay under the mouse, or with the focus."""
         if event.type() == _E.ContextMenu and event.reason() == QtGui.QContextMenuEvent.Keyboard:
             return self._key(event)
         if self._owner is Owner.RVIZ:

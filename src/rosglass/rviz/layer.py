@@ -73,7 +73,7 @@ class Layer:
         self._closed = False
 
     def set_z(self, z: int) -> None:
-        """Draw it after the layers of lower `z`, from 0 to :data:`HIGHEST_Z`."""
+        """Set its order, from 0 to :data:`HIGHEST_Z`: higher ones are drawn later."""
         if not self._closed:
             self._overlay.setZOrder(z)
 
@@ -84,7 +84,7 @@ class Layer:
             self._show()
 
     def set_opacity(self, opacity: float) -> None:
-        """Blend it more faintly, from 0 to 1; the picture stays as it is."""
+        """Set its opacity, from 0 to 1."""
         if opacity != self._opacity:
             self._opacity = opacity
             self._blend()
@@ -137,7 +137,7 @@ class Layer:
         return rects
 
     def close(self) -> None:
-        """Take it off the view and let its texture go; safe to call twice."""
+        """Remove it from the view, with its texture; safe to call twice."""
         if self._closed:
             return
         self._closed = True
@@ -195,7 +195,7 @@ class Layer:
         )
 
     def _place(self, changed: list[Rect], width: int, height: int) -> None:
-        """Put panels where there is something, but keep those that stand well enough."""
+        """Place panels where the picture is not empty; keep those that fit well enough."""
         waste = uncovered(self._covered, self._rects)
         if waste is None or waste - self._waste > _SLACK:
             changed = self._rects = cover(self._covered, width, height, worth=_PANEL)
@@ -224,7 +224,7 @@ class Layer:
         self._show()
 
     def _fit(self, number: int, width: int, height: int) -> None:
-        """Have a panel no larger than what is on it."""
+        """Shrink a panel to what is on it."""
         assert self._before is not None
         rect, panel = trimmed(self._before, self._rects[number]), self._panels[number]
         if rect == self._shown[number]:
@@ -294,7 +294,7 @@ class Work(NamedTuple):
 
     @property
     def total(self) -> float:
-        """All together."""
+        """The sum."""
         return sum(self)
 
 
@@ -316,12 +316,12 @@ class Drawing:
         self._failed = False
 
     def mark(self) -> None:
-        """Have it drawn before the next frame in which it is shown."""
+        """Mark it to be drawn before the next frame in which it is shown."""
         self.dirty = True
 
     @property
     def shown(self) -> bool:
-        """Whether there is anything to see of it."""
+        """Whether it is visible."""
         return self.overlay.visible and self.overlay.opacity > 0
 
     def before_frame(self, width: int, height: int, ratio: float) -> Work | None:
@@ -375,7 +375,7 @@ class Drawing:
         return Work(*(1e3 * part for part in parts))
 
     def close(self) -> None:
-        """Take it off the view; the overlay is for others to close."""
+        """Remove it from the view; the caller closes the overlay."""
         self.layer.close()
 
 

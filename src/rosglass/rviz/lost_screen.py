@@ -1,4 +1,4 @@
-"""An X server that ends, and windows that others destroy: the program says so, and ends.
+"""Ends the process when its X server is gone or its window was destroyed.
 
 Qt and Xlib call ``exit()`` where the connection to the X server breaks, which destroys what other
 threads still use. Where a window is gone, Mesa's software renderer ignores the error and draws in
@@ -139,7 +139,7 @@ class LostScreen(Handle):
         atexit.register(self.close)
 
     def check(self) -> None:
-        """Look whether all is there; does not return if not. To be called before drawing."""
+        """Check screen and windows before drawing; does not return if one is gone."""
         with self._lock:
             gone = not self._closed and self._windows & self._connection.destroyed()
         if gone:
@@ -148,7 +148,7 @@ class LostScreen(Handle):
             time.sleep(_EXIT_PAUSE_S)
 
     def close(self) -> None:
-        """Watch no more; safe to call twice. RViz's windows may go from now on."""
+        """Stop watching, so that RViz's windows can be closed; safe to call twice."""
         with self._lock:
             closed, self._closed = self._closed, True
         if closed:

@@ -30,7 +30,7 @@ _PORT = 11311
 
 
 class _Asker:
-    """Asks a master for its process number, again and again, in a thread of its own.
+    """Asks a master for its process id periodically, in a thread of its own.
 
     Args:
         uri: The master's.
@@ -60,7 +60,7 @@ class _Asker:
             self._answered(answer)
 
     def close(self) -> None:
-        """Ask no more; safe to call twice."""
+        """Stop asking; safe to call twice."""
         self._end.set()
         self._thread.join(_TIMEOUT_S / 4)
         self._executor.close()
@@ -170,7 +170,7 @@ class MasterWatch(QtCore.QObject):
 
     @property
     def advice(self) -> str:
-        """What the operator is to do, in a line; empty when there is nothing wrong."""
+        """What to do about the problem, in a line; empty without one."""
         if not self._problem:
             return ""
         if self.replaced:
@@ -178,11 +178,11 @@ class MasterWatch(QtCore.QObject):
         return "No answer from the ROS master: mend the network, or start roscore and RViz anew"
 
     def close(self) -> None:
-        """Watch no more."""
+        """Stop watching."""
         self._asker.close()
 
     def on_answer(self, answer: Any) -> None:
-        """Take the number of the master's process, or the error that came instead."""
+        """Handle the process id of the master, or the error of the request."""
         problem = ""
         self.replaced = not isinstance(answer, Error) and self.number not in (-1, answer)
         if isinstance(answer, Error):

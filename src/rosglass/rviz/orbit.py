@@ -43,7 +43,7 @@ class Point(NamedTuple):
         return Point(c * self.x - s * self.y, s * self.x + c * self.y, self.z)
 
     def towards(self, other: Sequence[float], part: float) -> Point:
-        """Return the point that lies a part of the way, 0 to 1, from here to `other`."""
+        """Interpolate between this and `other`, by a share from 0 to 1."""
         x, y, z = _numbers(other)
         return Point(
             self.x + (x - self.x) * part,
@@ -59,7 +59,7 @@ def _numbers(point: object) -> tuple[float, float, float]:
 
 
 class Place(NamedTuple):
-    """Where a frame is, as far as the camera goes with it.
+    """The position and yaw of a frame.
 
     Attributes:
         point: Its origin, in the fixed frame.
@@ -118,7 +118,7 @@ class Orbit(NamedTuple):
         return cls(focus, distance, yaw, pitch)
 
     def towards(self, other: Orbit, part: float) -> Orbit:
-        """Return what lies a part of the way, 0 to 1, from here to `other`; it turns the short way.
+        """Interpolate between this and `other`, by a share from 0 to 1; turns the short way.
 
         Distances are passed in equal ratios, so that a camera that comes from far seems to move
         evenly.
@@ -131,7 +131,7 @@ class Orbit(NamedTuple):
         )
 
     def carried(self, before: Place, after: Place) -> Orbit:
-        """Return where it is after it has gone along with a frame.
+        """Return it carried along with a frame.
 
         Args:
             before: Where the frame was.
@@ -157,7 +157,7 @@ def shortest_turn(start: float, end: float) -> float:
 
 
 def ease(progress: float) -> float:
-    """Return how far a movement is after a part of its time, both 0 to 1, by a sigmoid.
+    """Return the progress of a movement after a share of its time, both 0 to 1, by a sigmoid.
 
     As in hector_rviz_plugins' view controller, 1 / (1 + e^(-12 (p - 0.5))), stretched so that it
     begins at 0 and ends at 1.

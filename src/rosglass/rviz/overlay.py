@@ -92,7 +92,7 @@ class Overlay(QtCore.QObject):
 
     @property
     def z(self) -> int:
-        """Its place in the stack."""
+        """Its order: overlays of higher values are above those of lower."""
         return self._z
 
     @z.setter
@@ -196,7 +196,7 @@ class Overlay(QtCore.QObject):
         return None
 
     def close(self) -> None:
-        """Let everything go; safe to call twice."""
+        """Release everything; safe to call twice."""
 
 
 def _is_number(value: object) -> bool:
@@ -214,7 +214,7 @@ _ids: dict[type[Any], str] = {}
 
 
 def register(kind: _T, class_id: str = "", make: Callable[[str], Overlay] | None = None) -> _T:
-    """Have overlays of a class come back from a saved ``.rviz`` file; also as a decorator.
+    """Register a class of overlays, so that a ``.rviz`` file restores them; also as a decorator.
 
     Do it before the file is loaded.
 
@@ -265,7 +265,7 @@ _OWNER_NAMES = ("self", "overlay", "panel", "popup", "dialog", "root", "widget")
 
 @contextlib.contextmanager
 def guarded(overlay: Overlay, doing: str) -> Iterator[None]:
-    """Keep what an overlay raises, itself or in a slot or paintEvent of its own, from going on.
+    """Catch what an overlay raises, in its methods, slots and paint events, and log it.
 
     Args:
         overlay: Whose code runs.
@@ -294,7 +294,7 @@ def guarded(overlay: Overlay, doing: str) -> Iterator[None]:
 
 
 def log_uncaught_errors() -> Callable[[], None]:
-    """Keep PyQt5 from aborting the process when something raises in a slot or virtual function.
+    """Log exceptions of slots and virtual functions, for which PyQt5 would abort the process.
 
     It becomes the problem of the overlay that the traceback points to. A hook of the program's own
     is called as well.

@@ -142,7 +142,7 @@ class Watched(QtCore.QObject):
         emit_rest()
 
     def _sync_items(self) -> None:
-        """Drop at once what RViz is about to delete, before its place goes to another object."""
+        """Update the items; drop what RViz is about to delete before its address is reused."""
         raise NotImplementedError(f"{type(self).__name__} has to give _sync_items()")
 
     def _sync_rest(self) -> Callable[[], None]:

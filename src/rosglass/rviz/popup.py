@@ -104,7 +104,7 @@ class Popup(WidgetOverlay):
         return self.root.width() / 2, self.root.height() / 2
 
     def move(self, x: float, y: float) -> None:
-        """Put it at a place, and follow nothing any longer; it is kept inside the view.
+        """Move it to a place inside the view, and stop following a point.
 
         Args:
             x: Units from the left edge of the view.
@@ -121,7 +121,7 @@ class Popup(WidgetOverlay):
     def follow(
         self, trackers: Trackers, point: Sequence[float] = (0, 0, 0), frame: str = ""
     ) -> None:
-        """Stay where a point of the scene is seen; a frame not known yet is its `problem`.
+        """Follow a point of the scene; a frame that is unknown yet becomes its `problem`.
 
         Args:
             trackers: Those of the RViz it is shown over, ``app.rviz.trackers``.
@@ -169,7 +169,7 @@ class Popup(WidgetOverlay):
         self._put()
 
     def _put(self) -> None:
-        """Place the content as its size, the view's, and what it follows are now."""
+        """Place the content by its size, the size of the view, and the point that it follows."""
         content = self.content
         if not is_alive(content):
             return
@@ -229,7 +229,7 @@ class _PopupWidget(QtWidgets.QWidget):  # type: ignore[misc]
 
 
 class _Veil(QtWidgets.QWidget):  # type: ignore[misc]
-    """Greys out a popup whose place is old; it can be operated all the same."""
+    """Greys out a popup whose frame is stale; it gets no events itself."""
 
     def __init__(self, base: Any) -> None:
         super().__init__(base)
@@ -237,7 +237,7 @@ class _Veil(QtWidgets.QWidget):  # type: ignore[misc]
         self.hide()
 
     def paintEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
-        """Cover it halfway."""
+        """Draw it half transparent."""
         QtGui.QPainter(self).fillRect(event.rect(), QtGui.QColor(128, 128, 128, 150))
 
 
@@ -257,7 +257,7 @@ class MoveBar(QtWidgets.QLabel):  # type: ignore[misc]
         self.setCursor(QtCore.Qt.SizeAllCursor)
 
     def mousePressEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
-        """Take hold of it."""
+        """Start dragging."""
         if self.popup is None or event.button() != QtCore.Qt.LeftButton:
             event.ignore()
             return
@@ -271,7 +271,7 @@ class MoveBar(QtWidgets.QLabel):  # type: ignore[misc]
         self._from = event.screenPos()
 
     def mouseMoveEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
-        """Move it along."""
+        """Drag it."""
         if self._from is not None and self.popup is not None:
             way = (event.screenPos() - self._from) / self.popup.scale
             self.popup.move(self._start[0] + way.x(), self._start[1] + way.y())

@@ -173,7 +173,7 @@ def describe_properties(item: Any, path: str = "") -> list[dict[str, Any]]:
 
 
 def _kind(item: Any) -> str:
-    """Return a word for what a property holds: ``bool``, ``int``, ``float``, ``color``, ..."""
+    """Return the kind of a property: ``bool``, ``int``, ``float``, ``color``, ..."""
     kind = class_of(item).removeprefix("rviz::").removesuffix("Property").lower()
     if kind:
         return {"rostopic": "topic", "tfframe": "frame"}.get(kind, kind)
@@ -211,7 +211,7 @@ def _convert(item: Any, kind: str, value: Any, name: str) -> tuple[Any, Any]:
 
 
 def _choices(item: Any) -> list[str]:
-    """Return what can be chosen, which only the property's editor knows."""
+    """Return the choices of a property, which only its editor knows."""
     widgets = pyqt("QtWidgets")
     host = widgets.QWidget()
     editor = item.createEditor(host, widgets.QStyleOptionViewItem())
@@ -421,7 +421,7 @@ def _choose(model: RegisteredProperty, window: Any, choices: Choices) -> None:
 
 
 def log_errors(otherwise: Any = None) -> Callable[[Any], Any]:
-    """Make a function that C++ calls log what it raises, and return something else instead."""
+    """Make a function that C++ calls log its exceptions, and return a default instead."""
 
     def decorate(function: Any) -> Any:
         # To make the help text of one of its functions, PySide2 loads whatever it knows.
@@ -439,26 +439,26 @@ def log_errors(otherwise: Any = None) -> Callable[[Any], Any]:
 
 
 def owned_by_rviz(item: Any) -> Any:
-    """Return a property whose end is RViz's to decide, with the property that it stands below."""
+    """Return a property that RViz deletes, together with the property above it."""
     pyqt("sip").transferto(item, None)
     return item
 
 
 @cache
 def _classes() -> tuple[Any, Any]:
-    """Return our kind of RViz's ``Property``, and of its ``BoolProperty``."""
+    """Return our classes of RViz's ``Property`` and ``BoolProperty``."""
     bindings, core = rviz(), pyqt()
 
     class _Shown:
-        """What both share; `view` is set right after it is made."""
+        """The base of both; `view` is set right after it is created."""
 
         view: PropertyView | None = None
 
         def load(self, config: Any) -> None:
-            """Values come from the display, which knows their types."""
+            """Do nothing: the display loads them."""
 
         def save(self, config: Any) -> None:
-            """And go there."""
+            """Do nothing: the display saves them."""
 
     def flags(item: Any, base: Any, column: int) -> Any:
         found = base.getViewFlags(item, column)
@@ -538,7 +538,7 @@ class PropertyView:
         return pyqt("QtGui").QColor(self.model.kind.saved(self.model.get()))
 
     def close(self) -> None:
-        """Follow the property no longer."""
+        """Stop following the property."""
         watches, self._watches = self._watches, []
         for signal, slot in watches if is_alive(self.model) else ():
             signal.disconnect(slot)
@@ -594,7 +594,7 @@ def _from_text(text: str, parts: list[str]) -> dict[str, str]:
 
 
 def _plain(value: Any) -> Any:
-    """Return what an editor gave as Python has it."""
+    """Return the Python value of what an editor gave."""
     return value.value() if isinstance(value, pyqt().QVariant) else value
 
 
@@ -625,7 +625,7 @@ class PropertyTree:
         return self._views[found].item
 
     def close(self) -> None:
-        """Follow the owner no longer, and take its properties out of the tree."""
+        """Stop following the owner, and remove its properties from the tree."""
         if is_alive(self._owner):
             self._owner.registered.disconnect(self._added)
             self._owner.unregistered.disconnect(self._gone)
@@ -655,7 +655,7 @@ class PropertyTree:
         self._hide(found)
 
     def _show(self, found: RegisteredProperty) -> None:
-        """Have a property be in the tree or not.
+        """Add a property to the tree, or remove it.
 
         RViz's own way of hiding one, by a signal that comes later, crashes when it is gone by then.
         """
@@ -679,7 +679,7 @@ class PropertyTree:
 
 
 def remove_from_tree(item: Any) -> None:
-    """Take a property out of RViz's tree, and delete it once it is not used any more."""
+    """Remove a property from RViz's tree, and delete it later."""
     if not _is_deleted(item):
         above = item.getParent()
         if above is not None:

@@ -541,7 +541,7 @@ def plain_config(config: Any) -> Any:
 
 
 def merged(older: Mapping[str, Any], newer: Mapping[str, Any]) -> dict[str, Any]:
-    """Return `newer` with what only `older` has."""
+    """Return `newer`, with what is only in `older`."""
     found = {**older, **newer}
     for key, value in newer.items():
         before = older.get(key)

@@ -104,7 +104,7 @@ class Scene(QtCore.QObject):
         renderer.start(self._control, self.window)
 
     def show_in(self, panel: Any) -> None:
-        """Say which widget shows it: keys, shortcuts and the mouse's shape are its window's."""
+        """Set the widget that shows it, whose window has its keys, shortcuts and cursor."""
         self._control.panel = panel
 
     def show_item(self, item: Any) -> None:
@@ -137,7 +137,7 @@ class Scene(QtCore.QObject):
             self._item.setSize(self._units)
 
     def draw(self) -> NDArray[np.uint32]:
-        """Return how it looks now.
+        """Return the rendered picture.
 
         Returns:
             Shape (height, width), each pixel 0xAARRGGBB with premultiplied colours; valid until
@@ -150,7 +150,7 @@ class Scene(QtCore.QObject):
         self.renderer.rest()
 
     def close(self) -> None:
-        """Let the window go as soon as no event is handled any more; safe to call twice."""
+        """Delete the window once no event is handled any more; safe to call twice."""
         if self._closed:
             return
         self._closed = True
@@ -191,7 +191,7 @@ class QmlInput:
     _listed = 0.0
 
     def deliver(self, event: Any) -> bool:
-        """Give the event to the item it is for."""
+        """Send an event to the items; return whether one takes it."""
         window, kind = self._window, event.type()
         if kind not in _FOR_SCENE or not is_alive(window):
             return False
@@ -267,7 +267,7 @@ class QmlInput:
             content.setEnabled(True)
 
     def set_focus(self, focus: bool) -> None:
-        """Give keys to the item that has the focus in its scope, or take them away."""
+        """Give the focus to the scene, or take it away."""
         if is_alive(self._window):
             event = QtGui.QFocusEvent(_E.FocusIn if focus else _E.FocusOut)
             Qt5Core.QCoreApplication.sendEvent(self._window, event)
@@ -291,13 +291,13 @@ class QmlInput:
 
 
 class _VisibleItem(NamedTuple):
-    """An item, and those around it beyond which it is not seen."""
+    """An item, with the items that clip it."""
 
     item: Any
     clips: tuple[Any, ...]
 
     def has(self, at: Any) -> bool:
-        """Return whether a place of the window is in it, and it may get what happens there."""
+        """Return whether a position of the window is in its visible part."""
         if not all(is_alive(item) for item in (self.item, *self.clips)):
             return False
         return bool(
@@ -308,7 +308,7 @@ class _VisibleItem(NamedTuple):
 
 
 class _Touch(NamedTuple):
-    """Fingers, as they were last heard of."""
+    """The last touch event."""
 
     #: Of the QTouchDevice; PySide2's object for it ends with the event.
     device: int
@@ -316,12 +316,12 @@ class _Touch(NamedTuple):
 
     @classmethod
     def of(cls, event: Any) -> _Touch:
-        """Remember an event."""
+        """Return the touch of an event."""
         device = shiboken.getCppPointer(event.device())[0]
         return cls(device, [QtGui.QTouchEvent.TouchPoint(p) for p in event.touchPoints()])
 
     def ended(self) -> Iterator[Any]:
-        """Iterate over the events by which all of them go up far outside, for nothing."""
+        """Iterate over the events that release all fingers far outside."""
         device = shiboken.wrapInstance(self.device, QtGui.QTouchDevice)
         for point in self.points:
             point.setState(Qt5Core.Qt.TouchPointReleased)
@@ -379,7 +379,7 @@ def _is_tap(handler: Any) -> bool:
 
 
 def _handlers(window: Any, at: Any) -> Iterator[Any]:
-    """Iterate over the enabled pointer handlers of the items at a place."""
+    """Iterate over the enabled pointer handlers of the items at a position."""
     for shown in _shown(window):
         children = shown.item.children()
         found = [c for c in children if c.metaObject().className().endswith("Handler")]
@@ -587,7 +587,7 @@ class QmlOverlay(QmlInput, Overlay):
             self.tell_problem(self.problem)
 
     def tell_problem(self, problem: str) -> None:
-        """Say what is wrong with it; as long as its file has errors, it is they."""
+        """Set its problem; errors of its file take precedence."""
         super().tell_problem(problem or self._error or self._not_drawn)
 
     def _show_error(self, error: str) -> None:
@@ -647,7 +647,7 @@ class QmlOverlay(QmlInput, Overlay):
         return pixels
 
     def close(self) -> None:
-        """Let the interface, its engine and all its memory go; safe to call twice."""
+        """Release the interface and its engine; safe to call twice."""
         if self._closed:
             return
         self._closed = True

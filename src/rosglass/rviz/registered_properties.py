@@ -71,7 +71,7 @@ class RegisteredProperty(QtCore.QObject):
         return self._value
 
     def set(self, value: Any) -> None:
-        """Change the value, also of one that is read-only to people.
+        """Change the value, also of a property that is read-only in the panel.
 
         Raises:
             Error: The property cannot hold it.
@@ -130,7 +130,7 @@ class RegisteredProperty(QtCore.QObject):
             self.aboutChanged.emit()
 
     def adopt(self, kind: Kind, about: dict[str, Any]) -> None:
-        """Take over what a later registration says; a value out of its range becomes the default.
+        """Adopt a later registration; a value out of its range becomes the default.
 
         Args:
             kind: Of the same class as before.
@@ -293,7 +293,7 @@ class RegisteredProperties(QtCore.QObject):
         default: Any = None,
         **options: Any,
     ) -> RegisteredProperty:
-        """Return the property of a name, which is made where there is none.
+        """Return the property of a name, created if there is none.
 
         Args:
             kind: See :attr:`RegisteredProperty.kindName`.
@@ -351,7 +351,7 @@ class RegisteredProperties(QtCore.QObject):
     def _sorted(
         kind: str, name: str, options: dict[str, Any]
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return what is said about a property, and what narrows its values."""
+        """Split options into those of all kinds and those of this kind, and check them."""
         own = KINDS[kind].OPTIONS
         for option, value in options.items():
             if option not in (*_COMMON, *own):
@@ -390,7 +390,7 @@ class RegisteredProperties(QtCore.QObject):
             waiting[:0] = found.properties.values()
 
     def unregister(self, found: RegisteredProperty) -> None:
-        """Take a property away, with those below it; its value stays for one of its name."""
+        """Remove a property with those below it; its value is kept for one of its name."""
         self._saved = self.save()
         siblings = found.container.properties if found.container else self.properties
         if siblings.get(found.path[-1]) is found:
@@ -398,7 +398,7 @@ class RegisteredProperties(QtCore.QObject):
             self.unregistered.emit(found)
 
     def begin_load(self) -> None:
-        """Let each property be registered with another kind: the interface is loaded anew."""
+        """Allow properties to be registered with another kind, as the interface is loaded anew."""
         self._older = set(self.all())
 
     # Files.
@@ -408,7 +408,7 @@ class RegisteredProperties(QtCore.QObject):
         return merged(self._saved, _saved(self.properties))
 
     def load(self, saved: dict[str, Any]) -> None:
-        """Take the values that a file has, now or for when a property is registered.
+        """Restore values from a file, now or when a property is registered.
 
         Args:
             saved: As :meth:`save` gave it; scalars may be text.

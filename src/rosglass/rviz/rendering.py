@@ -59,7 +59,7 @@ def _gl() -> ctypes.CDLL:
 
 @contextlib.contextmanager
 def keep_context() -> Iterator[None]:
-    """Make the OpenGL context current again that is so now: Ogre takes it to be its own."""
+    """Restore the current OpenGL context at the end: Ogre takes it to be its own."""
     library = _gl()
     display, context = library.glXGetCurrentDisplay(), library.glXGetCurrentContext()
     drawable = library.glXGetCurrentDrawable()
@@ -281,7 +281,7 @@ class OpenGLRenderer:
 
 
 class SoftwareRenderer:
-    """Has Qt's software renderer draw: no shaders, no particles, no video by OpenGL."""
+    """Draws by Qt's software renderer: no shaders, no particles, no video by OpenGL."""
 
     def __init__(self) -> None:
         self.read_back = 0.0
@@ -342,14 +342,14 @@ class SoftwareRenderer:
 
 
 class OverlayRendererChoice(RendererChoice):
-    """The one choice of a process, made with its first overlay in QML."""
+    """The renderer choice of the process, made with its first overlay in QML."""
 
     _subject = "overlays"
     _application = "rosglass.rviz.Application"
     _log = logging.getLogger("rosglass.rviz")
 
     def prefer(self, renderer: str) -> None:
-        """Take note of what the user wants, which counts for more than what Qt's variables say.
+        """Set the user's choice, which takes precedence over Qt's environment variables.
 
         Args:
             renderer: One of :data:`rosglass.qml.renderer_choice.RENDERERS`.

@@ -62,7 +62,7 @@ def _string(text: str) -> _String:
 
 
 def is_initialized() -> bool:
-    """Return whether this process has a node of roscpp already."""
+    """Return whether this process has a roscpp node."""
     return bool(cpp_function("libroscpp", "_ZN3ros13isInitializedEv", ctypes.c_bool)())
 
 
@@ -109,7 +109,7 @@ _log = logging.getLogger("rosglass.rviz")
 
 
 def name_node(name: str, options: Ros1Options) -> None:
-    """Make RViz's node, unless the program has one of roscpp already.
+    """Initialize RViz's node, unless the program has a roscpp node.
 
     Args:
         name: Its name; empty for ``rviz`` with what makes it unique.

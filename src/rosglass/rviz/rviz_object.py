@@ -382,7 +382,7 @@ class QmlView(Face):
 
 
 def _file_path(use: str = "") -> Callable[[Any], str]:
-    """Return what takes a file, named by a path or a ``file:`` address.
+    """Return a converter for files, named by a path or a ``file:`` URL.
 
     Args:
         use: What it is for, where ``package://`` will not do.
@@ -477,14 +477,14 @@ class RvizObject(RegisteredProperties):
 
     @cached_property
     def tool_manager(self) -> QmlToolManager:
-        """What QML has as `toolManager`."""
+        """The object `toolManager` of QML."""
         self._icons = ToolIcons(self.access.tools)
         self._engine.addImageProvider(_ICONS, self._icons)
         return QmlToolManager(self.access.tools, self.runtime, self._engine)
 
     @cached_property
     def display_faces(self) -> ItemFaces:
-        """What QML has for displays."""
+        """The QML objects of the displays."""
         displays = self.access.displays
         faces = ItemFaces(displays, QmlDisplay, self.runtime, self._engine)
         faces.changed.connect(self.displaysChanged)
@@ -495,7 +495,7 @@ class RvizObject(RegisteredProperties):
 
     @cached_property
     def camera(self) -> QmlView:
-        """What QML has as `view`."""
+        """The object `view` of QML."""
         return QmlView(self.access, self.runtime, self._engine)
 
     # The overlay and the window.

@@ -37,12 +37,12 @@ class MemoryCleaner(QtCore.QObject):
         self._timer.timeout.connect(self._clean)
 
     def overlay_added(self) -> None:
-        """Give back what an overlay needed only to come."""
+        """Release soon what an overlay needed only to be created."""
         if not self._timer.isActive():
             self._timer.start()
 
     def overlay_removed(self) -> None:
-        """Give back all that an overlay had: its parts refer to each other.
+        """Release soon what an overlay had: its parts refer to each other.
 
         Left to Python, that takes hundreds of overlays, by which memory is in pieces.
         """
@@ -112,7 +112,7 @@ class Stack(QtCore.QObject):
         self._cleaner.overlay_added()
 
     def remove(self, overlay: Overlay) -> None:
-        """Take an overlay away and close it; does nothing when it is not there."""
+        """Remove and close an overlay; do nothing if it is not there."""
         for entry in self._entries:
             if entry.overlay is overlay:
                 self._entries.remove(entry)
@@ -157,7 +157,7 @@ class Stack(QtCore.QObject):
         self._move_to_end(overlay, 0, min)
 
     def put_in_order(self, overlays: Sequence[Overlay]) -> None:
-        """Have overlays of equal `z` lie above each other as they are given, the lowest first.
+        """Stack overlays of equal `z` in the given order, the lowest first.
 
         Args:
             overlays: Some of those that there are; the others keep their places.
@@ -187,7 +187,7 @@ class Stack(QtCore.QObject):
         return sum(entry.layer.covered for entry in self._entries if entry.shown)
 
     def close(self) -> None:
-        """Take every overlay away."""
+        """Remove every overlay."""
         for overlay in list(self):
             self.remove(overlay)
         if QtCore.QThread.currentThread().loopLevel() == 0:
@@ -228,7 +228,7 @@ def _close(overlay: Overlay) -> None:
 
 
 def _no_overlay(given: object) -> str:
-    """Return why something cannot be shown, and what can."""
+    """Return the error for something that is no overlay."""
     if isinstance(given, Overlay):
         kind = type(given).__name__
         return f"overlay {kind}: its __init__ must call super().__init__(), which gives it a name"

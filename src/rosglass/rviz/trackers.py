@@ -192,7 +192,7 @@ class Tracker(QtCore.QObject):
         return bool(self._frame)
 
     def update(self) -> None:
-        """Find out where it is seen now."""
+        """Update its position and status."""
         at, problem = _NAN, ""
         stale = bool(self._frame)
         try:
@@ -234,7 +234,7 @@ class Tracker(QtCore.QObject):
             self.update()
 
     def use_frame(self, frame: str) -> None:
-        """Have the point mean another frame's; empty for the fixed frame.
+        """Set the frame that the point moves with; empty for the fixed frame.
 
         Raises:
             Error: It is no name.
@@ -274,7 +274,7 @@ class Tracker(QtCore.QObject):
 
 
 class Trackers:
-    """All trackers of an RViz, brought up to date before each of its frames.
+    """All trackers of an RViz, updated before each of its frames.
 
     Args:
         window: RViz.
@@ -310,7 +310,7 @@ class Trackers:
         return made
 
     def remove(self, tracker: Tracker) -> None:
-        """Follow it no longer; does nothing when it is not followed."""
+        """Remove a tracker; do nothing if it is not there."""
         if tracker in self._trackers:
             self._trackers.remove(tracker)
 

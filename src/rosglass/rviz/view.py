@@ -198,7 +198,7 @@ class ViewSettings:
         return self.properties.save()
 
     def load(self, saved: dict[str, Any]) -> None:
-        """Take what a file has; what it does not have is as a program has set it, or as at first.
+        """Restore values from a file; others are what a program has set, or the defaults.
 
         Args:
             saved: Values by name, which may be text; one that does not fit is logged.
@@ -265,7 +265,7 @@ class CurrentView(QtCore.QObject):
 
     @property
     def state(self) -> tuple[Any, ...]:
-        """What its properties say: class, target frame, and whatever moves the camera.
+        """The values of its properties: class, target frame, and whatever moves the camera.
 
         Of :data:`ORBIT`, the focus follows, of :data:`FLAT` its x and y.
         """
@@ -286,7 +286,7 @@ class CurrentView(QtCore.QObject):
         return Orbit(Point(x, y, z), distance, sign * yaw, sign * pitch)
 
     def write(self, where: Orbit, kind: str) -> None:
-        """Show something.
+        """Move the view.
 
         Args:
             where: What.
@@ -783,7 +783,7 @@ class View(QtCore.QObject):
 
 
 def _is_shifted(before: tuple[Any, ...], now: tuple[Any, ...]) -> bool:
-    """Return whether what is looked at is elsewhere, by the states of the same view."""
+    """Return whether the focus has moved between two states of one view."""
     axes = 2 if now[0] == FLAT else 3
     return before[2 : 2 + axes] != now[2 : 2 + axes]
 
@@ -813,12 +813,12 @@ class Views(QtCore.QObject):
 
     @property
     def kinds(self) -> list[str]:
-        """Ids of the kinds that there are, e.g. ``rviz/Orbit``."""
+        """Ids of the available types, e.g. ``rviz/Orbit``."""
         return list(declared(VIEW))
 
     @property
     def kind(self) -> str:
-        """Id of the kind that is shown."""
+        """Id of the type that is shown."""
         return str(self._manager.getCurrent().getClassId())
 
     @kind.setter

@@ -172,7 +172,7 @@ class ViewServices(QtCore.QObject):
         node_name: Full name of RViz's own node, which ``~`` stands for.
     """
 
-    #: Why they are not there; empty when they are, or nothing has to be.
+    #: Why topics and services are missing; empty if they are not.
     problem_changed = Signal(str)
     #: All that is wanted is there now.
     opened = Signal()
@@ -205,21 +205,21 @@ class ViewServices(QtCore.QObject):
 
     @property
     def namespace(self) -> str:
-        """Where topics and services are, as an absolute name; empty where that is no valid one."""
+        """The absolute namespace of topics and services; empty if the setting is not valid."""
         return self._wanted.namespace
 
     @property
     def problem(self) -> str:
-        """Why they are not there; empty when they are, or nothing has to be."""
+        """Why topics and services are missing; empty if they are not."""
         return self._problem
 
     @property
     def is_open(self) -> bool:
-        """Whether there is anything now."""
+        """Whether there are topics or services."""
         return bool(self._handles)
 
     def close(self) -> None:
-        """Withdraw them; safe to call twice."""
+        """Close topics and services; safe to call twice."""
         if not self._closed:
             self._closed = True
             self._close_handles()
@@ -368,7 +368,7 @@ class ViewServices(QtCore.QObject):
 
 
 class _Wanted(NamedTuple):
-    """What is to be there, and where; what is wrong with that."""
+    """The topics and services that the settings ask for."""
 
     topics: bool
     services: bool
@@ -377,7 +377,7 @@ class _Wanted(NamedTuple):
 
 
 class _Made:
-    """What the worker has made."""
+    """The publishers and servers that the worker has made."""
 
     def __init__(self) -> None:
         self.handles: list[Handle] = []
@@ -385,7 +385,7 @@ class _Made:
 
 
 def _raising_service_errors(answer: Callable[[Message], None]) -> Callable[[Message], None]:
-    """Have what a callback cannot do be an answer, not a fault of ours."""
+    """Turn an Error of a callback into a failed response."""
 
     def call(request: Message) -> None:
         try:
@@ -413,7 +413,7 @@ _OK, _WARN = 0, 1
 
 @cache
 def _class() -> Any:
-    """Return our kind of RViz's display: one that cannot be switched off."""
+    """Return our class of RViz's display, one that cannot be switched off."""
     base, core = display_class(), pyqt()
 
     class Display(base):  # type: ignore[misc,valid-type]
@@ -461,17 +461,17 @@ class _Entry:
             config.mapSetValue(name, value)
 
     def load(self, config: Any) -> None:
-        """Take what a ``.rviz`` file has."""
+        """Restore the settings from RViz's ``Config``."""
         self._settings.load(plain_config(config))
 
     def close(self) -> None:
-        """Follow the settings no longer."""
+        """Stop following the settings."""
         for tree in self._trees:
             tree.close()
 
 
 class ViewEntry(QtCore.QObject):
-    """Shows the settings of the camera in the panel: by the menu Overlays, or as a file has it.
+    """The view controller's entry in the panel, added by the menu Overlays or by a config file.
 
     A file that has no entry, and removing it, leave the settings as a program has made them, or as
     at first.
@@ -567,7 +567,7 @@ class ViewEntry(QtCore.QObject):
 
     @Slot()
     def _reset_without_entry(self) -> None:
-        """Have the settings be as without an entry if there is none, once a file is loaded."""
+        """Reset the settings if there is no entry once a file is loaded."""
         if self._loading and not self._loaded:
             return
         self._loading = self._loaded = False

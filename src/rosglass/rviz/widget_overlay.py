@@ -36,7 +36,7 @@ _MOST_RECTS = 12
 
 
 class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
-    """A view of a scene that is seen nowhere, though Qt takes it for visible.
+    """A view of a scene that is not on the screen, though Qt takes it for visible.
 
     Only a visible view learns which part of an item has changed: the scene's own signal names the
     whole item, here the widget that fills everything.
@@ -72,7 +72,7 @@ class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
         self.setRenderHint(QtGui.QPainter.Antialiasing)
 
     def fit(self, width: int, height: int, ratio: float) -> None:
-        """Set the size; all of it is painted next time.
+        """Set the size, and mark all of it as changed.
 
         Args:
             width: Pixels.
@@ -87,7 +87,7 @@ class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
         self._stale = QtGui.QRegion(self.viewport().rect())
 
     def paintEvent(self, event: Any) -> None:  # noqa: N802 - Qt's
-        """Take note of what Qt would have painted now, unless it is painted."""
+        """Record the region that Qt asks to be painted."""
         if self._painting:
             super().paintEvent(event)
         else:
@@ -149,7 +149,7 @@ class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
 
 @lru_cache(maxsize=1)
 def _scratch(shape: tuple[int, int], ratio: float) -> Any:
-    """Return the picture of a size that all canvases paint into before they take what they need."""
+    """Return the image of a size that all canvases paint into first."""
     picture = QtGui.QImage(shape[1], shape[0], QtGui.QImage.Format_ARGB32_Premultiplied)
     picture.setDevicePixelRatio(ratio)
     return picture
@@ -163,7 +163,7 @@ _DEBOUNCE = 80
 
 
 def read_style_sheet(source: str) -> tuple[str, Path | None]:
-    """Return a style sheet, and the file that it was read from; None where it is written out.
+    """Return a style sheet and its file; None where it is the text itself.
 
     Args:
         source: Path of a ``.qss`` file, ``package://package/file.qss``, or the style sheet itself.
@@ -198,7 +198,7 @@ def _absolute(match: re.Match[str], folder: Path) -> str:
 
 
 def _check(text: str, what: str) -> None:
-    """Find what Qt would only print."""
+    """Raise errors for what Qt would only print."""
     bare = re.sub(r"/\*.*?\*/", lambda m: "\n" * m[0].count("\n"), text, flags=re.DOTALL)
     depth = 0
     for number, line in enumerate(bare.split("\n"), 1):
@@ -236,7 +236,7 @@ class StyleSheet(QtCore.QObject):  # type: ignore[misc]
         self._pause.timeout.connect(self._read)
 
     def use(self, source: str, *, watch: bool = False, strict: bool = False) -> None:
-        """Use another one.
+        """Use another style sheet.
 
         Args:
             source: See :func:`read_style_sheet`.
@@ -278,7 +278,7 @@ class StyleSheet(QtCore.QObject):  # type: ignore[misc]
             watcher.deleteLater()
 
     def close(self) -> None:
-        """Watch nothing any longer."""
+        """Stop watching the file."""
         self._pause.stop()
         self._stop_watching()
 
@@ -464,7 +464,7 @@ class WidgetOverlay(Overlay):
             self._focus_before = self._focus_widget() or self._focus_before
 
     def _align_with_focus(self, receiver: Any) -> None:
-        """Have what a widget opens by a key, e.g. a menu, stand beside it."""
+        """Place what a widget opens by a key, e.g. a menu, beside it."""
         if receiver is not None and is_alive(self._panel):
             shown = receiver.window().graphicsProxyWidget()
             middle = receiver.mapTo(receiver.window(), receiver.rect().center())
@@ -488,7 +488,7 @@ class WidgetOverlay(Overlay):
         QtCore.QCoreApplication.sendEvent(viewport, QtCore.QEvent(_E.Leave))
 
     def set_focus(self, focus: bool) -> None:
-        """Give keys to the widget that had them last, or take them away."""
+        """Give the focus to the widget that had it last, or take it away."""
         self._focused = focus
         if is_alive(self._scene):
             event = QtGui.QFocusEvent(_E.FocusIn if focus else _E.FocusOut)
@@ -509,7 +509,7 @@ class WidgetOverlay(Overlay):
         return [w for w in embedded if w.graphicsProxyWidget().scene() is self._scene]
 
     def _update_popups(self, *_: Any) -> None:
-        """Keep them inside the 3D view; give the keys back to who had them when none is open."""
+        """Keep popups inside the 3D view, and restore the focus when the last one closes."""
         popups = self._popups()
         opened, self._opened = self._opened, bool(popups)
         if popups:
@@ -569,14 +569,14 @@ class _HiddenView(QtWidgets.QGraphicsView):  # type: ignore[misc]
         self.viewport().setMouseTracking(True)
 
     def fit(self, units: Any) -> None:
-        """Take the size of the scene, and so its coordinates."""
+        """Take the size of the scene."""
         size = units.size().toSize()
         self.resize(size)
         # Qt does not lay out what is hidden.
         self.viewport().resize(size)
 
     def send(self, event: Any) -> bool:
-        """Return whether something in the scene takes an event."""
+        """Send an event to the scene; return whether it is accepted."""
         event.setAccepted(False)
         if event.type() in DRAG or event.type() == _E.DragLeave:
             # The application would give it to what is dragged over, which this is not.
@@ -586,7 +586,7 @@ class _HiddenView(QtWidgets.QGraphicsView):  # type: ignore[misc]
         return bool(event.isAccepted())
 
     def align_with_screen(self, event: Any, at: Any) -> None:
-        """Stand where an event on the screen is at a place of the view: Qt asks the screen."""
+        """Move the view so that the event's screen position matches its position in the view."""
         kind = event.type()
         if kind in MOUSE:
             seen = event.screenPos().toPoint()
@@ -647,7 +647,7 @@ def _as_widget(item: Any) -> Any:
 
 
 def _focus_clicked(widget: Any) -> None:
-    """Give the keys to a widget that takes them when it is clicked on.
+    """Focus a widget that accepts focus by a click.
 
     Qt does so itself only for events that come from the window system.
     """
@@ -659,7 +659,7 @@ def _focus_clicked(widget: Any) -> None:
 
 
 def _has(widget: Any, quality: Callable[[Any], bool]) -> bool:
-    """Return whether a widget or one that it is part of has a quality."""
+    """Return whether a predicate holds for a widget or one of its parents."""
     while widget is not None:
         if quality(widget):
             return True

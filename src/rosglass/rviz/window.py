@@ -54,12 +54,12 @@ class BareView(QtCore.QObject):
 
     @property
     def action(self) -> Any:
-        """What a menu shows for it."""
+        """The menu action."""
         return self._action
 
     @property
     def on(self) -> bool:
-        """Whether there is nothing but the 3D view."""
+        """Whether only the 3D view is shown."""
         return self._on
 
     @on.setter
@@ -67,13 +67,13 @@ class BareView(QtCore.QObject):
         self._action.setChecked(on)
 
     def warn(self, warning: bool) -> None:
-        """Show the status bar, or no longer, whatever else is hidden."""
+        """Show or hide the status bar, whatever else is hidden."""
         self._warning = warning
         hidden = self._on or self._window.isFullScreen()
         self._window.statusBar().setVisible(warning or not hidden)
 
     def hide_again(self) -> None:
-        """Hide what RViz has brought back, now and once it is done with what it does."""
+        """Hide what RViz has shown again, now and after the current event."""
         self._hide()
         QtCore.QTimer.singleShot(0, self._hide)
 
@@ -286,7 +286,7 @@ class Window(QtCore.QObject):
         return found
 
     def close(self) -> None:
-        """Take the window down, without asking for unsaved changes; safe to call twice."""
+        """Hide the window, without asking about unsaved changes; safe to call twice."""
         self._emit_closing()
         self.widget.hide()
 
@@ -312,7 +312,7 @@ class Window(QtCore.QObject):
         self.fullscreen_changed.emit(fullscreen)
 
     def _fill_screen(self) -> None:
-        """Take the size of the screen where no window manager runs that would give it."""
+        """Take the size of the screen, where no window manager does."""
         place = self.widget.windowHandle().screen().geometry()
         if self.fullscreen and self.widget.size() != place.size():
             self._filled = True
@@ -338,7 +338,7 @@ class Window(QtCore.QObject):
 
 @contextlib.contextmanager
 def _with_stand_in_package() -> Iterator[None]:
-    """Keep RViz from complaining that it does not find a package which it can do without."""
+    """Provide a stand-in for a package that RViz looks for and does not need."""
     before = os.environ.get(_PATHS)
     stand_in = str(Path(__file__).with_name("media_export"))
     os.environ[_PATHS] = os.pathsep.join(filter(None, [before, stand_in]))
@@ -356,7 +356,7 @@ def _plain(title: str) -> str:
 
 
 class _CloseWatch(QtCore.QObject):
-    """Calls back when a window was closed, and not when the user has cancelled that.
+    """Calls back when a window was closed, unless the user has cancelled that.
 
     Args:
         bare: What is hidden must be seen when RViz saves its config.
@@ -368,7 +368,7 @@ class _CloseWatch(QtCore.QObject):
         self._bare, self._closed, self._asking = bare, closed, False
 
     def eventFilter(self, watched: QtCore.QObject, event: QtCore.QEvent) -> bool:  # noqa: N802
-        """See Qt; RViz decides, and may ask the user, while the event is sent once more."""
+        """Send the close event once more: RViz decides, and may ask the user."""
         if event.type() != QtCore.QEvent.Type.Close or self._asking:
             return False
         self._asking = True
