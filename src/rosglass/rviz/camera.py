@@ -52,9 +52,6 @@ class Camera:
 
     Used in the GUI thread. RViz moves its camera between ``before_frame`` and drawing, so that what
     is read there is one frame old.
-
-    Args:
-        window: RViz.
     """
 
     def __init__(self, window: Window) -> None:
@@ -143,11 +140,7 @@ def _point(point: Sequence[float]) -> NDArray[np.float64]:
 
 
 class Picker:
-    """Picks points and takes pictures, by drawing the 3D view once more; takes some milliseconds.
-
-    Args:
-        window: RViz.
-    """
+    """Picks points and takes pictures by drawing the 3D view once more; takes milliseconds."""
 
     def __init__(self, window: Window) -> None:
         self._window = window

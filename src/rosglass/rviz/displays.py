@@ -177,9 +177,6 @@ class Displays(Watched):
 
     What changes of one is its name, its status, or whether it is shown; one that is dragged to
     another group is another one then.
-
-    Args:
-        window: RViz.
     """
 
     #: RViz's own status has changed, e.g. to an unknown fixed frame.

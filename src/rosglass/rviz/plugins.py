@@ -99,9 +99,6 @@ class Watched(QtCore.QObject):
     A base class: :meth:`_sync_items` brings :attr:`_items` up to date, and :meth:`_sync_rest` says
     what else has changed. Signals are emitted once RViz has finished what it was doing, so that
     slots may add and remove items.
-
-    Args:
-        window: RViz.
     """
 
     #: One came: itself.

@@ -277,7 +277,7 @@ class QmlView(Face):
         self._last_seen = self._seen()
         self.model.mode_changed.connect(self.modeChanged)
         self.model.tracked_frame_changed.connect(self.trackedFrameChanged)
-        self.model.problem_changed.connect(self._on_problem)
+        self.model.problem_changed.connect(self.problemChanged)
         self.views.kind_changed.connect(self.typeChanged)
         self.views.saved_changed.connect(self.savedViewsChanged)
         settings = self.model.settings
@@ -361,11 +361,6 @@ class QmlView(Face):
     saveView = passing("saveView", 0, "views.save", name=anything)
     showView = passing("showView", 0, "views.show", name=anything)
     removeView = passing("removeView", 0, "views.remove", name=anything)
-
-    @Slot(str)
-    def _on_problem(self, problem: str) -> None:
-        del problem
-        self.problemChanged.emit()
 
     def _seen(self) -> tuple[Point, Point]:
         seen = self.model.seen

@@ -67,11 +67,7 @@ def _trim() -> Callable[[int], Any] | None:
 
 
 class Stack(QtCore.QObject):
-    """Draws the overlays of one RViz, right before each of its frames.
-
-    Args:
-        window: RViz.
-    """
+    """Draws the overlays of one RViz, right before each of its frames."""
 
     #: Overlays came, went, or changed places.
     changed = Signal()

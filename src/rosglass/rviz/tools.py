@@ -104,11 +104,7 @@ class Tool:
 
 
 class Tools(Watched):
-    """The tools of an RViz; what changes of one is its name or its description.
-
-    Args:
-        window: RViz.
-    """
+    """The tools of an RViz; what changes of one is its name or its description."""
 
     #: Another tool has the mouse.
     selected = Signal()

@@ -237,11 +237,7 @@ _FIELD_OF_VIEW = math.pi / 4
 
 
 class CurrentView(QtCore.QObject):
-    """The view that RViz shows, whichever it is, as an `Orbit`.
-
-    Args:
-        window: RViz.
-    """
+    """The view that RViz shows, whichever it is, as an `Orbit`."""
 
     #: Another view is the current one; whether by :meth:`write`.
     changed = Signal(bool)
@@ -792,11 +788,7 @@ _LONGEST = 1000
 
 
 class Views(QtCore.QObject):
-    """The views of an RViz.
-
-    Args:
-        window: RViz.
-    """
+    """The views of an RViz."""
 
     #: Another kind of view is shown.
     kind_changed = Signal()
