@@ -1,10 +1,15 @@
-"""``rosglass topic``: look at topics, listen to them, publish on them."""
+"""``rosglass topic``: list, print, measure and publish topics."""
 
 from __future__ import annotations
 
 import argparse
+import math
+import statistics
+import threading
 import time
-from typing import TYPE_CHECKING
+from collections import deque
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.cli.completion import complete
 from rosglass.cli.connecting import (
@@ -21,20 +26,229 @@ from rosglass.cli.connecting import (
     wait,
 )
 from rosglass.cli.endpoints import describe, problems, short, sources
-from rosglass.cli.output import Style, add_output_options, note, print_json, template
+from rosglass.cli.output import (
+    SHOWN,
+    SHOWN_JSON,
+    Style,
+    add_output_options,
+    fields,
+    note,
+    print_json,
+    template,
+    to_json,
+    to_yaml,
+)
 from rosglass.cli.subcommands import Subcommands
-from rosglass.cli.topic_echo import echo
-from rosglass.cli.topic_rates import measure
 from rosglass.cli.values import parse_fields, profile, split_type
+from rosglass.cli.waiting import Reasons
 from rosglass.cli.worlds import as_ros1, is_hidden, spelled
 from rosglass.comm.names import similar
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
-    from rosglass.comm import Node
+    from rosglass.comm import Node, Sample
 
-__all__ = ["configure", "run"]
+__all__ = ["configure", "echo", "measure", "run"]
+
+
+def echo(args: argparse.Namespace) -> int:
+    """Print messages until Ctrl-C, or as many as were asked for."""
+    style = Style(args)
+    # What reads a table would take what is cut for another value, or for fewer columns.
+    limit = args.truncate or (None if args.csv else SHOWN_JSON if args.json else SHOWN)
+    received = 0
+    with connect(args, patient=True) as node:
+        subscription = node.create_subscription(args.topic, args.type, qos=profile(args))
+        get = _getter(args.field)
+        end = End()
+        due = time.monotonic() + (math.inf if args.timeout is None else args.timeout)
+        with Reasons(node, subscription, args) as reasons:
+            while not end.is_set() and (args.count is None or received < args.count):
+                sample = subscription.wait(0.2)
+                if sample is None:
+                    late = time.monotonic() > due
+                    reasons.report(last=late)
+                    if late:
+                        break
+                    continue
+                received += 1
+                reasons.on_count(received)
+                due = time.monotonic() + (math.inf if args.timeout is None else args.timeout)
+                if args.stamps and not args.json:
+                    print(style(f"# received {sample.received.seconds:.6f}", "dim"))
+                print(_text(args, sample, get, None if args.full else limit), flush=True)
+        dropped = subscription.statistics().dropped
+    if dropped:
+        note(f"{dropped} messages came faster than they could be printed, and were left out")
+    if end.is_set():
+        return end.code
+    return 0 if args.count is None or received == args.count else 1
+
+
+def _getter(path: str | None) -> Callable[[Sample], Any]:
+    if path is None:
+        return lambda sample: sample.message()
+
+    def get(sample: Sample) -> Any:
+        return sample.message()[path]
+
+    return get
+
+
+def _text(
+    args: argparse.Namespace, sample: Sample, get: Callable[[Sample], Any], limit: int | None
+) -> str:
+    from rosglass.messages import OpaqueType
+
+    if args.raw or isinstance(sample.type, OpaqueType):
+        data = bytes(sample.data)
+        shown = data if limit is None else data[: 16 * limit]
+        more = "" if len(shown) == len(data) else f" ... {len(data)} bytes in all"
+        if args.json:
+            return to_json({"bytes": data.hex(), "received": sample.received.seconds})
+        return f"{shown.hex(' ', 4)}{more}\n---"
+    found = fields(get(sample), limit)
+    if args.json:
+        return to_json(found)
+    if args.csv:
+        return ",".join(_cells(found))
+    text = to_yaml(found)
+    return text.rstrip("\n") + ("" if args.field and text.count("\n") < 2 else "\n---")
+
+
+def _cells(value: Any) -> Iterator[str]:
+    """Yield what a line of comma-separated values has for a value, in the order of the fields."""
+    if isinstance(value, (dict, list)):
+        for inner in value.values() if isinstance(value, dict) else value:
+            yield from _cells(inner)
+        return
+    text = str(value)
+    if set(text) & set(',"\n\r'):
+        text = '"' + text.replace('"', '""') + '"'
+    yield text
+
+
+class _Seen(NamedTuple):
+    received: int
+    size: int
+    delay: float | None
+
+
+def measure(args: argparse.Namespace) -> int:
+    """Print a figure each second, until Ctrl-C or the end of the duration."""
+    from rosglass.comm import IMMEDIATE
+
+    seen: deque[_Seen] = deque(maxlen=args.window)
+    lock = threading.Lock()
+    wants_stamp = args.what == "delay"
+    failure: list[str] = []
+
+    def receive(sample: Sample) -> None:
+        delay = _delay(sample, failure) if wants_stamp else None
+        with lock:
+            seen.append(_Seen(sample.received_ns, len(sample.data), delay))
+
+    with connect(args, patient=True) as node:
+        subscription = node.create_subscription(
+            args.topic, args.type, qos=profile(args), raw_callback=receive, executor=IMMEDIATE
+        )
+        end = End()
+        until = None if args.duration is None else time.monotonic() + args.duration
+        shown = -1
+        with Reasons(node, subscription, args) as reasons:
+            while not end.is_set() and not failure:
+                left = 1.0 if until is None else until - time.monotonic()
+                if left <= 0:
+                    break
+                end.wait(min(1.0, left))
+                with lock:
+                    samples = [s for s in seen if s.delay is not None or not wants_stamp]
+                total = subscription.statistics().received
+                reasons.on_count(total)
+                if total != shown and len(samples) > 1:
+                    shown = total
+                    result = _FIGURES[args.what](samples)
+                    print(to_json(result) if args.json else result.pop("text"), flush=True)
+                elif reasons.report() and total:
+                    # Start over after an interruption.
+                    with lock:
+                        seen.clear()
+            if shown < 0 and not failure and not end.is_set():
+                reasons.report(last=True)
+    for reason in failure[:1]:
+        note(f"{args.topic}: {reason}")
+    if end.is_set():
+        return end.code
+    return 0 if shown > 0 and not failure else 1
+
+
+def _delay(sample: Sample, failure: list[str]) -> float | None:
+    from rosglass.errors import Error
+
+    try:
+        stamp = sample.message()["header.stamp"]
+        words = ("secs", "nsecs") if sample.wire == "ros1" else ("sec", "nanosec")
+        sent = stamp[words[0]] * 10**9 + stamp[words[1]]
+        return float(sample.received_ns - sent) / 1e9
+    except (Error, AttributeError) as error:
+        failure.append(f"its messages have no header.stamp: {error}")
+        return None
+
+
+def _show_rate(samples: list[_Seen]) -> dict[str, Any]:
+    gaps = [(b.received - a.received) / 1e9 for a, b in pairwise(samples)]
+    mean = statistics.fmean(gaps)
+    rate = 1 / mean if mean > 0 else 0.0
+    found = {
+        "rate": rate, "min": min(gaps), "max": max(gaps), "std_dev": statistics.pstdev(gaps),
+        "window": len(samples),
+    }  # fmt: skip
+    text = (
+        f"{rate:.2f} Hz  gap min {found['min'] * 1e3:.1f} ms, max {found['max'] * 1e3:.1f} ms, "
+        f"std dev {found['std_dev'] * 1e3:.2f} ms, window {len(samples)}"
+    )
+    return found | {"text": text}
+
+
+def _show_bandwidth(samples: list[_Seen]) -> dict[str, Any]:
+    span = (samples[-1].received - samples[0].received) / 1e9
+    sizes = [sample.size for sample in samples]
+    rate = sum(sizes[1:]) / span if span > 0 else 0.0
+    found = {
+        "bytes_per_second": rate, "mean": statistics.fmean(sizes), "min": min(sizes),
+        "max": max(sizes), "window": len(samples),
+    }  # fmt: skip
+    text = (
+        f"{_amount(rate)}/s  message mean {_amount(found['mean'])}, min {_amount(min(sizes))}, "
+        f"max {_amount(max(sizes))}, window {len(samples)}"
+    )
+    return found | {"text": text}
+
+
+def _show_delay(samples: list[_Seen]) -> dict[str, Any]:
+    delays = [sample.delay or 0.0 for sample in samples]
+    found = {
+        "mean": statistics.fmean(delays), "min": min(delays), "max": max(delays),
+        "std_dev": statistics.pstdev(delays), "window": len(delays),
+    }  # fmt: skip
+    text = (
+        f"{found['mean'] * 1e3:.2f} ms  min {found['min'] * 1e3:.2f} ms, max "
+        f"{found['max'] * 1e3:.2f} ms, std dev {found['std_dev'] * 1e3:.2f} ms, "
+        f"window {len(delays)}"
+    )
+    return found | {"text": text}
+
+
+def _amount(size: float) -> str:
+    for unit, factor in (("MB", 1e6), ("kB", 1e3)):
+        if size >= factor:
+            return f"{size / factor:.2f} {unit}"
+    return f"{size:.0f} B"
+
+
+_FIGURES = {"hz": _show_rate, "bw": _show_bandwidth, "delay": _show_delay}
+
 
 #: Shown for an unknown type.
 _UNKNOWN = "unknown"

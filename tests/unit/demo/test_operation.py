@@ -9,8 +9,17 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from rosglass.demo import operation as module
-from rosglass.demo.goal import ABORTED, ACTIVE, PREEMPTED, REJECTED, SUCCEEDED
-from rosglass.demo.operation import BEHAVIOURS, MODES, WAYPOINTS, Operation
+from rosglass.demo.operation import (
+    ABORTED,
+    ACTIVE,
+    BEHAVIOURS,
+    MODES,
+    PREEMPTED,
+    REJECTED,
+    SUCCEEDED,
+    WAYPOINTS,
+    Operation,
+)
 from rosglass.demo.simulation import RobotState, Simulation
 from rosglass.errors import Error
 
