@@ -30,7 +30,7 @@ __all__ = ["Display", "Displays", "Status", "status_of"]
 
 #: Milliseconds between checks of what RViz has no signal for.
 _PERIOD_MS = 200
-_LONGEST = 1000
+_MAX_NAME_LENGTH = 1000
 _SIGNALS = ("displayAdded(rviz::Display*)", "displayRemoved(rviz::Display*)")
 
 
@@ -343,6 +343,11 @@ def _walk(group: Any) -> Iterator[tuple[Any, bool]]:
 
 
 def _plain_name(name: object) -> str:
-    if isinstance(name, str) and name.strip() and len(name) <= _LONGEST and name.isprintable():
+    if (
+        isinstance(name, str)
+        and name.strip()
+        and len(name) <= _MAX_NAME_LENGTH
+        and name.isprintable()
+    ):
         return name
     raise Error(f"expected a name, a text of one line, got {shown(name)}")

@@ -177,7 +177,7 @@ _NONE = QtCore.Qt.NoButton
 #: Events after which RViz's window may miss the release of buttons and fingers.
 _LOSING = frozenset({_E.WindowDeactivate, _E.WindowBlocked, _E.Hide})
 #: Milliseconds after which it is noticed that the mouse went away without a word.
-_LOOK_AROUND = 100
+_HOVER_CHECK_MS = 100
 
 
 class Owner(enum.Enum):
@@ -232,7 +232,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         window.widget.installEventFilter(self)
         stack.changed.connect(self._overlays_changed)
         self._look_around = QtCore.QTimer()
-        self._look_around.setInterval(_LOOK_AROUND)
+        self._look_around.setInterval(_HOVER_CHECK_MS)
         self._look_around.timeout.connect(self._update_hover)
 
     @property

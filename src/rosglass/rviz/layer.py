@@ -31,7 +31,7 @@ _numbers = itertools.count()
 _WINDOWS = ("OgreWindow(0)", "OgreWindow(1)")
 _GROUP = "General"
 #: Pixels that are blended in the time that a panel takes to be drawn.
-_PANEL = 2000
+_PANEL_COST_PIXELS = 2000
 #: Tiles that panels may cover without need before they are placed anew.
 _SLACK = 128
 #: Shows a texture as it is. OpenGL's own way adds a second colour, for Ogre asks for that always.
@@ -198,7 +198,7 @@ class Layer:
         """Place panels where the picture is not empty; keep those that fit well enough."""
         waste = uncovered(self._covered, self._rects)
         if waste is None or waste - self._waste > _SLACK:
-            changed = self._rects = cover(self._covered, width, height, worth=_PANEL)
+            changed = self._rects = cover(self._covered, width, height, worth=_PANEL_COST_PIXELS)
             self._waste = uncovered(self._covered, self._rects) or 0
             self._make_panels()
         for number, rect in enumerate(self._rects):

@@ -27,7 +27,7 @@ DISPLAY, TOOL, VIEW = "rviz::Display", "rviz::Tool", "rviz::ViewController"
 _EXAMPLES = {DISPLAY: "rviz/Grid", TOOL: "rviz/Measure", VIEW: "rviz/Orbit"}
 #: Where Debian has its packages, which rospack finds without any variable.
 _SYSTEM = "/usr/share"
-_LONGEST = 200
+_MAX_ID_LENGTH = 200
 
 
 class Plugin(NamedTuple):
@@ -62,7 +62,7 @@ def require_class_id(class_id: object, base: str) -> str:
     Raises:
         Error: It is no text of the form ``package/Class``.
     """
-    if isinstance(class_id, str) and len(class_id) <= _LONGEST:
+    if isinstance(class_id, str) and len(class_id) <= _MAX_ID_LENGTH:
         package, slash, name = class_id.partition("/")
         if slash and all(p.replace("_", "").isalnum() and p.isascii() for p in (package, name)):
             return class_id

@@ -40,7 +40,7 @@ __all__ = [
 ]
 
 
-_LONGEST = 10_000
+_MAX_TEXT_LENGTH = 10_000
 _INT32 = (-(2**31), 2**31 - 1)
 #: What RViz keeps as text with its parts between semicolons, and the names of the parts.
 _PARTS = {"rviz::VectorProperty": "xyz", "rviz::QuaternionProperty": "xyzw"}
@@ -205,7 +205,7 @@ def _convert(item: Any, kind: str, value: Any, name: str) -> tuple[Any, Any]:
     choices = _choices(item) if kind == "rviz::EnumProperty" else []
     if choices and value not in choices:
         raise Error(f"{name}: expected one of {', '.join(choices)}, got {shown(value)}")
-    if not isinstance(value, str) or len(value) > _LONGEST or not value.isprintable():
+    if not isinstance(value, str) or len(value) > _MAX_TEXT_LENGTH or not value.isprintable():
         raise Error(f"{name}: expected a text of one line, got {shown(value)}")
     return value, value
 

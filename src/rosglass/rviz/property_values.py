@@ -437,7 +437,7 @@ _WORDS: dict[str, Any] = {
     "[]": [],
 }
 _WANTED = "null, true, false, a number, a text, a list or a map of these"
-_DEEPEST = 50
+_MAX_DEPTH = 50
 #: What YAML has no way to write, or what would not come back as it was.
 _UNWRITABLE = re.compile(r"[\0-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff\ufeff\u2028\u2029]")
 
@@ -452,8 +452,8 @@ def writable(value: Any, path: str) -> Any:
 
 
 def _writable(value: Any, path: str, depth: int) -> Any:
-    if depth > _DEEPEST:
-        raise ConversionError(path[:60], "more", f"values nested at most {_DEEPEST} deep")
+    if depth > _MAX_DEPTH:
+        raise ConversionError(path[:60], "more", f"values nested at most {_MAX_DEPTH} deep")
     if isinstance(value, dict):
         for key in value:
             if not isinstance(key, str) or _UNWRITABLE.search(key):

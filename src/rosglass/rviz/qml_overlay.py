@@ -168,7 +168,7 @@ _FOR_SCENE = PRESS | TOUCH | DRAG | KEYS | _INPUT_METHOD
 _FOR_SCENE |= {_E.MouseMove, _E.MouseButtonRelease, _E.Wheel, _E.DragLeave}
 _TOUCH_ENDS = frozenset({_E.TouchEnd, _E.TouchCancel})
 #: Seconds for which the list of items that take note of the mouse is kept.
-_KEPT = 0.25
+_ITEMS_MAX_AGE_S = 0.25
 
 
 class QmlInput:
@@ -284,7 +284,7 @@ class QmlInput:
 
     def _is_hovered(self, at: Any) -> bool:
         now = time.monotonic()
-        if now - self._listed > _KEPT:
+        if now - self._listed > _ITEMS_MAX_AGE_S:
             self._listed = now
             self._hoverable = [s for s in _shown(self._window) if s.item.acceptHoverEvents()]
         return any(shown.has(at) for shown in self._hoverable)
@@ -412,7 +412,7 @@ _IMPORTS = Path(__file__).with_name("imports")
 #: In `Session.shared`: the overlays that talk through it.
 _USERS = "overlays"
 #: Milliseconds after a drawing until what has come since is looked at.
-_LOOK = 1000
+_IDLE_DELAY_MS = 1000
 
 
 class QmlOverlay(QmlInput, Overlay):
@@ -467,7 +467,7 @@ class QmlOverlay(QmlInput, Overlay):
         self._error = self._not_drawn = ""
         self._look = Qt5Core.QTimer()
         self._look.setSingleShot(True)
-        self._look.setInterval(_LOOK)
+        self._look.setInterval(_IDLE_DELAY_MS)
         self._look.timeout.connect(self._on_idle)
         self._errors = ErrorView(self.engine, PANEL)
         self.arranged.connect(self._fit_errors)

@@ -55,7 +55,7 @@ _ICONS = "rviz_tool_icons"
 #: Pixels of an icon that is asked for without a size, and at most.
 _ICON_SIZE, _MAX_ICON_SIZE = 48, 1024
 #: Metres below which the camera counts as standing still.
-_STILL = 1e-4
+_MIN_MOVE_M = 1e-4
 _FRAME = "the name of a frame, or '' for none"
 
 
@@ -370,7 +370,7 @@ class QmlView(Face):
     def _on_frame(self) -> None:
         now = self._seen()
         for new, old in zip(now, self._last_seen, strict=True):
-            if max(abs(n) for n in new - old) > _STILL:
+            if max(abs(n) for n in new - old) > _MIN_MOVE_M:
                 self._last_seen = now
                 self.moved.emit()
                 return

@@ -22,7 +22,7 @@ __all__ = ["MemoryCleaner", "Stack"]
 
 
 #: Milliseconds after which an overlay that came has been drawn, and one that went is gone.
-_WAIT = 3000
+_CLEAN_DELAY_MS = 3000
 
 
 class MemoryCleaner(QtCore.QObject):
@@ -33,7 +33,7 @@ class MemoryCleaner(QtCore.QObject):
         self._gone = False
         self._timer = QtCore.QTimer(self)
         self._timer.setSingleShot(True)
-        self._timer.setInterval(_WAIT)
+        self._timer.setInterval(_CLEAN_DELAY_MS)
         self._timer.timeout.connect(self._clean)
 
     def overlay_added(self) -> None:

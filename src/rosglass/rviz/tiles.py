@@ -25,7 +25,7 @@ __all__ = [
 #: Pixels of a tile's edge.
 TILE = 8
 #: Rows of pixels that are compared at a time; a multiple of a tile's.
-_LOOK = 64
+_ROWS_AT_A_TIME = 64
 
 
 class Rect(NamedTuple):
@@ -110,11 +110,11 @@ def changed_tiles(
             )
             tiles[rows, columns] |= covered_tiles(pixels[place] ^ before[place])
         return tiles
-    for top in range(0, height, _LOOK):
-        now, then = pixels[top : top + _LOOK], before[top : top + _LOOK]
+    for top in range(0, height, _ROWS_AT_A_TIME):
+        now, then = pixels[top : top + _ROWS_AT_A_TIME], before[top : top + _ROWS_AT_A_TIME]
         # Most of a picture stays as it is, which is found out faster than what is another.
         if (now != then).any():
-            tiles[top // TILE : -(-(top + _LOOK) // TILE)] = covered_tiles(now ^ then)
+            tiles[top // TILE : -(-(top + _ROWS_AT_A_TIME) // TILE)] = covered_tiles(now ^ then)
     return tiles
 
 

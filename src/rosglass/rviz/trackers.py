@@ -30,9 +30,9 @@ __all__ = ["FIXED_FRAME", "Frames", "Tracker", "Trackers"]
 
 
 #: How many frames a message names.
-_NAMED = 8
+_MAX_NAMED_FRAMES = 8
 #: Seconds for which a message holds, and how many are kept.
-_FRESH, _CASES = 1.0, 100
+_EXPLANATION_MAX_AGE_S, _MAX_EXPLANATIONS = 1.0, 100
 #: How RViz's properties name the fixed frame.
 FIXED_FRAME = "<Fixed Frame>"
 
@@ -102,9 +102,9 @@ class Frames(QtCore.QObject):
         """Return :meth:`_explain`'s text of the last second: it is asked for once per frame."""
         case, now = (frame, fixed, str(error)), time.monotonic()
         made, text = self._explained.get(case, (-math.inf, ""))
-        if now - made > _FRESH:
+        if now - made > _EXPLANATION_MAX_AGE_S:
             text = self._explain(frame, fixed, error)
-            if len(self._explained) > _CASES:
+            if len(self._explained) > _MAX_EXPLANATIONS:
                 self._explained.clear()
             self._explained[case] = (now, text)
         return text
@@ -116,7 +116,9 @@ class Frames(QtCore.QObject):
             return f"RViz has no fixed frame, in which {frame!r} could be placed; choose one"
         if not known:
             return f"there is no frame {frame!r}: nothing is received on /tf and /tf_static"
-        there = f"there are {', '.join(known[:_NAMED])}" + (", ..." if known[_NAMED:] else "")
+        there = f"there are {', '.join(known[:_MAX_NAMED_FRAMES])}" + (
+            ", ..." if known[_MAX_NAMED_FRAMES:] else ""
+        )
         if frame not in known:
             return f"there is no frame {frame!r}{similar(frame, known) or f'; {there}'}"
         if fixed not in known:
@@ -143,9 +145,9 @@ class Frames(QtCore.QObject):
 
 
 #: Units and metres below which a change is none.
-_THRESHOLD = 0.01
+_MIN_CHANGE = 0.01
 #: Seconds without a newer transform after which a frame that has moved is stale.
-_OLD = DEFAULT_TIMEOUT_MS / 1000
+_STALE_AFTER_S = DEFAULT_TIMEOUT_MS / 1000
 _NAN = (math.nan, math.nan, math.nan)
 
 
@@ -199,7 +201,7 @@ class Tracker(QtCore.QObject):
             at, stamp = self._owner.locate(self._point, self._frame, self._scale())
             stale = self._is_old(stamp)
             if stale:
-                problem = f"the frame {self._frame!r} was not updated for {_OLD:g} s"
+                problem = f"the frame {self._frame!r} was not updated for {_STALE_AFTER_S:g} s"
         except Error as error:
             problem = str(error)
         before, self._stale = self._stale, stale
@@ -219,7 +221,7 @@ class Tracker(QtCore.QObject):
         now = self._owner.steady()
         if self._newest is None or self._newest[0] != stamp:
             self._newest = stamp, now
-        return now - self._newest[1] > _OLD
+        return now - self._newest[1] > _STALE_AFTER_S
 
     def move(self, point: Sequence[float] | dict[str, float]) -> None:
         """Follow another point, in the same frame.
@@ -363,4 +365,4 @@ class Trackers:
 def _differ(new: Sequence[float], old: Sequence[float]) -> bool:
     if math.isnan(new[0]) or math.isnan(old[0]):
         return math.isnan(new[0]) != math.isnan(old[0])
-    return any(abs(a - b) > _THRESHOLD for a, b in zip(new, old, strict=True))
+    return any(abs(a - b) > _MIN_CHANGE for a, b in zip(new, old, strict=True))

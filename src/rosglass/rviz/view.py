@@ -380,7 +380,7 @@ def _positive(angle: float) -> float:
 _START = Orbit.between(Point(4.0, 0.0, 3.0), Point(0.0, 0.0, 0.0))
 #: Metres from the fixed frame's origin; RViz's numbers have 32 bits, and its renderer crashes
 #: where they are infinite.
-_FARTHEST = 1e8
+_FARTHEST_M = 1e8
 
 
 class ViewMode(enum.IntEnum):
@@ -754,9 +754,9 @@ class View(QtCore.QObject):
         point = Point(x, y, z)
         if frame:
             point = Point(*self._frames.locate(frame).apply_point(point))
-        if max(abs(number) for number in point) > _FARTHEST:
+        if max(abs(number) for number in point) > _FARTHEST_M:
             raise Error(
-                f"{shown([x, y, z])} is more than {_FARTHEST:g} m from the fixed frame's origin"
+                f"{shown([x, y, z])} is more than {_FARTHEST_M:g} m from the fixed frame's origin"
             )
         return point
 
@@ -784,7 +784,7 @@ def _is_shifted(before: tuple[Any, ...], now: tuple[Any, ...]) -> bool:
     return before[2 : 2 + axes] != now[2 : 2 + axes]
 
 
-_LONGEST = 1000
+_MAX_NAME_LENGTH = 1000
 
 
 class Views(QtCore.QObject):
@@ -839,8 +839,8 @@ class Views(QtCore.QObject):
         """
         if not (isinstance(name, str) and name.strip() and name.isprintable()):
             raise Error(f"expected a name for the view, a text of one line, got {shown(name)}")
-        if len(name) > _LONGEST:
-            raise Error(f"expected a name of at most {_LONGEST} characters")
+        if len(name) > _MAX_NAME_LENGTH:
+            raise Error(f"expected a name of at most {_MAX_NAME_LENGTH} characters")
         if name in self.saved:
             self._manager.takeAt(self.saved.index(name)).deleteLater()
         self._manager.copyCurrentToList()

@@ -47,7 +47,7 @@ _ARROWS = {
     _Qt.Key_Right: (0, -1),
 }
 #: Seconds; a frame that takes longer moves the camera no farther.
-_LONGEST_STEP = 0.2
+_MAX_STEP_S = 0.2
 
 
 class ViewKeys(QtCore.QObject):
@@ -134,7 +134,7 @@ class ViewKeys(QtCore.QObject):
         if not self._loading:
             return
         now = time.monotonic()
-        passed, self._last_step = min(now - self._last_step, _LONGEST_STEP), now
+        passed, self._last_step = min(now - self._last_step, _MAX_STEP_S), now
         if self._is_elsewhere() or not self._settings.keys:
             # Who has the keys now gets to know when they are released.
             self._loading.clear()

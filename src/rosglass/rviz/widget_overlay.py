@@ -32,7 +32,7 @@ __all__ = ["Canvas", "StyleSheet", "WidgetOverlay", "make_widget", "read_style_s
 
 
 #: Rectangles that are painted one by one; of more, what is around them is.
-_MOST_RECTS = 12
+_MAX_RECTS = 12
 
 
 class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
@@ -102,7 +102,7 @@ class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
             return []
         if own != round(own) or self._shadows_are_larger():
             stale = everything
-        elif stale.rectCount() > _MOST_RECTS:
+        elif stale.rectCount() > _MAX_RECTS:
             stale = QtGui.QRegion(stale.boundingRect())
         # Qt rounds what is exposed of widgets, and would leave out a row at the edge.
         more = math.ceil(self.transform().m11()) + 1
@@ -159,7 +159,7 @@ _log = logging.getLogger("rosglass.rviz")
 _URL = re.compile(r"""url\(\s*(["']?)([^"')]+)\1\s*\)""")
 _MAX_BYTES = 1 << 20
 #: Milliseconds after a change of the file: editors write in several steps.
-_DEBOUNCE = 80
+_DEBOUNCE_MS = 80
 
 
 def read_style_sheet(source: str) -> tuple[str, Path | None]:
@@ -232,7 +232,7 @@ class StyleSheet(QtCore.QObject):  # type: ignore[misc]
         self._watcher: Any = None
         self._pause = QtCore.QTimer()
         self._pause.setSingleShot(True)
-        self._pause.setInterval(_DEBOUNCE)
+        self._pause.setInterval(_DEBOUNCE_MS)
         self._pause.timeout.connect(self._read)
 
     def use(self, source: str, *, watch: bool = False, strict: bool = False) -> None:

@@ -127,7 +127,7 @@ class BareView(QtCore.QObject):
 #: What RViz says right before it makes the displays of a config file.
 _LOADING = "Creating displays"
 #: Milliseconds that a window manager may take to make a window as large as the screen.
-_RESIZING = 300
+_RESIZE_DELAY_MS = 300
 _PATHS = "ROS_PACKAGE_PATH"
 #: Where a config file has the displays.
 _CONTENT = "Visualization Manager"
@@ -304,7 +304,7 @@ class Window(QtCore.QObject):
     def _on_fullscreen(self, fullscreen: bool) -> None:
         if fullscreen:
             self._normal = self.widget.geometry()
-            QtCore.QTimer.singleShot(_RESIZING, self._fill_screen)
+            QtCore.QTimer.singleShot(_RESIZE_DELAY_MS, self._fill_screen)
         elif self._filled:
             self._filled = False
             self.widget.setGeometry(self._normal)
