@@ -42,6 +42,14 @@ def square(x: int, y: int, fill: str, size: int = 60) -> str:
     return f'Rectangle {{ x: {x}; y: {y}; width: {size}; height: {size}; color: "{fill}" }}\n'
 
 
+def test_translucent_colours_are_blended_right(show: Any, grab: Any) -> None:
+    show('Item { Rectangle { x: 40; y: 30; width: 100; height: 60; color: "#800080ff" } }')
+    picture = grab()
+    # Half of (0, 128, 255) and half of RViz's own grey.
+    assert close_to(colour(picture, 90, 60), (24, 88, 152), by=1)
+    assert colour(picture, 30, 60) == GREY
+
+
 def test_overlays_lie_above_each_other_by_z_and_popups_above_all(
     app: Any, show: Any, grab: Any
 ) -> None:

@@ -1,4 +1,4 @@
-"""Overlays on screens with more pixels than units, and where there is no OpenGL for Qt."""
+"""Overlays on screens with more pixels than units: each pixel is drawn, clicks hit their target."""
 
 from __future__ import annotations
 
@@ -22,3 +22,19 @@ def test_overlays_have_every_pixel_of_the_screen(factor: str, renderer: str, see
     assert found["widget"] == ["#00ff00", "#00ff00"]
     assert "#00ff00" not in found["beside"]
     assert found["problem"] == ""
+
+
+@pytest.mark.parametrize(
+    ("factor", "renderer"),
+    [("1", "opengl"), ("2", "opengl"), ("1.5", "opengl"), ("2", "software"), ("1.5", "software")],
+)
+def test_clicks_hit_what_is_seen(factor: str, renderer: str, seen: Any) -> None:
+    found = seen("screen_input_program.py", factor, renderer)
+    for place in found["item"]:
+        assert place == pytest.approx([7, 9], abs=1)
+    for place in found["widget"]:
+        assert place == pytest.approx([93, 51], abs=1)
+    # Where Qt says that they are on the screen; in QML drawn by OpenGL, Qt takes pixels for units.
+    assert found["screen"] == [[True], [True]]
+    for off in found["global"] if factor == "1" or renderer == "software" else []:
+        assert off == pytest.approx([0, 0], abs=1)
