@@ -12,6 +12,7 @@ import pytest
 from rosglass.comm.handle import Handle
 from rosglass.qml import Session
 from rosglass.qml.element import Element
+from rosglass.qml.goal_handle import GoalHandle, ServerGoalHandle
 from rosglass.qml.parameter import ParameterLink
 from rosglass.tf import TransformBuffer
 
@@ -167,16 +168,25 @@ def test_the_node_keeps_no_elements(running: Bench, wait: Any) -> None:
                 name: "/s"; serviceType: "std_srvs/Trigger"; handler: function () {}
             }
             property var actions: ActionServer {
-                name: "/a"; actionType: "example_interfaces/Fibonacci"; execute: function () {}
+                name: "/a"; actionType: "example_interfaces/Fibonacci"
+                execute: function (goal, handle, later) {}
             }
             property var client: Ros2.createServiceClient("/s", "std_srvs/Trigger")
+            property var sender: Ros2.createActionClient("/a", "example_interfaces/Fibonacci")
+            property var goal
             property TfBuffer buffer: TfBuffer { }
             property TfTransform tf: TfTransform { sourceFrame: "a"; targetFrame: "b" }
             function ready() {
                 return sub.subscribed && server.ready && actions.ready && client.ready
+                    && sender.ready
             }
+            function send() { goal = sender.sendGoalAsync({}) }
+            function executes() { return actions.activeGoals === 1 && goal.isActive }
         }
     """)
     wait(root.ready)
+    root.send()
+    wait(root.executes)
     wait.nothing_happens(0.2)
-    assert [one for one in reachable(running.session.node) if isinstance(one, Element)] == []
+    kinds = (Element, GoalHandle, ServerGoalHandle)
+    assert [one for one in reachable(running.session.node) if isinstance(one, kinds)] == []

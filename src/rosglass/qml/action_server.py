@@ -9,7 +9,7 @@ from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
-from rosglass.qml.callbacks import Answers, call_back
+from rosglass.qml.callbacks import Answers, call_back, weak_callback
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import Element
 from rosglass.qml.js_values import properties_of
@@ -100,8 +100,11 @@ class ActionServer(Element):
         self._cleanup["goals"] = goals.close
         # What the node holds does not keep the goals, either: JavaScript has their handles.
         key = goals.key
-        on_goal, accepts = self._weak(self._on_goal, Error(_GONE)), self._weak(self._accepts, False)
-        allows = self._weak(self._allows, True)
+        on_goal, accepts = (
+            weak_callback(self._on_goal, Error(_GONE)),
+            weak_callback(self._accepts, False),
+        )
+        allows = weak_callback(self._allows, True)
         return lambda: node.create_action_server(
             name,
             type_name,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any
+from weakref import WeakMethod
 
 from rosglass.errors import Error
 from rosglass.qml.log import Caller, log_from_qml, plain_path
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from rosglass.qt import QtQml
 
 
-__all__ = ["Answers", "Deferred", "JsCalls", "call_back"]
+__all__ = ["Answers", "Deferred", "JsCalls", "call_back", "weak_callback"]
 
 _SCRIPT = """(function (calls, jobs) {
     function thrown(value) {
@@ -97,6 +98,29 @@ def call_back(runtime: Runtime, callback: QJSValue, *arguments: QJSValue) -> QJS
     line = 0 if named.isUndefined() else result.property("lineNumber").toInt()
     log_from_qml("", logging.ERROR, result.toString(), Caller(file, max(line, 0), ""))
     return QJSValue()
+
+
+def weak_callback(method: Callable[..., Any], otherwise: Any = None) -> Callable[..., Any]:
+    """Return a callback that does not keep a QML object, for what other threads hold.
+
+    PySide crashes when a thread drops the last reference to an object that the GUI thread is
+    deleting.
+
+    Args:
+        method: A method of the object, called on the GUI thread.
+        otherwise: What the callback returns, or the error it raises, when the object is gone.
+    """
+    reference = WeakMethod(method)
+
+    def call(*arguments: Any) -> Any:
+        found = reference()
+        if found is not None:
+            return found(*arguments)
+        if isinstance(otherwise, Error):
+            raise otherwise
+        return otherwise
+
+    return call
 
 
 class Deferred:

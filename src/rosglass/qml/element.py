@@ -7,10 +7,10 @@ import time
 from abc import abstractmethod
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, ClassVar
-from weakref import WeakMethod
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error, TypeNotFoundError
+from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.dialect import Dialect, resolve_namespace, within_namespace
 from rosglass.qml.log import Caller, RateLimit, log_from_qml, plain_path
 from rosglass.qml.properties import ReadOnly, report
@@ -193,28 +193,6 @@ class Element(QtCore.QObject):
         if dispose is not None:
             dispose()
         self._on_closed(endpoint)
-
-    def _weak(self, method: Callable[..., Any], otherwise: Any = None) -> Callable[..., Any]:
-        """Return a callback that does not keep the element, for what other threads hold.
-
-        PySide crashes when a thread drops the last reference to an object that the GUI thread is
-        deleting.
-
-        Args:
-            method: One of this element's methods, called on the GUI thread.
-            otherwise: What the callback returns, or the error it raises, when the element is gone.
-        """
-        reference = WeakMethod(method)
-
-        def call(*arguments: Any) -> Any:
-            found = reference()
-            if found is not None:
-                return found(*arguments)
-            if isinstance(otherwise, Error):
-                raise otherwise
-            return otherwise
-
-        return call
 
     # -- the session -----------------------------------------------------------------------------
 
@@ -510,7 +488,7 @@ class ClientElement(Element):
             )
 
     def _on_created(self, endpoint: Any) -> None:
-        self._watch = endpoint.on_ready_change(self._weak(self._on_ready), self._executor)
+        self._watch = endpoint.on_ready_change(weak_callback(self._on_ready), self._executor)
         # A client that has just started to look for its server has not found it yet.
         self._set_problem(endpoint.problem, logging.DEBUG)
         QtCore.QTimer.singleShot(_SEARCH_MS, lambda: self._warn(endpoint))

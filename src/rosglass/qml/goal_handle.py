@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rosglass.comm.action_client import GoalStatus
 from rosglass.comm.time import Time
 from rosglass.errors import Error
+from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import given_fields, named
 from rosglass.qml.enums import (
     ActionCommStates,
@@ -204,14 +205,14 @@ class GoalHandle(QtCore.QObject):
         assert client.type is not None
         goal = client.send_goal(
             given_fields(self._value, client.type.goal, self._dialect),
-            on_feedback=self._on_feedback,
-            on_status_change=self._on_status,
-            on_done=self._on_done,
+            on_feedback=weak_callback(self._on_feedback),
+            on_status_change=weak_callback(self._on_status),
+            on_done=weak_callback(self._on_done),
             executor=executor,
             timeout=self.left,
         )
         self._goal, self._value = goal, QJSValue()
-        goal.acceptance.on_done(self._on_acceptance, executor)
+        goal.acceptance.on_done(weak_callback(self._on_acceptance), executor)
         self.goalIdChanged.emit()
         self._sent(goal, executor)
 
@@ -428,7 +429,7 @@ class RosGoalHandle(GoalHandle):
         watch: Any = getattr(goal, "on_comm_state_change", None)
         if watch is not None:
             self._native = True
-            watch(self._on_comm_state, executor)
+            watch(weak_callback(self._on_comm_state), executor)
             self._on_comm_state(goal.comm_state)  # type: ignore[attr-defined]
 
     def _on_comm_state(self, state: Any) -> None:
@@ -495,7 +496,8 @@ class ServerGoalHandle(QtCore.QObject):
         self.destroyed.connect(
             lambda: None if goal.status.is_active else let_go(state, _SERVER_HELD)
         )
-        goal.cancel_request.on_done(lambda _: self.refresh(), runtime.session.executor)
+        refresh = weak_callback(self.refresh)
+        goal.cancel_request.on_done(lambda _: refresh(), runtime.session.executor)
 
     # What QML sees.
 

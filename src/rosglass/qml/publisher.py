@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from rosglass.comm.names import similar
 from rosglass.comm.qos import Durability, History, QoS
 from rosglass.errors import ConversionError, Error, UnsupportedError
+from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import NO_PEER_MS, Element, single_shot
 from rosglass.qml.from_js import fields_from_js
@@ -352,7 +353,7 @@ class RosPublisher(Publisher):
 
     def _on_created(self, endpoint: Sender) -> None:
         with suppress(UnsupportedError):  # a recording, which has no subscribers
-            endpoint.on_matched(self._weak(self._on_matched), self._executor)
+            endpoint.on_matched(weak_callback(self._on_matched), self._executor)
         super()._on_created(endpoint)
 
     def _on_matched(self, event: Matched) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error, ServiceError
-from rosglass.qml.callbacks import Answers
+from rosglass.qml.callbacks import Answers, weak_callback
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import Element
 from rosglass.qml.from_js import fields_from_js
@@ -67,7 +67,7 @@ class ServiceServer(Element):
         assert runtime is not None
         answers = self._answers = Answers(runtime, f"the handler of {self.label}")
         self._cleanup["answers"] = answers.give_up
-        on_request = self._weak(self._on_request, ServiceError(_GONE))
+        on_request = weak_callback(self._on_request, ServiceError(_GONE))
         return lambda: node.create_service_server(name, type_name, on_request, executor=executor)
 
     def _on_created(self, endpoint: Server) -> None:

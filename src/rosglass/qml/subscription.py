@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm.handle import Executor
 from rosglass.comm.qos import Durability, History, QoS, Reliability
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
-from rosglass.qml.callbacks import Deferred, call_back
+from rosglass.qml.callbacks import Deferred, call_back, weak_callback
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import DEFAULT_TIMEOUT_MS, TopicElement, single_shot
 from rosglass.qml.js_values import qos_from_js
@@ -249,7 +249,7 @@ class Subscription(TopicElement):
         super()._create_endpoint(wanted)
 
     def _factory(self, node: Node, topic: str, type_name: str, qos: QoS) -> Callable[[], _Feed]:
-        executor, on_arrival = self._executor, self._weak(self._on_arrival)
+        executor, on_arrival = self._executor, weak_callback(self._on_arrival)
         return lambda: _Feed(node, topic, type_name, qos, executor, on_arrival)
 
     def _on_created(self, endpoint: _Feed) -> None:  # noqa: ARG002 - the base's signature

@@ -13,6 +13,7 @@ from rosglass.comm.approximate_time import ApproximateTime
 from rosglass.comm.executor import Dispatcher
 from rosglass.comm.statistics import note_time, rate_of
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
+from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import DEFAULT_TIMEOUT_MS, Element
 from rosglass.qml.js_values import qos_from_js, shown
@@ -240,7 +241,7 @@ class SynchronizedSubscription(Element):
 
     def _factory(self, *wanted: Any) -> Callable[[], _Matcher]:
         node, sources, size, slop_ns, headerless = wanted
-        on_sets, executor = self._weak(self._on_sets), self._executor
+        on_sets, executor = weak_callback(self._on_sets), self._executor
         return lambda: _Matcher(node, sources, size, slop_ns, headerless, on_sets, executor)
 
     def _on_created(self, endpoint: _Matcher) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.time import Time
 from rosglass.errors import ConversionError, Error, TransformException
+from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import Element
 from rosglass.qml.js_values import time_from_js
@@ -401,8 +402,8 @@ class _Listening(_Queries):
         node, namespace = wanted
         link = TfLink.join(session, node, namespace, self)
         watches = [
-            link.buffer.on_update(self._weak(self._on_update), session.executor),
-            link.buffer.on_tree_change(self._weak(self._on_tree), session.executor),
+            link.buffer.on_update(weak_callback(self._on_update), session.executor),
+            link.buffer.on_tree_change(weak_callback(self._on_tree), session.executor),
         ]
         self._set_endpoint(_Watches(link, watches))
 

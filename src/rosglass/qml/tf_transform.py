@@ -8,6 +8,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error, TransformException
+from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import DEFAULT_TIMEOUT_MS, Element, single_shot
 from rosglass.qml.from_js import fields_from_js
@@ -164,7 +165,7 @@ class TfTransform(Element):
 
     def _create_endpoint(self, wanted: tuple[Any, ...]) -> None:
         buffer, target, source = wanted
-        on_change = self._weak(self._on_change)
+        on_change = weak_callback(self._on_change)
         try:
             self._set_endpoint(buffer.on_change(target, source, on_change, self._executor))
         except TransformException as error:
