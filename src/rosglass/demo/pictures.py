@@ -154,6 +154,7 @@ class _Picture(TopicElement):
         return (node, topic) if node is not None and topic else None
 
     def _factory(self, node: Node, topic: str) -> Callable[[], Subscription]:
+        self._set_problem("")  # not later: the first message may have one
         engine = QtQml.qjsEngine(self)
         if self._provider is None and isinstance(engine, QtQml.QQmlEngine):
             self._provider = _Provider()
@@ -161,9 +162,6 @@ class _Picture(TopicElement):
         return lambda: node.create_subscription(
             topic, self.kind, self._on_message, self.qos, executor=self._painter
         )
-
-    def _on_created(self, endpoint: Subscription) -> None:  # noqa: ARG002 - the base's signature
-        self._set_problem("")
 
     def _on_message(self, message: Message) -> None:
         try:
