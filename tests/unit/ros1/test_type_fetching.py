@@ -80,12 +80,19 @@ def test_a_service_comes_by_its_sum_from_the_library(join: Callable[..., Any]) -
         join("other", other).fetch_type(ASK, timeout=30)
 
 
-def test_an_action_comes_from_its_topics(join: Callable[..., Any]) -> None:
+def test_an_action_comes_from_its_topics(
+    join: Callable[..., Any], eventually: Callable[..., Any]
+) -> None:
     robot = join("robot", robot_library())
     robot.create_action_server("/go", GO, lambda goal: None)
     user = join("cockpit")
-    with pytest.raises(TypeNotFoundError, match="the server of /go does not send it"):
-        user.fetch_type(GO, timeout=5)
+
+    def is_refused() -> bool:
+        with pytest.raises(TypeNotFoundError) as raised:
+            user.fetch_type(GO, timeout=2)
+        return "the server of /go does not send it" in str(raised.value)
+
+    eventually(is_refused)
     join("desk", robot_library()).create_action_client("/go", GO)
     found = user.fetch_type(GO, timeout=30)
     assert found.name == GO
