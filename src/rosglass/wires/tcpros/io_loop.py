@@ -158,8 +158,11 @@ class IoLoop:
                 handler = key.data
                 if handler is None:
                     self._on_wake()
-                else:
-                    self._run(handler, events)
+                    continue
+                try:  # as in _run(), without its call: each message on a slow topic is an event
+                    handler.ready(events)
+                except BaseException as error:
+                    self._on_error(handler, error)
             if self._polling:
                 self._poll()
             while self._later and self._later[0][0] <= time.monotonic():
@@ -217,11 +220,15 @@ class IoLoop:
     def _run(self, handler: Ready, events: int) -> None:
         try:
             handler.ready(events)
-        except BaseException as error:  # nothing may end this thread
-            _log.exception("%s failed", handler)
-            reason = f"an error of ours, {error!r}"
-            # What the handler left in the socket would make it fail again, at once and for ever.
-            self._run_job(lambda: handler.end(reason))
+        except BaseException as error:
+            self._on_error(handler, error)
+
+    def _on_error(self, handler: Ready, error: BaseException) -> None:
+        """Log an error and end the handler; no error may end this thread."""
+        _log.exception("%s failed", handler)
+        reason = f"an error of ours, {error!r}"
+        # What the handler left in the socket would make it fail again, at once and for ever.
+        self._run_job(lambda: handler.end(reason))
 
     def _run_job(self, job: Callable[[], None]) -> None:
         try:
