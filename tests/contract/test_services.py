@@ -6,7 +6,7 @@ import asyncio
 import concurrent.futures
 import threading
 from concurrent.futures import Future
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import pytest
 from executors import Failing, Manual
@@ -655,3 +655,26 @@ def test_empty_requests_and_responses(robot, console, topic):
     assert client.wait_for_server(30), client.problem
     response = client.call(timeout=30)
     assert (response.success, response.message) == (True, "done")
+
+
+def test_calls_that_enter_while_another_thread_closes_the_client_end(console, topic, wire):
+    def enter_calls(client, calls, entered):
+        with suppress(rosglass.NodeClosedError):
+            while True:
+                calls.append(client.call_async(timeout=None))
+                entered.set()
+
+    for _ in range(20):
+        client, calls, entered = (
+            console.create_service_client(topic, wire.add),
+            [],
+            threading.Event(),
+        )
+        thread = threading.Thread(target=enter_calls, args=(client, calls, entered))
+        thread.start()
+        assert entered.wait(30)
+        client.close()
+        thread.join(30)
+        assert not thread.is_alive()
+        assert {type(call.exception(30)) for call in calls} == {rosglass.NodeClosedError}
+        assert client.pending == 0
