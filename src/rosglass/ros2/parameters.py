@@ -1,12 +1,9 @@
 """Parameters of ROS 2: a node's own, the services that offer them, and those of other nodes.
 
-Types: ``rcl_interfaces/msg/ParameterType``. Rules: rclcpp's documentation of
-``Node::declare_parameter`` and its relatives, and the design article "ROS 2 Parameter API":
-parameters are declared before they are used, and keep their type.
-
-Six services and ``/parameter_events``. Names, types and profiles: rclcpp's ``ParameterService`` and
-``NodeParameters``, rmw's ``rmw_qos_profile_parameters`` and ``rmw_qos_profile_parameter_events``;
-fields: ``rcl_interfaces/msg/ParameterValue``, ``ParameterDescriptor`` and ``ParameterEvent``.
+Rules: rclcpp's documentation of ``Node::declare_parameter`` and its relatives, and the design
+article "ROS 2 Parameter API": parameters are declared before they are used, and keep their type.
+Services and ``/parameter_events``: rclcpp's ``ParameterService`` and ``NodeParameters``, rmw's
+``rmw_qos_profile_parameters`` and ``rmw_qos_profile_parameter_events``, ``rcl_interfaces``.
 """
 
 from __future__ import annotations
