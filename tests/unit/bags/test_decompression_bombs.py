@@ -383,7 +383,7 @@ def test_profiles_in_a_compressed_database_that_stand_for_too_much_are_refused(t
     packed_bag(tmp_path / "bag", pack)
     count, problem = read(tmp_path / "bag")
     assert count is None
-    assert "million" in problem or "stands for" in problem
+    assert "more than 1000000 values" in problem
 
 
 @pytest.mark.parametrize("bomb", ["zstd that says so", "zstd that lies", "lz4 that lies"])
@@ -417,7 +417,7 @@ def test_profiles_in_a_database_that_stand_for_too_much_are_refused(tmp_path):
     database.close()
     count, problem = read(file)
     assert count is None
-    assert "million" in problem or "stands for" in problem
+    assert "more than 1000000 values" in problem
 
 
 def test_nothing_within_the_limit_is_refused():
