@@ -1,7 +1,7 @@
 """Recordings: record topics to a file, and play files back."""
 
-from rosglass.bags.bag import Bag, BagMessage, Channel, open_bag
-from rosglass.bags.player import Playback, Player, PlayerState
+from rosglass.bags.bag import Bag, BagMessage, Channel
+from rosglass.bags.player import Playback, Player, PlayerState, open_bag
 from rosglass.bags.recorder import Recorder, RecordingStatus
 from rosglass.bags.replay_node import ReplayNode
 

@@ -7,12 +7,10 @@ import heapq
 import io
 import itertools
 import logging
-import os
 import sys
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import yaml
@@ -24,6 +22,7 @@ from rosglass.messages import MessageType, OpaqueType, load
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
+    from pathlib import Path
 
     from rosglass.comm import Sample
     from rosglass.interfaces import Library
@@ -39,15 +38,10 @@ __all__ = [
     "by_time",
     "decompress",
     "merge_chunks",
-    "open_bag",
     "parse_profile",
     "read_profiles",
     "write_profiles",
 ]
-
-
-#: The magic number of MCAP files.
-_MCAP = b"\x89MCAP0\r\n"
 
 
 @dataclass(frozen=True)
@@ -132,7 +126,7 @@ class BagMessage(NamedTuple):
 
 
 class Bag(Handle):
-    """A recording that is open for reading; made by :func:`open_bag`.
+    """A recording that is open for reading; opened by :func:`rosglass.bags.open_bag`.
 
     Attributes:
         path: The file or folder.
@@ -483,37 +477,3 @@ def _parse_duration(value: object) -> Duration | None:
     except (TypeError, ValueError, OverflowError):
         return None
     return Duration(total) if 0 < total < _CENTURY else None
-
-
-def open_bag(path: str | os.PathLike[str]) -> Bag:
-    """Open a recording: an MCAP file, a ROS 2 bag (folder, ``.mcap`` or ``.db3``), a ROS 1 bag.
-
-    Raises:
-        BagError: It does not exist, is damaged, or is none of these.
-    """
-    if not isinstance(path, (str, os.PathLike)):
-        raise BagError(f"a recording is given by its path, not by {path!r:.80}")
-    found = Path(path).expanduser()
-    if not found.exists():
-        raise BagError(f"{found} does not exist; name an MCAP file, a ROS 2 bag or a ROS 1 bag")
-    if found.is_file() and (found.suffix == ".mcap" or _starts_with(found, _MCAP)):
-        from rosglass.bags.mcap_file import McapBag  # noqa: PLC0415 - the library is an extra
-
-        return McapBag(found)
-    from rosglass.bags.ros1_bag_file import MAGIC, Ros1CutBag  # noqa: PLC0415 - for few files
-    from rosglass.bags.rosbags_bag import RosbagsBag  # noqa: PLC0415 - slow to import
-
-    try:
-        return RosbagsBag(found)
-    except BagError:
-        if not (found.is_file() and _starts_with(found, MAGIC)):
-            raise
-    return Ros1CutBag(found)
-
-
-def _starts_with(path: Path, magic: bytes) -> bool:
-    try:
-        with path.open("rb") as file:
-            return file.read(len(magic)) == magic
-    except OSError as error:
-        raise BagError(f"{path} cannot be read: {error.strerror}") from error

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import logging
 import struct
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from mcap.data_stream import ReadDataStream
@@ -19,7 +20,6 @@ from mcap.records import Chunk, ChunkIndex, Message, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-import rosglass
 from rosglass.bags.bag import (
     Channel,
     RecordingFile,
@@ -273,7 +273,7 @@ class McapFile(RecordingFile):
         self.by_publisher = wire == "ros1"
         self._writer: Any = Writer(file, compression=_COMPRESSIONS[compression])
         profile = "ros1" if wire == "ros1" else "ros2"
-        self._writer.start(profile=profile, library=f"rosglass {rosglass.__version__}")
+        self._writer.start(profile=profile, library=f"rosglass {version('rosglass')}")
 
     def channel(
         self, topic: str, kind: MessageType, offered: Sequence[QoS], publisher: bytes

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
+import os
 import re
 import threading
 import time
 from dataclasses import dataclass
 from enum import Enum
 from math import isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Durability, Handle, QoS
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from rosglass.bags.bag import Bag, BagMessage, Channel
     from rosglass.comm import Node, Publisher
 
-__all__ = ["Playback", "Player", "PlayerState", "PlayerStatus"]
+__all__ = ["Playback", "Player", "PlayerState", "PlayerStatus", "open_bag"]
 
 
 _log = logging.getLogger("rosglass.bags")
@@ -31,6 +33,8 @@ _MAX_SLEEP_S = 0.5
 _MIN_LOOP_S = 0.1
 #: Seconds that closing waits for the player's thread.
 _CLOSE_TIMEOUT_S = 5.0
+#: The magic number of MCAP files.
+_MCAP = b"\x89MCAP0\r\n"
 #: Number of failed messages that are logged for each topic.
 _MAX_LOGGED = 3
 
@@ -636,3 +640,37 @@ class Playback(Handle):
         """Stop; safe to call twice."""
         self._player.close()
         self._bag.close()
+
+
+def open_bag(path: str | os.PathLike[str]) -> Bag:
+    """Open a recording: an MCAP file, a ROS 2 bag (folder, ``.mcap`` or ``.db3``), a ROS 1 bag.
+
+    Raises:
+        BagError: It does not exist, is damaged, or is none of these.
+    """
+    if not isinstance(path, (str, os.PathLike)):
+        raise BagError(f"a recording is given by its path, not by {path!r:.80}")
+    found = Path(path).expanduser()
+    if not found.exists():
+        raise BagError(f"{found} does not exist; name an MCAP file, a ROS 2 bag or a ROS 1 bag")
+    if found.is_file() and (found.suffix == ".mcap" or _starts_with(found, _MCAP)):
+        from rosglass.bags.mcap_file import McapBag  # noqa: PLC0415 - the library is an extra
+
+        return McapBag(found)
+    from rosglass.bags.ros1_bag_file import MAGIC, Ros1CutBag  # noqa: PLC0415 - for few files
+    from rosglass.bags.rosbags_bag import RosbagsBag  # noqa: PLC0415 - slow to import
+
+    try:
+        return RosbagsBag(found)
+    except BagError:
+        if not (found.is_file() and _starts_with(found, MAGIC)):
+            raise
+    return Ros1CutBag(found)
+
+
+def _starts_with(path: Path, magic: bytes) -> bool:
+    try:
+        with path.open("rb") as file:
+            return file.read(len(magic)) == magic
+    except OSError as error:
+        raise BagError(f"{path} cannot be read: {error.strerror}") from error

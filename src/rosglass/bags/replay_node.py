@@ -8,8 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NoReturn
 from urllib.parse import parse_qsl, quote, unquote
 
-from rosglass.bags.bag import open_bag
-from rosglass.bags.player import Playback
+from rosglass.bags.player import Playback, open_bag
 from rosglass.comm import (
     IMMEDIATE,
     ConnectionState,

@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm.executor import check_plain
+from rosglass.comm.node import OtherNode
 from rosglass.comm.promise import Deadline
-from rosglass.comm.service_client import OtherNode
 from rosglass.comm.time import Time
 from rosglass.errors import TransitionError
 

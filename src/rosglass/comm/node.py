@@ -20,7 +20,7 @@ from rosglass.errors import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
+    from collections.abc import Awaitable, Callable, Mapping
 
     from rosglass.comm.action_client import ActionClient
     from rosglass.comm.action_server import ActionServer, Result, ServerGoal
@@ -33,13 +33,13 @@ if TYPE_CHECKING:
     from rosglass.comm.lifecycle import LifecycleClient
     from rosglass.comm.log import NodeLogger
     from rosglass.comm.parameters import ParameterClient, Parameters
-    from rosglass.comm.promise import Promise
+    from rosglass.comm.promise import Deadline, Promise
     from rosglass.comm.service_client import ServiceClient
     from rosglass.comm.service_server import Answer, ServiceServer
     from rosglass.comm.time import Duration, Time
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
 
-__all__ = ["Node"]
+__all__ = ["Node", "OtherNode"]
 
 #: Pause between two checks whether a node that spins is closed.
 _SPIN_POLL_S = 0.2
@@ -481,3 +481,92 @@ class Node(Handle):
         Safe to call twice, from any thread and from callbacks.
         """
         self._core.close()
+
+
+class OtherNode(Handle):
+    """Clients of the services that another node has by itself, and subscriptions to its events.
+
+    Args:
+        owner: The node that the clients belong to.
+        node: Full name of the other node.
+        services: Types of the services by name, relative to the node.
+        first: The service whose server shows that the node is available. Its client is created at
+            once, so that it finds the server before the first call.
+        qos: The services' profile; None for the default.
+    """
+
+    def __init__(
+        self,
+        owner: Node,
+        node: str,
+        services: Mapping[str, str],
+        first: str,
+        qos: QoS | None = None,
+    ) -> None:
+        self.node = node
+        self._owner, self._services, self._qos = owner, services, qos
+        #: Every use is atomic; what is added while another thread closes them is closed there.
+        self._clients: dict[str, ServiceClient] = {}
+        self._subscriptions: dict[Subscription, None] = {}
+        self._closed = False
+        self._first = first
+        self._client(first)
+
+    @property
+    def ready(self) -> bool:
+        """Whether the node is available and has the services."""
+        return not self._closed and self._client(self._first).ready
+
+    def wait_for_server(self, timeout: float | None = None) -> bool:
+        """Wait up to `timeout` seconds (None: forever) for the node; return whether it is ready."""
+        return self._client(self._first).wait_for_server(timeout)
+
+    def close(self) -> None:
+        """End all calls, with NodeClosedError, and all subscriptions; safe to call twice."""
+        self._closed = True
+        clients, self._clients = self._clients, {}
+        subscriptions, self._subscriptions = self._subscriptions, {}
+        for handle in (*clients.values(), *subscriptions):
+            handle.close()
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise NodeClosedError(f"{self!r} is closed; create another one")
+
+    def _client(self, service: str) -> ServiceClient:
+        self._check_open()
+        client = self._clients.get(service)
+        if client is None:
+            name = f"{self.node}/{service}"
+            made = self._owner.create_service_client(name, self._services[service], self._qos)
+            client = self._clients.setdefault(service, made)
+            if client is not made:  # another thread was faster
+                made.close()
+            if self._closed:
+                client.close()
+                self._check_open()
+        return client
+
+    def _call(self, service: str, request: dict[str, Any], deadline: Deadline) -> Message:
+        return self._client(service).call(request, timeout=deadline.left())
+
+    def _subscribe(
+        self,
+        topic: str,
+        type: str,
+        callback: Callable[[Message], None],
+        qos: QoS | int,
+        executor: Executor | None,
+    ) -> Handle:
+        """Subscribe to the node's events until the handle, or this client, is closed."""
+        subscription = self._owner.create_subscription(
+            topic, type, callback, qos, executor=executor
+        )
+        self._subscriptions[subscription] = None
+        for other in list(self._subscriptions):
+            if other.closed:
+                self._subscriptions.pop(other, None)
+        if self._closed:
+            subscription.close()
+            self._check_open()
+        return subscription

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import atexit
 import logging
+import threading
+import time
 from typing import TYPE_CHECKING
 from weakref import WeakValueDictionary
 
@@ -16,15 +18,18 @@ from rosglass.comm.types import Types
 from rosglass.ros2.ros_arguments import NO_ARGUMENTS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable
+
     from rosglass.comm import NodeName
     from rosglass.interfaces import Library
-    from rosglass.ros2.rmw_services import RequestWindow
     from rosglass.ros2.ros_arguments import Arguments
     from rosglass.wires.base import Middleware
 
-__all__ = ["Core"]
+__all__ = ["REQUEST_LIMIT", "Core", "RequestWindow"]
 
 _log = logging.getLogger("rosglass.ros2")
+#: Requests that are open at a time, or replies in a burst: two less than the peer's queue holds.
+REQUEST_LIMIT = 8
 
 
 class Core(NodeCore):
@@ -119,3 +124,47 @@ class Core(NodeCore):
             status = self.middleware.status()
             if status.state is ConnectionState.LOST:
                 _log.warning("%s: %s", self.url, status.detail)
+
+
+class RequestWindow:
+    """The open requests of a node to one service: at most :data:`REQUEST_LIMIT`.
+
+    Args:
+        stall_s: Seconds without an answer after which an open request counts as taken.
+    """
+
+    def __init__(self, stall_s: float) -> None:
+        self._stall_s = stall_s
+        #: Guards both dicts: all clients of a service in a node share the window.
+        self._lock = threading.Lock()
+        #: Monotonic time of sending of each open request, the oldest first.
+        self._open: dict[Hashable, float] = {}
+        #: The callbacks of requesters that found the window full.
+        self._waiting: dict[Callable[[], None], None] = {}
+
+    def enter(self, request: Hashable, retry: Callable[[], None]) -> bool:
+        """Return whether a request may be sent now.
+
+        Args:
+            request: The request; it is open until :meth:`leave`.
+            retry: Returned by :meth:`leave` when there is room again.
+        """
+        now = time.monotonic()
+        with self._lock:
+            if len(self._open) >= REQUEST_LIMIT:
+                while self._open and now - next(iter(self._open.values())) >= self._stall_s:
+                    del self._open[next(iter(self._open))]
+                if len(self._open) >= REQUEST_LIMIT:
+                    self._waiting[retry] = None
+                    return False
+            self._open[request] = now
+        return True
+
+    def leave(self, request: Hashable) -> list[Callable[[], None]]:
+        """Remove a request; return the callbacks to call now that there is room."""
+        with self._lock:
+            if self._open.pop(request, None) is None or not self._waiting:
+                return []
+            waiting = list(self._waiting)
+            self._waiting.clear()
+        return waiting

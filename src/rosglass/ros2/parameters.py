@@ -31,8 +31,8 @@ from rosglass.comm import (
 )
 from rosglass.comm.builtin_services import USE_SIM_TIME
 from rosglass.comm.executor import check_plain
+from rosglass.comm.node import OtherNode
 from rosglass.comm.parameters import RemoteParameters, check_values
-from rosglass.comm.service_client import OtherNode
 from rosglass.errors import NodeClosedError, ParameterError, shown
 
 if TYPE_CHECKING:

@@ -25,10 +25,11 @@ from rosglass.comm.service_client import Call, PendingCall, ServiceClient, Servi
 from rosglass.comm.service_server import ServiceServer
 from rosglass.errors import Error, NodeClosedError, ServiceError
 from rosglass.ros2.announced import Announced, choose, identity, mismatches, nodes_of, rivals
+from rosglass.ros2.core import REQUEST_LIMIT, RequestWindow
 from rosglass.wires.base import SERVER_LEFT, Replier, RequestId
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Hashable, Mapping, Sequence
+    from collections.abc import Awaitable, Callable, Mapping, Sequence
 
     from rosglass.comm import Answer, Executor
     from rosglass.comm.timers import Timers
@@ -38,11 +39,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "HOLD_S",
-    "LIMIT",
     "STALL_S",
     "ActionServiceClient",
     "ReplyPacer",
-    "RequestWindow",
     "Ros2Replier",
     "Ros2Requester",
     "create_service_client",
@@ -256,7 +255,9 @@ class Ros2Requester(ServiceRequester):
     def delay(self, pending: PendingCall) -> str:  # noqa: ARG002 - the same for all
         """Return why a request was not sent when there is no conflict."""
         if self.ready():
-            return f"{LIMIT} requests before it still wait for {self.server_name()} to answer"
+            return (
+                f"{REQUEST_LIMIT} requests before it still wait for {self.server_name()} to answer"
+            )
         return "its server appeared too late"
 
     # -- sending -----------------------------------------------------------------------------------
@@ -588,8 +589,6 @@ class Ros2Replier(Replier, NodeMember):
         self._core.remove(self)
 
 
-#: Requests that are open at a time, or replies in a burst: two less than the peer's queue holds.
-LIMIT = 8
 #: Seconds without an answer after which an open request counts as taken: its server holds it until
 #: later, or it is lost.
 STALL_S = 30.0
@@ -600,50 +599,6 @@ _BURST_S = 0.04
 #: Clients whose open requests are counted, and delayed replies to one client: a client that sends
 #: requests faster than it takes replies loses most of what is beyond.
 _MAX_CLIENTS = _MAX_WAITING = 1000
-
-
-class RequestWindow:
-    """The open requests of a node to one service: at most :data:`LIMIT`.
-
-    Args:
-        stall_s: Seconds without an answer after which an open request counts as taken.
-    """
-
-    def __init__(self, stall_s: float) -> None:
-        self._stall_s = stall_s
-        #: Guards both dicts: all clients of a service in a node share the window.
-        self._lock = threading.Lock()
-        #: Monotonic time of sending of each open request, the oldest first.
-        self._open: dict[Hashable, float] = {}
-        #: The callbacks of requesters that found the window full.
-        self._waiting: dict[Callable[[], None], None] = {}
-
-    def enter(self, request: Hashable, retry: Callable[[], None]) -> bool:
-        """Return whether a request may be sent now.
-
-        Args:
-            request: The request; it is open until :meth:`leave`.
-            retry: Returned by :meth:`leave` when there is room again.
-        """
-        now = time.monotonic()
-        with self._lock:
-            if len(self._open) >= LIMIT:
-                while self._open and now - next(iter(self._open.values())) >= self._stall_s:
-                    del self._open[next(iter(self._open))]
-                if len(self._open) >= LIMIT:
-                    self._waiting[retry] = None
-                    return False
-            self._open[request] = now
-        return True
-
-    def leave(self, request: Hashable) -> list[Callable[[], None]]:
-        """Remove a request; return the callbacks to call now that there is room."""
-        with self._lock:
-            if self._open.pop(request, None) is None or not self._waiting:
-                return []
-            waiting = list(self._waiting)
-            self._waiting.clear()
-        return waiting
 
 
 @dataclass(slots=True)
@@ -667,7 +622,7 @@ class _Client:
 
 
 class ReplyPacer:
-    """Sends replies to clients with many open requests in bursts of :data:`LIMIT`.
+    """Sends replies to clients with many open requests in bursts of :data:`REQUEST_LIMIT`.
 
     A client with fewer open requests gets each reply at once.
 
@@ -690,7 +645,7 @@ class ReplyPacer:
                     self._drop_one()
                 known = self._clients[client] = _Client()
             known.open += 1
-            if known.open > LIMIT:
+            if known.open > REQUEST_LIMIT:
                 known.paced = True
 
     def on_reply(self, client: bytes) -> bool:
@@ -743,7 +698,11 @@ class ReplyPacer:
                     return
                 now = time.monotonic()
                 later = known.since + _BURST_S - now
-                if later > 0 and known.burst >= LIMIT and len(known.waiting) <= _MAX_WAITING:
+                if (
+                    later > 0
+                    and known.burst >= REQUEST_LIMIT
+                    and len(known.waiting) <= _MAX_WAITING
+                ):
                     break
                 send = known.waiting.pop(0)
                 self._count_reply(known, now)
@@ -753,7 +712,7 @@ class ReplyPacer:
     def _count_reply(self, known: _Client, now: float) -> None:
         """Count a reply that is about to be sent; the lock is held."""
         if now - known.since >= _BURST_S:
-            known.burst, known.since, known.paced = 0, now, known.open > LIMIT
+            known.burst, known.since, known.paced = 0, now, known.open > REQUEST_LIMIT
         known.burst += 1
         known.open -= 1
 
