@@ -17,12 +17,6 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[1]
 SEARCHED = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "src", "docs", "examples")
-#: Folders that still have such words: take one off when it is clean.
-NOT_CLEAN = (
-    "src/rosglass/comm",
-    *("src/rosglass/qml", "src/rosglass/ros2", "src/rosglass/rviz"),
-    *("src/rosglass/wires/base.py", "src/rosglass/wires/dds"),
-)
 SUFFIXES = {".md", ".py", ".qml", ".js", ".toml", ".c"}
 
 
@@ -47,10 +41,7 @@ def files() -> Iterator[Path]:
     for name in SEARCHED:
         found = [ROOT / name] if (ROOT / name).is_file() else sorted((ROOT / name).rglob("*"))
         for file in found:
-            path = file.relative_to(ROOT).as_posix()
-            if file.suffix in SUFFIXES and not f"{path}/".startswith(
-                tuple(f"{folder}/" for folder in NOT_CLEAN)
-            ):
+            if file.suffix in SUFFIXES:
                 yield file
 
 

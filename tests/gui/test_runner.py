@@ -252,7 +252,7 @@ def test_errors_at_run_time_do_not_stop_a_reload(
     wait(lambda: len(world.publishers) == 1)
 
 
-def test_a_reload_is_put_off_while_a_call_waits(runner: Runner, file: Path, wait: Any) -> None:
+def test_a_reload_is_deferred_while_a_call_waits(runner: Runner, file: Path, wait: Any) -> None:
     from rosglass.qml.waiting import wait_for
     from rosglass.qt import QtCore
 
@@ -406,7 +406,7 @@ def test_connecting_waits_for_the_first_frame(
     app: Any, file: Path, world: LocalWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     order: list[str] = []
-    monkeypatch.setattr("rosglass.qml.session._LONGEST_PUT_OFF", 60_000)
+    monkeypatch.setattr("rosglass.qml.session._MAX_DEFER_MS", 60_000)
 
     def connect(*arguments: Any) -> LocalNode:
         order.append("connected")
@@ -428,7 +428,7 @@ def test_connecting_waits_for_the_first_frame(
 def test_connecting_does_not_wait_for_a_window_that_nobody_sees(
     app: Any, file: Path, world: LocalWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.session._LONGEST_PUT_OFF", 60_000)
+    monkeypatch.setattr("rosglass.qml.session._MAX_DEFER_MS", 60_000)
     file.write_text(
         """import QtQuick 2.15
         import QtQuick.Window 2.15
@@ -446,9 +446,9 @@ def test_connecting_does_not_wait_for_a_window_that_nobody_sees(
 def test_connecting_waits_for_a_frame_that_never_comes_only_so_long(
     app: Any, world: LocalWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.session._LONGEST_PUT_OFF", 50)
+    monkeypatch.setattr("rosglass.qml.session._MAX_DEFER_MS", 50)
     session = Session(connect=world.connect)
-    session.put_off()
+    session.defer_connecting()
     session.init("ui")
     assert session.state == "connecting"
     wait(lambda: session.node is not None)
@@ -458,9 +458,9 @@ def test_connecting_waits_for_a_frame_that_never_comes_only_so_long(
 def test_connecting_does_not_wait_while_a_call_of_qml_does(
     app: Any, world: LocalWorld, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.session._LONGEST_PUT_OFF", 60_000)
+    monkeypatch.setattr("rosglass.qml.session._MAX_DEFER_MS", 60_000)
     session = Session(connect=world.connect)
-    session.put_off()
+    session.defer_connecting()
     session.init("ui")
     assert wait_for(session, session.node_changed.connect)
     assert session.node is not None

@@ -195,7 +195,7 @@ def test_a_drive_that_does_not_answer(bench: Any, tmp_path: Path, monkeypatch: A
     go = threading.Event()
     for name in ("_read", "_replace"):
         monkeypatch.setattr(f"rosglass.qml.yaml_io.{name}", lambda *_: go.wait(60))
-    monkeypatch.setattr("rosglass.qml.yaml_io.FILE_PATIENCE", 0.1)
+    monkeypatch.setattr("rosglass.qml.yaml_io.FILE_TIMEOUT_S", 0.1)
     file = tmp_path / "far.yaml"
     assert read(bench, file) is False
     assert write(bench, file, "{a: 1}") is False

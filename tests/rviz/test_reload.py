@@ -375,7 +375,9 @@ def test_hidden_overlays_are_shown_anew_when_they_are_seen_again(
     assert seen(grab()) == LIME
 
 
-def test_a_reload_is_put_off_while_a_call_waits(show: Any, file: Path, app: Any, wait: Any) -> None:
+def test_a_reload_is_deferred_while_a_call_waits(
+    show: Any, file: Path, app: Any, wait: Any
+) -> None:
     from rosglass.qml.waiting import wait_for
     from rosglass.qt import QtCore
 

@@ -327,8 +327,8 @@ class RosActionClient(GoalSender):
 
         Args:
             goal: An object with the goal's fields; one that does not fit throws.
-            transition: Told the handle whenever its ``commState`` has changed.
-            feedback: Told the handle and each feedback.
+            transition: Called with the handle whenever its ``commState`` has changed.
+            feedback: Called with the handle and each feedback.
         """
         runtime = self._runtime
         assert runtime is not None

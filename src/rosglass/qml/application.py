@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Application"]
 
-#: Seconds after which a program that was asked to end is ended, whatever the robot does.
-_PATIENCE = 1.7
+#: After this time a program that received a signal ends, whatever the robot does.
+_QUIT_TIMEOUT_S = 1.7
 
 
 class Application(Handle):
@@ -92,7 +92,7 @@ class Application(Handle):
             if not word.isidentifier() or word[0].isupper():
                 raise Error(f"context: QML cannot use the name {word!r}: expected e.g. {'arm'!r}")
         # KeyboardInterrupt, raised in what Qt calls, would be swallowed there.
-        with _signals_put_off():
+        with _signals_deferred():
             path = interface_file(file)
             warn_on_terminal(LocationFormatter())
             #: The Qt application.
@@ -150,7 +150,7 @@ class Application(Handle):
         Raises:
             QmlError: The file has errors; the message lists them as ``file:line:column: text``.
         """
-        with _signals_put_off():
+        with _signals_deferred():
             self._load()
 
     def _load(self) -> None:
@@ -196,7 +196,7 @@ class Application(Handle):
             signals.append(number)
             self.quit(128 + number)
 
-        with QuitOnSignal(interrupted, _PATIENCE):
+        with QuitOnSignal(interrupted, _QUIT_TIMEOUT_S):
             try:
                 self._load()
                 code = self._runner.exit_code
@@ -206,7 +206,7 @@ class Application(Handle):
                 if signals:
                     code = 128 + signals[0]
                 if end_process:
-                    end_process_within(_PATIENCE, code)
+                    end_process_within(_QUIT_TIMEOUT_S, code)
             finally:
                 self.close()
         return code
@@ -225,8 +225,8 @@ class Application(Handle):
 
 
 @contextmanager
-def _signals_put_off() -> Iterator[None]:
-    """Put Ctrl-C and SIGTERM off until the end, but for no more than :data:`_PATIENCE`.
+def _signals_deferred() -> Iterator[None]:
+    """Defer Ctrl-C and SIGTERM until the end, for at most :data:`_QUIT_TIMEOUT_S`.
 
     Handlers of the program's own stay, and answer at once.
 
@@ -234,7 +234,7 @@ def _signals_put_off() -> Iterator[None]:
         SystemExit: One came; with its exit code, as :meth:`Application.run` returns it.
     """
     received: list[int] = []
-    with QuitOnSignal(received.append, _PATIENCE, keep_handlers=True):
+    with QuitOnSignal(received.append, _QUIT_TIMEOUT_S, keep_handlers=True):
         yield
     if received:
         raise SystemExit(128 + received[0])

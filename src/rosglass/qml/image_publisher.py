@@ -50,7 +50,7 @@ class ItemGrab:
     Args:
         item: The item.
         size: Width and height of the picture in pixels; None for the item's on the screen.
-        done: Told the picture, on the GUI thread.
+        done: Called with the picture, on the GUI thread.
 
     Attributes:
         problem: Why there will be no picture; empty when one can come.

@@ -214,7 +214,7 @@ class SharedStream(QtCore.QObject):
         interval = min(intervals, default=self._interval)
         if interval != self._interval:
             self._interval = interval
-            # Somebody may want pictures sooner than the next turn.
+            # A user may want pictures sooner than the next turn.
             self._turn.stop()
             self._balancer.forget(self)
             self._fetch()

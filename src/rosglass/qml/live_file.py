@@ -344,7 +344,7 @@ class LiveFile(QtCore.QObject):
         self._folders = [import_folder(path) for path in import_paths]
         #: What was made last; None before anything was.
         self.made: Made | None = None
-        self._put_off = False
+        self._deferred = False
         self._closed = False
         self.engine = QtQml.QQmlEngine()
         log_engine_warnings(self.engine)
@@ -379,8 +379,8 @@ class LiveFile(QtCore.QObject):
 
         Not while a call from QML waits, which would return into an interface that is gone.
         """
-        self._put_off = bool(self._session.waiting_calls)
-        return not self._put_off and not self._closed and is_alive(self.engine)
+        self._deferred = bool(self._session.waiting_calls)
+        return not self._deferred and not self._closed and is_alive(self.engine)
 
     def create(self) -> Made:
         """Make the file as it is now, beside what was made of it before.
@@ -456,8 +456,8 @@ class LiveFile(QtCore.QObject):
 
     def _go_on(self) -> None:
         # The call that has ended is still to return into QML.
-        if self._put_off:
-            self._put_off = False
+        if self._deferred:
+            self._deferred = False
             QtCore.QTimer.singleShot(0, self._tell_due)
 
     def _tell_due(self) -> None:

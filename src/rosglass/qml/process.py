@@ -138,8 +138,8 @@ def _require_x11_plugin() -> None:
         ) from None
 
 
-#: Seconds that the program has to end in good order.
-_PATIENCE = 4.0
+#: How long the program may take to end in good order.
+_QUIT_TIMEOUT_S = 4.0
 #: The signals that end a program, with Python's own handlers.
 _DEFAULTS: dict[int, Any] = {
     signal.SIGINT: signal.default_int_handler,
@@ -175,11 +175,11 @@ class QuitOnSignal:
     def __init__(
         self,
         quit: Callable[[int], None],
-        patience: float = _PATIENCE,
+        timeout_s: float = _QUIT_TIMEOUT_S,
         *,
         keep_handlers: bool = False,
     ) -> None:
-        self._quit, self._patience = quit, patience
+        self._quit, self._timeout_s = quit, timeout_s
         self._signals = [n for n in _DEFAULTS if not (keep_handlers and _is_programs_own(n))]
         self._reader, self._writer = os.pipe()
         self._ended = threading.Event()
@@ -220,7 +220,7 @@ class QuitOnSignal:
                     os.write(self._wakeup, received)
             else:
                 self._quit(received[0])
-                if not self._ended.wait(self._patience):
+                if not self._ended.wait(self._timeout_s):
                     sys.stderr.write("rosglass: the interface does not react; ending it\n")
                     sys.stderr.flush()
                     os._exit(128 + received[0])

@@ -32,7 +32,7 @@ from rosglass.qml.subscription import DEFAULT_QOS, Subscriber, next_message
 from rosglass.qml.synchronized_subscription import RosSynchronizedSubscription
 from rosglass.qml.tf_buffer import RosTfBuffer, RosTfTransformListener
 from rosglass.qml.tf_transform import RosTfBroadcaster, RosTfTransform
-from rosglass.qml.waiting import FOLDER_PATIENCE, MOST_WAITING, wait_for, within
+from rosglass.qml.waiting import FOLDER_TIMEOUT_S, MOST_WAITING, wait_for, within
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
 
 if TYPE_CHECKING:
@@ -107,8 +107,8 @@ class Time(WallTime):
 
 _T = TypeVar("_T")
 
-#: Seconds that the program ``rospack`` is given.
-_PATIENCE = 10
+#: How long the program ``rospack`` may take.
+_ROSPACK_TIMEOUT_S = 10
 
 
 class Package(QtCore.QObject):
@@ -140,7 +140,7 @@ class Package(QtCore.QObject):
             return search(self._found)
 
         try:
-            return within(FOLDER_PATIENCE, "a folder of packages", look)
+            return within(FOLDER_TIMEOUT_S, "a folder of packages", look)
         except Error as error:
             text = f"Ros.package: {error}"
             log_from_qml("", logging.ERROR, text, self._runtime.caller())
@@ -212,7 +212,9 @@ def _rospack(command: str) -> str:
 
     try:
         words = ["rospack", *shlex.split(command)]
-        done = subprocess.run(words, capture_output=True, text=True, timeout=_PATIENCE, check=False)
+        done = subprocess.run(
+            words, capture_output=True, text=True, timeout=_ROSPACK_TIMEOUT_S, check=False
+        )
     except FileNotFoundError:
         raise Error("rospack is not installed; getPath() and getAll() need no ROS") from None
     except (OSError, ValueError, subprocess.TimeoutExpired) as error:
@@ -369,7 +371,7 @@ class Ros(ValueFunctions):
         Args:
             type_name: Service type, ``pkg/Type``.
             name: Service name.
-            handler: Told the request; returns the response, or a promise of it.
+            handler: Called with the request; returns the response, or a promise of it.
         """
         return self._offer(
             "advertiseService", RosServiceServer, name, type_name, lambda: server_function(handler)
@@ -407,7 +409,7 @@ class Ros(ValueFunctions):
         Args:
             type_name: Action type, ``pkg/DoAction``.
             name: Action name.
-            execute: Told the goal and its handle; returns the result, or a promise of it, or
+            execute: Called with the goal and its handle; returns the result, or a promise of it, or
                 nothing, and ends the goal by its handle. Or an object of ``execute``, ``accept``
                 and ``cancel``.
         """

@@ -34,7 +34,7 @@ from rosglass.qml.subscription import DEFAULT_QOS, Subscription, next_message
 from rosglass.qml.synchronized_subscription import SynchronizedSubscription
 from rosglass.qml.tf_buffer import TfBuffer, TfTransformListener
 from rosglass.qml.tf_transform import TfBroadcaster, TfTransform
-from rosglass.qml.waiting import FOLDER_PATIENCE, within
+from rosglass.qml.waiting import FOLDER_TIMEOUT_S, within
 from rosglass.qt import QJSValue, QtCore, Signal, Slot
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ class AmentIndex(QtCore.QObject):
 
 def _look(search: Callable[[], _T], otherwise: _T) -> _T:
     try:
-        return within(FOLDER_PATIENCE, "a folder in AMENT_PREFIX_PATH", search)
+        return within(FOLDER_TIMEOUT_S, "a folder in AMENT_PREFIX_PATH", search)
     except Error as error:
         _log.error("AmentIndex: %s", error)
         return otherwise
@@ -288,7 +288,7 @@ class Ros2(ValueFunctions):
         Args:
             name: Service name.
             type_name: Service type, ``pkg/srv/Type`` or ``pkg/Type``.
-            handler: Told the request; returns the response, or a promise of it.
+            handler: Called with the request; returns the response, or a promise of it.
         """
         return self._offer(
             "createServiceServer", ServiceServer, name, type_name, lambda: server_function(handler)
@@ -324,7 +324,7 @@ class Ros2(ValueFunctions):
         Args:
             name: Action name.
             type_name: Action type, ``pkg/action/Type`` or ``pkg/Type``.
-            execute: Told the goal and its handle; returns the result, or a promise of it, or
+            execute: Called with the goal and its handle; returns the result, or a promise of it, or
                 nothing, and ends the goal by its handle. Or an object of ``execute``, ``accept``
                 and ``cancel``.
         """

@@ -191,7 +191,7 @@ class Runner(QtCore.QObject):
         """
         choice.expect(self.file)
         choice.choose(self.engine.importPathList())
-        self.session.put_off()
+        self.session.defer_connecting()
         try:
             made = self._live.create()
             self._live.replace(made, lambda: self._show(made.root))

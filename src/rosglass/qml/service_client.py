@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rosglass.messages import Message
     from rosglass.qml.runtime import Runtime
 
-    #: Told the response, or why there is none; on the GUI thread.
+    #: Called with the response, or why there is none; on the GUI thread.
     Done: TypeAlias = Callable[[Message | Error], None]
 
 __all__ = ["Service", "ServiceClient"]
@@ -146,7 +146,7 @@ class ServiceClient(ClientElement):
 
         Args:
             value: The request; one that does not fit throws into JavaScript.
-            done: Told the response or the error, on the GUI thread.
+            done: Called with the response or the error, on the GUI thread.
 
         Returns:
             Whether it is on its way; `done` is not called otherwise.
@@ -255,8 +255,8 @@ class ServiceClient(ClientElement):
                 self._give_up(request)
 
 
-#: Milliseconds that a call waits for a server; one that exists takes that long to be found.
-_PATIENCE = 5000
+#: How long a call waits for a server; discovering an existing one takes up to this long.
+_CONNECTION_TIMEOUT_MS = 5000
 
 
 class Service(QtCore.QObject):
@@ -330,5 +330,5 @@ class Service(QtCore.QObject):
         if client is None or not is_alive(client):
             client = self._clients[key] = ServiceClient(runtime, *key, Dialect.ROS1)
             client.setParent(self)
-            client.setProperty("connectionTimeout", _PATIENCE)
+            client.setProperty("connectionTimeout", _CONNECTION_TIMEOUT_MS)
         return client

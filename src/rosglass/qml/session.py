@@ -165,10 +165,10 @@ NOT_INITIALIZED = (
     'no node was asked for: call Ros2.init("name"), or Ros.init("name") with Ros 1.0, '
     "e.g. in Component.onCompleted"
 )
-#: Milliseconds that connecting is put off at most; an interface without a window has no frame.
-_LONGEST_PUT_OFF = 1000
-#: Seconds that the end of the program waits for the node to say goodbye, and for all threads.
-_PATIENCE = 1.2
+#: Longest delay of connecting; an interface without a window has no first frame.
+_MAX_DEFER_MS = 1000
+#: How long the end of the program waits for the node to close, and for all threads.
+_CLOSE_TIMEOUT_S = 1.2
 
 
 def _connect(url: str | None, name: str, namespace: str, arguments: Sequence[str] = ()) -> Node:
@@ -258,7 +258,7 @@ class Session(QtCore.QObject):
         self.duplicate_nodes: dict[str, int] = {}
         self._steady: tuple[Callable[[], float], float] = (time.monotonic, 0.0)
         self._generation = 0
-        self._put_off = False
+        self._deferred = False
         self._closed = False
         self._handles: list[Handle] = []
         self._rosout: QmlRosout | None = None
@@ -393,19 +393,19 @@ class Session(QtCore.QObject):
         self.initialized.emit()
         return True
 
-    def put_off(self) -> None:
+    def defer_connecting(self) -> None:
         """Delay connecting until :meth:`go_on`, a second at most.
 
         Connecting keeps Python busy, which the first frame of an interface needs, too.
         """
         if not self.is_initialized:
-            self._put_off = True
-            QtCore.QTimer.singleShot(_LONGEST_PUT_OFF, self.go_on)
+            self._deferred = True
+            QtCore.QTimer.singleShot(_MAX_DEFER_MS, self.go_on)
 
     def go_on(self) -> None:
-        """Connect, if that was put off; safe to call at any time."""
-        put_off, self._put_off = self._put_off, False
-        if put_off and self.is_initialized and self._owns_node:
+        """Connect now if that was deferred; safe to call at any time."""
+        deferred, self._deferred = self._deferred, False
+        if deferred and self.is_initialized and self._owns_node:
             self._start()
 
     def adopt(self, node: Node) -> None:
@@ -438,7 +438,7 @@ class Session(QtCore.QObject):
             return
         self._closed = True
         self.holding = 0
-        until = time.monotonic() + _PATIENCE
+        until = time.monotonic() + _CLOSE_TIMEOUT_S
         streams = list(self.streams.values())
         self.shutdown()
         done = threading.Event()
@@ -448,7 +448,7 @@ class Session(QtCore.QObject):
         for stream in streams:
             stream.stream.join(max(0.0, until - time.monotonic()))
         if not done.wait(max(0.0, until - time.monotonic())):
-            _log.warning("the node is still closing after %.1f s", _PATIENCE)
+            _log.warning("the node is still closing after %.1f s", _CLOSE_TIMEOUT_S)
         self.executor.close()
         self._worker.close()
         if Session._default is self:
@@ -550,7 +550,7 @@ class Session(QtCore.QObject):
             connect = partial(connect, arguments=arguments)
         self._failed = False
         self._set_status(Status(ConnectionState.CONNECTING, f"connecting to {url or 'the robot'}"))
-        if self._put_off:
+        if self._deferred:
             return
 
         def work() -> Node:

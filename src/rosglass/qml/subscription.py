@@ -507,7 +507,7 @@ def wait_for_message(
         subscription: A new one, made for this.
         topic: Topic name.
         milliseconds: How long to wait, 0 or infinity for ever.
-        done: Told the message; None when none came.
+        done: Called with the message; None if there was none.
     """
     subscription.setParent(runtime)
     subscription.configure(topic, "", QoS.best_available())

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rosglass.qml.session import Session
 
 
-__all__ = ["FILE_PATIENCE", "FOLDER_PATIENCE", "MOST_WAITING", "wait_for", "within"]
+__all__ = ["FILE_TIMEOUT_S", "FOLDER_TIMEOUT_S", "MOST_WAITING", "wait_for", "within"]
 
 #: Calls that wait within each other at most. Each needs a part of the stack, and once that is used
 #: up, nothing works any more, a stop button neither.
@@ -93,8 +93,8 @@ def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> b
 
 _T = TypeVar("_T")
 
-#: Seconds that a file may hold up the interface, and a tree of folders that is searched.
-FILE_PATIENCE, FOLDER_PATIENCE = 2.0, 5.0
+#: How long a file, and a folder that is searched, may block the interface.
+FILE_TIMEOUT_S, FOLDER_TIMEOUT_S = 2.0, 5.0
 
 
 def within(seconds: float, what: str, work: Callable[[], _T]) -> _T:

@@ -264,8 +264,8 @@ _GLANCE = 50e-6
 _GAP = 1.0
 #: The part of its time that a thread computes at least, when it does not wait for something.
 _BUSY = 0.05
-#: On a machine with too much to do, JavaScript is given up to so many times as long.
-_PATIENCE = 4
+#: On an overloaded machine, JavaScript may take up to this many times as long.
+_LOAD_FACTOR = 4
 #: Seconds within which the next function of JavaScript does not begin.
 _LATE = 30e-6
 _OURS = str(Path(__file__).parents[1])
@@ -280,7 +280,7 @@ class _Watched(NamedTuple):
     Attributes:
         engine: The engine.
         stack: Its stack.
-        tell: Told on the GUI thread what was done to it.
+        tell: Called on the GUI thread with what was done to the engine.
         waiting: What was the innermost function when the event loop was last seen to run; others
             than 0 wait for something in an event loop of their own.
     """
@@ -401,7 +401,7 @@ class Watchdog(QtCore.QObject):
 
         Args:
             engine: The engine; :meth:`forget` it before it goes.
-            tell: Told on the GUI thread what was done to it, or that Python stood in its way.
+            tell: Called on the GUI thread with what was done to the engine, or why nothing was.
         """
         stack = JsStack(engine)
         self._watched[id(engine)] = _Watched(engine, stack, tell, [stack.frame])
@@ -497,7 +497,7 @@ class Watchdog(QtCore.QObject):
             if not limit:
                 return
             if not passed:
-                # Nobody knows what it did.
+                # What it did is unknown.
                 continue
             still += passed
             running = [watched for watched in tuple(self._watched.values()) if watched.is_running]
@@ -505,7 +505,7 @@ class Watchdog(QtCore.QObject):
             innermost = min(running, key=lambda watched: watched.stack.frame, default=None)
             if innermost is not None and (used.runs or computed > _BUSY * passed):
                 last, handler = handler, innermost.handler
-                script = (script if handler == last else 0.0) + computed + ready / _PATIENCE
+                script = (script if handler == last else 0.0) + computed + ready / _LOAD_FACTOR
                 if script < limit:
                     continue
                 if self._beaten == beaten and self._end_script(innermost, script):
@@ -522,7 +522,7 @@ class Watchdog(QtCore.QObject):
             ended = watched.handler != handler
             if ended:
                 break
-            # Told while it waits for this thread's processor, it would not be seen to end.
+            # Interrupted while it waits for this thread's processor, it would not be seen to end.
             if not self._computes() and self._use().runs:
                 continue
             if not shared:

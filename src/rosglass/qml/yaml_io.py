@@ -17,7 +17,7 @@ from rosglass.qml.dialect import Dialect
 from rosglass.qml.from_js import plain_from_js
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.to_js import exact
-from rosglass.qml.waiting import FILE_PATIENCE, within
+from rosglass.qml.waiting import FILE_TIMEOUT_S, within
 from rosglass.qt import QJSValue, QtCore, Slot
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class Io(QtCore.QObject):
         """
         try:
             file = _local(path)
-            text = within(FILE_PATIENCE, str(file), lambda: _read(file))
+            text = within(FILE_TIMEOUT_S, str(file), lambda: _read(file))
             return _Reader(self._runtime, self._dialect).value(_load(text, file), 0)
         except (OSError, UnicodeError, RecursionError, Error) as error:
             return self._failed("readYaml", error)
@@ -78,7 +78,7 @@ class Io(QtCore.QObject):
         try:
             file = _local(path)
             text = _dump(plain_from_js(value), self._dialect)
-            within(FILE_PATIENCE, str(file), lambda: _replace(file, text))
+            within(FILE_TIMEOUT_S, str(file), lambda: _replace(file, text))
         except (OSError, UnicodeError, RecursionError, Error) as error:
             self._failed("writeYaml", error)
             return False

@@ -503,7 +503,7 @@ class QmlOverlay(QmlInput, Overlay):
             QmlError: It has errors, and is not watched. They are shown in its place all the same,
                 until :meth:`reload` finds them mended.
         """
-        self.session.put_off()
+        self.session.defer_connecting()
         try:
             self._load()
         except QmlError as error:

@@ -55,7 +55,7 @@ class Batch:
         self._serdata = (c_void_p * size)()
         self._infos = (c_ubyte * (_INFO.size * size))()
         self._addresses = memoryview(self._serdata).cast("B").cast("Q")
-        self._told = memoryview(self._infos).cast("B")
+        self._info_bytes = memoryview(self._infos).cast("B")
         self._at = ctypes.addressof(self._serdata), ctypes.addressof(self._infos)
         # Its lock is held by no thread that calls us, and for no longer than this takes.
         self._take = keeping().dds_takecdr
@@ -70,7 +70,7 @@ class Batch:
         Returns:
             For each sample its payload, as :func:`payload` returns it, the writer's time stamp in
             nanoseconds since the Unix epoch, the handle of the writer, and what `describe` said.
-            Without those that only tell that a writer is gone.
+            Samples that only report a deleted writer are left out.
 
         Raises:
             NodeClosedError: The reader was deleted.
@@ -82,10 +82,10 @@ class Batch:
             return []
         infos: Iterable[tuple[bool, int, int]]
         if count == 1:
-            addresses, infos = [self._addresses[0]], [_INFO.unpack_from(self._told)]
+            addresses, infos = [self._addresses[0]], [_INFO.unpack_from(self._info_bytes)]
         else:
             addresses = self._addresses[:count].tolist()
-            infos = _INFO.iter_unpack(self._told[: count * _INFO.size])
+            infos = _INFO.iter_unpack(self._info_bytes[: count * _INFO.size])
         taken = []
         describe = self._describe
         for serdata, (valid, sent, writer) in zip(addresses, infos, strict=True):
