@@ -325,7 +325,9 @@ class TypeFetcher(NodeMember):
         key = name, hash, ""
         self._put((key, tuple(endpoints), on_done, None))
         request = self._requests.get(key)
-        return "" if request is None else request.problem
+        if request is None or any(endpoint.node not in request.nodes for endpoint in endpoints):
+            return ""  # the problem is that of nodes queried before
+        return request.problem
 
     def knows(self, name: str) -> bool:
         """Return whether an endpoint in the graph uses a type."""
@@ -548,9 +550,7 @@ class TypeFetcher(NodeMember):
         same = [user for user in users.get(name, ()) if user.type_hash == request.hash]
         own = self._core.name
         nodes = dict.fromkeys(u.node for u in (*request.endpoints, *same) if u.node != own)
-        if not request.nodes.issuperset(nodes):
-            request.nodes.update(nodes)
-            request.since = now  # a new node's service may show later, too
+        request.on_nodes(set(nodes), now)
         servers: dict[bytes | str, EndpointInfo] = {}
         without: list[str] = []
         for node in nodes:
@@ -797,11 +797,19 @@ class TypeRequest:
         now = time.monotonic()
         if endpoints is not None:
             self.endpoints, self.used = endpoints, now
+            self.on_nodes({endpoint.node for endpoint in endpoints}, now)
         if listener is not None and listener not in self.listeners:
             self.listeners.append(listener)
         if promise is not None:
             self.since = now
             self.promises.append(promise)
+
+    def on_nodes(self, nodes: set[NodeName], now: float) -> None:
+        """Start anew if a node uses the type that did not before."""
+        if not nodes <= self.nodes:
+            self.nodes |= nodes
+            # Its service may show later, and what failed before says nothing about it.
+            self.since, self.problem = now, ""
 
     def notify(self) -> None:
         """Call the listeners."""

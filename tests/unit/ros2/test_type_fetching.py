@@ -211,6 +211,22 @@ def test_a_node_that_appears_late_has_time_to_show_its_service(
     assert promise.result().rihs01 == hash_of(STATE)
 
 
+def test_what_failed_before_says_nothing_of_a_new_node(join: Callable[..., Ros2Node]) -> None:
+    library = robot_library()
+    user = join("cockpit", serves=False)
+    subscription = user.create_subscription("/state")
+    key = use(user, STATE, hash_of(STATE), "gone")
+    eventually(lambda: "is being fetched" in subscription.problem)
+    user.fake.graph.remove(key)
+    with pytest.raises(TypeNotFoundError, match="/gone has no get_type_description"):
+        user.fetch_type(STATE, hash=hash_of(STATE), timeout=30)
+    join("spare", library)
+    use(user, STATE, hash_of(STATE), "spare")
+    eventually(lambda: subscription.type)
+    assert not isinstance(subscription.type, OpaqueType)
+    assert subscription.type.definition.source.provider == "wire /spare"
+
+
 def test_local_types_are_taken_when_the_robot_has_the_same(join: Callable[..., Ros2Node]) -> None:
     library = Library()
     user = join("cockpit", library, serves=False)
