@@ -250,7 +250,7 @@ BROKEN = "a: [1,\n b: }"
         (["--name", "a-b"], "node name 'a-b' contains '-'"),
         (["--fixed-frame", "/map"], "'/map' is no name of a frame"),
         (["-I", "{folder}/none"], "no such folder to import QML modules from"),
-        (["__foo:=x"], "__foo is not known"),
+        (["__foo:=x"], "__foo is unknown"),
     ],
 )
 def test_bad_input_is_told(

@@ -271,6 +271,8 @@ class LocalWriter(_Endpoint["LocalReader"], Writer):
         if other.info.qos.durability is Durability.TRANSIENT_LOCAL:
             now = time.monotonic()
             kept = [sample for expiry, sample in self._kept if now < expiry]
+            if other.info.qos.history is History.KEEP_LAST:
+                kept = kept[-other.info.qos.depth :]
             if kept and other.hold(self.gid, kept):
                 calls.append(partial(other.catch_up, self.gid))
 
