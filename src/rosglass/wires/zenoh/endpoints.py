@@ -61,8 +61,8 @@ _POLL_INTERVAL_S = 0.0005
 class LocalRegistry(Generic[_T]):
     """The node's own readers or servers, to which it delivers directly instead of over Zenoh.
 
-    Zenoh would call back in the sending thread. In the main thread, Ctrl-C is likely to strike in
-    that callback, and Zenoh swallows whatever it raises: the program would not end.
+    Zenoh would call back in the sending thread. In the main thread, Ctrl-C often interrupts that
+    callback, and Zenoh swallows the KeyboardInterrupt: the program would not end.
     """
 
     def __init__(self) -> None:
@@ -116,7 +116,7 @@ class Owner(Protocol):
 
 
 class Declaration(Handle):
-    """A token and what belongs to it, declared as soon as the session is open.
+    """A liveliness token and its Zenoh entities, declared as soon as the session is open.
 
     Args:
         owner: The middleware.
@@ -132,7 +132,7 @@ class Declaration(Handle):
         self._handles: list[Any] = []
 
     def attach(self, session: zenoh.Session) -> None:
-        """Declare it on the session that was opened."""
+        """Declare it on a newly opened session."""
         with self._lock:
             if self._closed or self._attached:
                 return
@@ -147,7 +147,7 @@ class Declaration(Handle):
 
     @abstractmethod
     def declare(self, session: zenoh.Session) -> list[Any]:
-        """Declare what belongs to the token, and return the handles to undeclare."""
+        """Declare the entities of the token, and return the handles to undeclare."""
 
     def poll(self) -> None:
         """Do periodic work; called about once a second."""
@@ -207,7 +207,7 @@ class Announcement(Declaration):
     """The token of a node."""
 
     def declare(self, session: zenoh.Session) -> list[Any]:  # noqa: ARG002 - nothing but the token
-        """Declare nothing more."""
+        """Declare nothing: a node has only its token."""
         return []
 
 
@@ -248,7 +248,7 @@ class ZenohWriter(Declaration, Writer):
         self._history: deque[tuple[bytes | bytearray, bytes, int]] = deque(maxlen=self._qos.depth)
         #: A buffer to join parts in: fresh memory takes longer than copying.
         self._buffers: list[bytearray] = []
-        # What is kept for late subscriptions would fill the shared memory.
+        # Samples kept for late subscriptions would fill the shared memory.
         self._shared = None if self._latched else shared
 
     def declare(self, session: zenoh.Session) -> list[Any]:
@@ -316,7 +316,7 @@ class ZenohWriter(Declaration, Writer):
                 self._release()
 
     def match(self, subscriptions: Sequence[EndpointInfo]) -> None:
-        """Publish also on the key without type hash if a subscription, as of Humble, uses that."""
+        """Also publish on the key without type hash if a subscription, as in Humble, uses it."""
         ours = {self._type_hash or HUMBLE_HASH, HUMBLE_HASH}
         wanted = {endpoint.type_hash or HUMBLE_HASH for endpoint in subscriptions}
         with self._lock:
@@ -334,7 +334,7 @@ class ZenohWriter(Declaration, Writer):
                 raise self._error(error) from error
 
     def _release(self) -> None:
-        # Zenoh refuses to undeclare what is in use. A write ends soon, or else releases this.
+        # Zenoh refuses to undeclare a publisher in use. A write ends soon, or else releases it.
         own, deadline = threading.get_ident(), time.monotonic() + _CLOSE_TIMEOUT_S
         while set(self._writing) - {own} and time.monotonic() < deadline:
             time.sleep(_POLL_INTERVAL_S)
@@ -381,7 +381,7 @@ class ZenohWriter(Declaration, Writer):
 
 
 def _guarded(callback: Callable[[Any], None]) -> Callable[[Any], None]:
-    """Log what a callback raises; Zenoh would only print it."""
+    """Log the exceptions of a callback; Zenoh would only print them."""
 
     def guarded(item: Any) -> None:
         try:
@@ -540,9 +540,9 @@ def lockable_bytes() -> int:
 
 
 def _free() -> int:
-    """Return the free shared memory in bytes; writing beyond it kills a program."""
+    """Return the free shared memory in bytes; writing more would kill the program."""
     try:
         state = os.statvfs(_SHM_FOLDER)
-    except (AttributeError, OSError):  # another system than Linux
+    except (AttributeError, OSError):  # not Linux
         return 1 << 62
     return state.f_bavail * state.f_frsize

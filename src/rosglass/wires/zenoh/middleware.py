@@ -82,8 +82,8 @@ _SETTLING_TIME_S = 0.2
 class ZenohMiddleware(Middleware):
     """A Zenoh session.
 
-    What is created before the session is open (that of a client opens when its router answers) is
-    declared then.
+    Entities created before the session opens are declared when it does; the session of a client
+    opens when its router answers.
     """
 
     matches_qos = False
@@ -128,7 +128,7 @@ class ZenohMiddleware(Middleware):
         check_process()
         self._graph, self._changed = graph, changed
         if not self._is_peer:
-            self._retries_open = True  # poll() opens it, as it would wait for the router
+            self._retries_open = True  # poll() opens it: opening waits for the router
             changed()
         else:
             self._open()
@@ -327,7 +327,7 @@ class ZenohMiddleware(Middleware):
                 self._increase_version()
 
     def _await_history(self, session: zenoh.Session) -> None:
-        """Send a query without result to a router, which ends after all tokens before it."""
+        """Send a query without result to a router; it ends after all tokens sent before it."""
         with suppress(zenoh.ZError):  # the session is closed
             channel = zenoh.handlers.FifoChannel(4)
             history = session.liveliness().get(self._no_token, channel, timeout=_HISTORY_TIMEOUT_S)
@@ -335,7 +335,7 @@ class ZenohMiddleware(Middleware):
                 self._history = history
 
     def _increase_version(self) -> None:
-        # A new number on whichever thread.
+        # next() is atomic: a new number on every thread.
         self.version = next(self._versions)
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
@@ -353,7 +353,7 @@ class ZenohMiddleware(Middleware):
     def _on_token(self, sample: zenoh.Sample) -> None:
         key = str(sample.key_expr)
         if f"/{self._id}/" in key or self._closed:
-            return  # our own stay in the graph while they are declared, regardless of links
+            return  # own tokens stay in the graph while declared, regardless of links
         if sample.kind == zenoh.SampleKind.DELETE:
             self._hide(key)
         else:

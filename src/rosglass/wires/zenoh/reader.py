@@ -432,7 +432,7 @@ class ZenohReader(Declaration, Reader):
             self._log_failure()
 
     def _check_rate(self) -> None:
-        """Have the mode chosen again if the rate is too high for it."""
+        """Request another mode if the rate is too high for the present one."""
         span = time.monotonic() - self._marked_at
         fast = self._count - self._marked > _THREAD_RATE_HZ * span
         if fast and span > _MIN_RATE_WINDOW_S and self._mode is _Mode.DIRECT:

@@ -47,7 +47,7 @@ class Router(Handle):
 
     Raises:
         ArgumentError: `listen` is not an address.
-        ConnectionLostError: The address is in use, or none of this machine.
+        ConnectionLostError: The address is in use, or does not belong to this machine.
     """
 
     def __init__(self, listen: str = DEFAULT_LISTEN) -> None:

@@ -191,7 +191,7 @@ class ZenohRequester(Declaration, Requester):
         return self._service.describe_conflicts(servers, "it cannot be called")
 
     def declare(self, session: zenoh.Session) -> list[Any]:
-        """Declare queriers, which know whether a query will reach a server."""
+        """Declare queriers, which report whether a query will reach a server."""
         self._session = session
         for name, key in self._service.keys.items():
             self._queriers[name] = session.declare_querier(
@@ -374,7 +374,7 @@ class OpenRequest:
     Args:
         answer: Sends the response.
         refuse: Reports that there will be no response.
-        release: Lets go of the client.
+        release: Releases the client.
     """
 
     __slots__ = ("__weakref__", "_ends")
@@ -396,7 +396,7 @@ class OpenRequest:
         self._end(1, reason)
 
     def release(self) -> None:
-        """Let go of the client, which notices that the call has ended."""
+        """Release the client, which then detects the end of the call."""
         self._end(2)
 
     def _end(self, which: int, *arguments: Any) -> None:
@@ -454,7 +454,7 @@ class ZenohReplier(Declaration, Replier):
         self._waiting: weakref.WeakSet[OpenRequest] = weakref.WeakSet()
         self._warned = False
         self._session: zenoh.Session | None = None
-        #: The token for clients that know no hashes, and whether it is declared.
+        #: The token for clients without type hashes, and whether it is declared.
         self._second = without_hash(token, service.hash)
         self._has_second = False
         own_servers.add(service.place, self)
@@ -503,7 +503,7 @@ class ZenohReplier(Declaration, Replier):
             self._on_request(request, data)
 
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:
-        """Answer a request; a client that is gone is no error."""
+        """Answer a request; raises nothing if the client is gone."""
         if isinstance(request.handle, OpenRequest):
             request.handle.answer(data)
 

@@ -4,9 +4,9 @@ On one machine, a session is a peer that connects to a router, listens on the lo
 only, and discovers other peers by gossip, never by multicast. To a router on another machine it is
 a client.
 
-Zenoh drops a dead link after its lease: 10 s, and 60 s with the routers of ROS 2. Until then an
-operator would see the last picture as if it were live. And a connection that survives delivers,
-when the network returns, commands that were sent long ago.
+Zenoh drops a dead link after its lease: 10 s, and 60 s with the routers of ROS 2. Until then, an
+operator would see the last picture as if it were live. If the connection survives, it delivers old
+commands when the network returns.
 """
 
 from __future__ import annotations
@@ -156,14 +156,14 @@ def check_process() -> None:
         )
 
 
-#: The process that uses Zenoh, but not its forks.
+#: Ids of the process that uses Zenoh; a fork has another id.
 _processes: set[int] = set()
 
 
 def close_session(session: zenoh.Session, pause: float = 0.0) -> None:
     """Close a session, in any state, within 5 s.
 
-    A thread of Zenoh does not wait, as closing waits for that thread.
+    On a thread of Zenoh, it does not wait: closing waits for that thread.
 
     Args:
         session: The session.
