@@ -1,8 +1,8 @@
 """Corresponding types of ROS 1 and ROS 2: names, fields, times, and what is lost or added.
 
-What differs (ROS 2 design article "Mapping between ROS interface types and DDS", the migration
+Differences (ROS 2 design article "Mapping between ROS interface types and DDS", the migration
 guide, and ros1_bridge's rules): ``time`` and ``duration`` are messages in ROS 2, its ``Header`` has
-no ``seq``, its field names are lower case, some types have moved, some have got more fields.
+no ``seq``, field names are lower case, some types have moved, some have more fields.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ RENAMED = {
     "roscpp_tutorials/srv/TwoInts": "example_interfaces/srv/AddTwoInts",
     "rospy_tutorials/srv/AddTwoInts": "example_interfaces/srv/AddTwoInts",
 }
-#: ROS 2's types that ROS 1 knows under another name; where it has several, the usual one.
+#: ROS 2's types with another name in ROS 1; of several names, the usual one.
 _BACK = {new: old for old, new in RENAMED.items()}
 #: Packages that have another name in ROS 2.
 _PACKAGES = {"topic_tools": "topic_tools_interfaces"}
@@ -50,7 +50,7 @@ _PACKAGES_BACK = {new: old for old, new in _PACKAGES.items()}
 #: ROS 1's primitives that are messages in ROS 2.
 _TIMES = {"time": "builtin_interfaces/msg/Time", "duration": "builtin_interfaces/msg/Duration"}
 _TIMES_BACK = {new: old for old, new in _TIMES.items()}
-#: ROS 1's primitives -> those of ROS 2 that mean the same, the usual one first.
+#: ROS 1's primitives -> ROS 2's with the same meaning, the usual one first.
 _PRIMITIVES = {
     "byte": ("int8", "byte", "uint8"),
     "char": ("uint8", "char"),
@@ -60,9 +60,9 @@ _PRIMITIVES = {
 #: ROS 2's primitives -> ROS 1's.
 _PRIMITIVES_BACK = {"byte": "uint8", "char": "uint8", "wstring": "string"}
 _HEADER = "std_msgs/msg/Header"
-#: Field of ROS 1's Header that ROS 2's is without.
+#: The field that only ROS 1's Header has.
 _SEQ = "seq"
-#: What rosidl puts into messages without fields.
+#: The field that rosidl adds to messages without fields.
 _FILLER = "structure_needs_at_least_one_member"
 
 
@@ -71,7 +71,7 @@ class PairedField:
     """A field in ROS 1 and the corresponding one in ROS 2.
 
     Attributes:
-        one: Path of attributes in ROS 1's message, mostly of one name.
+        one: Path of attributes in ROS 1's message, usually one name.
         two: The same in ROS 2's.
         type_one: Its type in ROS 1.
         type_two: Its type in ROS 2.
@@ -92,13 +92,13 @@ class Pair:
     Attributes:
         one: ROS 1's definition.
         two: ROS 2's.
-        fields: What corresponds, in ROS 1's order.
-        only_one: Fields that only ROS 1's has, ``Header.seq`` excepted: left out for ROS 2.
-        only_two: Fields that only ROS 2's has: left out for ROS 1, default the other way.
-        exact: Whether the bytes of the fields are the same in one wire format, ``Header.seq`` at
-            the very beginning excepted.
-        has_times: Whether there are times or durations in it, at any depth.
-        has_seq: Whether there is a ``Header.seq`` in it that ROS 2 has not.
+        fields: The corresponding fields, in ROS 1's order.
+        only_one: Fields that only ROS 1's has, except ``Header.seq``; dropped on the way to ROS 2.
+        only_two: Fields that only ROS 2's has; dropped on the way to ROS 1, default the other way.
+        exact: Whether the fields have the same bytes in one wire format, except ``Header.seq`` at
+            the very beginning.
+        has_times: Whether it contains times or durations, at any depth.
+        has_seq: Whether it contains a ``Header.seq`` that ROS 2 lacks.
     """
 
     one: Definition
@@ -130,7 +130,7 @@ class Counterparts:
     """Finds or derives the corresponding type of the other ROS.
 
     Args:
-        library: Where the other ROS's types are looked up.
+        library: Library for the types of the other ROS.
     """
 
     def __init__(self, library: Library) -> None:
@@ -147,7 +147,7 @@ class Counterparts:
             wanted: Definitions of the other ROS to prefer when they correspond: those in use.
 
         Raises:
-            UnsupportedError: There can be none: names of fields differ only in case.
+            UnsupportedError: It has no counterpart: field names differ only in case.
         """
         for candidate in wanted:
             pair = self._match(source, candidate)
@@ -283,17 +283,17 @@ class Counterparts:
 def match(one: Definition, two: Definition, known: _Pairs | None = None) -> Pair | None:
     """Return how the fields of a message of ROS 1 and one of ROS 2 correspond.
 
-    None when they do not: a field of ROS 1 has no place in ROS 2, or means something else there.
+    None if they do not: a field of ROS 1 is missing in ROS 2, or has another meaning there.
 
     Args:
         one: ROS 1's message.
         two: ROS 2's.
-        known: What was found before, and takes what is found.
+        known: Cache of the pairs found so far; extended.
     """
     known = {} if known is None else known
     key = id(one), id(two)
     if key not in known:
-        # With both, so that no other object gets the same identity.
+        # Keep both alive, so that no other object gets their ids.
         known[key] = one, two, _match(one, two, known)
     return known[key][2]
 
@@ -305,7 +305,7 @@ def _match(one: Definition, two: Definition, known: _Pairs) -> Pair | None:
         _TIMES_BACK[two.name]
     ]:
         field = one.fields[0]
-        # The only field is what the other message is.
+        # Its only field corresponds to the whole other message.
         paired = PairedField((field.name,), (), field.type, FieldType(two.name))
         return Pair(one, two, (paired,), exact=True, has_times=True)
     ours = [field for field in one.fields if not _left_out(one, field)]
@@ -353,7 +353,7 @@ def _exact(pair: Pair, same_order: bool) -> bool:
             return False
         many = field.type_one.array is not ArrayKind.NONE
         if field.type_one.name in _TIMES and many:
-            return False  # whether each fits must be looked at
+            return False  # each value must be checked for its range
         if field.inner is not None:
             if not field.inner.exact or (many and field.inner.has_times):
                 return False

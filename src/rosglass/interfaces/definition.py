@@ -52,8 +52,8 @@ class FieldType:
         size: Element count of a fixed array, maximum of a bounded sequence, otherwise None.
         string_bound: Maximum length of a bounded string, in UTF-8 bytes (wstring: UTF-16 units),
             otherwise None.
-        letter: Whether a ``char`` is IDL's own, whose hash differs: a ``.msg`` file's is an
-            ``uint8`` to rosidl. Both are numbers from 0 to 255 here.
+        letter: Whether a ``char`` is IDL's own, which has another hash; rosidl treats that of a
+            ``.msg`` file as ``uint8``. Both are numbers from 0 to 255 here.
     """
 
     name: str
@@ -83,10 +83,10 @@ class Field:
     Attributes:
         name: The name on the wire.
         type: Its type.
-        default: Default value given in the definition (ROS 2), None when there is none.
+        default: Default value given in the definition (ROS 2); None if there is none.
         comment: The comment lines above and beside the field, joined by newlines.
-        unit: Unit named in the comment, e.g. ``m`` or ``rad/s``; empty when there is none.
-        place: Line and column in the source's file, 1-based; zeros when unknown.
+        unit: Unit named in the comment, e.g. ``m`` or ``rad/s``; empty if there is none.
+        place: Line and column in the source's file, 1-based; zeros if unknown.
     """
 
     name: str
@@ -136,12 +136,12 @@ class Definition:
 
     Attributes:
         name: Full name, ``pkg/msg/Type``.
-        ros: 1 or 2: whose syntax, primitive types and wire format it follows.
+        ros: 1 or 2: the ROS whose syntax, primitive types and wire format it has.
         fields: In order of declaration. An empty ROS 2 message has no fields here; codecs add the
             placeholder byte that its wire format demands.
         constants: In order of declaration.
         text: The definition as received, comments included.
-        source: Where it came from.
+        source: Its origin.
         nested: Every message type it needs, directly or indirectly, by full name.
         comment: The comment at the start of the definition, about the message as a whole.
     """

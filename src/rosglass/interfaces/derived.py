@@ -69,7 +69,7 @@ def derived_from(name: str, ros: int) -> Iterator[tuple[str, str]]:
         ros: 1 or 2.
 
     Yields:
-        Full name of the service or action, and the suffix that makes `name` of it.
+        Full name of the service or action, and the suffix that turns it into `name`.
     """
     package, kind, base = name.split("/")
     if kind == "srv":
@@ -101,10 +101,10 @@ def compose(
 
     Args:
         name: Full type name, ``pkg/action/Type``.
-        find: Returns the definition of a message, None when there is none.
+        find: Returns the definition of a message; None if there is none.
 
     Returns:
-        The action that the messages generated from it show, None unless all are there.
+        The action, composed of its generated messages; None if one of them is missing.
     """
     package, _, base = name.split("/")
     names = [f"{package}/msg/{base}{suffix}" for suffix in ("Goal", "Result", "Feedback")]

@@ -43,7 +43,7 @@ _ARRAY_OFFSETS = {
 }
 _PLACEHOLDER = "structure_needs_at_least_one_member"
 
-# What rosidl and actionlib add to services and actions; fixed parts of the hashes.
+# Types that rosidl and actionlib add to services and actions; fixed parts of the hashes.
 _BUILT_IN = {
     (2, "builtin_interfaces/msg/Time"): "int32 sec\nuint32 nanosec",
     (2, "unique_identifier_msgs/msg/UUID"): "uint8[16] uuid",
@@ -66,7 +66,7 @@ class NoSuchHashError(UnsupportedError, AttributeError):
 
 
 def check_definition(value: object) -> None:
-    """Raise UnsupportedError if `value` is not a definition, but for example a type's name."""
+    """Raise UnsupportedError if `value` is not a definition, for example a type's name."""
     if not isinstance(value, (Definition, ServiceDefinition, ActionDefinition)):
         raise UnsupportedError(
             f"a definition is expected, as Library.definition(name) returns it, not {value!r:.80}"

@@ -77,7 +77,7 @@ class Lexer:
         file: Label for errors.
 
     Raises:
-        DefinitionError: Something in the text is no token.
+        DefinitionError: The text contains something that is not a token.
     """
 
     def __init__(self, text: str, file: str) -> None:
@@ -119,10 +119,10 @@ class Lexer:
         return self._tokens[self._next]
 
     def take(self, expected: str = "", kind: str = "") -> Token:
-        """Return the next token and go on.
+        """Consume and return the next token.
 
         Raises:
-            DefinitionError: It is not the text, or not of the kind, that was expected.
+            DefinitionError: The token does not have the expected text or kind.
         """
         token = self.token
         if (expected and token.text != expected) or (kind and token.kind != kind):
@@ -196,8 +196,8 @@ def parse_idl(
     """Parse an IDL file of ROS 2.
 
     Args:
-        text: The IDL; what it includes is not read, types are looked up by name.
-        name: Full name of the type to take from it; ``pkg/Type`` means a message.
+        text: The IDL; its includes are not read, types are looked up by name.
+        name: Full name of the type to return; ``pkg/Type`` means a message.
         file: Label for error messages, by default the name in angle brackets.
         provider: Recorded in the definition's source.
 
@@ -205,7 +205,7 @@ def parse_idl(
         The definition, not resolved; ``nested`` holds the other messages in the file.
 
     Raises:
-        DefinitionError: The text is not IDL, uses what ROS 2 does not have, or has no such type.
+        DefinitionError: The text is not IDL, uses a feature ROS 2 lacks, or has no such type.
         InvalidNameError: `name` is not a type name.
     """
     full = join_name(name)

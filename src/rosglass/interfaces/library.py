@@ -42,12 +42,12 @@ __all__ = ["Library"]
 class Versions:
     """Resolved ROS 2 definitions by name and RIHS01 hash.
 
-    Versions of a type exist side by side: the hash that a peer announces says which one it means.
+    Versions of a type exist side by side: the hash that a peer announces selects one.
     The library's lock guards all methods.
 
     Args:
-        find: Returns the definition of a message that types imply (times, identifiers) and no
-            description has; None when there is none.
+        find: Returns the definition of a message that types imply (times, identifiers) but
+            descriptions omit; None if there is none.
     """
 
     def __init__(self, find: Callable[[str], InterfaceDefinition | None]) -> None:
@@ -58,7 +58,7 @@ class Versions:
         """Store a resolved definition, and those it needs; returns its hash.
 
         Raises:
-            UnsupportedError: It is a ROS 1 definition, or none.
+            UnsupportedError: It is a ROS 1 definition, or not a definition.
             DefinitionError: It is not resolved.
         """
         check_definition(definition)
@@ -78,7 +78,7 @@ class Versions:
 
         Args:
             name: Full type name.
-            wanted: A hash that it is announced by; empty takes what came last.
+            wanted: A hash announced for it; empty for the version added last.
         """
         known = self._known.get(name, {})
         found = known.get(wanted) if wanted else next(reversed(known.values()), None)
@@ -104,7 +104,7 @@ class Versions:
 
     def _put(self, definition: InterfaceDefinition, type_hash: str) -> None:
         known = self._known.setdefault(definition.name, {})
-        # The first object stays: types are made once per definition. It becomes the last to come.
+        # Keep the first object: types are made once per definition. It counts as added last.
         known[type_hash] = known.pop(type_hash, definition)
 
     def _resolver(self, owner: InterfaceDefinition) -> Resolver:
@@ -140,15 +140,15 @@ PREFER_VARIABLE = "ROSGLASS_PREFER_DEFINITIONS"
 class Library:
     """Finds the definitions of types; thread-safe.
 
-    A type is looked for in definitions received from peers, the sourced workspace, folders added by
-    the user, and the distributions' standard sets, in this order. For a type that is not found, the
-    environment is read again: it may name another workspace by now. When two of them define a type
-    differently neither is used, unless one is preferred. Versions that peers sent on request come
-    last, and where their hash is asked for.
+    A type is looked up in definitions received from peers, the sourced workspace, folders added by
+    the user, and the distributions' standard sets, in this order. If it is not found, the
+    environment is read again: it may name another workspace by then. If two of them define a type
+    differently, neither is used unless one is preferred. Versions that peers sent on request are
+    used last, and where their hash is requested.
 
     Args:
         providers: Replaces the workspace, the folders and the standard sets.
-        distribution: Whose standard set comes first, e.g. ``humble``; by default the
+        distribution: The one whose standard set is searched first, e.g. ``humble``; by default the
             environment's ``ROS_DISTRO``, else Jazzy.
         prefer: Names of providers that win when definitions differ, see :meth:`prefer`; by
             default the environment's ``ROSGLASS_PREFER_DEFINITIONS`` (separated by commas).
@@ -188,19 +188,19 @@ class Library:
         """Return the resolved definition of a type.
 
         Args:
-            name: ``pkg/msg/Type``, ``pkg/srv/Type``, ``pkg/action/Type``; ``pkg/Type`` is the
-                message, service or action of that name, whichever there is first. Types implied
-                by services and actions have names too, e.g. ``pkg/srv/Type_Request``,
-                ``pkg/action/Type_FeedbackMessage``; in ROS 1 ``pkg/TypeActionGoal``.
+            name: ``pkg/msg/Type``, ``pkg/srv/Type``, ``pkg/action/Type``; ``pkg/Type`` is the first
+                message, service or action of that name. Types implied by services and actions have
+                names too, e.g. ``pkg/srv/Type_Request``, ``pkg/action/Type_FeedbackMessage``; in
+                ROS 1 ``pkg/TypeActionGoal``.
             ros: 1 or 2.
-            hash: md5 sum (ROS 1) or RIHS01 hash (ROS 2) that a peer announced for it. Picks the
-                definition that has it, of any provider and any distribution; ``*``, with which
-                ROS 1 peers say "any", is the same as none. For a service it may be that of its
-                request, which is what ROS 2 nodes announce over DDS.
+            hash: md5 sum (ROS 1) or RIHS01 hash (ROS 2) that a peer announced for it. Selects the
+                definition with this hash, of any provider and distribution; ``*``, ROS 1's "any",
+                counts as none. For a service, it may be the hash of its request, which ROS 2 nodes
+                announce over DDS.
 
         Raises:
             InvalidNameError: `name` is not a type name.
-            TypeNotFoundError: The type is unknown; the message says where it was looked for.
+            TypeNotFoundError: The type is unknown; the message lists the places searched.
             DefinitionConflictError: Two providers define the type, or one that it needs,
                 differently, or no definition has `hash`.
             DefinitionError: A definition has an error or needs an unknown type.
@@ -228,7 +228,7 @@ class Library:
                 sent = self._version(name, ros)
                 if sent is None:
                     raise self._unknown(name, ros)
-                return sent  # not kept: another one may come
+                return sent  # not cached: a peer may send another
             # All spellings of a name share one object.
             loaded = self._loaded.setdefault((ros, found.name, ""), found)
         self._loaded[ros, name, hash] = loaded
@@ -242,7 +242,7 @@ class Library:
         found, self._sourced = workspace(os.environ), sourced
         self._chain[self._chain.index(self._workspace)] = found
         self._workspace = found
-        # No type is made of parts of both.
+        # Never combine parts of both in one type.
         self._loaded.clear()
         self._resolvers.clear()
         self._explained.clear()
@@ -273,7 +273,7 @@ class Library:
     def add_path(self, folder: str | os.PathLike[str]) -> None:
         """Add a folder: a package, a tree of packages, or an install or devel space.
 
-        Types that are loaded already stay as they are.
+        Types that are loaded already do not change.
 
         Raises:
             TypeNotFoundError: There is no such folder.
@@ -298,7 +298,7 @@ class Library:
             name: Its type name; ``pkg/Type`` means a message.
             text: The definition, optionally with those it needs after ``===`` lines.
             ros: 1 or 2.
-            source: Who sent it, for error messages, e.g. ``wire /camera/image``.
+            source: Its sender, for error messages, e.g. ``wire /camera/image``.
             encoding: ``idl`` for IDL; otherwise the kind in `name` decides.
 
         Returns:
@@ -306,8 +306,8 @@ class Library:
 
         Raises:
             DefinitionError: The text breaks a rule.
-            DefinitionConflictError: It differs from what another peer sent, or from the
-                definition that is in use already.
+            DefinitionConflictError: It differs from that of another peer, or from the definition in
+                use.
         """
         file = f"<{name} from {source}>"
         if encoding == "idl":
@@ -340,19 +340,19 @@ class Library:
     def add_version(self, definition: InterfaceDefinition) -> str:
         """Add a ROS 2 definition that a peer sent, to be found under its hash.
 
-        Unlike with :meth:`add`, other definitions of the type are no conflict: this one is used
-        where its hash is requested and, if no provider knows the type, for its name alone (the
-        version added last, if there are several).
+        Unlike with :meth:`add`, other definitions of the type are no conflict: this one is used if
+        its hash is requested and, if no provider has the type, for its name alone (the version
+        added last, if there are several).
 
         Args:
-            definition: With everything that it needs in ``nested``.
+            definition: The definition, with all types that it needs in ``nested``.
 
         Returns:
             Its RIHS01 hash.
 
         Raises:
-            UnsupportedError: It is a ROS 1 definition, or none.
-            DefinitionError: Something that it needs is missing.
+            UnsupportedError: It is a ROS 1 definition, or not a definition.
+            DefinitionError: A type that it needs is missing.
         """
         with self._lock:
             self._explained.clear()
@@ -425,7 +425,7 @@ class Library:
         return None
 
     def _version(self, name: str, ros: int, wanted: str = "") -> InterfaceDefinition | None:
-        """Return the definition that a peer sent with a hash, or last."""
+        """Return the definition that a peer sent with a hash, or the last one sent."""
         for full in _full_names(name) if ros == 2 else ():
             found = self._versions.find(full, wanted)
             if found is not None:
@@ -502,7 +502,7 @@ class Library:
                 continue
             hashes = (md5(found),) if ros == 1 else announced_hashes(found)
             if wanted in hashes:
-                # The usual definition, when it is the one that was asked for, stays one object.
+                # If the usual definition is the requested one, return the same object.
                 return self._loaded.setdefault((ros, found.name, ""), found) if check else found
             tried.setdefault(hashes[0], _place(None, found))
         if problem is not None and not tried:
@@ -516,7 +516,7 @@ class Library:
     def _views(self, ros: int) -> Iterator[tuple[Resolver, list[Provider], bool]]:
         """Yield the chain, then the chain with each provider and distribution moved to the front.
 
-        Each comes with a resolver and whether definitions that differ are an error.
+        Each has a resolver, and a flag whether differing definitions are an error.
         """
         yield self._resolver(ros), self._chain, True
         for provider in self._chain:
@@ -560,14 +560,14 @@ class Library:
         short = {f"{n.split('/')[0]}/{n.split('/')[2]}".lower(): n for n in reversed(names)}
         wanted = "/".join(part for part in name.split("/") if part not in KINDS)
         near = difflib.get_close_matches(wanted.lower(), short, 3, 0.75)
-        # A long package in common makes no names of types alike.
+        # Types with a long package name in common are not similar for that.
         base = wanted.rpartition("/")[2].lower()
         near = [m for m in near if difflib.get_close_matches(base, [m.rpartition("/")[2]])]
         if near[:1] == [wanted.lower()]:
             del near[1:]  # only the case is wrong
         close = [short[match] for match in near]
         if ros == 1 and name.count("/") == 1:
-            # As ROS 1, and who asked, spell it.
+            # Spelled as in ROS 1 and in the request.
             close = [ros1_name(match) for match in close]
         text = f"looked in {'; '.join(looked) or 'nothing: there are no providers'}."
         if close:

@@ -22,7 +22,7 @@ __all__ = [
 #: The kinds of interfaces, which are also the names of folders and file extensions.
 KINDS = ("msg", "srv", "action")
 
-#: Type names in a text, but no parts of paths.
+#: Matches type names in a text, but not parts of paths.
 _IN_TEXT = re.compile(
     r"(?<![\w./-])([A-Za-z]\w*)/(?:msg|srv|action)/([A-Za-z]\w*)(?![\w/]|\.(?:msg|srv|action)\b)"
 )

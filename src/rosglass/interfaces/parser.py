@@ -86,7 +86,7 @@ _ESCAPES = {
 
 
 class LiteralError(ValueError):
-    """A literal is invalid for its type; the text says why."""
+    """A literal is invalid for its type; the message gives the reason."""
 
 
 def strip_comment(text: str) -> str:
@@ -95,7 +95,7 @@ def strip_comment(text: str) -> str:
     if "#" not in stripped:
         return stripped
     quote = ""
-    # Quotes count only where strings begin with them: an apostrophe in bare text is just that.
+    # Only a quote at the start of a value is a delimiter: elsewhere it is an apostrophe.
     quoting = stripped[0] in "\"'["
     for match in re.finditer(_QUOTE_OR_COMMENT, stripped):
         sign = match.group()
@@ -105,7 +105,7 @@ def strip_comment(text: str) -> str:
             return stripped[: match.start()].rstrip()
         elif not quote and quoting and sign in ("'", '"'):
             quote = sign
-    # Without a closing quote the text isn't a quoted string after all.
+    # Without a closing quote, the text is not a quoted string.
     return stripped.partition("#")[0].rstrip() if quote else stripped
 
 
@@ -288,7 +288,7 @@ _UNIT = re.compile(
     r"(?: ?[*/\u00b7] ?[A-Za-z0-9^\u00b2\u00b3]+)*"
 )
 
-# What people also put in brackets.
+# Other words that authors put in brackets.
 _NO_UNITS = frozenset(
     {"default", "deprecated", "enum", "internal", "optional", "required", "todo", "unused"}
 )
@@ -312,8 +312,8 @@ def clean_comment(lines: list[str]) -> str:
 def find_unit(comment: str) -> str:
     """Return the unit in brackets in a comment, e.g. ``rad/s`` for ``Speed [rad/s]``.
 
-    As in rosidl a unit has no comma in it (``[0, 1]`` is a range) and must be the only one;
-    beyond rosidl, bracketed numbers, ranges and sentences are not taken for units.
+    As in rosidl, a unit has no comma in it (``[0, 1]`` is a range) and must be the only one; unlike
+    in rosidl, bracketed numbers, ranges and sentences are not units.
     """
     if "[" not in comment:
         return ""
@@ -362,7 +362,7 @@ class Context(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A run of lines.
+    """Consecutive lines of a text.
 
     Attributes:
         first: Line number of the first one.
@@ -403,8 +403,8 @@ def build_message(
     Args:
         name: Its full name.
         part: Its lines.
-        context: Where they belong.
-        nested: Definitions that came along.
+        context: Their context.
+        nested: Definitions in the same text.
 
     Raises:
         DefinitionError: A line breaks a rule.
@@ -434,9 +434,9 @@ def build_message(
 class _Builder:
     """Collects the lines of one message.
 
-    Comments go the way rosidl sends them: those at the very start are about the message, those
-    above and beside a field or constant about it, indented ones continue the one before. Unlike
-    rosidl, a start comment that touches the first field belongs to both: it is ambiguous.
+    Comments belong where rosidl puts them: those at the very start to the message, those above and
+    beside a field or constant to it; indented ones continue the previous one. Unlike in rosidl, a
+    start comment that touches the first field belongs to both: it is ambiguous.
     """
 
     def __init__(self, package: str, context: Context) -> None:
@@ -654,7 +654,7 @@ def parse(
         provider: Recorded in the definition's source.
 
     Raises:
-        DefinitionError: The text breaks a rule; says where.
+        DefinitionError: The text breaks a rule; the message names the place.
         InvalidNameError: `name` is not a type name.
     """
     kind = join_name(name).split("/")[1]
@@ -686,7 +686,7 @@ def parse_service(
     main, nested = _split_blocks(text, context)
     parts = _split_parts(main, context)
     if len(parts) == 1 and ros == 1:
-        parts.append(Part(0, []))  # genmsg reads it as a service that answers nothing
+        parts.append(Part(0, []))  # genmsg reads it as a service with an empty response
     if len(parts) != 2:
         raise context.error(
             f"a service has one line '---' between request and response, found {len(parts) - 1}",
@@ -785,7 +785,7 @@ def _split_parts(part: Part, context: Context) -> list[Part]:
     """Split at the ``---`` lines of services and actions."""
     cuts = [index for index, line in enumerate(part.lines) if line.startswith("---")]
     for cut in cuts:
-        # genmsg takes any line that starts so, rosidl only '---' itself.
+        # genmsg accepts any line with this prefix, rosidl only '---' itself.
         if context.ros == 2 and part.lines[cut].strip("- \t"):
             raise context.error("a line that separates is just '---'", part.first + cut, 1)
     bounds = [-1, *cuts, len(part.lines)]

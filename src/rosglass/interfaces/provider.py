@@ -55,8 +55,8 @@ class Provider(ABC):
     def find(self, name: str, ros: int) -> Sequence[InterfaceDefinition]:
         """Return the unresolved definitions of a full type name, the best first, or nothing.
 
-        Several are variants that are all fine (other distributions'); the library uses the first,
-        unless a peer's hash asks for another.
+        Several are valid variants (of other distributions); the library uses the first, unless a
+        peer's hash selects another.
         """
 
     @abstractmethod
@@ -100,7 +100,7 @@ class MemoryProvider(Provider):
         return known is definition
 
     def replace(self, definition: InterfaceDefinition) -> None:
-        """Store a definition in place of the one that is stored, if any."""
+        """Store a definition, replacing the stored one, if any."""
         self._known[definition.ros, definition.name] = definition
 
     def find(self, name: str, ros: int) -> Sequence[InterfaceDefinition]:
@@ -119,7 +119,7 @@ class MemoryProvider(Provider):
 
 
 def difference(one: InterfaceDefinition, other: InterfaceDefinition) -> str:
-    """Say how two definitions of a type differ on the wire, empty when they don't.
+    """Describe how two definitions of a type differ on the wire; empty if they do not.
 
     Compares what the hashes cover: fields and, in ROS 1, constants. Field types that are messages
     are compared by name: their own definitions are compared when they are looked up.

@@ -30,19 +30,19 @@ __all__ = [
     "Resolver",
 ]
 
-#: How deep types may nest, and how many types one definition may need in all. ROS's own stay below
-#: 10 and 20.
+#: Limits for the nesting depth of types, and for the number of types that a definition needs. ROS's
+#: own stay below 10 and 20.
 MAX_DEPTH = 64
 MAX_TYPES = 500
-#: Fields of a message, at every depth, each as often as it occurs and those of an array's elements
-#: once: what is generated for a type grows with them. ROS's own stay below 500.
+#: Limit for the fields of a message at every depth, counting each occurrence, and array elements
+#: once: the generated code grows with them. ROS's own stay below 500.
 MAX_FIELDS = 3000
-#: Values of a message whose sequences are empty, an array of numbers being one, and bytes of its
-#: fixed arrays: what a message takes before anything is in it.
+#: Limits for the values of a message with empty sequences, where an array of numbers is one, and
+#: for the bytes of its fixed arrays: the memory of an empty message.
 MAX_VALUES = 100_000
 MAX_FIXED_SIZE = 1 << 25
-#: Messages without fields in a message, or in one of its sequences: in ROS 1 they take no bytes,
-#: so that nothing in a buffer limits their number.
+#: Limit for the messages without fields in a message or sequence: in ROS 1 they take no bytes, so
+#: that the size of a buffer does not limit their number.
 MAX_EMPTY = 1024
 
 _SIZES = {"bool": 1, "byte": 1, "char": 1, "string": 4, "wstring": 4, "time": 8, "duration": 8}
@@ -57,9 +57,9 @@ class Extent:
     Attributes:
         depth: Levels of messages, itself included.
         fields: Fields at every depth, those of an array's elements once.
-        values: Values at every depth when sequences are empty; an array of numbers is one.
+        values: Values at every depth if sequences are empty; an array of numbers is one.
         empties: Messages without fields among them.
-        size: Bytes of its fields on the wire when sequences and strings are empty, roughly.
+        size: Bytes of its fields on the wire if sequences and strings are empty, roughly.
     """
 
     __slots__ = ("depth", "empties", "fields", "size", "values")
@@ -74,10 +74,10 @@ class Extent:
         Args:
             owner: The message, for errors.
             field: The field.
-            inner: The extent of the message that an element of it is, None for primitives.
+            inner: The extent of an element that is a message; None for primitives.
 
         Raises:
-            DefinitionError: The message goes beyond a limit.
+            DefinitionError: The message exceeds a limit.
         """
         kind = field.type
         array, count = kind.array, 1
@@ -123,8 +123,8 @@ class Resolver:
     """Resolves definitions, and caches the results.
 
     Args:
-        find: Returns the unresolved definition of a full message name; raises what it likes when
-            there is none (called with the name and the place that needs it).
+        find: Called with a full message name and the place that needs it; returns the unresolved
+            definition, or raises any error if there is none.
     """
 
     def __init__(self, find: Callable[[str, Definition, Field], Definition]) -> None:
@@ -134,7 +134,7 @@ class Resolver:
         self._chain: list[str] = []
 
     def known(self, name: str) -> Definition | None:
-        """Return the resolved definition of a message, None if it was not used yet."""
+        """Return the resolved definition of a message; None if it has not been used yet."""
         return self._done.get(name)
 
     def resolve(self, definition: InterfaceDefinition) -> InterfaceDefinition:

@@ -64,13 +64,13 @@ _ESCAPES = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"}
 
 
 def message_text(definition: Definition) -> str:
-    """Return `definition` as a ROS 2 ``.msg`` file would say it, comments and constants included.
+    """Return `definition` as the text of a ROS 2 ``.msg`` file, with comments and constants.
 
     Parsing the text gives the same fields, defaults and constants.
     """
     head = definition.comment
     members: list[Constant | Field] = [*definition.constants, *definition.fields]
-    # A head comment that touches the first member is that member's, too.
+    # A head comment that touches the first member also belongs to that member.
     shared = bool(head and members and _begins(members[0].comment, head))
     touching = shared and "\n" not in _own(members[0].comment, head)
     lines = list(_comment(head))
@@ -95,12 +95,12 @@ def message_text(definition: Definition) -> str:
 
 
 def _begins(comment: str, head: str) -> bool:
-    """Return whether a member's comment begins with the message's, which touches it."""
+    """Return whether a member's comment begins with the adjacent one of the message."""
     return f"{comment}\n".startswith(f"{head}\n")
 
 
 def _own(comment: str, head: str) -> str:
-    """Return a member's comment without that of the message, which stands at the beginning."""
+    """Return a member's comment without the message's at its beginning."""
     return comment[len(head) :].lstrip("\n") if head and _begins(comment, head) else comment
 
 
@@ -134,7 +134,7 @@ def _character(sign: str) -> str:
 #: The encoding of types that have no text of their own: requests, goals and the like.
 _IMPLICIT = "implicit"
 _FILE_KINDS = ("msg", "srv", "action")
-# What Python prints of bytes, line by line.
+# A line of escaped text, as Python prints bytes.
 _ESCAPED = re.compile(r"(?:[ -\[\]-~]|\\[\\'\"tnr]|\\x[0-9a-f]{2})*")
 _ESCAPE = re.compile(rb"\\(x..|.)")
 _CONTROLS = {b"t": b"\t", b"n": b"\n", b"r": b"\r"}
@@ -197,15 +197,15 @@ def add_type_sources(
 ) -> InterfaceDefinition:
     """Return a definition with the constants, comments and defaults of its texts.
 
-    A text that cannot be read, or is about something else, is left out: then its type stays as
+    A text that cannot be parsed, or describes something else, is left out: its type stays as
     described.
 
     Args:
         definition: As :func:`rosglass.interfaces.parse_type_description` returns it.
         sources: The texts.
-        verbatim: Whether the texts are as people wrote them. rosidl's generator sends them with
-            tabs, quotes and everything beyond ASCII escaped, and cuts off as many characters at
-            the end as that adds (seen in Iron to Kilted); this is undone.
+        verbatim: Whether the texts are unescaped. rosidl's generator escapes tabs, quotes and
+            non-ASCII characters, and cuts off as many characters at the end as that adds (seen in
+            Iron to Kilted); this is undone.
     """
     texts = _Texts(definition.source.provider, sources, verbatim)
     parts = parts_of(definition)
@@ -268,10 +268,10 @@ class _Texts:
                 self._known.setdefault(name, (encoding, text))
 
     def interface(self, name: str) -> tuple[InterfaceDefinition | None, bool]:
-        """Return what the text of a type says, and whether that is all of it.
+        """Return the parsed text of a type, and whether it is complete.
 
-        A request, goal or the like is part of the text of its service or action, where that came
-        along.
+        A request, goal or the like is part of the text of its service or action, if that was
+        received.
         """
         found, whole = self._read(name)
         if found is None:
@@ -302,13 +302,13 @@ def _described(kind: FieldType) -> FieldType:
 
 
 def _restore(text: str) -> tuple[str, bool]:
-    """Undo what rosidl's generator does to texts.
+    """Undo the escaping by rosidl's generator.
 
-    rosidl_generator_c's ``idl__description.c.em`` prints each line as Python's ``repr`` of bytes
-    and gives the string the length of the original: where something was escaped, the end is lost.
+    rosidl_generator_c's ``idl__description.c.em`` prints each line as Python's ``repr`` of bytes,
+    but gives the string the length of the original: escapes cut off the end.
 
     Returns:
-        The text, and whether its end is there; without its last, broken line otherwise.
+        The text, and whether it is complete; otherwise it lacks its last, broken line.
     """
     if "\\" not in text:
         return text, True
@@ -360,14 +360,14 @@ def parse_type_description(
 
     Args:
         description: ``type_description`` and ``referenced_type_descriptions``, as in the message
-            ``type_description_interfaces/msg/TypeDescription`` made a dict.
+            ``type_description_interfaces/msg/TypeDescription`` as a dict.
         provider: Recorded in the definition's source.
 
     Returns:
-        The definition, resolved; a service or action when the description is one's.
+        The definition, resolved; a service or action if the description is of one.
 
     Raises:
-        DefinitionError: It makes no sense; names the type and the field.
+        DefinitionError: The description is invalid; the message names the type and the field.
         CyclicTypeError: A type contains itself.
     """
     reader = _Reader(provider)
@@ -428,7 +428,7 @@ def _referenced(
 
 
 class _Reader:
-    """Reads individual descriptions, with a limit of fields."""
+    """Parses individual descriptions, up to a limit of fields."""
 
     def __init__(self, provider: str) -> None:
         self._provider = provider
@@ -453,7 +453,7 @@ class _Reader:
                 raise DefinitionError(f"field {twice} appears twice", label)
             seen.add(twice)
         if names == [_PLACEHOLDER] and fields[0].type == FieldType("uint8"):
-            fields = ()  # what rosidl puts into empty structs
+            fields = ()  # rosidl's placeholder in empty structs
         source = Source(self._provider, f"<{name} from {self._provider}>")
         definition = Definition(name, 2, fields, source=source)
         return replace(definition, text=message_text(definition))
@@ -534,7 +534,7 @@ def _default(field: Mapping[str, Any], kind: FieldType, where: str, label: str) 
             text = f"[{text}]"
         return parse_default(kind, text)
     except LiteralError as error:
-        # No hash covers defaults, and nothing that is received depends on them.
+        # No hash covers defaults, and decoding does not depend on them.
         _log.warning("%s: %s is used without its default value: %s", label, where, error)
         return None
 
@@ -561,7 +561,7 @@ _MAX_TOTAL = 64 << 20
 def cache_folder() -> str:
     """Return the folder of the cache; empty if it is disabled.
 
-    ``ROSGLASS_TYPE_CACHE`` if it is set, otherwise where the system keeps such things:
+    ``ROSGLASS_TYPE_CACHE`` if it is set, otherwise a folder in the system's cache folder:
     ``rosglass/types`` in ``XDG_CACHE_HOME`` or ``~/.cache`` (Linux), ``~/Library/Caches`` (macOS),
     ``%LOCALAPPDATA%`` (Windows).
     """
@@ -586,7 +586,7 @@ class TypeCache:
     """A cache with one file per definition, named by its hash; errors are ignored.
 
     Args:
-        folder: Where the files are; empty for a cache that keeps nothing. Made when needed.
+        folder: Folder of the files, created when needed; empty for no cache.
     """
 
     def __init__(self, folder: str) -> None:
