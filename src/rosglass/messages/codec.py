@@ -50,7 +50,7 @@ class Walk:
     """Steps over a message field by field; raises DecodeError with path and offset.
 
     Attributes:
-        offset: Where in the buffer the walk has got to.
+        offset: Current position in the buffer.
     """
 
     def __init__(self, schema: Schema, wire: Wire, buffer: bytes | memoryview, offset: int) -> None:
@@ -178,7 +178,7 @@ class Codec:
         wire: The wire.
         cls: The class of plain messages.
         stride: (stride, size) of its elements in arrays if constant, otherwise None.
-        plain: The codec of the same wire in bytes; itself unless it is of views.
+        plain: The codec of the same wire for bytes; itself unless it is for views.
     """
 
     def __init__(self, schema: Schema, wire: Wire) -> None:
@@ -279,7 +279,7 @@ class Codec:
 
     @property
     def reader_of_one(self) -> Callable[[Any, int], tuple[Message, int]]:
-        """The function ``read(buffer, offset) -> (message, end)``, which others call."""
+        """The function ``read(buffer, offset) -> (message, end)``, called by other functions."""
         return self.made("one", self._one)  # type: ignore[no-any-return]
 
     def _one(self) -> Any:
@@ -292,7 +292,7 @@ class Codec:
         return source.compile("read_one(b, o)", self._title("nested"))
 
     def reader_of_many(self, known: Knowledge) -> Callable[[Any, int, int], tuple[Any, int]]:
-        """Return ``read(buffer, offset, count) -> (list, end)`` for what is known of the offset."""
+        """Return ``read(buffer, offset, count) -> (list, end)`` for offsets that match `known`."""
         return self.made(("many", known), lambda: self._many(known))  # type: ignore[no-any-return]
 
     def _many(self, known: Knowledge) -> Any:
@@ -339,7 +339,7 @@ class Codec:
 
     @property
     def skipper(self) -> Callable[[Any, int], int]:
-        """The function ``skip(buffer, offset) -> end``, which raises anything for damaged bytes."""
+        """The function ``skip(buffer, offset) -> end``; damaged bytes may raise any error."""
         return self.made("skip", self._skip)  # type: ignore[no-any-return]
 
     def _skip(self) -> Any:
@@ -361,7 +361,7 @@ class Codec:
 
     @property
     def reader(self) -> Callable[[bytes | memoryview], Message]:
-        """The function that decodes everything at once, and raises anything for damaged bytes."""
+        """The function that decodes everything at once; damaged bytes may raise any error."""
         return self.made("eager", self._eager)  # type: ignore[no-any-return]
 
     def _eager(self) -> Any:
@@ -374,7 +374,7 @@ class Codec:
         return source.compile("decode(b)", self._title("decode"))
 
     def end(self, buffer: bytes | memoryview) -> int:
-        """Return the offset after the last field, having checked every length on the way."""
+        """Check every length, and return the offset after the last field."""
         scan = self.made("scan", self._scan)
         try:
             end: int = scan(buffer)
@@ -404,7 +404,7 @@ class Codec:
                 try:
                     return self._converted_writer(True, joined)(complete(self.schema, value))
                 except Exception:
-                    pass  # the careful way finds out what it was
+                    pass  # the conversion below handles it
             message = convert(self.schema, value)
             try:
                 return self._converted_writer(False, joined)(message)
@@ -415,14 +415,14 @@ class Codec:
         return write_function(self, from_dict, joined, slowly)
 
     def nested_writer(self, from_dict: bool, joined: bool, lenient: bool) -> Callable[..., int]:
-        """Return the function that other writers call for a message inside theirs."""
+        """Return the function by which other writers write a nested message."""
         return self.made(  # type: ignore[no-any-return]
             ("write nested", from_dict, joined, lenient),
             lambda: nested_write_function(self, from_dict, joined, lenient),
         )
 
     def _converted_writer(self, from_dict: bool, joined: bool) -> Callable[[Any], Any]:
-        """Return the writer for values that were converted already."""
+        """Return the writer for converted values."""
         return self.made(  # type: ignore[no-any-return]
             ("write converted", from_dict, joined),
             lambda: write_function(self, from_dict, joined, None),

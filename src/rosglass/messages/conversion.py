@@ -1,6 +1,6 @@
 """Strict conversion of Python values into messages, with the field path in every error.
 
-One rule set for all places. Integers take integers and floats without a fraction, in range;
+The same rules apply everywhere. Integers take integers and floats without a fraction, in range;
 floats take integers and floats (a finite value that float32 cannot hold is refused); bools take
 bools; strings take str. A ``byte`` also takes bytes of length 1, as rclpy writes it. Nothing is
 truncated, wrapped or guessed. Missing fields get the type's defaults.
@@ -68,7 +68,7 @@ def as_int(value: Any) -> int:
 
 
 def as_float(value: Any) -> float:
-    """Return a float; raises ConversionError for anything but numbers that are no bools."""
+    """Return a float; raises ConversionError for bools and for anything but numbers."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         try:
             return float(value)
@@ -172,9 +172,9 @@ def numbers(member: Member, value: Any, path: str) -> np.ndarray:
 
 
 def elements(member: Member, step: int | slice, count: int, value: Any, path: str) -> Any:
-    """Return what to set an element of a numeric array to, or a slice of `count` elements.
+    """Return the value to assign to an element of a numeric array, or to a slice of `count` ones.
 
-    A single number for a slice is meant for all of them.
+    A single number is assigned to the whole slice.
 
     Raises:
         ConversionError: It does not fit.
@@ -228,7 +228,7 @@ def _from_array(number: Number, dtype: Any, value: np.ndarray, path: str) -> np.
 
 
 def _changed(number: Number, value: Any, made: Any) -> Any:
-    """Return which elements of `value` did not survive the cast to `made`, None if all did."""
+    """Return which elements of `value` the cast to `made` has changed; None if it changed none."""
     numpy = import_module("numpy")
     if number.python is float:
         return numpy.isfinite(value) & ~numpy.isfinite(made)
@@ -277,7 +277,7 @@ def array_packer(member: Member, wire: Wire) -> Callable[[Any], tuple[Any, int]]
                 value = numbers(member, value, "")
                 if value.dtype != wanted:
                     value = value.astype(wanted)
-            # Gaps between the elements show when the parts are joined, see Codec.
+            # Gaps between the elements are detected when the parts are joined, see Codec.
             count, data = len(value), value
         if limit is not None and (count > limit or (fixed is not None and count != fixed)):
             _check_length(member, count, value, "")
@@ -332,8 +332,8 @@ def complete(schema: Schema, value: Any) -> dict[str, Any]:
     """Return a dict with every field, the missing ones with their defaults; checks no values.
 
     Raises:
-        LookupError, TypeError, AttributeError, ConversionError: There is more amiss than missing
-            fields.
+        LookupError, TypeError, AttributeError, ConversionError: Missing fields are not the only
+            fault.
     """
     if isinstance(value, Message):
         if value._schema__ is not schema:

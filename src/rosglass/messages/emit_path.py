@@ -1,6 +1,6 @@
-"""Generates field paths: functions from bytes to the values at some paths, making no messages.
+"""Generates functions that read the values at field paths from bytes, without creating messages.
 
-Everything before the last target is stepped over, everything behind it is not looked at. Columns
+They step over everything before the last target, and ignore everything after it. Columns
 (``poses[*].position.x``) of elements of constant size are numpy views with a stride.
 """
 
@@ -40,11 +40,11 @@ def path_function(
     """Return the function from a message's bytes to the values at the paths.
 
     Args:
-        codec: How the bytes are written.
+        codec: Codec of the bytes.
         paths: The paths.
         single: Whether it returns the value of the only path, instead of a tuple.
-        other: Called with buffers whose CDR header does not say this codec's byte order.
-        failed: Called with the buffer and the error when anything goes wrong.
+        other: Called with buffers whose CDR header has another byte order than this codec.
+        failed: Called with the buffer and the error after any error.
 
     Raises:
         FieldPathError: A path does not exist in the type.
@@ -122,13 +122,13 @@ def _constant_offset(schema: Schema, route: Route, wire: Wire) -> int | None:
 
 
 class _Walk:
-    """Emits the way to every target."""
+    """Emits the steps to every target."""
 
     def __init__(self, codec: Codec, source: Source) -> None:
         self.codec, self.wire, self.source = codec, codec.wire, source
 
     def _fork(self, reader: Reader) -> Reader:
-        """Return a reader that starts at the same place and leaves the first one there."""
+        """Return a copy of a reader at its present position, which it keeps."""
         reader.flush()
         cursor = reader.cursor.copy()
         if cursor.var:
@@ -176,7 +176,7 @@ class _Walk:
             deeper = [(name, route[1:], path) for name, route, path in inner]
             self.schema(reader, member.struct, deeper, last)
             return
-        # Each on its own from the start of the field: indexes can be in any order.
+        # Read each from the start of the field: indexes can be in any order.
         for target in whole:
             self._member(self._fork(reader), member, [target], last=True)
         if not member.is_array:

@@ -1,4 +1,4 @@
-"""Generates code that steps through bytes: the common ground of decoding and of field paths.
+"""Generates code that steps through bytes: the common part of decoding and of field paths.
 
 Read :meth:`Skipper.skip_member` as the specification of both formats: numbers are collected into
 runs that one :mod:`struct` call unpacks, strings are a count and that many bytes (CDR counts and
@@ -35,15 +35,15 @@ __all__ = ["Reader", "Skipper", "is_shared"]
 
 
 _NEAR = 256
-#: Fields, at every depth, up to which a nested message's code is repeated in each function that
-#: needs it: that is quicker than a call.
+#: Limit of fields, at every depth, for repeating a nested message's code in each function that
+#: needs it: this is faster than a call.
 _MOST_INLINE = 200
 
 
 def is_shared(schema: Schema, source: Source) -> bool:
-    """Return whether a nested message is left to a function of its own, which all others call.
+    """Return whether a nested message has a function of its own, which all others call.
 
-    What is generated for a type then grows with its definition, not with its messages.
+    The code of a type then grows with its definition, not with its messages.
     """
     return bool(schema.members) and (schema.extent.fields > _MOST_INLINE or source.is_full)
 
@@ -52,8 +52,8 @@ class Skipper:
     """Emits steps through a buffer called ``b``.
 
     Attributes:
-        source: Where the code goes.
-        cursor: Where in the buffer the code has got to.
+        source: Receives the code.
+        cursor: Position of the code in the buffer.
     """
 
     def __init__(self, codec: Codec, source: Source, cursor: Cursor) -> None:
@@ -61,7 +61,7 @@ class Skipper:
         self.source, self.cursor = source, cursor
         #: Numbers to be unpacked together: target, format character, size.
         self.run: list[tuple[str, str, int]] = []
-        #: Whether the end was not yet proved to lie within the buffer.
+        #: Whether the end is not yet proved to lie within the buffer.
         self.unproved = False
 
     def number(self, target: str, code: str, size: int) -> None:
@@ -133,7 +133,7 @@ class Skipper:
 
     @property
     def var(self) -> str:
-        """The local that holds the offset once it is not constant any more."""
+        """The local variable of the offset, once that is not constant."""
         return self.cursor.var or "o"
 
     # -- arrays ----------------------------------------------------------------------------------
@@ -160,7 +160,7 @@ class Skipper:
             self.source.line(f"if {count} > {MAX_EMPTY}: {short}()")
 
     def elements_start(self, size: int, count: str) -> str:
-        """Return the offset of the first element; CDR pads only when there is one."""
+        """Return the offset of the first element; CDR pads only if there is one."""
         pad = self.cursor.padding(size)
         if pad == 0:
             return self.cursor.at()
@@ -174,7 +174,7 @@ class Skipper:
         return start
 
     def pass_elements(self, step: int, size: int, align: int, count: str, start: str) -> None:
-        """Move behind `count` elements, `step` bytes apart, the last one `size` bytes long."""
+        """Move past `count` elements, `step` bytes apart, the last one `size` bytes long."""
         if count.isdigit():
             self.cursor.advance(step * (int(count) - 1) + size)
             return
@@ -191,14 +191,14 @@ class Skipper:
         return layout.align_of(schema.members[0], self.wire) if schema.members else 1
 
     def pass_stride(self, schema: Schema, stride: tuple[int, int], count: str, start: str) -> None:
-        """Move behind `count` messages of constant (stride, size)."""
+        """Move past `count` messages of constant (stride, size)."""
         step, size = stride
         self.pass_elements(step, size, self.first_align(schema), count, start)
         self.unproved = True
 
     @contextmanager
     def loop(self, head: str, step: Callable[[Knowledge], Knowledge]) -> Iterator[None]:
-        """Emit a loop; `step` says what its body does to what is known of the position."""
+        """Emit a loop; `step` returns what is known of the position after its body."""
         self.flush()
         var = self.var
         self.settle(var)
@@ -220,7 +220,7 @@ class Skipper:
         return self.loop(head, lambda known: layout.after_schema(known, self.wire, schema))
 
     def settle(self, var: str) -> None:
-        """Make the variable hold the present offset."""
+        """Assign the current offset to the variable."""
         self.flush()
         if self.cursor.at() != var:
             self.source.line(f"{var} = {self.cursor.at()}")
@@ -285,7 +285,7 @@ class Skipper:
         width = self.wire.wide if member.wide else 1
         times = f" * {width}" if width != 1 else ""
         if width == 4:
-            # Not any four bytes are a character: reading would refuse them.
+            # Not every four bytes are a character: reading would refuse them.
             self.source.line(f"s = {self.cursor.at()}")
             self.source.line(f"{var} = s + n{times}")
             check = self.source.bind(read_wide, "wide")
@@ -314,7 +314,7 @@ class Skipper:
                 with self.schema_loop(f"for _ in range({index}):", schema):
                     self.skip(schema)
             return
-        # Whether or not there are elements: an index was checked before.
+        # Align even before an empty array: an index was checked before.
         self.cursor.align(self.source, self.first_align(schema), self.var)
         step = stride[0]
         if index.isdigit():
@@ -325,7 +325,7 @@ class Skipper:
             self.cursor.move(var, self.cursor.known.many(step))
 
     def prove(self) -> None:
-        """Emit the check that everything read so far lay within the buffer, if it is needed."""
+        """Emit the check, if needed, that everything read so far lay within the buffer."""
         self.flush()
         if self.unproved:
             short = self.source.bind(too_short, "short")
@@ -333,7 +333,7 @@ class Skipper:
             self.unproved = False
 
 
-#: Nested messages of up to this many values are filled with their parent, bigger ones on demand.
+#: Nested messages of up to this many values are decoded with their parent, bigger ones on demand.
 INLINE_LEAVES = 16
 
 #: Arrays of up to this many messages of varying size are decoded with the fields around them.
@@ -351,7 +351,7 @@ class Reader(Skipper):
             self.member(member, f"{target}.{member.attr}", lazy)
 
     def placeholder(self) -> None:
-        """Read what stands for a message without fields."""
+        """Read the placeholder of a message without fields."""
         # IDL has no empty structs: rosidl gives them one uint8.
         if self.wire.aligned:
             self.number("", "x", 1)
@@ -429,7 +429,7 @@ class Reader(Skipper):
             last = self._other_var(var)
             line(f"{last} = {self.cursor.at(-1)} + n")
             line(f"{target} = {self._decoded(f'b[{start}:{last}]')}")
-            # The look at the last byte is the bounds check, too. Some writers send no NUL.
+            # Reading the last byte is the bounds check, too. Some writers send no NUL.
             whole = self._decoded(f"b[{start}:{last} + 1]")
             line(f"if b[{last}]: {target} = {whole}")
             self.cursor.move(last, known, 1)
@@ -446,7 +446,7 @@ class Reader(Skipper):
         return f"str({part}, {how})" if self.wire.view else f"{part}.decode({how})"
 
     def _other_var(self, var: str) -> str:
-        """Return the other of the two locals that take turns in holding the offset."""
+        """Return the other one of the two locals that hold the offset alternately."""
         return var[:-1] if var.endswith("_") else f"{var}_"
 
     def _numbers(self, member: Member, target: str, count: str) -> None:
@@ -482,7 +482,7 @@ class Reader(Skipper):
         if not lazy:
             self._list(schema, target, count)
         elif stride is None and not last:
-            # To get past a few elements takes hardly less than to decode them.
+            # Skipping a few elements takes hardly less time than decoding them.
             before, var = self.cursor.copy(), self.var
             with self.source.block(f"if {count} <= {_FEW}:"):
                 self._list(schema, target, count)
@@ -503,7 +503,7 @@ class Reader(Skipper):
             self.pass_stride(schema, stride, count, start)
 
     def _sequence(self, codec: Codec, target: str, count: str, start: str) -> None:
-        """Make a lazy array."""
+        """Create a lazy array."""
         name, cls = self.source.fresh("q"), self.source.bind(codec.sequence, "S")
         self.source.line(f"{target} = {name} = {cls}()")
         self.source.line(f"{name}._items = None")
@@ -527,7 +527,7 @@ class Reader(Skipper):
         cls = self.source.bind(self.codec.of(schema).cls, "C")
         line = self.source.line
         if not layout.min_size(schema, self.wire):
-            # Without anything in them, one is as good as another.
+            # Messages without content are all alike: share one.
             line(f"m = {cls}()")
             self.fields(schema, "m")
             line(f"out = [m] * {count}")
@@ -546,12 +546,12 @@ class Reader(Skipper):
             line("add(m)")
 
     def _records(self, schema: Schema, size: int, count: str, cls: str) -> None:
-        """Decode messages of nothing but numbers, without a gap between them, in one sweep."""
+        """Decode messages of only numbers, without gaps between them, in one pass."""
         start = self.elements_start(self.first_align(schema), count)
         if start != "o":
             self.source.line(f"o = {start}")
         known = layout.after_elements(self.cursor.known, self.first_align(schema), size, size)
-        # Elements start on their largest alignment, so any such position will do to lay them out.
+        # Elements start on their largest alignment, so any such position gives their layout.
         self.cursor.move("o", layout.START)
         body = Source()
         body.globals = self.source.globals

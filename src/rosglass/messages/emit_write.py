@@ -1,10 +1,10 @@
-"""Generates code that writes bytes, from messages or from nested dicts without making messages.
+"""Generates code that writes bytes, from messages or directly from nested dicts.
 
-The code assumes that everything is as it should be, checks just enough to notice when it is not,
-and leaves all other cases (missing fields, convertible values, errors) to :mod:`.conversion`.
-Numbers are collected into runs that one :mod:`struct` call packs; padding and the NUL of a string
-before are part of the next run. After a string, CDR's padding depends on its length: the run then
-comes in prepared layouts, one for each position modulo its largest alignment.
+The code assumes valid values, checks just enough to detect others, and leaves those (missing
+fields, convertible values, errors) to :mod:`.conversion`. Numbers are collected into runs that one
+:mod:`struct` call packs; padding and the NUL of a preceding string are part of the next run. After
+a string, CDR's padding depends on its length: the run then has prepared layouts, one for each
+position modulo its largest alignment.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Writer:
     """Emits the writing of a message.
 
     Attributes:
-        source: Where the code goes.
+        source: Receives the code.
         from_dict: Whether values come from nested dicts instead of messages.
         joined: Whether the parts are joined in the end.
         lenient: Whether strings may hold bytes that are not UTF-8, as surrogates.
@@ -47,7 +47,7 @@ class Writer:
     ) -> None:
         self.codec, self.wire, self.source = codec, codec.wire, source
         self.from_dict, self.joined, self.lenient = from_dict, joined, lenient
-        # Positions in the body; the header goes out with the first run.
+        # Positions in the body; the header is written with the first run.
         self.cursor = Cursor(self.wire, "", 0, START)
         self.cursor.shift = 0
         self._run: list[tuple[str, str, int]] = []
@@ -62,12 +62,12 @@ class Writer:
         self._inline = False
 
     def join(self) -> None:
-        """Write behind the parts of another function: ``add`` adds one, ``o`` is where it is."""
+        """Append to the parts of another function: ``add`` adds one, ``o`` is the position."""
         self.cursor.move("o", ANYWHERE)
         self._header, self._parts = b"", None
 
     def leave(self) -> None:
-        """Emit the end of a function that joined another: it returns the position."""
+        """Emit the end of a function with :meth:`join`: it returns the position."""
         self._zeros()
         self.source.line(f"return {self.cursor.at()}")
 
@@ -108,7 +108,7 @@ class Writer:
         place = self.cursor.at()
         self._part(f"{table}[{place} & {largest - 1}]({values})")
         if run[0][2] == largest:
-            # Only the first number is padded for, by as much as brings it onto its alignment.
+            # Pad only before the first number, up to its alignment.
             end = f"({self.cursor.aligned(largest)}) + {layouts[0][1]}"
         else:
             sizes = self.source.bind(tuple(size for _, size in layouts), "sizes")
@@ -118,7 +118,7 @@ class Writer:
         self._pending = 0
 
     def _check_types(self) -> None:
-        """Convert the numbers of the run that are not of the very type expected.
+        """Convert the numbers of the run that do not have exactly the expected type.
 
         The check itself is one chain of comparisons: conversion is the exception.
         """
@@ -183,7 +183,7 @@ class Writer:
     def finish(self) -> None:
         """Emit the end of the function: the bytes, or the list of parts."""
         self._zeros()
-        self.source.take_last("o = ")  # nothing follows that would need the position
+        self.source.take_last("o = ")  # nothing that follows needs the position
         if not self.joined:
             parts = "parts" if self._parts is None else f"[{', '.join(self._parts)}]"
             self.source.line(f"return {parts}")
@@ -210,8 +210,8 @@ class Writer:
         if self.from_dict:
             strange = self.source.bind(odd, "odd")
             count = len(schema.members)
-            # Neither an unknown field nor a missing one can hide behind the right number; without
-            # fields, anything empty could.
+            # With the right number of fields, an unknown or missing one is detected below; without
+            # fields, anything empty would pass.
             empty = f"type({holder}) is dict and not {holder}"
             right = f"len({holder}) == {count}" if count else empty
             self.source.line(f"if not ({right}): {strange}()")
@@ -269,7 +269,7 @@ class Writer:
             wide = self.source.bind(write_wide, "wide")
             line(f"{text}, {count} = {wide}({value}, {width}, {self.wire.big})")
         else:
-            # Strict is quicker; what it refuses comes back by way of the conversion.
+            # Strict is faster; what it refuses is left to the conversion.
             how = '"utf-8", "surrogateescape"' if self.lenient else ""
             line(f"{text} = {value}.encode({how})")
             line(f"{count} = len({text})" + (" + 1" if self.wire.aligned else ""))
@@ -353,7 +353,7 @@ class Writer:
     def _block(self, member: Member, items: str) -> str:
         """Emit the search for elements whose bytes can be written as they are.
 
-        Returns the local that holds them, or None in it; empty where elements have gaps.
+        Returns the local for them, which may hold None; empty if elements have gaps.
         """
         schema = member.struct
         stride = None if schema is None else layout.constant_stride(schema, self.wire)
@@ -373,7 +373,7 @@ class Writer:
     def _records(
         self, schema: Schema, size: int, head: str, item: str, count: str, block: str
     ) -> None:
-        """Write messages of one size without a gap between them."""
+        """Write messages of one size, without gaps between them."""
         self._zeros()
         self._open_list()
         before = self.cursor.known
@@ -400,7 +400,7 @@ class Writer:
 
     @contextmanager
     def _loop(self, head: str, step: Callable[[Knowledge], Knowledge]) -> Iterator[None]:
-        """Emit a loop; `step` says what its body does to what is known of the position."""
+        """Emit a loop; `step` returns what is known of the position after its body."""
         self._zeros()
         self._open_list()
         known = START
@@ -443,8 +443,8 @@ def write_function(
         codec: The codec.
         from_dict: Whether it takes dicts, otherwise messages.
         joined: Whether it returns bytes, otherwise a list of buffers.
-        convert: Called with the value and the error when the generated code does not do; returns
-            what the function returns. None for values that are converted already.
+        convert: Called with the value and the error if the generated code fails; its result is
+            returned. None for values that are converted already.
     """
     source = Source()
     writer = Writer(codec, source, from_dict, joined, lenient=convert is None)

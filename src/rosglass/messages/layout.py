@@ -28,9 +28,9 @@ class Wire:
     Attributes:
         name: ``cdr`` or ``ros1``.
         big: Whether numbers are big endian.
-        wide: Bytes for each UTF-16 unit of a ``wstring``: 4, as ROS 2's nodes have it, or 2.
-        view: Whether the bytes are in a memoryview, whose slices cannot be decoded as those of
-            bytes can, and more quickly.
+        wide: Bytes for each UTF-16 unit of a ``wstring``: 4, as in ROS 2's nodes, or 2.
+        view: Whether the bytes are in a memoryview; slices of bytes can be decoded directly, which
+            is faster.
     """
 
     name: str
@@ -122,7 +122,7 @@ def member_span(member: Member, wire: Wire, position: int) -> int | None:
         size = member.number.size
         return position + (-position % size if wire.aligned else 0) + size * count
     assert member.struct is not None
-    # What an element takes depends on where it starts, modulo 8: soon they take turns.
+    # An element's size depends on its start modulo 8: soon the sizes repeat.
     before: dict[int, tuple[int, int]] = {}
     left = count
     while left:
@@ -144,8 +144,8 @@ def member_span(member: Member, wire: Wire, position: int) -> int | None:
 def constant_stride(schema: Schema, wire: Wire) -> tuple[int, int] | None:
     """Return (stride, size) of the elements of an array of `schema`, None if they vary.
 
-    With alignment the stride is constant only if the first member needs the largest alignment of
-    all, so that every element starts on it; the last element has no padding behind it.
+    With alignment, the stride is constant only if the first member needs the largest alignment of
+    all, so that every element starts on it; there is no padding after the last element.
     """
     size = span(schema, wire, 0)
     if size is None:
@@ -157,7 +157,7 @@ def constant_stride(schema: Schema, wire: Wire) -> tuple[int, int] | None:
 
 
 def min_size(schema: Schema, wire: Wire) -> int:
-    """Return the least number of bytes a value can take, paddings left out."""
+    """Return the smallest size of a value in bytes, without padding."""
     total: int = schema.cached(("min", wire.aligned, wire.wide), lambda: _min_size(schema, wire))
     return total
 
@@ -177,7 +177,7 @@ def _min_size(schema: Schema, wire: Wire) -> int:
 
 
 def element_size(member: Member, wire: Wire) -> int:
-    """Return the least number of bytes an element of the member can take."""
+    """Return the smallest size of an element of the member in bytes."""
     if member.kind is Kind.TEXT:
         return 4
     if member.number is not None:
@@ -186,7 +186,7 @@ def element_size(member: Member, wire: Wire) -> int:
     return min_size(member.struct, wire)
 
 
-#: What an array of messages counts as in :func:`leaves`.
+#: Number of values that an array of messages counts as in :func:`leaves`.
 MANY = 1000
 
 
@@ -242,7 +242,7 @@ class Knowledge:
         return Knowledge(align, 0)
 
     def repeated(self, step: Callable[[Knowledge], Knowledge]) -> Knowledge:
-        """Return what holds before and after every round of a loop that does `step`."""
+        """Return what holds before and after every iteration of a loop with the body `step`."""
         known = self
         while (both := known.meet(step(known))) != known:
             known = both
@@ -269,7 +269,7 @@ def after_text(known: Knowledge, wire: Wire, wide: bool) -> Knowledge:
 
 
 def after_elements(known: Knowledge, align: int, step: int, size: int) -> Knowledge:
-    """Return what is known after any number of elements, no padding behind the last."""
+    """Return what is known after any number of elements, without padding after the last."""
     return known.meet(known.to(align).many(step).after(size))
 
 
@@ -315,7 +315,7 @@ def after_member(known: Knowledge, wire: Wire, member: Member) -> Knowledge:
 
 
 class Cursor:
-    """An offset in generated code: a variable (or none: a constant) plus a known distance."""
+    """An offset in generated code: a known distance from a variable, or from zero."""
 
     def __init__(self, wire: Wire, var: str, delta: int, known: Knowledge) -> None:
         self.wire, self.var, self.delta, self.known = wire, var, delta, known
@@ -323,7 +323,7 @@ class Cursor:
         self.shift = wire.origin
 
     def copy(self) -> Cursor:
-        """Return an independent cursor at the same place."""
+        """Return an independent cursor at the same position."""
         twin = Cursor(self.wire, self.var, self.delta, self.known)
         twin.shift = self.shift
         return twin
@@ -341,7 +341,7 @@ class Cursor:
         self.known = self.known.after(size)
 
     def move(self, var: str, known: Knowledge, delta: int = 0) -> None:
-        """Stand `delta` bytes behind where `var` says, of which `known` is known."""
+        """Move to `delta` bytes after the variable `var`, of which `known` is known."""
         self.var, self.delta, self.known = var, delta, known
 
     def padding(self, align: int) -> int | None:
@@ -362,11 +362,11 @@ class Cursor:
         return f"{text} + {origin}" if origin else text
 
     def align(self, source: Source, align: int, var: str = "o") -> None:
-        """Move to the next multiple of `align`, with a line of code if it takes one."""
+        """Move to the next multiple of `align`, with a line of code if needed."""
         pad = self.padding(align)
         if pad is None:
             before = source.take_last(f"{self.var} = ") if self.var == var else None
-            # One step with the previous sum, if nothing else uses that.
+            # Merge with the previous sum, if nothing else uses that.
             at = self.copy()
             if before is not None:
                 at.var, _, constant = before.rpartition(" + ")

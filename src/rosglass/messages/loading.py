@@ -153,8 +153,8 @@ def load(
         found, usual = types.get((name, ros, hash)), types.get((name, ros, ""))
     if found is not None and found.definition is definition:
         return found
-    # The usual version, when it is the one that was asked for, stays one object. Without the lock:
-    # a large type must not keep others from being loaded.
+    # If the usual version is the requested one, return the same object. Without the lock: a large
+    # type must not delay the loading of others.
     same = usual is not None and usual.definition is definition
     made = usual if usual and same else _make(definition)
     with _lock:

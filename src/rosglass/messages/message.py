@@ -1,8 +1,8 @@
 """Messages: plain objects with a slot for every field, or shells that become such an object.
 
-A shell holds the received bytes and nothing else. The first access to any field decodes that level
-and turns the shell into a plain object, in place; from then on access costs what any attribute
-costs. Nested messages of some size and arrays of messages stay shells of their own.
+A shell holds only the received bytes. The first access to any field decodes that level and turns
+the shell into a plain object, in place; from then on, access is as fast as for any attribute.
+Larger nested messages and arrays of messages stay shells of their own.
 """
 
 from __future__ import annotations
@@ -65,17 +65,17 @@ class Message:
     Fields are attributes (``message.header.stamp.sec``), items (``message["header"]``) and ends of
     paths (``message["poses[2].position.x"]``). A field whose name is a Python keyword has an
     underscore appended as an attribute (``message.from_``) and keeps its name everywhere else.
-    A field called like a method (``copy``) or ``type`` wins over it: code for any message uses
+    A field named like a method (``copy``) or ``type`` hides it: code for any message uses
     :func:`type_of` and ``Message.copy(message)``.
 
-    Numeric arrays of a received message are numpy views of its bytes and read-only: take
+    Numeric arrays of a received message are numpy views of its bytes and read-only: use
     :meth:`writable` or a :meth:`copy` to change single elements. Values are checked when the
     message is encoded.
     """
 
     __slots__ = ("_buffer__", "_offset__")
     __hash__ = None  # type: ignore[assignment]
-    #: The bytes of a shell; unset in plain objects. A view keeps what it is of alive.
+    #: The bytes of a shell; unset in plain objects. A view keeps its object alive.
     _buffer__: bytes | memoryview
     #: Where in the bytes the shell of a nested message starts.
     _offset__: int
@@ -141,17 +141,17 @@ class Message:
     def to_dict(self) -> dict[str, Any]:
         """Return the message as a dict of wire field names.
 
-        Nested messages become dicts, arrays of messages lists of dicts; numeric arrays stay the
-        numpy arrays they are. ``encode`` turns it into the same bytes again.
+        Nested messages become dicts, arrays of messages lists of dicts; numeric arrays remain numpy
+        arrays. ``encode`` returns the same bytes for it.
         """
         return to_dict(self)
 
     def to_json(self, indent: int | None = None) -> str:
         """Return the message as JSON.
 
-        Arrays are lists; floats that JSON cannot say become the strings ``"NaN"``,
-        ``"Infinity"`` and ``"-Infinity"``, as in protobuf's JSON mapping; bytes of strings that
-        are not UTF-8, and surrogates that are no pair, become U+FFFD.
+        Arrays are lists; floats that JSON cannot represent become the strings ``"NaN"``,
+        ``"Infinity"`` and ``"-Infinity"``, as in protobuf's JSON mapping; bytes of strings that are
+        not UTF-8, and unpaired surrogates, become U+FFFD.
         """
         return to_json(self, indent)
 
@@ -196,7 +196,7 @@ def _no_field(schema: Schema, name: str) -> str:
 
 
 def type_of(message: Message) -> MessageType:
-    """Return the type of any message, one with a field called ``type`` included."""
+    """Return the type of any message, even of one with a field called ``type``."""
     return message._schema__.type
 
 
@@ -208,7 +208,7 @@ def touch(message: Message) -> None:
 
 
 def copy_of(message: Message) -> Message:
-    """Return a deep copy; a value that is not of its field's kind is copied as it is."""
+    """Return a deep copy; a value of another kind than its field is copied unchanged."""
     twin = plain_class(message._schema__)()
     for member in message._schema__.members:
         value = getattr(message, member.attr)
@@ -262,7 +262,7 @@ class Stamp:
 
     @property
     def nanoseconds(self) -> int:
-        """The whole in nanoseconds."""
+        """The total in nanoseconds."""
         whole, rest = (getattr(self, member.attr) for member in self._schema__.members)
         return int(whole) * 1_000_000_000 + int(rest)
 
@@ -273,7 +273,7 @@ class Stamp:
 
     @property
     def seconds(self) -> float:
-        """The whole in seconds; a float loses accuracy below a microsecond."""
+        """The total in seconds; a float loses accuracy below a microsecond."""
         return self.nanoseconds / 1e9
 
 
@@ -301,9 +301,9 @@ def shell_class(
     """Return the class of a schema's shells: its plain class with every field shadowed.
 
     Args:
-        codec: Whose bytes the shells hold.
+        codec: Codec of the shells' bytes.
         root: Whether a shell's buffer is the whole message.
-        compile_fill: Called with the class and the name of an attribute; makes the function that
+        compile_fill: Called with the class and the name of an attribute; returns the function that
             decodes a shell and returns that attribute (nothing for an empty name).
     """
     cls = plain_class(codec.schema)
@@ -452,12 +452,12 @@ def resolve_path(schema: Schema, path: str) -> list[tuple[Member, Step | None]]:
 
 
 def column_type(rest: list[tuple[Member, Step | None]]) -> Any:
-    """Return the numpy type of a column whose elements a route leads to, None for other values."""
+    """Return the numpy type of a column at the end of a route; None for other values."""
     number, step = rest[-1][0].number, rest[-1][1]
     if number is None or (rest[-1][0].is_array and not isinstance(step, int)):
         return None
     if any(isinstance(step, slice) for _, step in rest):
-        return None  # a column of columns, each as long as it likes
+        return None  # a column of columns, of any lengths
     return bool if number.python is bool else number_type(number.dtype, "<")
 
 
@@ -504,10 +504,10 @@ def _follow(message: Any, route: list[tuple[Member, Step | None]], path: str) ->
 
 
 def set_path(message: Message, path: str, value: Any) -> None:
-    """Set what a path leads to; an array still in the received bytes is copied first.
+    """Set the value at a path; an array still in the received bytes is copied first.
 
     Raises:
-        FieldPathError: The path leads nowhere.
+        FieldPathError: The path does not exist.
         ConversionError: A number does not fit its array; other values are checked when encoding.
     """
     route = resolve_path(message._schema__, path)
@@ -561,7 +561,7 @@ def writable(message: Message, path: str) -> np.ndarray:
 def _own(holder: Any, member: Member) -> Any:
     array = getattr(holder, member.attr)
     flags = getattr(array, "flags", None)
-    if flags is None:  # what was assigned to the field
+    if flags is None:  # a value assigned to the field
         array = _conversion().numbers(member, array, member.name)
     elif flags.writeable:
         return array
@@ -572,7 +572,7 @@ def _own(holder: Any, member: Member) -> Any:
 
 
 def _conversion() -> Any:
-    # It makes messages, which need this module.
+    # Imported late: it creates messages, which need this module.
     return import_module("rosglass.messages.conversion")
 
 
@@ -583,7 +583,7 @@ _SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 def to_dict(message: Message) -> dict[str, Any]:
-    """Return the message as nested dicts; numeric arrays stay what they are."""
+    """Return the message as nested dicts; numeric arrays are kept."""
     return {
         member.name: _dict_value(member, getattr(message, member.attr))
         for member in message._schema__.members

@@ -1,7 +1,7 @@
 """Schemas: resolved definitions with the Python attribute, kind and nested schema of each member.
 
-Schemas are interned by structure: two definitions that say the same (comments aside) share one
-schema, hence one Python class, wherever they came from.
+Schemas are interned by structure: definitions that differ only in comments share one schema, hence
+one Python class, whatever their origin.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ _NUMBERS = {
         Number("float64", "d", 8, "f8"),
     )
 }
-# ROS 1 says byte is int8 (genmsg), ROS 2 says it is an octet (rosidl).
+# byte is int8 in ROS 1 (genmsg), an octet in ROS 2 (rosidl).
 _NUMBERS_ROS1 = {**_NUMBERS, "byte": _integer("byte", "b", 1, True)}
 
 
@@ -94,7 +94,7 @@ def _stamp_definition(name: str, part: str) -> Definition:
     return Definition(name, 1, (Field("secs", FieldType(part)), Field("nsecs", FieldType(part))))
 
 
-# ROS 1's built-in times behave like messages of two fields.
+# ROS 1's built-in times are treated as messages of two fields.
 _BUILTIN_ROS1 = {
     "time": _stamp_definition("time", "uint32"),
     "duration": _stamp_definition("duration", "int32"),
@@ -110,7 +110,7 @@ class Member:
         name: Name on the wire and in dicts.
         attr: Name of the Python attribute.
         field: The definition's field.
-        kind: What an element is.
+        kind: Kind of its elements.
         array: Whether and how it repeats.
         size: Count of a fixed array, maximum of a bounded sequence.
         number: The primitive, for numbers.
@@ -145,18 +145,18 @@ class Schema:
     """A message type for the codecs.
 
     Attributes:
-        definition: What it was made from.
+        definition: The definition it was made from.
         name: Full name, ``pkg/msg/Type``.
         ros: 1 or 2.
         members: The fields in wire order.
         by_name: The same, by wire name and by attribute.
         is_time: Whether it is a time or duration (two numbers: seconds and nanoseconds).
         has_wide: Whether a ``wstring`` occurs anywhere in it.
-        extent: How many fields and values it has, those of nested messages included.
-        cache: What other modules derive from the schema (class, codecs), by key.
+        extent: Number of its fields and values, including those of nested messages.
+        cache: Objects that other modules derive from the schema (class, codecs), by key.
     """
 
-    #: Makes the public type of a schema; :mod:`rosglass.messages.types` puts itself here.
+    #: Creates the public type of a schema; set by :mod:`rosglass.messages.types`.
     make_type: ClassVar[Callable[[Schema], MessageType]]
 
     def __init__(self, definition: Definition, members: tuple[Member, ...], extent: Extent) -> None:
@@ -221,7 +221,7 @@ def _resolve(
     for field in definition.fields:
         if field.name in members:
             raise DefinitionError(f"field {field.name!r} appears twice in {definition.name}", file)
-        # Names end up in generated code; definitions made by hand were seen by no parser.
+        # Names are used in generated code; no parser has checked definitions made by hand.
         if not (field.name.isascii() and field.name.isidentifier()):
             raise DefinitionError(f"{definition.name}: {field.name!r} is no field name", file)
         attr = _attribute(field.name, taken)

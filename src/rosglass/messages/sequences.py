@@ -23,13 +23,13 @@ __all__ = ["MessageSequence", "record_type", "same_bytes"]
 class MessageSequence(MutableSequence["Message"]):
     """The elements of an array field, as received; behaves as a list.
 
-    One element asked for is found and decoded alone (at once when all have the same size);
+    Access by index finds and decodes that element alone (directly if all have the same size);
     iterating and changing the sequence decodes them all.
     """
 
     __slots__ = ("_buffer", "_count", "_items", "_offsets", "_start")
     _codec: ClassVar[Codec]
-    #: The elements; before that, those asked for by their index, or None.
+    #: All elements; until they are decoded, those accessed by index, or None.
     _items: list[Message] | dict[int, Message] | None
     _buffer: bytes | memoryview
     _start: int
@@ -143,9 +143,9 @@ def same_bytes(value: Any, schema: Schema, size: int, big: bool) -> memoryview |
 
     Args:
         value: The array.
-        schema: What its elements are to be.
-        size: Bytes of each, which leave no gap.
-        big: Their byte order.
+        schema: Expected schema of its elements.
+        size: Bytes of each, without gaps.
+        big: Whether they are big endian.
     """
     if not isinstance(value, MessageSequence) or value._items is not None:
         return None
@@ -154,7 +154,7 @@ def same_bytes(value: Any, schema: Schema, size: int, big: bool) -> memoryview |
         return None
     end = value._start + value._count * size
     if end > len(value._buffer):
-        return None  # decoding says what is wrong
+        return None  # decoding reports the error
     return memoryview(value._buffer)[value._start : end]
 
 

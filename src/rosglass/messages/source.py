@@ -52,8 +52,8 @@ def iterator(fmt: str) -> Callable[..., Iterator[tuple[Any, ...]]]:
     return struct.Struct(fmt).iter_unpack
 
 
-#: Lines, and levels of blocks, from which on a function calls others instead of growing. Python
-#: takes some 5 kB and 10 us for a line, and 20 nested loops at most.
+#: Lines and levels of blocks beyond which a function calls others instead of growing. Python takes
+#: some 5 kB and 10 us for a line, and allows 20 nested loops.
 _MANY_LINES, _DEEP = 1000, 10
 
 
@@ -78,7 +78,7 @@ class Source:
         self.lines.append("    " * self._depth + text)
 
     def take_last(self, start: str) -> str | None:
-        """Take back the last line if it is of the current block and starts with `start`.
+        """Remove the last line if it is in the current block and starts with `start`.
 
         Returns:
             The rest of the line, None if there is no such line.
@@ -90,7 +90,7 @@ class Source:
 
     @contextmanager
     def block(self, head: str) -> Iterator[None]:
-        """Add `head` and indent what follows."""
+        """Add `head` and indent the following lines."""
         self.line(head)
         self._depth += 1
         yield
@@ -131,7 +131,7 @@ class _Loader:
 
 
 class TooShortError(Exception):
-    """The buffer ends too early; generated code raises it, callers see a DecodeError."""
+    """The buffer ends too early; raised by generated code, callers get a DecodeError."""
 
 
 def too_short() -> NoReturn:
@@ -140,7 +140,7 @@ def too_short() -> NoReturn:
 
 
 class OddValueError(Exception):
-    """A value needs the slow conversion; generated code raises it, callers never see it."""
+    """A value needs the slow conversion; raised by generated code, callers never get it."""
 
 
 def odd() -> NoReturn:

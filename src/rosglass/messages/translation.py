@@ -1,8 +1,8 @@
 """Translation of messages between ROS 1 and ROS 2: by their bytes where possible, or by fields.
 
-Where both have the same fields in the same order, the bytes are read as the other ROS's message at
-once: in ROS 1's wire format the two differ in ``Header.seq`` only. Whatever is alike goes through
-in blocks, arrays of messages included.
+If both have the same fields in the same order, the bytes are directly read as the other ROS's
+message: in ROS 1's wire format, the two differ only in ``Header.seq``. Equal parts are copied in
+blocks, including arrays of messages.
 """
 
 from __future__ import annotations
@@ -50,23 +50,23 @@ _TIME_RANGES = {
 class Translation:
     """Translates the messages of a type to the other ROS.
 
-    The target is the other ROS's own type where it has one whose fields correspond, so that its
+    The target is the other ROS's own type if it has one with corresponding fields, so that its
     nodes understand it; otherwise a type derived from the source's definition.
 
     Args:
         source: The type, of either ROS.
         wanted: Types of the other ROS to prefer when they correspond: those in use there.
-        library: Where the other ROS's types are looked up; None for the shared library.
+        library: Library for the types of the other ROS; None for the shared one.
 
     Attributes:
         source: As given.
         type: The type in the other ROS.
-        derived: Whether it was derived: the other ROS's nodes know it only if they have the same.
-        left_out: Paths of fields that the target has no place for.
+        derived: Whether it was derived: nodes of the other ROS need the same definition.
+        left_out: Paths of fields that the target lacks.
         added: Paths of fields that only the target has; they get their defaults.
 
     Raises:
-        UnsupportedError: There can be no such type; says why.
+        UnsupportedError: There can be no such type; the message gives the reason.
     """
 
     def __init__(
@@ -101,9 +101,9 @@ class Translation:
             data: The message as received, in its own ROS's wire format.
 
         Raises:
-            DecodeError: These are no bytes of such a message.
-            ConversionError: A value does not fit the other ROS, such as a time before 1970, or
-                an array beyond its bound; says which field.
+            DecodeError: The bytes are not such a message.
+            ConversionError: A value does not fit the other ROS, such as a time before 1970, or an
+                array beyond its bound; the message names the field.
         """
         if self._exact is None:
             return self._encode(data)
@@ -116,7 +116,7 @@ class Translation:
         else:
             message = self._exact.decode(data, wire="cdr")
         if not all(fits(message) for fits in self._times):
-            # Field by field it becomes clear where, and what is wrong there.
+            # Translating field by field finds the field and the error.
             return self._encode(self._whole(data))
         if self.source.ros == 1:
             return self._exact.encode(message, wire="cdr")
@@ -144,18 +144,18 @@ class ServiceTranslation:
     """Translates the requests and responses of a service to the other ROS.
 
     Args:
-        source: The service's type where it is offered, of either ROS.
+        source: The service's type at its server, of either ROS.
         wanted: Types of the other ROS to prefer when they correspond.
-        library: Where the other ROS's types are looked up; None for the shared library.
+        library: Library for the types of the other ROS; None for the shared one.
 
     Attributes:
         source: As given.
-        type: The type in the other ROS, where it is called.
-        request: From what is called there to what the server takes.
-        response: From what the server answers to what the caller gets.
+        type: The type in the other ROS, at the clients.
+        request: Translates requests of the clients for the server.
+        response: Translates responses of the server for the clients.
 
     Raises:
-        UnsupportedError: There can be no such type; says why.
+        UnsupportedError: There can be no such type; the message gives the reason.
     """
 
     def __init__(
@@ -177,19 +177,19 @@ class ActionTranslation:
     """Translates the goals, results and feedback of an action to the other ROS.
 
     Args:
-        source: The action's type where it is offered, of either ROS.
-        library: Where the other ROS's types are looked up; None for the shared library.
+        source: The action's type at its server, of either ROS.
+        library: Library for the types of the other ROS; None for the shared one.
 
     Attributes:
         source: As given.
-        type: The type in the other ROS, where goals are sent.
+        type: The type in the other ROS, at the clients.
         derived: Whether it was derived; see :class:`Translation`.
-        goal: From what is sent there to what the server takes.
-        result: From the server's results to the client's.
+        goal: Translates goals of the clients for the server.
+        result: Translates results of the server for the clients.
         feedback: The same for feedback.
 
     Raises:
-        UnsupportedError: There can be no such type; says why.
+        UnsupportedError: There can be no such type; the message gives the reason.
     """
 
     def __init__(self, source: ActionType, library: Library | None = None) -> None:
@@ -400,7 +400,7 @@ def _octets(target: Member) -> _Convert:
 
 
 def _level(level: int, ros: int) -> int:
-    """Return the level of a log message in the other ROS, that of the next lower known one."""
+    """Return a log level in the other ROS; for an unknown one, the next lower level."""
     pairs = _LEVELS if ros == 1 else tuple((two, one) for one, two in _LEVELS)
     return max((there for here, there in pairs if here <= level), default=pairs[0][1])
 

@@ -44,7 +44,7 @@ _WIRES = {
 }
 _ORDERS = {"little": False, "big": True}
 _PADDING = 3
-#: Bytes of a message, and values in it, up to which it is decoded sooner at once than in two steps.
+#: Limits of bytes and values for which decoding at once is faster than in two steps.
 _SMALL, _FEW_LEAVES = 1024, 16
 _MOST_PATHS = 1000
 
@@ -70,7 +70,7 @@ class MessageType:
         definition: The definition it was made from.
         name: Full name, ``pkg/msg/Type``.
         ros: 1 or 2.
-        wire: The wire format used unless another is asked for: ``cdr`` for ROS 2, ``ros1``.
+        wire: The default wire format: ``cdr`` for ROS 2, ``ros1``.
     """
 
     def __init__(self, definition: Definition) -> None:
@@ -196,15 +196,15 @@ class MessageType:
 
         Args:
             buffer: The bytes as received, for CDR with the encapsulation header. ``bytes`` and
-                read-only memoryviews of bytes are kept, not copied: what a view is of stays alive,
-                and must stay unchanged, as long as the message or an array out of it is used.
-                Anything else with bytes in it is copied first.
+                read-only memoryviews of bytes are kept, not copied: the object behind a view stays
+                alive, and must not change while the message or an array out of it is used. Any
+                other buffer is copied first.
             wire: ``cdr`` or ``ros1``; None for the type's own.
-            wstring_width: Bytes for each UTF-16 unit of wstrings, 2 or 4; None finds out.
+            wstring_width: Bytes for each UTF-16 unit of wstrings, 2 or 4; None to detect it.
 
         Raises:
             DecodeError: The buffer is no bytes, or its header announces another representation.
-                Other damage shows when fields are read; :meth:`validate` finds it at once.
+                Other damage is reported when fields are read; :meth:`validate` finds it at once.
         """
         if wire is None:
             wire = self.wire
@@ -218,7 +218,7 @@ class MessageType:
                 message._buffer__ = buffer
                 return message
         except LookupError:
-            pass  # the first of its kind, or too short for a header
+            pass  # no codec cached yet, or too short for a header
         return self._decode(buffer, wire, wstring_width)
 
     def _decode(self, buffer: Any, wire: str | None, wide: int | None) -> Message:
@@ -231,7 +231,7 @@ class MessageType:
         return message
 
     def _bytes(self, buffer: Any) -> bytes | memoryview:
-        """Return bytes, or a read-only view of some, which can be kept."""
+        """Return the buffer as bytes or a read-only view, which can be kept."""
         if type(buffer) is bytes:
             return buffer
         try:
@@ -264,8 +264,8 @@ class MessageType:
     def _plausible_width(self, data: bytes | memoryview, name: str, big: bool) -> int:
         """Return the wstring width that makes the message end where its bytes end.
 
-        If both do, the padding that the encapsulation header announces decides; otherwise 4,
-        which is what ROS 2's nodes write.
+        If both do, the padding that the encapsulation header announces decides; otherwise 4, as
+        written by ROS 2's nodes.
         """
         fitting = []
         for wide in (4, 2):
@@ -281,8 +281,8 @@ class MessageType:
     def decode_small(self, buffers: Sequence[bytes | memoryview]) -> list[Message] | None:
         """Decode many small messages of ROS 1 at once, which is faster than lazy messages.
 
-        None when they, or the type, are such that :meth:`decode` is better for each: big, damaged,
-        or with much in them.
+        None if :meth:`decode` is better for them or for the type: large, damaged, or with many
+        values.
         """
         read = self._at_once
         if read is None:
@@ -312,7 +312,7 @@ class MessageType:
     ) -> None:
         """Check that `buffer` is one message and nothing else, without decoding it.
 
-        :meth:`decode_all` takes the same buffers, and those with bytes left over.
+        :meth:`decode_all` accepts the same buffers, and those with bytes left over.
 
         Raises:
             DecodeError: A length does not fit the buffer, a unit of a wstring is no character, or
@@ -348,7 +348,7 @@ class MessageType:
         """
         name = self._wire_name(wire)
         if self._schema.has_wide and wstring_width is None:
-            # Only the bytes tell the width.
+            # The width is known only from the bytes.
             self._path(name, 4, False, (path, *more), not more)
             return partial(self._path_by_bytes, name, (path, *more), not more)
         return self._path(name, _width(wstring_width), False, (path, *more), not more)
@@ -414,7 +414,7 @@ class MessageType:
         Args:
             value: A message of this type, or a dict of fields; missing fields get the defaults.
             wire: ``cdr`` or ``ros1``; None for the type's own.
-            byteorder: ``little`` or ``big``; ROS 1 knows only little.
+            byteorder: ``little`` or ``big``; only ``little`` in ROS 1.
             wstring_width: Bytes for each UTF-16 unit of wstrings: 4 (default), as ROS 2's nodes
                 write and read them, or 2.
             fields: The fields as keyword arguments, instead of or on top of `value`.
@@ -430,7 +430,7 @@ class MessageType:
             try:
                 write = self._dict_writers[wire]
             except (KeyError, TypeError):
-                pass  # the first of its kind, or nonsense
+                pass  # no writer cached yet, or invalid arguments
             else:
                 return write(value)  # type: ignore[no-any-return]
         codec = self._writing_codec(wire, byteorder, wstring_width)
@@ -456,8 +456,8 @@ class MessageType:
     ) -> list[bytes | memoryview]:
         """Return the bytes of a message in parts, for ``writev``; arguments as :meth:`encode`.
 
-        Big arrays are not copied, nor a message that was received and never looked into: the parts
-        are views of what is in `value`, which must not change until the parts are sent.
+        Large arrays are not copied, nor is a received message whose fields were never read: the
+        parts are views of the data in `value`, which must not change until the parts are sent.
         """
         if value is None:
             value = fields
@@ -520,14 +520,14 @@ _WRITE = {1: "32 hexadecimal digits (an md5 sum)", 2: "RIHS01_ and 64 hexadecima
 class OpaqueType(MessageType):
     """A message type without definition, for topics that are passed on as bytes.
 
-    Whatever needs the definition (decoding, encoding, fields) raises TypeNotFoundError with the
-    reason why there is none.
+    Everything that needs the definition (decoding, encoding, fields) raises TypeNotFoundError with
+    the reason why there is none.
 
     Args:
         name: ``pkg/msg/Type``.
         type_hash: RIHS01 hash (ROS 1: md5 sum), as the robot announces it; empty to announce none.
         reason: Why there is no definition.
-        text: What the robot sent in place of a definition, to be passed on; ROS 1 only.
+        text: Text that the robot sent instead of a definition, to be passed on; ROS 1 only.
         ros: 1 or 2.
 
     Attributes:
@@ -595,7 +595,7 @@ class OpaqueType(MessageType):
         raise self._unknown()
 
     def __getattr__(self, name: str) -> Any:
-        # All that a definition gives is made from attributes that an opaque type does not have.
+        # Everything derived from a definition needs attributes that an opaque type lacks.
         if name.startswith("__"):
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         raise self._unknown()
