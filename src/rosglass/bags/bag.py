@@ -309,7 +309,7 @@ _Message: TypeAlias = tuple[int, int, bytes]
 #: Number and bytes of the messages that are held to sort them.
 _MAX_SORTED = 1000
 _MAX_SORTED_BYTES = 256 * 2**20
-#: Memory that a message takes besides its data, in bytes.
+#: Memory of a message in addition to its data, in bytes.
 _OVERHEAD = 200
 
 

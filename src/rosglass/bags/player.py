@@ -57,7 +57,7 @@ class PlayerStatus:
         state: The state.
         position: Seconds since the recording's first message.
         sent: Messages sent so far.
-        lag: Seconds by which sending is late, because messages take longer than the time between.
+        lag: Seconds by which sending is late, if it takes longer than the time between messages.
         rate: Speed; 2 is twice as fast.
     """
 
@@ -611,7 +611,7 @@ class Playback(Handle):
 
     @property
     def problem(self) -> str:
-        """What is not played, and why; empty if everything is."""
+        """Why some topics are not played; empty if all are."""
         problems = dict(self._player.problems)
         parts = [self._bag.problem, *(f"{t}: {why}" if t else why for t, why in problems.items())]
         return "; ".join(filter(None, parts))

@@ -153,7 +153,7 @@ class ReplayNode(Ros2Node):
     def create_publisher(
         self, topic: str, type: str | MessageType, qos: QoS | int = 10
     ) -> Publisher:
-        """Return a publisher whose messages are discarded, which its problem states."""
+        """Return a publisher that discards its messages; its `problem` reports that."""
         self._core.check_open()
         kind = self._core.types.message(type)
         profile = qos if isinstance(qos, QoS) else QoS(depth=qos)

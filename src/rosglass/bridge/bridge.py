@@ -69,8 +69,8 @@ class Bridge(Handle):
     are translated. The bridge does not relay its own messages back, nor those of other bridges
     between the same two graphs: of several, one relays a topic, and another takes over when it
     ends. They recognize each other by their nodes: both nodes of a bridge have the same base name,
-    which no other node has. Where bridges form a ring, the one that would relay something to a
-    graph where it has been reports that as a problem, and does not relay it.
+    which no other node has. If bridges form a ring, the one that would relay something back to a
+    graph where it has been does not relay it, and reports that as a problem.
 
     Both nodes may lose and regain their connections. The bridge does not close them.
 

@@ -219,7 +219,7 @@ class TopicRelay:
     """Relays a topic from one graph to the other.
 
     It subscribes only while the target graph has subscribers, so that robots send nothing in vain;
-    latched topics, and those to keep, always. Each latching publisher has its own counterpart in
+    to latched topics, and those to keep, always. Each latching publisher has its own counterpart in
     the target graph, which is closed with it.
 
     Methods run on the bridge's thread unless noted.

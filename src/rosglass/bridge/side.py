@@ -129,7 +129,7 @@ class Side:
 
     def add_route(self, key: str, endpoints: Sequence[EndpointInfo]) -> None:
         """Add the route of a relayed topic or service, for :meth:`publish_routes`."""
-        # What has lost its sources is offered for a while, with its last route.
+        # A relay without sources is kept for a while, with its last route.
         before = (
             frozenset() if self.sources(endpoints) else self._previous_routes.get(key, frozenset())
         )
@@ -160,7 +160,7 @@ class Side:
         return [e for e in endpoints if self.is_parallel(e.node)]
 
     def add_type(self, translation: Translation | ServiceTranslation | ActionTranslation) -> None:
-        """Let the node describe a type that was derived here, and that no other node knows."""
+        """Let the node describe a derived type, which no other node has."""
         if translation.derived and self.node.wire == "cdr":
             default_library().add_version(translation.type.definition)
 

@@ -174,7 +174,7 @@ class _Origin:
 
     def __init__(self, node: Node, topic: str, sample: Sample) -> None:
         self._node, self._topic, self._publisher = node, topic, sample.publisher
-        # ROS 1 sends the name when it connects.
+        # A ROS 1 publisher sends its name when it connects.
         self._name = sample.publisher.decode() if sample.wire == "ros1" else ""
 
     def __eq__(self, other: object) -> bool:
