@@ -1,1 +1,1 @@
-"""The demo: a simulated robot in a process of its own, and the cockpit that shows and steers it."""
+"""The demo: a simulated robot in a process of its own, and the cockpit that shows and drives it."""

@@ -39,8 +39,8 @@ class Cockpit:
     """The cockpit's window in this process.
 
     Args:
-        url: Where the robot is.
-        size: Of the window in pixels; None for its own.
+        url: URL of the robot's graph.
+        size: Size of the window in pixels; None for its own.
 
     Raises:
         UnsupportedError: There is no display.
@@ -52,7 +52,7 @@ class Cockpit:
         install_message_handler()
         self.app = QtGui.QGuiApplication.instance() or QtGui.QGuiApplication(sys.argv[:1])
         connected()
-        # Half the cost of distance fields without a graphics card, and sharper.
+        # Native text is sharper, and costs half of distance fields without a graphics card.
         QtQuick.QQuickWindow.setTextRenderType(
             QtQuick.QQuickWindow.TextRenderType.NativeTextRendering
         )
@@ -84,16 +84,16 @@ class Cockpit:
         )
 
     def at(self, seconds: float, job: Callable[[], None]) -> None:
-        """Do something some seconds from now."""
+        """Run a job after some seconds."""
         QtCore.QTimer.singleShot(round(seconds * 1000), job)
 
     def fly(self, plan: Sequence[tuple[float, float, float]] = AUTOPILOT) -> None:
-        """Let the stick be pulled by itself, the way a hand would."""
+        """Move the stick automatically, as an operator would."""
         for begin, x, y in plan:
             self.at(begin, lambda x=x, y=y: self.call("stick", "pull", x, y))  # type: ignore[misc]
 
     def screenshot(self, path: Path) -> None:
-        """Save what the window shows.
+        """Save a screenshot of the window.
 
         Raises:
             Error: The file cannot be written.
@@ -124,21 +124,21 @@ class Cockpit:
         return 128 + signals[0] if signals else 0
 
     def _let_go(self) -> None:
-        """Release the stick and give it the time to say so more than once."""
+        """Release the stick, and wait until its stop command was sent several times."""
         self.call("stick", "letGo")
         loop = QtCore.QEventLoop()
         QtCore.QTimer.singleShot(200, loop.quit)
         loop.exec()
 
     def close(self) -> None:
-        """Take the window down and leave the graph; safe to call twice."""
+        """Close the window and leave the graph; safe to call twice."""
         if self._closed:
             return
         self._closed = True
-        # Elements say goodbye to the session, so they have to go first.
+        # Elements unregister from the session, so that they have to be deleted first.
         self._runner.close()
         self.session.close()
-        # PySide takes down what is left in any order at the end of the program, and may crash.
+        # At the end of the program, PySide deletes remaining objects in any order, and may crash.
         gc.collect()
 
     def topics(self) -> list[Any]:
@@ -148,7 +148,7 @@ class Cockpit:
         return [found[topic] for topic in sorted(found)]
 
     def received(self, topic: str) -> bool:
-        """Return whether a message of the topic ever came."""
+        """Return whether a message of the topic was ever received."""
         return any(
             item.property("topic") == topic and item.property("age") >= 0 for item in self.topics()
         )
@@ -195,7 +195,7 @@ class Cockpit:
         """Return a part of the interface by its objectName.
 
         Raises:
-            Error: There is none of that name.
+            Error: There is no part of that name.
         """
         found = self.window.findChild(QtCore.QObject, name)
         if found is None:

@@ -1,4 +1,4 @@
-"""The robot's camera: draws what it sees, 640x480, in a few milliseconds on one core.
+"""The robot's camera: draws its view, 640x480, in a few milliseconds on one core.
 
 Every surface is flat, so each is one perspective warp of its texture into the polygon it covers on
 the screen, from far to near (painter's algorithm). OpenCV does the pixels and releases the
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CODE_POSITION", "HEIGHT", "MOUNT", "WIDTH", "Camera"]
 
-#: Where the frame code's first square is, pixels.
+#: Position of the frame code's first square in pixels.
 CODE_POSITION = (WIDTH - framecode.BITS * framecode.SQUARE - 8, HEIGHT - framecode.SQUARE - 6)
 _HAZE = np.array([222, 204, 184], np.float64)
 #: Front edge, half width and height of the deck's surfaces, and their colour.
@@ -60,7 +60,7 @@ class Camera:
     """Renders pictures of a world.
 
     Args:
-        world: The world to look at.
+        world: The world to render.
     """
 
     def __init__(self, world: World) -> None:
@@ -78,7 +78,7 @@ class Camera:
         self._beam = _beam()
 
     def render(self, state: RobotState, *, body: bool = True) -> Picture:
-        """Return a new picture, rows of RGB, of what is seen, of its own `body`, too."""
+        """Return a new picture (rows of RGB) of the view, with the robot itself if `body`."""
         picture = np.empty((HEIGHT, WIDTH, 3), np.uint8)
         rotation, position = pose_of(state)
         self._draw_sky(picture, state)
@@ -101,7 +101,7 @@ class Camera:
 
         Args:
             picture: The picture.
-            nanoseconds: System time at which it counts as taken.
+            nanoseconds: System time to encode as the time of the picture.
             number: Its running number.
         """
         seconds, rest = divmod(nanoseconds, 1_000_000_000)
@@ -130,7 +130,7 @@ class Camera:
         column = (-state.yaw % (2 * math.pi)) * FOCAL - math.radians(39) * FOCAL
         if column < 0:
             column += 2 * math.pi * FOCAL
-        # Picture -> panorama: turn by the roll around the centre, then shift.
+        # Picture -> panorama: rotate by the roll around the centre, then shift.
         offset_x = column + WIDTH / 2
         offset_y = self._sky_horizon + pitch * FOCAL
         cx, cy = WIDTH / 2, HEIGHT / 2
@@ -163,8 +163,8 @@ class Camera:
         top = int(max(0, min(HEIGHT, *rows)))
         if top >= HEIGHT:
             return
-        # Near the horizon a smaller texture avoids glitter; near the robot half the resolution
-        # is plenty, for there every texel covers several pixels.
+        # Near the horizon, a smaller texture avoids glitter; near the robot, half the resolution is
+        # enough, as every texel covers several pixels.
         switch = min(HEIGHT, max(top, int(max(rows)) + 90))
         far, near = self._ground_scale / 2, self._ground_scale
         _warp(self._ground_far, np.diag([far, far, 1.0]) @ inverse, picture, top, switch)

@@ -1,4 +1,4 @@
-"""The coloured point cloud: what the robot has seen of its world so far."""
+"""The coloured point cloud: all parts of the world that the robot has seen so far."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Cloud"]
 
-#: Metres between two points, of what stands and of the ground.
+#: Metres between two points of objects, and of the ground.
 _SPACING, _GROUND_SPACING = 0.11, 0.12
-#: Bare concrete is left to the map: what is drawn of it would cost the most, and tell the least.
+#: Bare concrete is left to the map: it would need the most points, and show the least.
 _COLOURED, _RAISED = 30, 0.02
 #: Height of the yard's walls in the cloud, metres: a camera behind the robot sees over them.
 _PARAPET = 0.85
-#: How far the robot can tell colours, metres.
+#: Range in metres at which the robot sees colours.
 _REACH = 5.5
 #: sensor_msgs/PointField's number of 32-bit floats.
 _FLOAT32 = 7
@@ -41,7 +41,7 @@ class Cloud:
     """Points on all objects of a world, published once the robot's laser has hit them.
 
     Args:
-        world: The world to look at.
+        world: The world to scan.
     """
 
     def __init__(self, world: World) -> None:
@@ -69,24 +69,24 @@ class Cloud:
         self._rows[:, 3] = (red << 16 | green << 8 | blue).view(np.float32)
 
     def look(self, state: RobotState, ranges: npt.NDArray[np.float32]) -> bool:
-        """Take note of what is in sight; returns whether anything is new.
+        """Record the points in sight; return whether any is new.
 
         Args:
-            state: Where the robot is.
-            ranges: What its laser meets there (:meth:`LaserScanner.scan`).
+            state: State of the robot.
+            ranges: Ranges of its laser in that state (:meth:`LaserScanner.scan`).
         """
         way = self._places - (state.x, state.y)
         distances = np.hypot(way[:, 0], way[:, 1])
         bearings = np.arctan2(way[:, 1], way[:, 0]) - state.yaw - LaserScanner.angle_min
         beams = np.rint(bearings % math.tau / LaserScanner.angle_increment).astype(int)
-        # Tops and far sides of low things are met from above.
+        # Tops and far sides of low objects are seen from above.
         free = ranges[beams % LaserScanner.beams] + 0.35
         new = (distances < _REACH) & (distances < free) & ~self._seen
         self._seen |= new
         return bool(new.any())
 
     def message(self, stamp: Time) -> dict[str, Any]:
-        """Return ``sensor_msgs/msg/PointCloud2`` of what has been seen, with ``rgb``."""
+        """Return ``sensor_msgs/msg/PointCloud2`` of the points seen so far, with ``rgb``."""
         rows = self._rows[self._seen]
         fields = [
             {"name": name, "offset": 4 * k, "datatype": _FLOAT32, "count": 1}

@@ -1,4 +1,4 @@
-"""What the simulated robot does when it is asked: a service, an action, a parameter."""
+"""The simulated robot's service, action and parameter."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["Duties"]
 _log = logging.getLogger("rosglass.demo.robot")
 _NAME = "max_speed"
 _PERIOD = 0.1
-#: Radians per second, and how near is near enough.
+#: Rate of a turn in radians per second, and its tolerance in radians.
 _TURN, _NEAR = 0.8, 0.03
 #: Metres per second.
 _SLOWEST, _FASTEST = 0.1, 1.2
@@ -32,8 +32,8 @@ class Duties:
     """The robot's service ``/flashlight/set``, action ``/turn`` and parameter ``max_speed``.
 
     Args:
-        node: Where they are offered.
-        state: Tells how the robot is now.
+        node: Node that offers them.
+        state: Returns the robot's current state.
         switch: Switches its flashlight.
         drive: Takes metres and radians per second.
     """
@@ -53,9 +53,9 @@ class Duties:
                 _NAME, _FASTEST, ParameterDescriptor(description=what, range=limits)
             )
         except UnsupportedError:
-            # ROS 1 knows no ranges.
+            # ROS 1 has no ranges.
             speed = node.parameters.declare(_NAME, _FASTEST, ParameterDescriptor(description=what))
-        # Kept: on ROS 1, asking takes the master, without which a robot must go on, and stop.
+        # Cached: ROS 1 reads it from the master, without which the robot must still drive.
         self._max_speed = speed
         self._parts: list[Any] = [
             node.parameters.on_change(self._on_parameters),
@@ -69,7 +69,7 @@ class Duties:
 
     @property
     def max_speed(self) -> float:
-        """Highest speed in metres per second; the slowest while it is set to nonsense."""
+        """Highest speed in metres per second; the slowest while its value is invalid."""
         value = self._max_speed
         if isinstance(value, (int, float)) and _SLOWEST <= value <= _FASTEST:
             return float(value)
@@ -92,7 +92,7 @@ class Duties:
         return {"success": on == request.data, "message": "on" if on else "off"}
 
     def _turn(self, goal: ServerGoal) -> dict[str, float]:
-        """Turn on the spot to a heading; ends where it is when it is cancelled or stopped."""
+        """Turn on the spot to a heading; ends where it is if cancelled or stopped."""
         wanted, start = float(goal.goal.theta), self._state().yaw
         if not math.isfinite(wanted):
             raise Error(f"the heading {wanted} is no angle")

@@ -1,4 +1,4 @@
-"""What the simulated robot has for an operator's whole station: model, cloud, cameras, modes."""
+"""The equipment that a full operator station needs: model, cloud, cameras, modes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["CAMERAS", "Equipment"]
 
 CAMERAS = ("rear", "left", "right", "thermal")
 _CLOUD_PERIOD, _CAMERA_PERIOD = 0.5, 0.1
-#: Seconds after which a cloud is sent again that has not changed.
+#: Seconds after which an unchanged cloud is sent again.
 _CLOUD_CONFIRM = 1.4
 _WIDTH, _HEIGHT = 320, 240
 
@@ -33,13 +33,13 @@ class Equipment:
     """Additional sensors and cameras of the robot; they cost little without subscribers.
 
     Args:
-        node: Where it is offered.
+        node: Node that offers it.
         simulation: The robot.
-        camera: What draws pictures of its world.
+        camera: Renders pictures of its world.
         scanner: Its laser.
         drive: Takes metres and radians per second.
         flippers: Takes four angles.
-        mode: The first mode.
+        mode: The initial mode.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Equipment:
         }
 
     def describe(self) -> None:
-        """Tell what the robot looks like: on ROS 1 a parameter, on ROS 2 a topic."""
+        """Publish the robot's model: in ROS 1 a parameter, in ROS 2 a topic."""
         if self._node.wire == "ros1":
             server: Any = self._node
             server.parameter_server.set("/robot_description", urdf())
@@ -80,18 +80,18 @@ class Equipment:
 
     @staticmethod
     def frames(stamp: Time) -> list[dict[str, Any]]:
-        """Return where its parts are, for ``/tf_static``."""
+        """Return the poses of its parts, for ``/tf_static``."""
         return [telemetry.part(stamp, name, place, turn) for name, place, turn in PARTS]
 
     def scan(self, ending: Callable[[float], bool]) -> None:
-        """Send the cloud, until `ending`, which waits some seconds, says so."""
+        """Publish the cloud until `ending`, which waits some seconds, returns true."""
         sent, changed = -math.inf, False
         while not ending(_CLOUD_PERIOD):
             state, now = self._simulation.state, time.monotonic()
             if abs(state.pitch) + abs(state.roll) < 0.3:
                 ranges = self._scanner.scan(state.x, state.y, state.yaw, state.carrier_phase)
                 changed |= self._cloud.look(state, ranges)
-            # Who shows it builds it anew each time.
+            # Displays rebuild it for each message.
             due = changed or now - sent >= _CLOUD_CONFIRM
             if due and self._points.subscription_count():
                 self._points.publish(self._cloud.message(Time.now()))
@@ -131,7 +131,7 @@ class Equipment:
 
 
 def _seen_to(state: RobotState, turn: float) -> RobotState:
-    """Return a robot that looks the way that a camera of this one does, turned by an angle."""
+    """Return a state whose camera looks in the direction of another camera, turned by an angle."""
     c, s = math.cos(turn), math.sin(turn)
     front_left, front_right, rear_left, rear_right = state.flippers
     return replace(

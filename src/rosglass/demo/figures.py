@@ -1,4 +1,4 @@
-"""What the demo measures while it runs, and the table it prints."""
+"""The figures that the demo measures, and the table that it prints."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ if TYPE_CHECKING:
 
     from rosglass.qt import QtQuick
 
-# Imported before QML makes a video sink: PySide knows only types whose module it has seen.
+# Imported before QML creates a video sink: PySide supports only types of imported modules.
 _MULTIMEDIA: Any = optional("QtMultimedia")
 
 __all__ = ["CameraFigures", "Latency", "ProcessFigures", "table"]
 
-#: Pictures whose latency is remembered, five minutes of them: a cockpit may run for days.
+#: Number of pictures whose latency is kept, for five minutes: a cockpit may run for days.
 _NEWEST = 9000
 
 
 @dataclass(frozen=True)
 class Latency:
-    """Milliseconds from a picture's stamp until it was on the screen.
+    """Milliseconds from a picture's stamp to its display.
 
     Attributes:
-        count: Pictures measured.
-        median: Half of them were quicker.
-        p95: 95 % were quicker.
+        count: Number of pictures.
+        median: Half of them were faster.
+        p95: 95 % were faster.
         worst: The slowest.
     """
 
@@ -59,12 +59,12 @@ class Latency:
 class CameraFigures(QtCore.QObject):
     """Follows the pictures of the simulated camera onto the screen.
 
-    Reads the frame code out of each picture that reaches the video sink; the picture counts as
-    shown when the window has swapped its buffers next.
+    Reads the frame code of each picture that reaches the video sink; the picture counts as
+    displayed at the window's next buffer swap.
 
     Args:
         sink: The ``QVideoSink`` that shows the camera.
-        window: The window it is in.
+        window: Window with the sink.
     """
 
     def __init__(self, sink: Any, window: QtQuick.QQuickWindow) -> None:
@@ -76,14 +76,14 @@ class CameraFigures(QtCore.QObject):
         self.latencies: deque[float] = deque(maxlen=_NEWEST)
         #: Pictures that reached the screen's video sink.
         self.frames = 0
-        #: Pictures missing between the first and the last, by their running numbers.
+        #: Pictures missing between the first and the last, by their sequence numbers.
         self.missing = 0
         self._sink.videoFrameChanged.connect(self._on_frame)
-        # Queued: nothing of Python's may run on the render thread.
+        # Queued: no Python code may run on the render thread.
         window.frameSwapped.connect(self._on_swap, QtCore.Qt.ConnectionType.QueuedConnection)
 
     def forget(self) -> None:
-        """Start counting anew."""
+        """Reset the counts."""
         self.latencies.clear()
         self.frames = self.missing = 0
         self._last = -1
@@ -97,7 +97,7 @@ class CameraFigures(QtCore.QObject):
             return
         if self._last >= 0:
             gap = (code.number - self._last) % 65536
-            # A robot that was restarted begins to count anew.
+            # A restarted robot counts from the beginning.
             self.missing += gap - 1 if 0 < gap < 1000 else 0
         self._last, self._waiting = code.number, code
 
@@ -123,7 +123,7 @@ class CameraFigures(QtCore.QObject):
 
 
 class ProcessFigures:
-    """What this process costs, from creation on."""
+    """CPU time and memory of this process, from creation on."""
 
     def __init__(self) -> None:
         self._wall, self._cpu = time.monotonic(), time.process_time()
@@ -135,7 +135,7 @@ class ProcessFigures:
 
     @staticmethod
     def memory() -> float:
-        """Return the resident memory in MiB; NaN where the system does not tell."""
+        """Return the resident memory in MiB; NaN if the system does not report it."""
         try:
             pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
         except OSError:

@@ -1,7 +1,7 @@
 """A line of black and white squares in the picture that a program can read back from the screen.
 
-It carries the moment the picture was taken and its running number, so that the way from the robot
-to the pixels can be measured without trusting any software in between.
+It encodes the time and the sequence number of the picture, so that the latency from the robot to
+the pixels can be measured without trusting any software in between.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _TIME_BITS, _NUMBER_BITS, _CHECK_BITS = 28, 16, 8
 BITS = _TIME_BITS + _NUMBER_BITS + _CHECK_BITS
 #: Side of a square in pixels of the picture.
 SQUARE = 8
-# Not quite black and white: easier on the eye, and still far apart.
+# Not quite black and white: easier on the eye, and still easy to distinguish.
 _BLACK, _WHITE = 28, 226
 _UNIT_NS = 10_000
 _WRAP = 1 << _TIME_BITS
@@ -35,11 +35,11 @@ class FrameCodeError(Error):
 
 @dataclass(frozen=True)
 class FrameCode:
-    """What the squares say.
+    """The content of the squares.
 
     Attributes:
-        time: Moment of the picture in units of 10 µs, modulo 2**28 (about 45 minutes).
-        number: The picture's running number, modulo 65536.
+        time: Time of the picture in units of 10 µs, modulo 2**28 (about 45 minutes).
+        number: The picture's sequence number, modulo 65536.
     """
 
     time: int
@@ -51,7 +51,7 @@ class FrameCode:
         return cls(nanoseconds // _UNIT_NS % _WRAP, number % (1 << _NUMBER_BITS))
 
     def age(self, nanoseconds: int) -> float:
-        """Return the picture's age in seconds at a system time; right below 45 minutes."""
+        """Return the picture's age in seconds at a system time; valid below 45 minutes."""
         return (nanoseconds // _UNIT_NS - self.time) % _WRAP * _UNIT_NS * 1e-9
 
 
@@ -72,15 +72,15 @@ def draw(picture: npt.NDArray[np.uint8], code: FrameCode, x: int, y: int) -> Non
 
 
 def read(row: npt.NDArray[np.uint8]) -> FrameCode:
-    """Read the squares back.
+    """Decode the squares.
 
     Args:
         row: Brightness along the middle of the line, from its first to its last square, at any
             scale of at least one value per square.
 
     Raises:
-        FrameCodeError: The row is too short, or it does not hold a whole, undisturbed code (a
-            picture half way replaced by the next one, for instance).
+        FrameCodeError: The row is too short, or the code is incomplete or disturbed (for instance a
+            picture half replaced by the next one).
     """
     if row.ndim != 1 or row.size < BITS:
         raise FrameCodeError(f"expected at least {BITS} values in one row, got shape {row.shape}")

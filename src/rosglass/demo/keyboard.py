@@ -1,4 +1,4 @@
-"""Which keys are held down, seen through the repeats of X11."""
+"""The keys that are held down, regardless of the repeats of X11."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from rosglass.qt import QtCore, QtQml
 
 __all__ = ["HeldKeys", "register"]
 
-#: Milliseconds of a tick, and ticks from a release until it counts. Two, so that after a hiccup the
-#: press that waits in the queue is seen between them.
+#: Milliseconds of a tick, and ticks from a release until it counts. Two, so that after a pause a
+#: press that waits in the queue is handled between them.
 _TICK, _TICKS = 16, 2
 
 
 class HeldKeys(QtCore.QObject):
-    """Tells keys that are let go from keys that repeat.
+    """Distinguishes released keys from repeating ones.
 
-    On X11 a key held down repeats as releases and presses, and Qt marks those as repeats only when
+    On X11, a key held down repeats as releases and presses, and Qt marks those as repeats only if
     both wait in its queue; on an idle window most do not. A press within 32 ms of the release of
-    the same key is therefore a repeat, and a release counts only when no such press follows.
+    the same key is therefore a repeat, and a release counts only if no such press follows.
 
-    Not a Timer of QML's, which ticks with the frames and would tell of a release late.
+    Not a Timer of QML's, which ticks with the frames and would report a release late.
     """
 
     #: A key was released, 16 to 32 ms ago.
@@ -37,7 +37,7 @@ class HeldKeys(QtCore.QObject):
 
     @QtCore.Slot(int, result=bool)
     def press(self, key: int) -> bool:
-        """Take note of a key's press; return False when it only repeats."""
+        """Handle a key's press; return False if it is a repeat."""
         repeats = self._leaving.pop(key, None) is not None or key in self._down
         if not repeats:
             self._down.add(key)
@@ -45,14 +45,14 @@ class HeldKeys(QtCore.QObject):
 
     @QtCore.Slot(int)
     def lift(self, key: int) -> None:
-        """Take note of a key's release, even of one whose press another window got."""
+        """Handle a key's release, even if another window received the press."""
         self._leaving[key] = _TICKS
         if not self._timer.isActive():
             self._timer.start()
 
     @QtCore.Slot()
     def clear(self) -> None:
-        """Forget all keys, without a word: their release may go to another window."""
+        """Forget all keys without a signal: their release may go to another window."""
         self._down.clear()
 
     @QtCore.Slot()
@@ -68,6 +68,6 @@ class HeldKeys(QtCore.QObject):
 
 
 def register() -> None:
-    """Make the type known to QML as ``RosglassDemo 1.0``."""
+    """Register the type in QML as ``RosglassDemo 1.0``."""
     register_type: Any = QtQml.qmlRegisterType  # PySide6's annotation wants bytes for names
     register_type(HeldKeys, "RosglassDemo", 1, 0, "HeldKeys")

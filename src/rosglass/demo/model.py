@@ -11,7 +11,7 @@ from rosglass.demo.telemetry import AXLES
 
 __all__ = ["PARTS", "urdf"]
 
-#: Parts that never move: name, place and roll, pitch, yaw on ``base_link``.
+#: Fixed parts: name, position and roll, pitch, yaw on ``base_link``.
 PARTS: tuple[tuple[str, tuple[float, float, float], tuple[float, float, float]], ...] = (
     ("rear_camera_link", (-0.36, 0.0, 0.30), (0.0, 0.0, math.pi)),
     ("left_camera_link", (0.0, 0.24, 0.30), (0.0, 0.0, math.pi / 2)),

@@ -33,20 +33,20 @@ __all__ = [
 ]
 
 
-#: Of ``actionlib_msgs/msg/GoalStatus``.
+#: Codes of ``actionlib_msgs/msg/GoalStatus``.
 ACTIVE, PREEMPTED, SUCCEEDED, ABORTED, REJECTED = 1, 2, 3, 4, 5
 #: Frames in which a goal is accepted: the robot's localization does not drift.
 _FRAMES = ("map", "odom", "")
-#: Seconds between two confirmations of what has not changed.
+#: Seconds between two confirmations of an unchanged state.
 _CONFIRM = 0.5
 
 
 class DriveGoal:
-    """A goal at ``/move_base_simple/goal``, and in ``/move_base/status`` what becomes of it.
+    """A goal from ``/move_base_simple/goal``, and its state in ``/move_base/status``.
 
     Args:
-        node: Where both are offered.
-        refusal: Why no goal is taken at present; empty when one is.
+        node: Node with both topics.
+        refusal: Returns why goals are refused at present; empty if they are accepted.
     """
 
     def __init__(self, node: Node, refusal: Callable[[], str]) -> None:
@@ -63,15 +63,15 @@ class DriveGoal:
 
     @property
     def place(self) -> tuple[float, float] | None:
-        """Where to drive to, metres in the frame map; None for nowhere."""
+        """Position of the goal in metres in the frame map; None without a goal."""
         return self._place
 
     def end(self, status: int, text: str) -> None:
-        """Drive there no longer; nothing happens where no goal is being driven to.
+        """End the current goal; does nothing without one.
 
         Args:
             status: One of the constants above.
-            text: Why.
+            text: The reason.
         """
         with self._lock:
             active, self._place = self._place is not None, None
@@ -81,12 +81,12 @@ class DriveGoal:
             self._tell()
 
     def confirm(self) -> None:
-        """Tell its state again, now and then."""
+        """Publish its state again from time to time."""
         if time.monotonic() - self._published_at >= _CONFIRM:
             self._tell()
 
     def close(self) -> None:
-        """Take no more goals; safe to call twice."""
+        """Accept no more goals; safe to call twice."""
         self._subscription.close()
 
     def _on_goal(self, message: Message) -> None:
@@ -125,7 +125,7 @@ BEHAVIOURS = ("Look around", "Turn around", "Flippers up", "Flippers flat", "Ret
 _log = logging.getLogger("rosglass.demo.robot")
 _PERIOD = 0.1
 _NEAR, _NEAR_ANGLE = 0.25, 0.05
-#: Metres and radians per second that it drives by itself, and metres per second when it is careful.
+#: Speeds of autonomous driving in metres and radians per second, and careful speed in m/s.
 _SPEED, _TURN, _CAREFUL = 0.55, 0.9, 0.3
 _FLIPPER_TIME = 2.0
 
@@ -133,24 +133,24 @@ _FLIPPER_TIME = 2.0
 class Operation:
     """Modes, mission, goals and behaviours.
 
-    ``/mode`` is one of :data:`MODES`; the services ``/mode/autonomous`` and so on select it.
-    The mission is driven in mode autonomous, and published on ``/mission/state``, ``/mission/path``
-    and ``/mission/waypoint``; ``/mission/pause`` holds it. A :class:`DriveGoal`
-    is driven to in mode supervised. Behaviours, ``/flexbe/execute_behavior``, are executed one at
-    a time, in all modes but safe.
+    ``/mode`` is one of :data:`MODES`; the services ``/mode/autonomous`` and so on select it. The
+    mission is driven in mode autonomous, and published on ``/mission/state``, ``/mission/path`` and
+    ``/mission/waypoint``; ``/mission/pause`` pauses it. A :class:`DriveGoal` is driven to in mode
+    supervised. Behaviours, ``/flexbe/execute_behavior``, are executed one at a time, in all modes
+    but safe.
 
     Args:
-        node: Where all this is offered.
-        state: Tells how the robot is now.
+        node: Node that offers all this.
+        state: Returns the robot's current state.
         drive: Takes metres and radians per second.
         flippers: Takes four angles.
-        dock: Where it charges.
-        mode: The first one.
+        dock: Position of the charging dock.
+        mode: The initial mode.
 
     Attributes:
-        mode: The one it is in.
-        goal: What is driven to in mode supervised.
-        next_waypoint: Index of the mission's waypoint that is driven to.
+        mode: The current mode.
+        goal: The goal to drive to in mode supervised.
+        next_waypoint: Index of the mission's next waypoint.
 
     Raises:
         Error: There is no such mode.
@@ -173,7 +173,7 @@ class Operation:
         self._paused, self.next_waypoint = False, 0
         self.goal = DriveGoal(node, self._refusal)
         self._behaviour, self._lock = "", threading.Lock()
-        #: Why a behaviour is to end.
+        #: The reason to end a behaviour.
         self._interruption = ""
         self._published: dict[str, tuple[Any, float]] = {}
         latched = QoS.latched()
@@ -205,11 +205,11 @@ class Operation:
 
     @property
     def max_speed(self) -> float:
-        """Metres per second that the mode allows."""
+        """Highest speed in the current mode, in metres per second."""
         return _CAREFUL if self.mode == "safe" else math.inf
 
     def work(self) -> None:
-        """Drive and tell, until :meth:`close`."""
+        """Drive and publish the state, until :meth:`close`."""
         while not self._ending.wait(_PERIOD):
             state = self._state()
             self._tell("/mode", self.mode)
@@ -218,7 +218,7 @@ class Operation:
             self.goal.confirm()
 
     def take_over(self) -> None:
-        """Leave the driving to the operator, who has just driven."""
+        """Leave the driving to the operator, who has just sent a command."""
         if self.mode == "autonomous":
             self.mode = "supervised"
         self._interruption = "the operator drives"
@@ -231,7 +231,7 @@ class Operation:
             part.close()
 
     def proceed(self, state: RobotState) -> str:
-        """Drive on for a moment; returns what the robot is about."""
+        """Drive for a moment; return a description of the robot's activity."""
         if state.emergency_stop:
             self.goal.end(ABORTED, "the emergency stop was pressed")
             return "emergency stop"
@@ -250,7 +250,7 @@ class Operation:
         return "on patrol"
 
     def _steer(self, state: RobotState, target: tuple[float, float]) -> bool:
-        """Drive towards a place; returns whether it is reached."""
+        """Drive towards a position; return whether it is reached."""
         x, y = target[0] - state.x, target[1] - state.y
         distance = math.hypot(x, y)
         if distance < _NEAR:
@@ -291,7 +291,7 @@ class Operation:
         return {"success": True, "message": "from the first waypoint"}
 
     def _refusal(self) -> str:
-        """Return why no goal is driven to at present; empty when one is."""
+        """Return why goals are refused at present; empty if they are accepted."""
         if self._state().emergency_stop:
             return "the emergency stop is latched; release it first"
         if self._behaviour:
@@ -336,7 +336,7 @@ class Operation:
             self._behaviour = ""
 
     def _steps(self, goal: ServerGoal) -> Any:
-        """Yield the robot's state now and then, until the behaviour is to end."""
+        """Yield the robot's state periodically, until the behaviour has to end."""
         while not goal.is_cancel_requested:
             if self._ending.wait(_PERIOD):
                 raise Error("the robot ends")

@@ -1,7 +1,7 @@
 """The map and the laser scan as pictures, painted outside the GUI thread.
 
-QML types ``MapPicture`` and ``ScanPicture`` of the module ``RosglassDemo 1.0``. Both take a topic
-and give a `source` for a QML ``Image``; cells and points never pass through JavaScript.
+QML types ``MapPicture`` and ``ScanPicture`` of the module ``RosglassDemo 1.0``. Both have a topic
+and provide a `source` for a QML ``Image``; cells and points never pass through JavaScript.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["MapPicture", "ScanPicture", "paint_map", "paint_scan", "register"]
 
 _log = logging.getLogger("rosglass.demo")
-#: Most cells of a map that is shown; a bigger one is refused rather than eating all memory.
+#: Largest number of cells of a map; a larger one is refused, as it would exhaust the memory.
 _MOST_CELLS = 100_000_000
 _numbers = itertools.count(1)
 
@@ -64,12 +64,12 @@ def paint_map(cells: npt.NDArray[np.int8], width: int, height: int) -> QtGui.QIm
 def paint_scan(
     ranges: npt.NDArray[np.float32], start: float, step: float, size: int, metres: float
 ) -> QtGui.QImage:
-    """Return a laser scan as a picture, the scanner in the middle looking to the right.
+    """Return a laser scan as a picture, with the scanner in the middle, facing right.
 
     Args:
-        ranges: Distances in metres; what is not finite is left out.
+        ranges: Distances in metres; non-finite ones are left out.
         start: Direction of the first beam, radians, counter-clockwise from ahead.
-        step: From beam to beam, radians.
+        step: Angle between two beams, radians.
         size: Side of the picture, pixels.
         metres: Side of the picture, metres.
     """
@@ -103,7 +103,7 @@ def paint_scan(
 
 
 class _Provider(QtQuick.QQuickImageProvider):
-    """Hands the newest picture of one element to QML's ``Image``."""
+    """Provides the newest picture of one element to QML's ``Image``."""
 
     def __init__(self) -> None:
         super().__init__(QtQuick.QQuickImageProvider.ImageType.Image)
@@ -118,9 +118,9 @@ class _Provider(QtQuick.QQuickImageProvider):
 
 
 class _Picture(TopicElement):
-    """A topic shown as a picture; subclasses say how to paint it."""
+    """A topic displayed as a picture; subclasses paint it."""
 
-    #: Type of the messages, and how they are asked for.
+    #: Type of the messages, and profile of the subscription.
     kind: str
     qos: QoS
 
@@ -143,11 +143,11 @@ class _Picture(TopicElement):
 
     @abstractmethod
     def paint(self, message: Message) -> tuple[QtGui.QImage, tuple[float, ...]]:
-        """Paint a message, on the painting thread; the numbers go to :meth:`take`."""
+        """Paint a message, on the painting thread; the numbers are passed to :meth:`take`."""
 
     @abstractmethod
     def take(self, numbers: tuple[float, ...]) -> None:
-        """Take what belongs to the picture that is shown from now on, on the GUI thread."""
+        """Set the values of the picture that is displayed from now on; on the GUI thread."""
 
     def _wanted(self) -> tuple[Node, str] | None:
         node, topic = self.node, self._resolve(self._topic)
@@ -171,7 +171,7 @@ class _Picture(TopicElement):
         except Exception as error:
             _log.exception("%s: cannot be painted", self._topic)
             result = Error(f"internal error: {error}")
-        with suppress(RuntimeError):  # the QML object went while its picture was painted
+        with suppress(RuntimeError):  # the QML object was destroyed while its picture was painted
             self._painted.emit(result)
 
     # Slots: QML elements with properties of their own hide methods that are not declared.
@@ -225,7 +225,7 @@ class _Picture(TopicElement):
         return QtCore.QUrl(f"image://{self._name}/{self._version}" if self._version else "")
 
     topic = Property(str, lambda self: self._topic, _set_topic, notify=topicChanged)
-    #: Seconds without a message after which the picture is not true any more; 0 for never.
+    #: Seconds without a message after which the picture is outdated; 0 for never.
     limit = Property(float, lambda self: self._stale_after_s, _set_limit, notify=limitChanged)
     source = Property(QtCore.QUrl, _source, notify=changed)
     received = Property(bool, lambda self: self._version > 0, notify=changed)
@@ -239,8 +239,8 @@ class _Picture(TopicElement):
 class MapPicture(_Picture):
     """A ``nav_msgs/msg/OccupancyGrid`` as a picture, north up.
 
-    `left` and `bottom` say where its lower left corner lies in the map, `metresWide` and
-    `metresHigh` how big it is. The map's own rotation is not supported and reported as a problem.
+    `left` and `bottom` are the position of its lower left corner in the map, `metresWide` and
+    `metresHigh` its size. The map's own rotation is not supported and reported as a problem.
     """
 
     kind, qos = "nav_msgs/msg/OccupancyGrid", QoS.latched()
@@ -266,7 +266,7 @@ class MapPicture(_Picture):
         return paint_map(cells, info.width, info.height), (corner.x, corner.y, *size)
 
     def take(self, numbers: tuple[float, ...]) -> None:
-        """Remember where the map lies."""
+        """Store the position and size of the map."""
         if numbers != self._numbers:
             self._numbers = numbers
             self.placed.emit()
@@ -278,7 +278,7 @@ class MapPicture(_Picture):
 
 
 class ScanPicture(_Picture):
-    """A ``sensor_msgs/msg/LaserScan`` as a picture, the scanner in the middle looking right.
+    """A ``sensor_msgs/msg/LaserScan`` as a picture, with the scanner in the middle, facing right.
 
     `metres` is the length of the picture's side.
     """
@@ -303,7 +303,7 @@ class ScanPicture(_Picture):
         return picture, (metres,)
 
     def take(self, numbers: tuple[float, ...]) -> None:
-        """Remember how big the picture is."""
+        """Store the size of the picture."""
         if numbers[0] != self._metres:
             self._metres = numbers[0]
             self.placed.emit()
@@ -312,7 +312,7 @@ class ScanPicture(_Picture):
 
 
 def register() -> None:
-    """Make the types known to QML as ``RosglassDemo 1.0``."""
+    """Register the types in QML as ``RosglassDemo 1.0``."""
     for kind in (MapPicture, ScanPicture):
         register_type: Any = QtQml.qmlRegisterType  # PySide6's annotation wants bytes for names
         register_type(kind, "RosglassDemo", 1, 0, kind.__name__)

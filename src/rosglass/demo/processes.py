@@ -1,4 +1,4 @@
-"""Programs that the demo starts and never leaves behind: the robot, a virtual screen."""
+"""Programs that the demo starts, and that end with it: the robot, a virtual screen."""
 
 from __future__ import annotations
 
@@ -19,20 +19,19 @@ if TYPE_CHECKING:
 __all__ = ["LEASH", "Child", "VirtualScreen", "start_robot"]
 
 _EXIT_TIMEOUT_S = 3.0
-#: Before a command: the system ends it when this program ends, even when it is killed.
+#: Prefix of a command: the system ends it when this program ends, even if that is killed.
 LEASH = ("setpriv", "--pdeathsig", "TERM") if shutil.which("setpriv") else ()
 
 
 class Child(Handle):
     """A program that ends when this one does.
 
-    Its standard input is a pipe that nothing is ever written to; a program started with
-    ``--leash`` ends when the pipe breaks, which the system sees to even when this program is
-    killed.
+    Its standard input is a pipe without data; a program started with ``--leash`` ends when the pipe
+    breaks, which the system ensures even if this program is killed.
 
     Args:
         command: Program and arguments.
-        name: For messages.
+        name: Name for messages.
 
     Raises:
         Error: The program cannot be started.
@@ -41,7 +40,7 @@ class Child(Handle):
     def __init__(self, command: Sequence[str], name: str) -> None:
         self.name = name
         try:
-            # A session of its own: Ctrl-C is for us, and we end our children in good order.
+            # A session of its own: only this program gets Ctrl-C, and ends its children in order.
             self._process = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True)
         except OSError as error:
             raise Error(f"cannot start {name} ({command[0]}): {error}") from error
@@ -56,7 +55,7 @@ class Child(Handle):
         return self._process.poll()
 
     def close(self) -> None:
-        """End it: politely, after 3 s by force. Safe to call twice."""
+        """Terminate it, or kill it after 3 s. Safe to call twice."""
         if self._process.stdin is not None:
             self._process.stdin.close()
         if self._process.poll() is not None:
@@ -73,7 +72,7 @@ def start_robot(url: str, options: Sequence[str] = ()) -> Child:
     """Start ``rosglass robot`` in a process of its own.
 
     Args:
-        url: Where it finds the other nodes.
+        url: URL of the graph.
         options: Further options of the command.
     """
     command = [sys.executable, "-m", "rosglass", "robot", "--url", url, "--leash", *options]
@@ -91,7 +90,7 @@ class VirtualScreen(Handle):
         process: The screen's program.
 
     Raises:
-        Error: Xvfb is missing or does not start; the message says what to do.
+        Error: Xvfb is missing or does not start; the message gives the fix.
     """
 
     def __init__(self, width: int = 1280, height: int = 800) -> None:
@@ -103,7 +102,7 @@ class VirtualScreen(Handle):
             )
         read, write = os.pipe()
         try:
-            # It ends with us where the system can see to that, otherwise with its last window.
+            # It ends with this program if the system supports that, otherwise with its last window.
             self.process = subprocess.Popen(
                 [
                     *LEASH,
@@ -129,7 +128,7 @@ class VirtualScreen(Handle):
         self.display = f":{number}"
 
     def close(self) -> None:
-        """Switch it off; safe to call twice."""
+        """End it; safe to call twice."""
         if self.process.poll() is None:
             self.process.terminate()
             try:
@@ -140,7 +139,7 @@ class VirtualScreen(Handle):
 
 
 def _read_line(descriptor: int, timeout: float) -> str:
-    """Return the line that comes within `timeout` seconds, empty when none does."""
+    """Return the line received within `timeout` seconds; empty if there is none."""
     deadline = time.monotonic() + timeout
     text = b""
     while b"\n" not in text:

@@ -1,4 +1,4 @@
-"""The simulated robot as a ROS 2 node: its threads, its topics and the commands it obeys.
+"""The simulated robot as a ROS 2 node: its threads, its topics and the commands it accepts.
 
 Three threads, so that none waits for another: the body moves at 100 Hz and never sends anything;
 the reporter sends the small topics; the camera renders and sends pictures. Commands arrive on the
@@ -34,7 +34,7 @@ __all__ = ["Robot", "RobotOptions"]
 _log = logging.getLogger("rosglass.demo.robot")
 _BODY_PERIOD = 0.01
 _REPORT_PERIOD = 1 / 30
-#: Every how many reports a topic is sent.
+#: Reports per message of a topic.
 _EVERY = {"scan": 3, "joints": 2, "confirm": 5, "battery": 15, "diagnostics": 15}
 _GRID_RESOLUTION = 0.05
 _LOG_EVERY = 2.0
@@ -42,7 +42,7 @@ _LOG_EVERY = 2.0
 
 @dataclass(frozen=True)
 class RobotOptions:
-    """What the robot sends.
+    """The options of a robot.
 
     Attributes:
         fps: Pictures per second, more than 0 and at most 120.
@@ -50,7 +50,7 @@ class RobotOptions:
         compressed: Whether to send ``/camera/image_raw/compressed`` (while it has subscribers).
         jpeg_quality: 1 to 100.
         equipped: Whether it has :class:`~rosglass.demo.equipment.Equipment` as well.
-        mode: The first one of :data:`~rosglass.demo.operation.MODES`, if it is equipped.
+        mode: The initial one of :data:`~rosglass.demo.operation.MODES`, if it is equipped.
     """
 
     fps: float = 30.0
@@ -71,13 +71,13 @@ class Robot:
     """A simulated robot on a node.
 
     Args:
-        node: Where it lives; stays the caller's, who closes it after the robot.
-        options: What it sends.
+        node: Its node; the caller closes it after the robot.
+        options: Its options.
         simulation: Its body; a new one in the standard world by default.
 
     Attributes:
-        options: What it sends.
-        duties: What it does on request, and the fastest that it drives.
+        options: Its options.
+        duties: Its service and action, and its highest speed, a parameter.
 
     Raises:
         ModuleNotFoundError: OpenCV is not installed.
@@ -123,11 +123,11 @@ class Robot:
 
     @property
     def state(self) -> RobotState:
-        """How the robot is now."""
+        """The robot's current state."""
         return self._simulation.state
 
     def start(self) -> None:
-        """Come to life."""
+        """Start the threads."""
         now = Time.now()
         cells = occupancy(self._simulation.world, _GRID_RESOLUTION)
         frames, work = (
@@ -154,7 +154,7 @@ class Robot:
             thread.start()
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait until :meth:`close` is called or a thread failed; True when the robot has ended."""
+        """Wait until :meth:`close` is called or a thread fails; True when the robot has ended."""
         return self._ending.wait(timeout)
 
     def close(self) -> None:
@@ -173,9 +173,9 @@ class Robot:
             try:
                 work()
             except NodeClosedError:
-                pass  # the node went first: nothing is left to do
+                pass  # the node was closed first
             except Exception:
-                # A robot that can't see or report must not go on driving.
+                # A robot that cannot see or report must stop driving.
                 _log.exception("the robot failed")
             finally:
                 self._ending.set()
@@ -201,7 +201,7 @@ class Robot:
     def _on_velocity(self, message: Message) -> None:
         speed, turn = message.linear.x, message.angular.z
         for value in (message.linear.y, message.linear.z, message.angular.x, message.angular.y):
-            # Also true for NaN. Tracks can't do it: better refused than half obeyed.
+            # Also true for NaN. Tracks cannot do this: refuse it instead of obeying half of it.
             if not abs(value) < 1e-6:
                 raise CommandRejectedError(
                     f"a motion only along linear.x and angular.z expected, "
@@ -300,7 +300,7 @@ class Robot:
     def _film(self) -> None:
         import cv2  # noqa: PLC0415 - an extra
 
-        # Two cores have to do for the robot, the cockpit and the middleware between them.
+        # Two cores must be enough for the robot, the cockpit and the middleware between them.
         cv2.setNumThreads(1)
         beat = _Beat(1 / self.options.fps)
         number, since = 0, time.monotonic()
@@ -346,7 +346,7 @@ class Robot:
 
 
 class _Beat:
-    """Keeps a rhythm: beats that were missed are left out, not made up for."""
+    """Keeps a rate; missed beats are skipped, not made up for."""
 
     def __init__(self, period: float) -> None:
         self._period = period

@@ -27,8 +27,8 @@ def main(seconds: float | None = None, picture: Path | None = None) -> int:
     """Run it until RViz is closed; without a display, for 20 s and with a picture.
 
     Args:
-        seconds: When it ends by itself; None for not at all.
-        picture: Where to save what it looks like then.
+        seconds: Seconds until it ends by itself; None to run until RViz is closed.
+        picture: File for a screenshot at that time.
 
     Returns:
         RViz's exit code.
@@ -56,16 +56,16 @@ def main(seconds: float | None = None, picture: Path | None = None) -> int:
             ending = ["--screenshot", str(picture or "rviz-demo.png"), "--after", str(seconds)]
         command = ["-m", "rosglass", "rviz", *files, "--bare", "--url", url, *ending]
         rviz = Child([*LEASH, sys.executable, *command], "RViz")
-        # Both at once: the user who closed RViz is waiting.
+        # Both at once: the user has closed RViz, and waits.
         stack.callback(_close, rviz, robot)
         code = _wait(rviz, received)
-        if ending and code == 0:  # RViz fails where it took none
+        if ending and code == 0:  # RViz fails without a picture
             print(f"picture of RViz: {Path(ending[1]).resolve()}")
         return code
 
 
 def _note_signals(stack: ExitStack) -> list[int]:
-    """Return the signals to end that come from now on; KeyboardInterrupt would lose a program."""
+    """Return the signals to end received from now on; KeyboardInterrupt would lose a program."""
     received: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         before = signal.signal(number, lambda got, _: received.append(got))

@@ -1,4 +1,4 @@
-"""The laser scanner and the map: what the robot knows about the walls around it."""
+"""The laser scanner, and the robot's map of the walls."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["LaserScanner", "cast", "occupancy"]
 
 
 def cast(x: float, y: float, angles: Floats, segments: Floats) -> Floats:
-    """Return how far a ray from the point runs in each direction until it meets a segment.
+    """Return the distance from the point to the nearest segment in each direction.
 
     Args:
         x: Origin, metres.
@@ -27,7 +27,7 @@ def cast(x: float, y: float, angles: Floats, segments: Floats) -> Floats:
         segments: One ``x0, y0, x1, y1`` per row.
 
     Returns:
-        Distances in metres, infinite where nothing is met.
+        Distances in metres, infinite where there is no segment.
     """
     dx, dy = np.cos(angles)[:, None], np.sin(angles)[:, None]
     px, py = segments[:, 0] - x, segments[:, 1] - y
@@ -42,15 +42,15 @@ def cast(x: float, y: float, angles: Floats, segments: Floats) -> Floats:
 
 
 class LaserScanner:
-    """A planar scanner that looks all around.
+    """A planar scanner with a view all around.
 
     Attributes:
         beams: Number of rays.
         angle_min: First direction relative to the robot, radians.
         angle_increment: Between two rays, radians.
-        range_min: Nearest distance it can tell, metres.
-        range_max: Farthest distance it can tell, metres.
-        mount: Where it sits on the robot, metres forward of the middle.
+        range_min: Nearest distance it measures, metres.
+        range_max: Farthest distance it measures, metres.
+        mount: Its position on the robot, metres forward of the middle.
     """
 
     beams = 360
@@ -75,7 +75,7 @@ class LaserScanner:
             x: The robot's middle.
             y: The robot's middle.
             yaw: Its heading, radians.
-            phase: Where the moving vehicle is (:meth:`World.carrier`).
+            phase: Position of the moving vehicle (:meth:`World.carrier`).
 
         Returns:
             One range per beam; infinite beyond :attr:`range_max` (REP 117).
@@ -91,7 +91,7 @@ class LaserScanner:
 
 
 def occupancy(world: World, resolution: float = 0.05, margin: float = 0.5) -> npt.NDArray[np.int8]:
-    """Return the map of everything that stands still.
+    """Return the map of all fixed objects.
 
     Args:
         world: The world.
@@ -99,8 +99,8 @@ def occupancy(world: World, resolution: float = 0.05, margin: float = 0.5) -> np
         margin: Unknown border around the walls, metres.
 
     Returns:
-        Rows from south to north, columns from west to east, as ``nav_msgs/msg/OccupancyGrid`` wants
-        them: 100 occupied, 0 free, -1 unknown; 35 where the going is rough.
+        Rows from south to north, columns from west to east, as in ``nav_msgs/msg/OccupancyGrid``:
+        100 occupied, 0 free, -1 unknown; 35 on rough ground.
     """
     half_x, half_y = world.half_length + margin, world.half_width + margin
     columns, rows = round(2 * half_x / resolution), round(2 * half_y / resolution)

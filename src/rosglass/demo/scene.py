@@ -1,4 +1,4 @@
-"""What the camera sees, as geometry: flat faces and where they come to lie on the screen."""
+"""The camera's view as geometry: flat faces and their positions on the screen."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 WIDTH, HEIGHT = 640, 480
-#: Where the camera sits on the robot: metres forward, metres up, radians nose down.
+#: Position of the camera on the robot: metres forward, metres up, radians nose down.
 MOUNT = (-0.04, 0.52, 0.11)
 #: Focal length in pixels: 78 degrees from the left to the right edge.
 FOCAL = WIDTH / 2 / math.tan(math.radians(78) / 2)
@@ -55,7 +55,7 @@ _OPTICAL = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 class Face:
     """A flat piece of surface: `origin` + u * `across` + v * `down`, u and v from 0 to 1.
 
-    `part` says how much of the texture's width and height it shows; a width above 1 repeats it.
+    `part` is the part of the texture's width and height that it shows; a width above 1 repeats it.
     """
 
     origin: Floats
@@ -80,7 +80,7 @@ class Face:
 
 @dataclass(frozen=True)
 class View:
-    """A face as it is seen: its outline in pixels, and the way from pixels to its u and v."""
+    """A face in view: its outline in pixels, and the mapping from pixels to its u and v."""
 
     face: Face
     distance: float
@@ -89,7 +89,7 @@ class View:
 
 
 class Surfaces:
-    """Many faces, with what is needed to find the visible ones quickly."""
+    """Many faces, with data to find the visible ones quickly."""
 
     def __init__(self, faces: list[Face]) -> None:
         self._faces = faces
@@ -102,7 +102,7 @@ class Surfaces:
         self._normals = np.array([np.cross(f.down, f.across) for f in faces])
 
     def views(self, rotation: Floats, position: Floats) -> list[View]:
-        """Return the faces that look towards the camera and lie in its field of view."""
+        """Return the faces that are turned towards the camera and lie in its field of view."""
         towards = ((position - self._origins) * self._normals).sum(axis=1) > 1e-6
         middle = (self._centres - position) @ rotation.T
         margin = self._reaches * 1.3
@@ -112,7 +112,7 @@ class Surfaces:
         if not seen.size:
             return []
         corners = (self._corners[seen] - position) @ rotation.T
-        # Columns: where one step across, one step down and the origin come to lie on the screen.
+        # Columns: one step across, one step down and the origin, projected to the screen.
         basis = self._basis[seen].copy()
         basis[:, :, 2] -= position
         inverses = np.linalg.inv(PROJECT @ rotation @ basis)
@@ -139,7 +139,7 @@ def from_body(points: Floats) -> Floats:
 
 
 def pose_of(state: RobotState) -> tuple[Floats, Floats]:
-    """Return the rotation from the world into the camera, and where the camera is."""
+    """Return the rotation from the world into the camera, and the camera's position."""
     cy, sy = math.cos(state.yaw), math.sin(state.yaw)
     cr, sr = math.cos(state.roll), math.sin(state.roll)
     yaw = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1.0]])
@@ -152,7 +152,7 @@ def pose_of(state: RobotState) -> tuple[Floats, Floats]:
 
 
 def outline_of(points: Floats) -> Pixels | None:
-    """Return the pixels a polygon in camera coordinates covers; None when it is out of sight."""
+    """Return the pixels that a polygon in camera coordinates covers; None if it is out of sight."""
     if not (points[:, 2] > _NEAR).all():
         kept = []
         for a, b in zip(points, np.roll(points, -1, axis=0), strict=True):
@@ -168,7 +168,7 @@ def outline_of(points: Floats) -> Pixels | None:
 
 def _pixels(points: Floats) -> Pixels:
     pixels = points[..., :2] / points[..., 2:] * FOCAL + (WIDTH / 2, HEIGHT / 2)
-    # Far outside is far enough: OpenCV's drawing wants small integers.
+    # Limited far outside of the screen: OpenCV draws with small integers.
     return np.rint(np.minimum(np.maximum(pixels, -20000), 20000)).astype(np.int32)
 
 

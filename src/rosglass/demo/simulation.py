@@ -1,7 +1,7 @@
 """The robot's body: how a tracked vehicle moves, stops, bumps into things and drains its battery.
 
-No input or output and no clock of its own: :meth:`Simulation.step` is all there is, so the same
-commands always give the same drive.
+Without input, output or a clock of its own: only :meth:`Simulation.step` advances it, so that the
+same commands always give the same drive.
 """
 
 from __future__ import annotations
@@ -34,22 +34,22 @@ _TRACK_LENGTH, _TRACK_WIDTH = 0.62, 0.46
 
 
 class CommandRejectedError(Error):
-    """A command makes no sense; the robot ignores it, so its watchdog goes on counting."""
+    """A command is invalid; the robot ignores it, and its watchdog continues."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What the robot can do, and what it refuses to believe.
+    """The limits of the robot and of its commands.
 
     Attributes:
-        speed: Fastest drive, m/s; faster commands are driven at this speed.
-        turn: Fastest turn, rad/s; faster commands are turned at this rate.
-        believable: Commands beyond this (m/s or rad/s) are taken for garbage and refused.
+        speed: Highest speed, m/s; faster commands are driven at this speed.
+        turn: Highest turn rate, rad/s; faster commands are turned at this rate.
+        believable: Commands beyond this (m/s or rad/s) are refused as invalid.
         acceleration: m/s².
         braking: m/s².
         turn_acceleration: rad/s².
         watchdog: Seconds after the last command until the robot stops by itself.
-        radius: Of the circle that must stay clear of obstacles, metres.
+        radius: Radius of the circle that must stay clear of obstacles, metres.
         flipper: Farthest flipper angle either way, radians.
         flipper_speed: rad/s.
     """
@@ -68,7 +68,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class RobotState:
-    """Everything there is to know about the robot at one moment. Map frame, SI units, REP 103.
+    """The complete state of the robot at one moment. Map frame, SI units, REP 103.
 
     Attributes:
         time: Seconds since the start.
@@ -85,17 +85,17 @@ class RobotState:
         pitch_rate: rad/s.
         commanded_speed: Commanded speed of the motors, m/s.
         commanded_turn: Commanded turn rate of the motors, rad/s.
-        commands_alive: Whether a command came within the watchdog's time.
+        commands_alive: Whether a command was received within the watchdog's time.
         emergency_stop: Whether the stop is latched.
         flashlight: Whether the lamp is on.
         bumped: Whether it touches something.
         flippers: Angles in the order of :data:`FLIPPERS`, radians, positive up.
         flipper_speeds: rad/s.
-        charge: Of the battery, 0 to 1.
-        current: Into the battery, A; negative while it discharges.
+        charge: Charge of the battery, 0 to 1.
+        current: Current into the battery, A; negative while it discharges.
         charging: Whether it stands in its dock.
         odometer: Metres driven.
-        carrier_phase: Where the moving vehicle is (:meth:`World.carrier`).
+        carrier_phase: Position of the moving vehicle (:meth:`World.carrier`).
     """
 
     time: float = 0.0
@@ -126,7 +126,7 @@ class RobotState:
 
     @property
     def voltage(self) -> float:
-        """Of the battery, V: a six-cell lithium pack that sags under load."""
+        """Voltage of the battery: a six-cell lithium pack that sags under load."""
         return 6 * (3.45 + 0.7 * self.charge) + 0.04 * self.current
 
     @property
@@ -147,9 +147,9 @@ class Simulation:
     """The moving robot in its world.
 
     Attributes:
-        world: Where it lives.
-        limits: What it can do.
-        state: How it is now; a new object after each step.
+        world: Its world.
+        limits: Its limits.
+        state: Its current state; a new object after each step.
     """
 
     def __init__(
@@ -177,14 +177,14 @@ class Simulation:
         self._settle()
 
     def command_velocity(self, speed: float, turn: float) -> None:
-        """Take a command to drive, as ``/cmd_vel`` brings it.
+        """Handle a drive command, as received on ``/cmd_vel``.
 
         Args:
             speed: Forwards, m/s.
             turn: Counter-clockwise, rad/s.
 
         Raises:
-            CommandRejectedError: A value is not finite or beyond all belief; the command before it
+            CommandRejectedError: A value is not finite, or not believable; the previous command
                 stays in force until the watchdog ends it.
         """
         for name, value, unit in (("linear.x", speed, "m/s"), ("angular.z", turn, "rad/s")):
@@ -197,7 +197,7 @@ class Simulation:
         self._command_time = self.state.time
 
     def command_flippers(self, angles: Sequence[float]) -> None:
-        """Take target angles for the flippers, in the order of :data:`FLIPPERS`.
+        """Set target angles for the flippers, in the order of :data:`FLIPPERS`.
 
         Raises:
             CommandRejectedError: Not four finite angles within the flippers' reach.
@@ -216,7 +216,7 @@ class Simulation:
         self._flipper_targets = [float(angle) for angle in angles]
 
     def set_emergency_stop(self, stop: bool) -> None:
-        """Latch or release the emergency stop; a release forgets the commands before it."""
+        """Latch or release the emergency stop; a release discards earlier commands."""
         if stop or self.state.emergency_stop:
             self._command, self._command_time = (0.0, 0.0), -math.inf
             self._flipper_targets = list(self.state.flippers)
@@ -227,14 +227,14 @@ class Simulation:
         self.state = replace(self.state, flashlight=on)
 
     def advance(self, elapsed: float) -> None:
-        """Let `elapsed` seconds pass in small steps; a long pause is caught up, not skipped."""
+        """Advance by `elapsed` seconds in small steps; a long pause is caught up, not skipped."""
         while elapsed > 1e-9:
             step = min(elapsed, _FLOOR_STEP)
             self.step(step)
             elapsed -= step
 
     def step(self, dt: float) -> None:
-        """Let `dt` seconds pass, at most 0.05: one step of the motion.
+        """Advance by `dt` seconds, at most 0.05: one step of the motion.
 
         Raises:
             CommandRejectedError: `dt` is not a positive step.
@@ -360,7 +360,7 @@ class Simulation:
     ) -> tuple[float, float, bool]:
         s, lim = self.state, self.limits
         effort = abs(speed) / lim.speed + 0.6 * abs(turn) / lim.turn
-        # A 20 Ah pack, drained ten times as fast as a real one so that a demo shows it.
+        # A 20 Ah pack, drained ten times as fast as a real one, as a demo is short.
         load = 1.2 + 9.0 * effort + (0.8 if s.flashlight else 0.0)
         charging = math.dist((x, y), self.world.dock) < 0.6 and abs(speed) < 0.02
         current = (16.0 if s.charge < 1.0 else load) - load if charging else -load

@@ -1,8 +1,8 @@
-"""What the simulated robot says about itself, as the fields of ROS messages.
+"""The simulated robot's state as fields of ROS messages.
 
 Frames follow REP 105 and REP 103: ``map -> odom -> base_link``, and on the robot ``laser``,
-``imu_link``, ``camera_link``, ``camera_optical_frame`` and one frame for each flipper. The robot
-knows exactly where it is: ``map -> odom`` is the identity.
+``imu_link``, ``camera_link``, ``camera_optical_frame`` and one frame for each flipper. The robot's
+localization is exact: ``map -> odom`` is the identity.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ __all__ = [
 ]
 
 Fields = dict[str, Any]
-#: Where the flippers' axles are: metres forward, left and up of the middle.
+#: Positions of the flippers' axles: metres forward, left and up of the middle.
 AXLES = {
     name: (0.26 * ahead, 0.32 * left, 0.14)
     for name, (ahead, left) in zip(FLIPPERS, ((1, 1), (1, -1), (-1, 1), (-1, -1)), strict=True)
 }
-# diagnostic_msgs/msg/DiagnosticStatus and sensor_msgs/msg/BatteryState name these numbers.
+# Constants of diagnostic_msgs/msg/DiagnosticStatus and sensor_msgs/msg/BatteryState.
 _OK, _WARN, _ERROR = 0, 1, 2
 _CHARGING, _DISCHARGING, _FULL = 1, 2, 4
 _GRAVITY = 9.81
@@ -100,7 +100,7 @@ def odometry(state: RobotState, stamp: Time) -> Fields:
 
 
 def moving_frames(state: RobotState, stamp: Time) -> Fields:
-    """Return ``tf2_msgs/msg/TFMessage`` with what moves."""
+    """Return ``tf2_msgs/msg/TFMessage`` with the moving frames."""
     body = _transform(
         stamp,
         "odom",
@@ -125,12 +125,12 @@ def moving_frames(state: RobotState, stamp: Time) -> Fields:
 def part(
     stamp: Time, name: str, place: tuple[float, float, float], turn: tuple[float, float, float]
 ) -> Fields:
-    """Return where a part is on ``base_link``; its turn is roll, pitch, yaw in radians."""
+    """Return the pose of a part on ``base_link``; `turn` is roll, pitch, yaw in radians."""
     return _transform(stamp, "base_link", name, _vector(*place), _rotation(*turn))
 
 
 def static_frames(stamp: Time) -> Fields:
-    """Return ``tf2_msgs/msg/TFMessage`` with what never moves."""
+    """Return ``tf2_msgs/msg/TFMessage`` with the fixed frames."""
     upright = _rotation(0.0, 0.0, 0.0)
     forward, up, down = MOUNT
     return {
@@ -255,7 +255,7 @@ def camera_info(stamp: Time, ros: int = 2) -> Fields:
         "width": WIDTH,
         "height": HEIGHT,
         "distortion_model": "plumb_bob",
-        # ROS 2 forbids capitals in the names of fields.
+        # ROS 2 forbids capitals in field names.
         **({name.upper(): value for name, value in matrices.items()} if ros == 1 else matrices),
     }
 
@@ -269,7 +269,7 @@ def diagnostics(
         state: The robot.
         stamp: Now.
         frames_per_second: The camera's rate.
-        render_time: What a picture costs, seconds.
+        render_time: Time to render a picture, seconds.
         rejected: Commands refused since the start.
     """
     if state.emergency_stop:

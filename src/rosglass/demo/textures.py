@@ -1,4 +1,4 @@
-"""The looks of the simulated world, painted when the robot starts: no image files to ship."""
+"""The textures of the simulated world, painted when the robot starts, without image files."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _CRATE: Colour = (176, 128, 74)
 
 
 def shadow_length() -> float:
-    """Return how long the shadow of something one metre high is, metres."""
+    """Return the length of the shadow of an object one metre high, metres."""
     return math.hypot(SUN[0], SUN[1]) / SUN[2]
 
 
@@ -46,7 +46,7 @@ def _noise(
     """Return smooth noise, mean 0, about -1 to 1, whose right end continues at its left.
 
     Args:
-        random: Where the noise comes from.
+        random: Random number generator.
         height: Pixels.
         width: Pixels.
         sizes: Feature heights in pixels.
@@ -219,7 +219,7 @@ def sides() -> dict[str, Picture]:
 def ground(world: World) -> tuple[Picture, float]:
     """Return the floor seen from above (north up, RGB) and its pixels per metre.
 
-    Markings and the shadows of everything that stands still are painted in.
+    Markings and the shadows of all fixed objects are painted in.
     """
     scale = _GROUND_SCALE
     width, height = round(2 * world.half_length * scale), round(2 * world.half_width * scale)

@@ -1,7 +1,7 @@
-"""The small world the simulated robot lives in: what stands where, and how high the ground is.
+"""The world of the simulated robot: its objects, and the height of the ground.
 
-Map frame, metres, x to the right of the plan, y up (REP 103). Everything that stands is an upright
-prism with a convex outline, so that one description serves collisions, the laser and the camera.
+Map frame, metres, x to the right of the plan, y up (REP 103). Every object is an upright prism with
+a convex outline, so that one description serves collisions, the laser and the camera.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Prism:
-    """Something that stands on the ground.
+    """An object that stands on the ground.
 
     Attributes:
-        name: For people.
+        name: Name for users.
         corners: Outline, counter-clockwise seen from above, convex, in metres.
         top: Height of its upper face in metres.
         texture: Name of the texture of its sides.
         top_texture: Name of the texture of its upper face.
-        in_map: Whether it is part of the map the robot was given.
+        in_map: Whether it is part of the robot's map.
     """
 
     name: str
@@ -100,12 +100,12 @@ class Ramp:
     """A ramp along x: up, a level part, down again.
 
     Attributes:
-        start: Where it leaves the ground, metres.
-        y: Its middle line.
-        width: Across, metres.
+        start: Its start in x, metres.
+        y: Its middle line, metres.
+        width: Its width, metres.
         slope_length: Length of each slope along x.
         top_length: Length of the level part.
-        height: Of the level part.
+        height: Height of the level part, metres.
     """
 
     start: float
@@ -117,7 +117,7 @@ class Ramp:
 
     @property
     def end(self) -> float:
-        """Where it meets the ground again."""
+        """End of the ramp in x, metres."""
         return self.start + 2 * self.slope_length + self.top_length
 
     def ground(self, x: Floats, y: Floats) -> Floats:
@@ -132,8 +132,8 @@ class RoughGround:
     """A field of rubble: smooth bumps that fade out towards its border.
 
     Attributes:
-        centre: Its middle.
-        radius: Its reach, metres.
+        centre: Its centre.
+        radius: Its radius, metres.
         amplitude: Height of the highest bumps, metres.
         wavelength: Distance from bump to bump, metres.
     """
@@ -154,13 +154,13 @@ class RoughGround:
 
 @dataclass(frozen=True)
 class World:
-    """The whole scene.
+    """The complete scene.
 
     Attributes:
         half_length: Half of the inner size along x, metres.
         half_width: Half of the inner size along y, metres.
-        dock: Where the charging dock is; the robot starts there.
-        prisms: All that stands still, the surrounding walls included.
+        dock: Position of the charging dock; the robot starts there.
+        prisms: All fixed objects, including the surrounding walls.
         ramp: The ramp.
         rough: The field of rubble.
     """
@@ -218,7 +218,7 @@ class World:
 
     @property
     def segments(self) -> Floats:
-        """Edges of everything that stands still, one ``x0, y0, x1, y1`` per row."""
+        """Edges of all fixed objects, one ``x0, y0, x1, y1`` per row."""
         return self._segments
 
     def ground(self, x: Floats, y: Floats) -> Floats:
@@ -229,7 +229,7 @@ class World:
         """Return the little transport vehicle that patrols the yard.
 
         Args:
-            phase: Seconds it has been under way; it goes to and fro in 26 s.
+            phase: Seconds since its start; it moves back and forth in 26 s.
         """
         angle = 2 * math.pi * phase / 26.0
         return box(
