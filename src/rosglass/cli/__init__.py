@@ -1,6 +1,6 @@
 """The ``rosglass`` command: one module per subcommand, imported only when it is used."""
 
-# Nothing is imported before main() can answer Ctrl-C; type checkers know this name.
+# Nothing is imported before main() can handle Ctrl-C; type checkers accept this name.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -12,15 +12,15 @@ def main(argv: "Sequence[str] | None" = None) -> int:
     """Run the command line.
 
     Returns:
-        The exit code: 0 done, 1 failed, 2 wrong usage, 130 ended by Ctrl-C, 143 by SIGTERM, 141
-        when the reader of the output went away. Ctrl-C while a command is still being loaded ends
-        the process at once.
+        The exit code: 0 done, 1 failed, 2 wrong usage, 130 ended by Ctrl-C, 143 by SIGTERM, 141 if
+        the reader of the output has exited. Ctrl-C while a command is still being loaded ends the
+        process at once.
     """
     try:
         import signal
 
         # Modules in C swallow the KeyboardInterrupt that is raised in them, or abort the process.
-        # `run` gives it back to commands that load none of Qt.
+        # `run` restores it for commands that do not load Qt.
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler and _is_main_thread():
             signal.signal(signal.SIGINT, end_at_once)
             try:
@@ -37,7 +37,7 @@ def main(argv: "Sequence[str] | None" = None) -> int:
             raise
         import signal
 
-        # Whatever still ends now can be cut short by pressing it again.
+        # Pressing it again cuts short whatever still has to end.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         return 130
 
@@ -56,7 +56,7 @@ def _is_main_thread() -> bool:
 
 
 def is_interrupt(error: "BaseException | None") -> bool:
-    """Return whether Ctrl-C is behind an error: C extensions report it as an ImportError."""
+    """Return whether Ctrl-C caused an error: C extensions report it as an ImportError."""
     while error is not None:
         if isinstance(error, KeyboardInterrupt):
             return True

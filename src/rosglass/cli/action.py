@@ -1,4 +1,4 @@
-"""``rosglass action``: look at actions, send goals."""
+"""``rosglass action``: inspect actions, send goals."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _CANCEL_TIMEOUT_S = 5.0
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare what can be done with actions."""
+    """Declare the subcommands for actions."""
     add = Subcommands(parser).add
     sub = add("list", "list actions", _list)
     sub.add_argument("-t", "--types", "--show-types", action="store_true", help="show types")
@@ -67,7 +67,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do it."""
+    """Run the subcommand."""
     return int(args.handler(args))
 
 

@@ -1,4 +1,4 @@
-"""``rosglass bridge``: relay topics, services and actions between two worlds."""
+"""``rosglass bridge``: relay topics, services and actions between two graphs."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check_known(kind: str) -> None:
-    """Raise TypeNotFoundError when no ROS's definition of a type is known here."""
+    """Raise TypeNotFoundError if neither ROS's definition of a type is known here."""
     from rosglass.errors import TypeNotFoundError
     from rosglass.messages import load
 
@@ -279,7 +279,7 @@ def _watch(args: argparse.Namespace, bridge: Bridge, end: End, nodes: tuple[Node
 
 
 class _News:
-    """Tells what is wrong, or gets lost, when it begins; and when it is over."""
+    """Prints what fails or gets lost, when that begins; and when it is over."""
 
     def __init__(self, on_terminal: bool) -> None:
         self._before = CLEAR_LINE if on_terminal else ""

@@ -1,7 +1,7 @@
-"""Tab completion: of options, and of names that the robot and the library know.
+"""Tab completion of options, and of names in the graph and the library.
 
-The ``argcomplete`` package (PyPI; ROS 2's own tools use it) asks the shell and the parser; here is
-what it offers for names.
+The ``argcomplete`` package (PyPI; ROS 2's own tools use it) talks to the shell and the parser; this
+module provides the names.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _DISCOVERY_TIMEOUT_S = 1.5
 
 
 def complete(argument: argparse.Action, what: str) -> None:
-    """Let Tab complete an argument.
+    """Enable Tab completion of an argument.
 
     Args:
         argument: As returned by ``add_argument``.
@@ -35,7 +35,7 @@ def complete(argument: argparse.Action, what: str) -> None:
 
 
 def complete_files(argument: argparse.Action, suffix: str) -> None:
-    """Let Tab complete an argument with folders, and files whose name ends in `suffix`."""
+    """Enable Tab completion with folders, and files whose name ends in `suffix`."""
     if is_completing():
         from argcomplete.completers import FilesCompleter
 
@@ -43,12 +43,12 @@ def complete_files(argument: argparse.Action, suffix: str) -> None:
 
 
 def is_completing() -> bool:
-    """Return whether the shell asks what could follow, instead of running a command."""
+    """Return whether the shell requests completions, instead of running a command."""
     return "_ARGCOMPLETE" in os.environ
 
 
 def offer(parser: argparse.ArgumentParser) -> None:
-    """Answer the shell, and end the program."""
+    """Print the completions for the shell, and end the program."""
     try:
         import argcomplete
     except ModuleNotFoundError:
@@ -57,7 +57,7 @@ def offer(parser: argparse.ArgumentParser) -> None:
 
 
 def script(shell: str) -> str:
-    """Return what a shell has to read so that Tab works."""
+    """Return the script by which a shell enables completion."""
     from argcomplete.shell_integration import shellcode
 
     return str(shellcode(["rosglass"], shell=shell))

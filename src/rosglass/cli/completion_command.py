@@ -1,4 +1,4 @@
-"""``rosglass completion``: make Tab complete commands, options and names."""
+"""``rosglass completion``: enable Tab completion of commands, options and names."""
 
 from __future__ import annotations
 
@@ -22,6 +22,6 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what the shell has to read."""
+    """Print the shell's script."""
     print(script(args.shell))
     return 0

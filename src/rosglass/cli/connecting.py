@@ -1,4 +1,4 @@
-"""What all commands that talk to a robot have in common: where it is, and getting there."""
+"""Connecting to the robot, as in all commands: options, and waiting for the graph."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ __all__ = [
     "wait",
 ]
 
-#: Names that a hint shows.
+#: Number of names in a hint.
 _EXAMPLES = 3
 _T = TypeVar("_T")
 #: Default of --timeout, in seconds.
@@ -48,17 +48,17 @@ _DISCOVERY = 3.0
 _REPORT_DELAY_S, _PROBE_DELAY_S = 2.0, 0.5
 #: The same once the robot has answered.
 _SOON = 1.0
-#: Seconds that programs have to name their nodes: Fast DDS takes 1 to 4; a Zenoh router that
-#: knows 10,000 topics 4 to 13.
+#: Seconds that programs have to name their nodes: Fast DDS takes 1 to 4; a Zenoh router with 10,000
+#: topics 4 to 13.
 _INTRODUCTION_S = {"dds": 8.0, "zenoh": 18.0}
-#: Seconds without news after which the graph counts as known; some know it at once.
+#: Seconds without changes after which the graph counts as complete; some are at once.
 _QUIET = {"zenoh": 0.3, "dds": 0.7, "ros1": 0.0, "replay": 0.0}
 
 
 def add_connection_options(
     parser: argparse.ArgumentParser, *, timeout: float | None = TIMEOUT
 ) -> None:
-    """Declare the options that say which robot is meant."""
+    """Declare the options that select the robot."""
     group = parser.add_argument_group("connection")
     group.add_argument(
         "--url",
@@ -88,7 +88,7 @@ def add_connection_options(
 
 
 def add_definitions_option(parser: argparse._ActionsContainer) -> None:
-    """Declare the option that says where definitions of types are, besides the usual places."""
+    """Declare the option for type definitions in unusual places."""
     parser.add_argument(
         "--definitions",
         action="append",
@@ -100,15 +100,15 @@ def add_definitions_option(parser: argparse._ActionsContainer) -> None:
 
 
 def connect(args: argparse.Namespace, *, patient: bool = False) -> Node:
-    """Join the graph that the options name, and wait for an answer.
+    """Join the graph given by the options, and wait for an answer.
 
     Reports on standard error what it waits for, if that takes a while. Over DDS, where there may be
     no other node, it returns after a moment.
 
     Args:
         args: The command's options.
-        patient: Whether to wait even where nothing listens, for a robot that is about to start:
-            for commands that go on until they are ended. ``--timeout`` asks others to.
+        patient: Whether to wait even if nothing listens, for a robot that is about to start: for
+            commands that run until they are ended. ``--timeout`` requests it for others.
 
     Raises:
         Error: As :func:`rosglass.connect`; ConnectionLostError if there is no answer in time.
@@ -150,12 +150,12 @@ def join(url: str, name: str, timeout: float) -> Node:
 
 
 def settle(node: Node, least: float = 0.0) -> None:
-    """Wait until the graph is known: no news for a moment, and every program has named its nodes.
+    """Wait until the graph is complete: no recent changes, and the nodes of every program named.
 
-    Says on standard error when programs do not name theirs, and goes on without after a while.
+    Prints on standard error if programs do not name their nodes, and stops waiting after a while.
 
     Args:
-        node: Whose graph.
+        node: Node in the graph.
         least: Seconds to wait at least.
     """
     wire = node.url.partition(":")[0]
@@ -173,7 +173,7 @@ def settle(node: Node, least: float = 0.0) -> None:
         return f"{programs} nodes yet" if count else ""
 
     def rest(since: float) -> None:
-        """Wait until there is no news; a graph that never rests is looked at as it is."""
+        """Wait until there are no changes; a graph that always changes is used as it is."""
         while time.monotonic() < min(max(moved + _QUIET[wire], began + least), since + 5.0):
             time.sleep(0.05)
 
@@ -182,14 +182,14 @@ def settle(node: Node, least: float = 0.0) -> None:
         if node.unnamed_programs():
             while node.unnamed_programs() and time.monotonic() < began + _INTRODUCTION_S[wire]:
                 time.sleep(0.05)
-            touch()  # what was sent last is being read
+            touch()  # the last received data is being handled
             rest(moved)
     if unnamed := reason():
         note(f"{unnamed}; there may be more than is shown")
 
 
 def wait(node: Node, look: Callable[[], _T], timeout: float) -> _T:
-    """Return the first true value of `look`, asked after each change of the graph.
+    """Return the first true value of `look`, called after each change of the graph.
 
     After `timeout` seconds its last value is returned, true or not.
     """
@@ -206,9 +206,9 @@ def wait(node: Node, look: Callable[[], _T], timeout: float) -> _T:
 
 
 def find(node: Node, look: Callable[[], _T], timeout: float) -> _T:
-    """Return what `look` finds in the graph, after having waited until that is complete.
+    """Wait until the graph is complete, and return the result of `look`.
 
-    What is not there is not waited for as long as for a robot that has not answered yet.
+    Waits less for a missing name than for a robot that has not answered yet.
     """
     wait(node, look, min(timeout, _DISCOVERY if _QUIET[node.url.partition(":")[0]] else 0.0))
     settle(node)
@@ -217,11 +217,11 @@ def find(node: Node, look: Callable[[], _T], timeout: float) -> _T:
 
 @contextmanager
 def telling(reason: Callable[[], str]) -> Iterator[None]:
-    """Say on standard error what the block is waiting for when it takes longer than a second.
+    """Print on standard error why the block waits, if it takes longer than a second.
 
     Args:
-        reason: Returns it in words, with the names that may be meant; empty for nothing. It is
-            called every second, in another thread; a new reason is printed.
+        reason: Returns the reason as a text, with similar names; empty for none. It is called every
+            second, in another thread; a new reason is printed.
     """
     done = threading.Event()
 
@@ -229,7 +229,7 @@ def telling(reason: Callable[[], str]) -> Iterator[None]:
         reported = ""
         while not done.wait(_SOON):
             text = ""
-            with suppress(Error):  # the caller reports what ends the waiting
+            with suppress(Error):  # the caller reports errors
                 text = reason()
             if text and text != reported and not done.is_set():
                 reported = text
@@ -245,14 +245,14 @@ def telling(reason: Callable[[], str]) -> Iterator[None]:
 
 
 def note_invalid_names(node: Node) -> None:
-    """Say how many names lists leave out because ROS's rules forbid them, and some of them."""
+    """Print how many names are left out because they break ROS's rules, and some of them."""
     text = left_out(node)
     if text:
         note(text)
 
 
 def left_out(node: Node) -> str:
-    """Return how many names ROS's rules forbid, and some of them; empty when there are none."""
+    """Return how many names break ROS's rules, and some of them; empty if none does."""
     names = node.invalid_names()
     if not names:
         return ""
@@ -262,13 +262,13 @@ def left_out(node: Node) -> str:
 
 
 def await_types(node: Node, look: Callable[[], Iterable[object]], timeout: float) -> None:
-    """Wait until all types that `look` returns are known, which ROS 1's servers are asked for."""
+    """Wait until all types that `look` returns are known; ROS 1's servers have to be asked."""
     if node.wire == "ros1":
         wait(node, lambda: all(look()), min(timeout, _DISCOVERY))
 
 
 class _Given(argparse.Action):
-    """Stores a value, and that it was given."""
+    """Stores a value, and records that it was given."""
 
     def __call__(
         self,
@@ -282,17 +282,17 @@ class _Given(argparse.Action):
 
 
 class End(threading.Event):
-    """An event that Ctrl-C and SIGTERM set, so that a command can end in good order.
+    """An event that Ctrl-C and SIGTERM set, so that a command can end in order.
 
-    To be made when all that can be waited for is there: until then, Ctrl-C is a
-    KeyboardInterrupt, which ends any waiting.
+    Create it after everything that it has to end: until then, Ctrl-C is a KeyboardInterrupt, which
+    ends any waiting.
 
     Args:
-        patient: Whether pressing Ctrl-C again changes nothing; otherwise it cuts short whatever
-            the command does in order to end.
+        patient: Whether pressing Ctrl-C again is ignored; otherwise it cuts short whatever the
+            command does in order to end.
 
     Attributes:
-        code: The exit code that says what ended the command; 0 for nothing.
+        code: The exit code by the signal that ended the command; 0 for none.
     """
 
     def __init__(self, *, patient: bool = False) -> None:
@@ -310,7 +310,7 @@ class End(threading.Event):
 
 
 def seconds(text: str) -> float:
-    """Read a number of seconds; for options."""
+    """Parse a number of seconds; for options."""
     try:
         value = float(text)
     except ValueError:
@@ -321,7 +321,7 @@ def seconds(text: str) -> float:
 
 
 def natural(text: str) -> int:
-    """Read a count of 1 or more; for options."""
+    """Parse a count of 1 or more; for options."""
     if not (text.isascii() and text.isdigit() and 0 < int(text[:10]) < 2**31):
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 1 or more")
     return int(text)
@@ -334,7 +334,7 @@ def _wait_for_connection(node: Node, timeout: float, patient: bool) -> None:
     connected, deadline = threading.Event(), time.monotonic() + timeout
 
     def look(status: Status) -> None:
-        # Over DDS, no node yet cannot be distinguished from a wrong address.
+        # Over DDS, a graph without nodes looks the same as a wrong address.
         if status.state is ConnectionState.CONNECTED or node.url.startswith("dds:"):
             connected.set()
 

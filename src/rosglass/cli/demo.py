@@ -55,7 +55,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the demo; returns 1 when camera or odometry never arrived."""
+    """Run the demo; returns 1 if camera or odometry never arrived."""
     if args.seconds is not None and not 1 <= args.seconds <= 86400:
         raise Error(f"--seconds {args.seconds:g}: expected 1 to 86400")
     if not args.url.lower().startswith(("dds:", "zenoh:")):
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     # Qt reads this when it is loaded; its media backends report every library they miss.
     rules = [_QUIET, os.environ.get("QT_LOGGING_RULES", "")]
     os.environ["QT_LOGGING_RULES"] = ";".join(filter(None, rules))
-    # Before anything is started: nothing is left running where it is not installed.
+    # Checked before anything is started, so that nothing is left running.
     import rosglass.qt  # noqa: F401
 
     headless = args.headless or not _has_display()
@@ -120,7 +120,7 @@ def _show(
         cockpit.at(max(0.5, seconds - 1.5), shoot)
     code = cockpit.run(seconds)
     if is_duplicate():
-        # The robot has said why. What the cockpit shows and steers is another one.
+        # The robot has printed the reason. The cockpit displays and drives another one.
         return 1
     if screenshot is not None and seconds is None:
         shoot()

@@ -1,4 +1,4 @@
-"""``rosglass doctor``: look for what keeps this machine and the robot apart, and how to mend it."""
+"""``rosglass doctor``: find what separates this machine from the robot, and how to fix it."""
 
 from __future__ import annotations
 
@@ -57,9 +57,9 @@ _VARIABLES = (
 #: Receive buffer in bytes that a camera picture needs.
 _BUFFER = 4 * 2**20
 _NO_NETWORK = "connect a network, or for this machine alone: sudo ip link set lo up multicast on"
-#: What helps against names that ROS's rules forbid.
+#: The fix for names that break ROS's rules.
 _RENAME = "rename them where they are made: letters, digits, '_' and '/', no digit first"
-#: Seconds to look around in a graph.
+#: Seconds to explore a graph.
 _LOOK = 3.0
 
 
@@ -70,11 +70,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     add_output_options(parser)
     add_connection_options(parser, timeout=5.0)
-    parser.set_defaults(looks_nearby=False)  # it says what is there
+    parser.set_defaults(looks_nearby=False)  # it reports what it finds
 
 
 def run(args: argparse.Namespace) -> int:
-    """Look at everything; returns 1 when something is broken."""
+    """Check everything; returns 1 if something is broken."""
     style = Style(args)
     marks = {
         "ok": style("ok     ", "green"),
@@ -191,7 +191,7 @@ def _interfaces(ros2: bool) -> Iterator[Finding]:
 
 
 def _address(answering: list[str]) -> Finding:
-    """Say what to set where nothing is set."""
+    """Return which URL to set if none is set."""
     if not answering:
         text = "no URL is given, and no robot answers on this machine"
         fix = (

@@ -1,4 +1,4 @@
-"""What ``rosglass doctor`` looks at in ROS 1: the master, names and addresses, and every node.
+"""The checks of ``rosglass doctor`` in ROS 1: the master, names and addresses, and every node.
 
 Most faults of ROS 1 networks are names: each node announces one, and all others must be able to
 connect to it (ROS wiki, "ROS/NetworkSetup").
@@ -30,14 +30,14 @@ _CALLER = "/rosglass_doctor"
 _AT_ONCE = 16
 #: Seconds that the master may take to notify of a parameter change.
 _ECHO = 3.0
-#: What helps against names that ROS's rules forbid.
+#: The fix for names that break ROS's rules.
 _RENAME = "rename them where they are made: letters, digits, '_' and '/', a letter first"
 _NETWORK = "set ROS_IP (or ROS_HOSTNAME) {where}, and restart the nodes there"
 
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a node says that it is, and what is wrong with that: ``name``, ``gone``, ``silent``."""
+    """The address that a node announces, and its problem: ``name``, ``gone``, ``silent``."""
 
     uri: str
     host: str = ""
@@ -46,7 +46,7 @@ class _Place:
 
 
 def look(url: str, timeout: float) -> Iterator[Finding]:
-    """Yield what is found in the graph of a ROS 1 master.
+    """Yield the findings in the graph of a ROS 1 master.
 
     Args:
         url: As given to :func:`rosglass.connect`.
@@ -96,7 +96,7 @@ def _join(url: str, timeout: float) -> Ros1Node | Finding:
 
 
 def _master(uri: str, timeout: float) -> Finding | None:
-    """Knock where the master should be; None when it answers."""
+    """Check whether the master answers; None if it does."""
     from rosglass.cli.network import roscore
     from rosglass.wires.tcpros.address import parse_uri
     from rosglass.wires.tcpros.master import call_node
@@ -126,7 +126,7 @@ def _master(uri: str, timeout: float) -> Finding | None:
 
 
 def _own_address(node: Ros1Node, options: Ros1Options) -> Iterator[Finding]:
-    """Look whether the address that nodes here announce makes sense."""
+    """Check whether the address that nodes here announce makes sense."""
     from rosglass.wires.tcpros.address import doubt, parse_uri
 
     host, _ = parse_uri(options.master, "master")
@@ -186,7 +186,7 @@ def _graph(node: Ros1Node) -> Iterator[Finding]:
 
 
 def _nodes(node: Ros1Node, options: Ros1Options, timeout: float) -> Iterator[Finding]:
-    """Look whether every node can be reached under what it announces."""
+    """Check whether every node can be reached at its announced address."""
     from rosglass.wires.tcpros.address import parse_uri
 
     me = node.resolve(node.name)
@@ -227,7 +227,7 @@ def _nodes(node: Ros1Node, options: Ros1Options, timeout: float) -> Iterator[Fin
 
 
 def _visit(master: str, name: str, timeout: float) -> _Place:
-    """Ask a node whether it is there."""
+    """Check whether a node answers."""
     from rosglass.wires.tcpros.address import parse_uri
     from rosglass.wires.tcpros.master import call_node
 
@@ -235,7 +235,7 @@ def _visit(master: str, name: str, timeout: float) -> _Place:
         uri = str(call_node(master, "lookupNode", _CALLER, name, timeout=timeout))
         host, port = parse_uri(uri, f"what {name} announces")
     except (MasterError, ConnectionLostError):
-        return _Place("")  # it left just now
+        return _Place("")  # it has just left
     except ConversionError as error:
         return _Place("", "", "odd", str(error))
     try:
@@ -250,7 +250,7 @@ def _visit(master: str, name: str, timeout: float) -> _Place:
         text = f"{uri} cannot be reached: {error.strerror or error}"
         return _Place(uri, host, "silent", text)
     except MasterError:
-        return _Place(uri, host)  # it answers, if only that it will not
+        return _Place(uri, host)  # it answers, even if with a refusal
     except ConnectionLostError as error:
         return _Place(uri, host, "hangs", f"it does not answer: {error}")
     return _Place(uri, host)

@@ -1,4 +1,4 @@
-"""Publishers, subscriptions, servers and clients, as people and programs read them."""
+"""Publishers, subscriptions, servers and clients, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = [
     "sources",
 ]
 
-#: What to do about nodes of one name.
+#: The fix for several nodes of one name.
 DUPLICATES_FIX = (
     "give each robot a namespace (-r __ns:=/name), or a domain or router of its own; over DDS, a "
     "node that was killed is seen for some 10 to 20 s"
@@ -36,19 +36,19 @@ _QOS_FIX = (
 
 
 class Problem(NamedTuple):
-    """Why some of a topic's endpoints do not match, and what helps."""
+    """Why some of a topic's endpoints do not match, and the fix."""
 
     text: str
     fix: str
 
 
 def duplicates(name: str, count: int) -> str:
-    """Return what to say of a name that several nodes bear."""
+    """Return the message for a name that several nodes have."""
     return f"{count} nodes are called {name}: what they publish is mixed, and all obey commands"
 
 
 def describe(node: Node, end: EndpointInfo) -> dict[str, Any]:
-    """Return an endpoint of the node's graph as JSON has it."""
+    """Return an endpoint of the node's graph as a dict for JSON."""
     if is_ros1(node):
         found: dict[str, Any] = {"kind": end.kind.value, "name": end.name, "node": str(end.node),
                  "type": spelled(node, end.type)}  # fmt: skip
@@ -80,7 +80,7 @@ def describe(node: Node, end: EndpointInfo) -> dict[str, Any]:
 
 
 def problems(ends: Sequence[EndpointInfo]) -> list[Problem]:
-    """Say which of a topic's endpoints do not match each other, and why."""
+    """Return which of a topic's endpoints do not match each other, and why."""
     found = []
     sinks = [end for end in ends if end.kind is EndpointKind.SUBSCRIPTION]
     if len({end.type for end in ends}) > 1:

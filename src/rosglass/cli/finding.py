@@ -1,4 +1,4 @@
-"""What ``rosglass doctor`` finds."""
+"""The findings of ``rosglass doctor``."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ __all__ = ["Finding"]
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that was looked at.
+    """The result of a check.
 
     Attributes:
         level: ``ok``, ``note``, ``warning`` or ``error``.
-        area: What was looked at.
-        text: What was found.
-        fix: What to do about it.
+        area: What was checked.
+        text: The result.
+        fix: How to fix it.
     """
 
     level: str

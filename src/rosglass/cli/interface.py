@@ -1,4 +1,4 @@
-"""``rosglass interface``: look at types of messages, services and actions."""
+"""``rosglass interface``: inspect types of messages, services and actions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["configure", "run"]
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare what can be done with types."""
+    """Declare the subcommands for types."""
     add = Subcommands(parser).add
     sub = add("show", "show the definition of a type, fetched from the robot if necessary", _show)
     complete(sub.add_argument("type", help="e.g. geometry_msgs/msg/Twist"), "interfaces")
@@ -38,7 +38,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do it."""
+    """Run the subcommand."""
     args.ros1 = args.ros1 or names_ros1(args)
     return int(args.handler(args))
 
@@ -138,7 +138,7 @@ def _find(args: argparse.Namespace) -> MessageType | ServiceType | ActionType:
             raise TypeNotFoundError(f"{error}; {where}") from error
     try:
         with connect(args) as node:
-            settle(node)  # who has it may not have introduced itself yet
+            settle(node)  # the node with the type may not be discovered yet
             return node.fetch_type(args.type, timeout=args.timeout)
     except (TypeNotFoundError, UnsupportedError) as error:
         raise TypeNotFoundError(f"{args.type}: {error}. {hint}".rstrip(". ")) from error

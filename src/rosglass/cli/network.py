@@ -1,4 +1,4 @@
-"""What the network of this machine does to a connection: for ``rosglass doctor``."""
+"""Checks of this machine's network, for ``rosglass doctor``."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def interfaces() -> list[Interface] | None:
             request = struct.pack("16sH14x", name.encode()[:15], 0)
             try:
                 answer = fcntl.ioctl(asking, _GET_FLAGS, request)
-            except OSError:  # it went away just now
+            except OSError:  # it has just disappeared
                 continue
             flags = struct.unpack("16sH14x", answer)[1]
             if flags & _UP:
@@ -52,22 +52,22 @@ def interfaces() -> list[Interface] | None:
 
 
 def is_loopback(url: str) -> bool:
-    """Return whether an URL names this machine, if only by leaving the host out."""
+    """Return whether a URL names this machine, or no host."""
     host = urlsplit(url).hostname or ""
     return host in ("", "localhost", "::1") or host.startswith("127.")
 
 
 def nearby_url() -> str:
-    """Return where a Zenoh router or ROS 1 master of this machine listens; empty for nowhere.
+    """Return the URL of a Zenoh router or ROS 1 master on this machine; empty for none.
 
-    It is for commands that nothing says to where the robot is; also empty where something does.
+    For commands without a setting for the robot's URL; also empty if there is one.
     """
     from rosglass.connection import default_url
 
     with suppress(Error):
         default_url(os.environ)
         return ""
-    if os.environ.get("RMW_IMPLEMENTATION"):  # one that is not known
+    if os.environ.get("RMW_IMPLEMENTATION"):  # an unknown one
         return ""
     for port, url in ((_PORT, "zenoh://127.0.0.1:7447"), (11311, "ros1://127.0.0.1:11311")):
         if url.startswith("zenoh:") and find_spec("zenoh") is None:
@@ -79,7 +79,7 @@ def nearby_url() -> str:
 
 
 def roscore(host: str, port: int) -> str:
-    """Say how to start a ROS 1 master that does not run."""
+    """Return how to start a ROS 1 master that does not run."""
     from rosglass.wires.tcpros.address import is_loopback
 
     start = "start it: roscore" + ("" if port == 11311 else f" -p {port}")
@@ -87,7 +87,7 @@ def roscore(host: str, port: int) -> str:
 
 
 def refused(url: str) -> tuple[str, str] | None:
-    """Return what is wrong, and what helps, when nothing listens where an URL says; else None.
+    """Return the problem and its fix if nothing listens at a URL; else None.
 
     None as well without any answer: that takes longer to distinguish from a slow network.
     """
@@ -117,9 +117,9 @@ def refused(url: str) -> tuple[str, str] | None:
 
 
 def ask(url: str, timeout: float) -> tuple[str, str]:
-    """Knock at the port that a ``zenoh://`` URL names; return what happens, and what helps.
+    """Connect to the port of a ``zenoh://`` URL; return the problem and its fix.
 
-    For when Zenoh got no answer there.
+    For a URL where Zenoh got no answer.
     """
     parts = urlsplit(url)
     host, port = parts.hostname or "127.0.0.1", parts.port or _PORT

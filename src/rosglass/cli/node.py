@@ -1,4 +1,4 @@
-"""``rosglass node``: look at nodes; in ROS 1 also end them, and clean up after them."""
+"""``rosglass node``: inspect nodes; in ROS 1 also end them, and clean up after them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = ["configure", "run"]
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare what can be done with nodes."""
+    """Declare the subcommands for nodes."""
     commands = Subcommands(parser)
     add = commands.add
     _finish(add("list", "list nodes", _list))
@@ -45,7 +45,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do it."""
+    """Run the subcommand."""
     return int(args.handler(args))
 
 
@@ -55,7 +55,7 @@ def _finish(parser: argparse.ArgumentParser) -> None:
 
 
 def _others(node: Node) -> list[str]:
-    """Return the names of all nodes but the one that this command is."""
+    """Return the names of all nodes except that of this command."""
     me = node.resolve(node.name)
     return [name.full for name in node.nodes() if name.full != me]
 

@@ -1,4 +1,4 @@
-"""``rosglass node ping``, ``kill`` and ``cleanup``, as ``rosnode`` has them: for ROS 1 only.
+"""``rosglass node ping``, ``kill`` and ``cleanup``, as in ``rosnode``: for ROS 1 only.
 
 API: ROS wiki, "ROS/Slave_API" (getPid, shutdown) and "ROS/Master_API" (lookupNode, unregister...).
 """
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["configure"]
 
-#: Seconds that a node may take to answer, as rosnode has it; and between two pings.
+#: Seconds that a node may take to answer, as in rosnode; and between two pings.
 _TIMEOUT, _PERIOD = 3.0, 1.0
 #: Nodes that are asked at the same time.
 _AT_ONCE = 16
@@ -41,12 +41,12 @@ _UNREGISTER = {
 
 
 class _Answer(NamedTuple):
-    """What came of asking a node for a sign of life.
+    """The result of a ping.
 
     Attributes:
-        uri: The node's API; empty when the master does not know the node.
-        seconds: How long it took to answer.
-        problem: Why it did not; empty when it did.
+        uri: The node's API; empty if the master does not list the node.
+        seconds: Time until the answer.
+        problem: Why it did not answer; empty if it did.
     """
 
     uri: str
@@ -55,7 +55,7 @@ class _Answer(NamedTuple):
 
 
 def configure(commands: Subcommands) -> None:
-    """Declare them."""
+    """Declare the subcommands."""
     sub = commands.add("ping", "ping a node repeatedly (ROS 1)", _ping)
     complete(sub.add_argument("node"), "nodes")
     sub.add_argument(
@@ -76,7 +76,7 @@ def _finish(parser: argparse.ArgumentParser) -> None:
 
 
 def _connect(args: argparse.Namespace, what: str) -> Ros1Node:
-    """Join the graph; raises UnsupportedError when it is none of ROS 1."""
+    """Join the graph; raises UnsupportedError if it is not one of ROS 1."""
     if names_ros1(args):
         node = as_ros1(connect(args))
         assert node is not None
@@ -93,7 +93,7 @@ def _others(node: Ros1Node) -> list[str]:
 
 
 def _known(node: Ros1Node, given: str, timeout: float) -> str:
-    """Return a node's full name; empty, with a note, when there is none."""
+    """Return a node's full name; print a note and return an empty text if there is none."""
     name = "/" + given.lstrip("/")
     if find(node, lambda: name in _others(node), timeout):
         return name
@@ -102,7 +102,7 @@ def _known(node: Ros1Node, given: str, timeout: float) -> str:
 
 
 def _visit(node: Ros1Node, name: str, timeout: float) -> _Answer:
-    """Ask a node for a sign of life."""
+    """Ping a node."""
     from rosglass.wires.tcpros.master import call_node
 
     me = node.resolve(node.name)
@@ -112,7 +112,7 @@ def _visit(node: Ros1Node, name: str, timeout: float) -> _Answer:
         return _Answer("", problem=f"{node.master_uri} does not know it any more")
     began = time.monotonic()
     try:
-        with suppress(MasterError):  # who refuses is there
+        with suppress(MasterError):  # a refusal is an answer, too
             call_node(uri, "getPid", me, timeout=timeout)
     except ConnectionLostError as error:
         return _Answer(uri, problem=str(error))
@@ -224,7 +224,7 @@ def _cleanup(args: argparse.Namespace) -> int:
 
 
 def _agreed(args: argparse.Namespace, count: int) -> bool:
-    """Ask whether to go on: who is only out of reach for a while would have to be restarted."""
+    """Ask for confirmation: nodes that are only out of reach would have to be restarted."""
     if args.yes:
         return True
     if args.json:
@@ -247,7 +247,7 @@ def _agreed(args: argparse.Namespace, count: int) -> bool:
 
 
 def _remove(node: Ros1Node, name: str, uri: str) -> bool:
-    """Unregister all of a node, in its name; returns whether the master took it."""
+    """Unregister everything of a node, in its name; return whether the master accepted it."""
     try:
         for end in node.endpoints(name):
             _unregister(node, end, uri)

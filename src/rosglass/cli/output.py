@@ -1,4 +1,4 @@
-"""How commands print: colours where a person looks, JSON where a program does."""
+"""The output of commands: colours for people, JSON for programs."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ __all__ = [
     "to_yaml",
 ]
 
-#: Elements of an array that are shown, unless all are asked for.
+#: Number of elements of an array that are shown, unless all are requested.
 SHOWN = 36
-#: The same for programs, which take more, but no pictures.
+#: The same for programs, which accept more, but no pictures.
 SHOWN_JSON = 10_000
-#: Stands for the ESC of our own sequences until a stream writes it: no peer can guess it.
+#: Stands for the ESC of own sequences until a stream writes it: no peer can guess it.
 _ESCAPE = f"\0{os.urandom(8).hex()}\0"
-#: Goes back to the beginning of the line and clears it, on a terminal.
+#: Returns to the beginning of the line and clears it, on a terminal.
 CLEAR_LINE = f"{_ESCAPE}[G{_ESCAPE}[K"
 _CODES = {"bold": 1, "dim": 2, "red": 31, "green": 32, "yellow": 33, "cyan": 36}
 
@@ -59,10 +59,10 @@ def add_output_options(parser: argparse.ArgumentParser) -> None:
 
 
 class EscapingStream:
-    """Standard output or error that writes no control characters but those of this module.
+    """Standard output or error, but without any control characters except this module's.
 
-    What robots say (names, types, texts) reaches the terminal through it, whichever command or log
-    prints it. All but :meth:`write` is the stream's.
+    Everything from robots (names, types, texts) reaches the terminal through it, from any command
+    or log. All but :meth:`write` is the stream's.
 
     Args:
         stream: The stream to write to.
@@ -92,7 +92,7 @@ class Style:
     def __call__(self, text: object, *kinds: str) -> str:
         """Return `text` as ``bold``, ``dim``, ``red``, ``green``, ``yellow`` or ``cyan``.
 
-        It is for an :class:`EscapingStream`.
+        The text is for an :class:`EscapingStream`.
         """
         if not self._on or not kinds:
             return str(text)
@@ -101,7 +101,7 @@ class Style:
 
 
 def note(text: str) -> None:
-    """Tell the person in front of it something that is no result."""
+    """Print a note for the user, which is not a result."""
     print(f"rosglass: {text}", file=sys.stderr, flush=True)
 
 
@@ -115,7 +115,7 @@ def print_json(value: object) -> None:
 def require_reader() -> None:
     """Raise BrokenPipeError if the reader of the output has exited, as in ``... | head -1``.
 
-    Without this, a command that waits for something to print would wait on.
+    Without this, a command that waits for something to print would not end.
     """
     events: list[tuple[int, int]] = []
     with suppress(OSError, ValueError, AttributeError):  # no file, closed, or on Windows
@@ -131,8 +131,8 @@ def fields(value: Any, limit: int | None = SHOWN) -> Any:
 
     Args:
         value: The message or field.
-        limit: Elements of an array to keep; None for all. A longer one becomes its first
-            elements and a text that says how many there are.
+        limit: Elements of an array to keep; None for all. A longer one becomes its first elements
+            and a text with their number.
     """
     from rosglass.messages.message import plain
 
@@ -152,7 +152,7 @@ def template(message_type: MessageType) -> str:
 
 
 def to_yaml(value: object) -> str:
-    """Return what :func:`fields` returned as YAML; lists of numbers take one line."""
+    """Return the result of :func:`fields` as YAML; lists of numbers take one line."""
     import yaml
 
     class Dumper(yaml.SafeDumper):
@@ -172,7 +172,7 @@ def to_yaml(value: object) -> str:
 
 
 def to_json(value: object) -> str:
-    """Return what :func:`fields` returned as strict JSON, in one line."""
+    """Return the result of :func:`fields` as strict JSON, in one line."""
     from rosglass.messages.message import finite
 
     return json.dumps(finite(value), ensure_ascii=False, allow_nan=False)

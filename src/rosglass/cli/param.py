@@ -34,7 +34,7 @@ _NEEDED = {
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare what can be done with parameters."""
+    """Declare the subcommands for parameters."""
     parser.epilog = (
         "In ROS 1, one server has all parameters: a name such as /robot/speed is accepted for NODE "
         "and PARAMETER, and any namespace for NODE."
@@ -66,7 +66,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do it."""
+    """Run the subcommand."""
     if names_ros1(args):
         from rosglass.cli import param_ros1
 
@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _missing(node: Node, name: str | None) -> str:
-    """Say what keeps a node from telling its parameters; empty when nothing does."""
+    """Return why a node's parameters cannot be read; empty if they can."""
     full = "/" + (name or "").lstrip("/")
     if not name or node.service_servers(f"{full}/get_parameters"):
         return ""
@@ -163,7 +163,7 @@ def _describe(node: Node, args: argparse.Namespace) -> int:
 def _set(node: Node, args: argparse.Namespace) -> int:
     from rosglass.ros2.parameter_files import parse_value
 
-    # Nothing between quotes is an empty text, as for ros2.
+    # Empty quotes are an empty text, as in ros2.
     value = parse_value(args.value, f"the value {args.value!r}") if args.value else ""
     with node.create_parameter_client(args.node) as client:
         fitting = _fitting(client, args, value)
@@ -177,8 +177,8 @@ def _fitting(
 ) -> ParameterValue:
     """Return a value as the parameter is declared: 5 may mean the double 5.0, or the text "5".
 
-    In ROS 2, a parameter keeps its type, and refuses the integer 5 for 5.0. What does not fit is
-    for the node to refuse.
+    In ROS 2, a parameter keeps its type, and refuses the integer 5 for 5.0. The node itself refuses
+    values that do not fit.
     """
     if isinstance(value, str):
         return value

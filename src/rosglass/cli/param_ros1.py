@@ -19,11 +19,11 @@ __all__ = ["run"]
 
 
 def run(what: str, node: Node, args: argparse.Namespace) -> int:
-    """Do what was asked for: ``list``, ``get``, ``set``, ``delete``, ``dump`` or ``load``.
+    """Run a subcommand: ``list``, ``get``, ``set``, ``delete``, ``dump`` or ``load``.
 
     Raises:
-        UnsupportedError: ROS 1 has no such thing.
-        ParameterError: A parameter is not there, or a value can be no parameter's.
+        UnsupportedError: ROS 1 lacks the feature.
+        ParameterError: A parameter is not set, or a value is not valid for one.
     """
     if what not in _DOES:
         name = _name(args, args.parameter)
@@ -41,7 +41,7 @@ def _server(node: Node) -> ParameterServer:
 
 
 def _name(args: argparse.Namespace, parameter: str | None) -> str:
-    """Return an absolute name: given whole, or as node and parameter, as in ROS 2."""
+    """Return an absolute name, given in full or as node and parameter, as in ROS 2."""
     whole = args.node if parameter is None else f"{args.node}/{parameter}"
     return "/" + whole.strip("/")
 
@@ -81,7 +81,7 @@ def _set(server: ParameterServer, args: argparse.Namespace) -> None:
     if text is None:
         raise Error(f"say to what value {args.node} shall be set: rosglass param set NAME VALUE")
     name = _name(args, parameter)
-    # Nothing between quotes is an empty text.
+    # Empty quotes are an empty text.
     value = parse_value(text, f"the value {text!r}") if text else ""
     server.set(name, value, timeout=args.timeout)
     _tell(args, name, "set")
@@ -117,7 +117,7 @@ def _load(server: ParameterServer, args: argparse.Namespace) -> None:
 
 
 def _file(args: argparse.Namespace) -> tuple[str, str]:
-    """Tell a file and a namespace apart: ``FILE``, ``FILE NAMESPACE`` or ``NODE FILE``."""
+    """Distinguish a file and a namespace: ``FILE``, ``FILE NAMESPACE`` or ``NODE FILE``."""
     first, second = args.node, args.file
     if second is None:
         return first, "/"

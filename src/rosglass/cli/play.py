@@ -1,4 +1,4 @@
-"""``rosglass play``: publish what a recording holds."""
+"""``rosglass play``: publish the messages of a recording."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["configure", "run"]
 _KEYS = (
     "space pauses, s sends one message, left and right jump 10 s, + and - change the rate, q ends"
 )
-#: What a terminal sends for keys, in order of looking.
+#: Key codes of terminals, in order of matching.
 _JUMPS = {"\033[D": -10.0, "\033[C": 10.0}
 
 
@@ -169,7 +169,7 @@ def _watch(player: Player, bag: Bag, end: End, printed: dict[str, str], *, keys:
                 f"{status.state.value} {status.position:.1f} of {bag.duration:.1f} s, "
                 f"rate {status.rate:g}, {status.sent} messages{lag}"
             )
-            # A line that wraps cannot be written over.
+            # A line that wraps cannot be overwritten.
             shown = line[: shutil.get_terminal_size().columns - 1]
             print(f"{CLEAR_LINE}{shown}", end="", flush=True)
     if interactive:
@@ -177,7 +177,7 @@ def _watch(player: Player, bag: Bag, end: End, printed: dict[str, str], *, keys:
 
 
 def _obey(player: Player, bag: Bag) -> bool:
-    """Do what the keys say; returns False for the end."""
+    """Handle pressed keys; return False to end."""
     import os
 
     typed = os.read(sys.stdin.fileno(), 16).decode(errors="replace")

@@ -48,13 +48,13 @@ COMMANDS = {
 
 #: Commands that load Qt: Ctrl-C ends the process until they handle it themselves.
 _WITH_QT = ("run", "rviz", "demo")
-#: What users of ``ros2`` type -> what it is here.
+#: Commands of ``ros2`` -> their counterparts here.
 _AS_IN_ROS2: dict[tuple[str, ...], list[str]] = {
     ("bag", "record"): ["record"],
     ("bag", "play"): ["play"],
     ("bag", "info"): ["play", "--list"],
 }
-#: Stands for all commands at once.
+#: Stands for all commands.
 _ALL = "*"
 
 
@@ -83,7 +83,7 @@ def build_parser(command: str | None = None) -> argparse.ArgumentParser:
 
 
 def _split(arguments: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
-    """Return what is for the command, for ROS (``--ros-args ... --``), and for others (``--``).
+    """Return the arguments of the command, of ROS (``--ros-args ... --``), and of others (``--``).
 
     argparse must not see the latter two: it would look for options in them.
     """
@@ -122,7 +122,7 @@ def run(argv: Sequence[str] | None = None) -> int:
 
 
 def _explain(error: Exception) -> int:
-    """Tell what went wrong, in words; returns the exit code. Our own faults are raised again."""
+    """Print an error for users; return the exit code. Bugs of rosglass are raised again."""
     if isinstance(error, rosglass.Error):
         return _fail(str(error))
     if isinstance(error, ModuleNotFoundError):
@@ -133,7 +133,7 @@ def _explain(error: Exception) -> int:
             return _fail(f"this command needs a package: {missing}")
     if isinstance(error, BrokenPipeError):
         _drop_output()
-        return 141  # as programs end that SIGPIPE ends
+        return 141  # as for programs that SIGPIPE ends
     if isinstance(error, OSError):
         _drop_output()
         where = f"{error.filename}: " if error.filename else ""
@@ -182,7 +182,7 @@ def _nearby_url() -> str:
 
 
 def _prepare_output() -> None:
-    """Make sure that what robots say can be printed, and does nothing to the terminal."""
+    """Ensure that received text can be printed, and does nothing to the terminal."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:  # closed by the parent process
@@ -196,7 +196,7 @@ def _prepare_output() -> None:
 
 
 def _drop_output() -> None:
-    """Let Python's end find nothing that cannot be written."""
+    """Drop unwritten output, which would make Python's exit fail."""
     with suppress(OSError, ValueError):
         null = os.open(os.devnull, os.O_WRONLY)
         os.dup2(null, sys.stdout.fileno())

@@ -17,7 +17,7 @@ __all__ = ["configure", "run"]
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Describe the options."""
+    """Declare the command's options."""
     parser.add_argument(
         "--qmlls-ini",
         action="store_true",
@@ -41,10 +41,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _with_import_path(file: Path, path: str) -> str:
-    """Return the settings of a file with our folders among the import paths.
+    """Return the settings of a file with rosglass's folders among the import paths.
 
     Raises:
-        Error: The file is not one of settings.
+        Error: The file is not a settings file.
     """
     settings = configparser.ConfigParser(interpolation=None)
     # Qt is case-sensitive.

@@ -134,7 +134,7 @@ def _watch(node: Node, recorder: Recorder, end: End, args: argparse.Namespace) -
 
 
 class _News:
-    """Tells what is wrong when it begins, and when it is over."""
+    """Prints problems when they begin, and when they are over."""
 
     def __init__(self, on_terminal: bool) -> None:
         self._before = CLEAR_LINE if on_terminal else ""
@@ -154,7 +154,7 @@ class _News:
             self._seen[topic] = (problem, since[1] if since[0] == problem else now)
             if self._reported.get(topic) == problem:
                 continue
-            # What is being looked for, or about to be replaced, is no news.
+            # A search or replacement in progress is not a problem yet.
             if last or now - self._seen[topic][1] > _REPORT_DELAY_S:
                 self._reported[topic] = problem
                 print(f"{self._before}rosglass: {topic}: {problem}", file=sys.stderr, flush=True)

@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 __all__ = ["DUPLICATE_EXIT", "configure", "run"]
 
-#: Exit code when a robot of the same name is there already.
+#: Exit code if a robot of the same name exists already.
 DUPLICATE_EXIT = 3
 #: Seconds after the start in which another robot, whose odometry has 30 Hz, ends
 #: this one.
 _DUPLICATE_WATCH_S = 5.0
-#: Seconds within which the one of two robots that should leave has left.
+#: Seconds in which one of two robots has to leave.
 _YIELD_S = 2.0
 
 
@@ -103,13 +103,13 @@ def run(args: argparse.Namespace) -> int:
             last_seen: dict[bytes, float] = {}
 
             def on_odometry(sample: Sample) -> None:
-                # One that was killed may still be seen, but sends nothing.
+                # A robot that was killed may still be in the graph, but sends nothing.
                 if full not in node.duplicate_nodes():
                     return
                 now, other = time.monotonic(), sample.publisher
                 since = last_seen.setdefault(other, now)
                 own = {end.gid for end in node.publishers("/odom") if end.node.full == full}
-                # Of two that start together one stays: the other leaves at once.
+                # Of two that start at the same time, one stays: the other leaves at once.
                 if min(own - last_seen.keys(), default=b"") < other and now - since < _YIELD_S:
                     return
                 duplicate.set()
@@ -134,7 +134,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _duplicate(name: str, url: str) -> str:
-    """Return what to say when a robot of the name is there already."""
+    """Return the message for a robot whose name exists already."""
     other = "dds://?domain=1" if url.startswith("dds:") else "zenoh://127.0.0.1:7448"
     return (
         f"a robot called {name} is on {url} already, and what both publish would be mixed. To look "
@@ -146,7 +146,7 @@ def _duplicate(name: str, url: str) -> str:
 def _default_url(env: Mapping[str, str]) -> str:
     """Return the URL to print at the start."""
     url = env.get("ROSGLASS_URL") or "zenoh://127.0.0.1:7447"
-    # Help and completion do without these.
+    # Not needed for help and completion.
     if env.get("ROSGLASS_URL") or not env.get("ROS_MASTER_URI"):
         return url
     from rosglass.connection import default_url

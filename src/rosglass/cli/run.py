@@ -38,7 +38,7 @@ _QUIET = "qt.multimedia.symbolsresolver=false;qt.multimedia.ffmpeg*=false;qt.qpa
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Describe the options."""
+    """Declare the command's options."""
     parser.add_argument(
         "file",
         metavar="FILE.qml",
@@ -82,7 +82,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def point_in_time(text: str) -> float:
-    """Read seconds from now, a day at most; for options."""
+    """Parse seconds from now, a day at most; for options."""
     try:
         value = float(text)
     except ValueError:
@@ -93,7 +93,7 @@ def point_in_time(text: str) -> float:
 
 
 def add_import_paths(parser: argparse.ArgumentParser) -> None:
-    """Declare the option that says where QML modules are, besides the usual places."""
+    """Declare the option for QML modules in unusual places."""
     parser.add_argument(
         "-I",
         dest="import_paths",
@@ -105,7 +105,7 @@ def add_import_paths(parser: argparse.ArgumentParser) -> None:
 
 
 def add_renderer(parser: argparse.ArgumentParser, what: str) -> None:
-    """Declare the option that says which of Qt's renderers draws."""
+    """Declare the option that selects Qt's renderer."""
     parser.add_argument(
         "--renderer",
         choices=("auto", "opengl", "software"),
@@ -116,7 +116,7 @@ def add_renderer(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def add_allow_network(parser: argparse.ArgumentParser) -> None:
-    """Declare the option that lets Qt fetch what QML names on other machines."""
+    """Declare the option that lets Qt load files of QML from other machines."""
     parser.add_argument(
         "--allow-network",
         action="store_true",
@@ -125,7 +125,7 @@ def add_allow_network(parser: argparse.ArgumentParser) -> None:
 
 
 def add_longest_script(parser: argparse.ArgumentParser) -> None:
-    """Declare the option that says for how long JavaScript may block the interface."""
+    """Declare the option that limits how long JavaScript may block the interface."""
     parser.add_argument(
         "--longest-script",
         metavar="SECONDS",
@@ -140,8 +140,8 @@ def add_screenshot(parser: argparse.ArgumentParser, what: str, after: float) -> 
     """Declare the options that save a picture.
 
     Args:
-        parser: Of the command.
-        what: What is in the picture.
+        parser: Parser of the command.
+        what: Content of the picture.
         after: Default of --after, in seconds.
     """
     parser.add_argument(
@@ -203,8 +203,8 @@ def show(
         after: Seconds until the screenshot.
         verbose: Show what is logged for developers, too.
         end_process: End the process soon after the interface, whatever still runs in it.
-        longest_script: Of :class:`rosglass.qml.Session`.
-        options: Of :class:`rosglass.qml.Application`.
+        longest_script: As for :class:`rosglass.qml.Session`.
+        options: As for :class:`rosglass.qml.Application`.
 
     Returns:
         The exit code: 0, what QML gave to ``Qt.exit()``, 130 after Ctrl-C.
@@ -222,18 +222,18 @@ def show(
         # Grabbing waits for the renderer, which may wait for Python.
         os.environ["QSG_RENDER_LOOP"] = "basic"
 
-    # Nothing of what is made until the window is there becomes garbage.
+    # Nothing created until the window is shown becomes garbage.
     gc.disable()
     try:
         return _show(file, screenshot, after, verbose, end_process, longest_script, options)
     except SystemExit as end:
-        # Of a signal before anything was shown: what there is would be taken down in any order.
+        # A signal before anything was shown: objects would be deleted in any order.
         if end_process and isinstance(end.code, int):
             os._exit(end.code)
         raise
     finally:
         gc.enable()
-        # PySide takes down what is left in any order at the end of the program, and may crash.
+        # At the end of the program, PySide deletes remaining objects in any order, and may crash.
         gc.collect()
 
 
@@ -267,7 +267,7 @@ def _show(
 
 
 class Picture:
-    """The picture that ``--screenshot`` asks for, and whether it was taken.
+    """The picture of ``--screenshot``, and whether it was taken.
 
     Args:
         target: The file.
@@ -279,7 +279,7 @@ class Picture:
         self._taken = False
 
     def take(self, end: Callable[[int], None], save: Callable[[Path], None]) -> None:
-        """Take it when it is time to.
+        """Take it after the given time.
 
         Args:
             end: Ends the program with an exit code.
@@ -300,7 +300,7 @@ class Picture:
         QtCore.QTimer.singleShot(round(self._after * 1000), take)
 
     def check(self, code: int) -> int:
-        """Return the program's exit code, which is no success where no picture was taken."""
+        """Return the program's exit code, which is an error if no picture was taken."""
         if code == 0 and not self._taken:
             note(
                 f"{self._target} was not written: the program was ended before {self._after:g} s "
@@ -327,7 +327,7 @@ def _save(app: Application, target: Path) -> None:
 
 
 def format_log(verbose: bool) -> None:
-    """Show messages of QML with file and line, from the level that their logger has."""
+    """Print messages of QML with file and line, from their logger's level on."""
     from rosglass.qml.log import LocationFormatter
 
     for handler in logging.getLogger().handlers:

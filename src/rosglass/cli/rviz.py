@@ -34,7 +34,7 @@ _QUIT_TIMEOUT_S = 1.7
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Describe the options."""
+    """Declare the command's options."""
     config = parser.add_argument(
         "config",
         metavar="CONFIG.rviz",

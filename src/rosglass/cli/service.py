@@ -1,4 +1,4 @@
-"""``rosglass service``: look at services, call them."""
+"""``rosglass service``: inspect services, call them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ __all__ = ["configure", "run"]
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare what can be done with services."""
+    """Declare the subcommands for services."""
     add = Subcommands(parser).add
     sub = add("list", "list services", _list)
     sub.add_argument("-t", "--types", "--show-types", action="store_true", help="show types")
@@ -66,7 +66,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do it."""
+    """Run the subcommand."""
     return int(args.handler(args))
 
 
@@ -123,7 +123,7 @@ def _info(args: argparse.Namespace) -> int:
     for end in ends:
         print(f"  {end.kind.value} {style(end.node, 'cyan')}")
         for key, value in describe(node, end).items():
-            # In ROS 1, the type is above.
+            # In ROS 1, the type is printed above.
             shown = ("md5",) if is_ros1(node) else ("type", "type_hash", "response_hash", "gid")
             if key in shown and value:
                 print(f"    {key}: {short(value)}")
@@ -144,7 +144,7 @@ def _call(args: argparse.Namespace) -> int:
         with node.create_service_client(name, type_name) as client:
 
             def settled() -> bool:
-                # ROS 1's master knows at once that there is no such service.
+                # ROS 1's master reports at once that there is no such service.
                 gone = is_ros1(node) and not node.service_servers(name)
                 return client.type is not None or gone
 

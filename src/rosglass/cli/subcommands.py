@@ -1,4 +1,4 @@
-"""Commands that consist of commands, such as ``rosglass topic list``."""
+"""Commands with subcommands, such as ``rosglass topic list``."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ __all__ = ["Parser", "Subcommands", "add_verbose"]
 
 
 class Parser(argparse.ArgumentParser):
-    """Takes options before, after and between arguments, as ``ros2`` commands are written.
+    """Accepts options before, after and between arguments, as ``ros2`` commands are written.
 
-    argparse alone gives up on ``pub --once /topic TYPE``, and on ``echo /topic --once TYPE``.
+    argparse alone rejects ``pub --once /topic TYPE``, and ``echo /topic --once TYPE``.
     """
 
     _mixing = False
@@ -48,10 +48,10 @@ class Parser(argparse.ArgumentParser):
 
 
 class Subcommands:
-    """What can be done with one kind of thing.
+    """The subcommands of a command.
 
     Args:
-        parser: The kind's own parser.
+        parser: Parser of the command.
     """
 
     def __init__(self, parser: argparse.ArgumentParser) -> None:
@@ -64,7 +64,7 @@ class Subcommands:
         handler: Callable[..., int],
         aliases: tuple[str, ...] = (),
     ) -> argparse.ArgumentParser:
-        """Add something that can be done, and return the parser of its options."""
+        """Add a subcommand, and return the parser of its options."""
         parser = self._commands.add_parser(
             name,
             aliases=aliases,

@@ -53,9 +53,9 @@ __all__ = ["configure", "echo", "measure", "run"]
 
 
 def echo(args: argparse.Namespace) -> int:
-    """Print messages until Ctrl-C, or as many as were asked for."""
+    """Print messages until Ctrl-C, or up to the requested number."""
     style = Style(args)
-    # What reads a table would take what is cut for another value, or for fewer columns.
+    # Readers of a table would misread truncated values, or miss columns.
     limit = args.truncate or (None if args.csv else SHOWN_JSON if args.json else SHOWN)
     received = 0
     with connect(args, patient=True) as node:
@@ -118,7 +118,7 @@ def _text(
 
 
 def _cells(value: Any) -> Iterator[str]:
-    """Yield what a line of comma-separated values has for a value, in the order of the fields."""
+    """Yield the cells of a value in a CSV line, in the order of the fields."""
     if isinstance(value, (dict, list)):
         for inner in value.values() if isinstance(value, dict) else value:
             yield from _cells(inner)
@@ -254,12 +254,12 @@ _FIGURES = {"hz": _show_rate, "bw": _show_bandwidth, "delay": _show_delay}
 _UNKNOWN = "unknown"
 #: Seconds that ROS 1's publishers may take to send their type.
 _ANSWER = 3.0
-#: Samples of which hz, bw and delay keep account.
+#: Samples that hz, bw and delay evaluate.
 _WINDOW = 10_000
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare what can be done with topics."""
+    """Declare the subcommands for topics."""
     add = Subcommands(parser).add
     sub = add("list", "list topics", _list)
     sub.add_argument("-t", "--types", "--show-types", action="store_true", help="show types")
@@ -337,7 +337,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do it."""
+    """Run the subcommand."""
     return int(args.handler(args))
 
 
@@ -448,7 +448,7 @@ def _info(args: argparse.Namespace) -> int:
         print(style(f"  {problem.text}", "red"))
     for end in ends:
         print(f"  {end.kind.value} {style(end.node, 'cyan')}")
-        # In ROS 1, a topic's type is one for all: it is above.
+        # In ROS 1, a topic has one type, which is printed above.
         above = ("kind", "name", "node", *(("type",) if ros1 else ()))
         for key, value in describe(node, end).items():
             if key not in above and value:

@@ -1,4 +1,4 @@
-"""What people write on a command line instead of messages."""
+"""The parts of a command line that stand for messages and profiles."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ __all__ = ["parse_fields", "profile", "split_type"]
 
 
 def parse_fields(text: str, type_name: str, template: str = "") -> dict[str, Any]:
-    """Return the fields that a YAML (or JSON) text gives, e.g. ``{linear: {x: 0.5}}``.
+    """Return the fields of a YAML (or JSON) text, e.g. ``{linear: {x: 0.5}}``.
 
     Args:
         text: The text; empty for no fields.
-        type_name: The type they are for, named in errors.
-        template: An example that errors show.
+        type_name: Their type, for errors.
+        template: An example for errors.
 
     Raises:
         ConversionError: It is no YAML, or no mapping.
@@ -45,7 +45,7 @@ def parse_fields(text: str, type_name: str, template: str = "") -> dict[str, Any
 
 
 def split_type(rest: Sequence[str]) -> tuple[str | None, str]:
-    """Tell ``[TYPE] [VALUES]`` apart: both may be left out.
+    """Split ``[TYPE] [VALUES]``, both of which may be left out.
 
     Raises:
         Error: There are more than two, or the first of two is no type's name.
@@ -66,7 +66,7 @@ def split_type(rest: Sequence[str]) -> tuple[str | None, str]:
 
 
 def profile(args: argparse.Namespace) -> QoS:
-    """Return what ``--qos`` and its companions say; raises ArgumentError."""
+    """Return the profile of ``--qos`` and its companions; raises ArgumentError."""
     from dataclasses import replace
 
     from rosglass.comm import Durability, History, QoS, Reliability

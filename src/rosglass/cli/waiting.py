@@ -1,4 +1,4 @@
-"""Telling the person who waits for messages why none come."""
+"""Reports why no messages are received."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _PAUSES = 5
 
 
 class Reasons:
-    """Prints why no messages are received, or no more; each reason once.
+    """Prints why no messages, or no more messages, are received; each reason once.
 
     Args:
         node: The subscribing node.
@@ -60,10 +60,10 @@ class Reasons:
         self._received, self._received_at, self._printed = count, now, ""
 
     def report(self, *, last: bool = False) -> str:
-        """Print the reason if it is new, and return it; empty when all is well.
+        """Print the reason if it is new, and return it; empty if there is none.
 
         Args:
-            last: Whether this is the end: there is nothing more to wait for.
+            last: Whether this is the last report, before the command ends.
 
         Raises:
             BrokenPipeError: The reader of the output has exited.
@@ -75,7 +75,7 @@ class Reasons:
         reason = self._reason(silent)
         if reason and reason != self._printed:
             self._printed = reason
-            # Definitions that contradict each other take pages.
+            # Conflicting definitions take pages.
             shown = reason.partition("\n")[0].rstrip() if self._quiet else reason
             note(f"{self._subscription.topic}: {spelled(self._node, shown)}")
         return reason

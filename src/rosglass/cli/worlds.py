@@ -1,4 +1,4 @@
-"""What differs between ROS 1 and ROS 2 in what commands show and ask for."""
+"""Differences of ROS 1 and ROS 2 in the output and arguments of commands."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def is_ros1(node: Node) -> bool:
 
 
 def as_ros1(node: Node) -> Ros1Node | None:
-    """Return a node that is in a ROS 1 graph as what it is; None when it is in none."""
+    """Return a node of a ROS 1 graph with its own class; None for any other node."""
     found: Any = node
     return found if is_ros1(node) else None
 
