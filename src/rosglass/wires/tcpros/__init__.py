@@ -1,1 +1,1 @@
-"""TCPROS and XML-RPC: what announces the endpoints of ROS 1 nodes, and moves their bytes."""
+"""TCPROS and XML-RPC: the registration of ROS 1's endpoints, and the transport of their data."""

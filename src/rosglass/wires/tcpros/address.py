@@ -24,7 +24,7 @@ _HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9.])?\Z|[0-9A-Fa-f:.]*:
 
 
 def given_address(env: Mapping[str, str]) -> tuple[str, str]:
-    """Return the host or address that the environment tells to announce, and the variable's name.
+    """Return the host or address to announce by the environment, and the variable's name.
 
     Raises:
         ArgumentError: The variable's value is not a host.

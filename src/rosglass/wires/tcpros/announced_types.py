@@ -21,7 +21,7 @@ class AnnouncedTypes(Types):
     """Finds types for one node: in its library, or in the headers of publishers.
 
     Args:
-        library: Where definitions come from; None for the shared library.
+        library: Library for definitions; None for the shared one.
         url: The node's URL, for messages.
     """
 

@@ -4,7 +4,7 @@ Formats: ROS wiki, "ROS/Connection Header" and "ROS/TCPROS". A header consists o
 ``name=value``, each after its length, all of them after theirs. The first frame is the header; a
 service's responses have one more byte before the length. All lengths are 32-bit, little-endian.
 
-All methods of a :class:`Connection` run in the loop's thread, except those that say so.
+All methods of a :class:`Connection` run in the loop's thread, unless stated otherwise.
 """
 
 from __future__ import annotations
@@ -87,8 +87,8 @@ def parse_header(data: bytes | memoryview) -> dict[str, str]:
     return fields
 
 
-#: Seconds. Only subscribers make connections: if we gave one up before its subscriber does, that
-#: would not reconnect. rospy's and roscpp's own keepalive takes 60 s and 9 times 10 s.
+#: Seconds. Only subscribers connect: if this end gave up before the subscriber does, that would not
+#: reconnect. rospy's and roscpp's own keepalive takes 60 s and 9 times 10 s.
 _SUBSCRIBER_KEEPALIVE = (("TCP_KEEPIDLE", 60), ("TCP_KEEPINTVL", 10), ("TCP_KEEPCNT", 12))
 _OUTAGE_LIMIT_S = 180
 #: TCP_RTO_MAX_MS, since Linux 6.15; Python has no name for it.
@@ -225,7 +225,7 @@ class Outgoing:
             frame: The frame.
             sent: Its bytes that are sent already; not 0 only when the queue is empty.
             keep: Most frames in the queue; 0 for any number.
-            keep_bytes: Most bytes in the queue, besides the frame; 0 for any number.
+            keep_bytes: Most bytes in the queue, without the frame; 0 for any number.
         """
         left = frame.rest(sent)
         self._frames.append((frame, left))
@@ -650,12 +650,12 @@ class Connection:
     def send_frame(self, frame: Frame, keep: int = 0, keep_bytes: int = 0) -> None:
         """Send a frame without blocking; from any thread.
 
-        Queues a copy of what the socket does not take: the caller may reuse its buffers.
+        Queues a copy of what the socket does not accept: the caller may reuse its buffers.
 
         Args:
             frame: The frame.
             keep: Most frames in the queue, the oldest are dropped; 0 for any number.
-            keep_bytes: Most bytes in the queue, besides the newest frame; 0 for any number.
+            keep_bytes: Most bytes in the queue, without the newest frame; 0 for any number.
         """
         with self._lock:
             if self._closed:
@@ -672,7 +672,7 @@ class Connection:
             self._loop.call(self._watch)
 
     def _write(self, parts: Sequence[memoryview]) -> int:
-        """Write what the socket takes; return the number of bytes."""
+        """Write as much as the socket accepts; return the number of bytes."""
         try:
             sent = self._sock.sendmsg(parts)
         except (BlockingIOError, InterruptedError):
@@ -766,7 +766,7 @@ class Connection:
                 self.set_urgent(True)
 
     def drain(self) -> None:
-        """Hand on what the socket has, unless that is done at once; from any thread."""
+        """Hand on the socket's data, unless that is done at once; from any thread."""
         me = threading.get_ident()
         if self._urgent or self._closed or self._turn_of == me:
             return
@@ -791,7 +791,7 @@ class Connection:
             self._turn.release()
 
     def _receive(self, resume: bool = False) -> None:
-        """Read what the socket has; with the turn, which ends here."""
+        """Read the socket's data; with the turn, which ends here."""
         incoming, sock = self._incoming, self._sock
         try:
             if resume:
@@ -870,7 +870,7 @@ class Connection:
             self.end("")
             return
         self.on_room = lambda: self.end("")
-        # The system goes on delivering what it has: the last message may be a stop command.
+        # The system continues to deliver its data: the last message may be a stop command.
         self._holds = self._held = False
         self._watch()
         self._loop.linger(self, True)

@@ -1,4 +1,4 @@
-"""The ROS graph, as the master knows it."""
+"""The ROS graph, as listed by the master."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class _Seen(NamedTuple):
         publishers: Nodes by topic.
         subscribers: Nodes by topic.
         services: The node of each service, in a list.
-        types: Type of each topic, as the master knows it.
+        types: Type of each topic, as listed by the master.
         invalid: Names that are left out because they break ROS's rules.
     """
 
@@ -107,7 +107,7 @@ class Graph:
         return sorted(NodeName(*split(node)) for node in found)
 
     def endpoints(self, kind: EndpointKind, name: str) -> list[EndpointInfo]:
-        """Return the endpoints of a topic or service; the master knows no service clients."""
+        """Return the endpoints of a topic or service; the master lists no service clients."""
         parts = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION, EndpointKind.SERVICE_SERVER)
         if kind not in parts:
             return []

@@ -229,7 +229,7 @@ class IoLoop:
         """Log an error and end the handler; no error may end this thread."""
         _log.exception("%s failed", handler)
         reason = f"an error of ours, {error!r}"
-        # What the handler left in the socket would make it fail again, at once and for ever.
+        # Data that the handler left in the socket would make it fail again, at once and forever.
         self._run_job(lambda: handler.end(reason))
 
     def _run_job(self, job: Callable[[], None]) -> None:

@@ -345,7 +345,7 @@ class Master:
         connection = self._server.connection()
         with suppress(IndexError):
             connection = self._idle.pop()
-        self._busy.add(connection)  # before the look at `_closed`, which close() sets first
+        self._busy.add(connection)  # before `_closed` is read, which close() sets first
         answered = False
         try:
             if self._closed:

@@ -195,7 +195,7 @@ class Registrations:
                 MasterError
             ):  # the name is unknown: the master has lost all registrations
                 uri = core.master.call("lookupNode", core.name.full)
-            # A new master may know the node by another call, without its registrations.
+            # A new master may list the node after another call, without its registrations.
             if not uri or process != self._process:
                 self._registered.clear()
                 self._tried.clear()
@@ -308,7 +308,7 @@ def unregister_later(core: TcprosCore, members: Iterable[Member]) -> None:
 
     Args:
         core: The node.
-        members: What the master may know of it.
+        members: Members that the master may list.
     """
     threading.Thread(
         target=_unregister, args=(core, list(members)), name="rosglass unregister", daemon=True

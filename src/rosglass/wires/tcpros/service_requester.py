@@ -491,7 +491,7 @@ class ServiceLink:
         return self._connection.quiet()
 
     def lives(self) -> bool:
-        """Return whether the server has not closed it; reads what the socket has."""
+        """Return whether the server has not closed it; reads the socket's data."""
         self._connection.ready(READ)
         return not self._connection.closed
 
@@ -535,7 +535,7 @@ class ServiceFinder:
         on_server: Called with the name and what a server of it announced.
         name: Absolute service name.
         wanted: The type, its name, or None for the type that the server announces.
-        owner: Notified of what is found.
+        owner: Notified of the results.
 
     Attributes:
         type: The service type; None while it is unknown.
@@ -582,7 +582,7 @@ class ServiceFinder:
         return "its server" if peer is None else peer.node
 
     def mismatch(self) -> str:
-        """Return how the server's type differs from ours; empty if it does not."""
+        """Return how the server's type differs from this node's; empty if it does not."""
         peer, ours = self.peer, self.type
         if peer is None or ours is None or peer.md5 in (ANY, ours.md5):
             return ""
@@ -693,7 +693,7 @@ class ServiceFinder:
             self.fail(location, why)
 
     def on_server_header(self, peer: ServerInfo) -> None:
-        """Handle a server's header: it is there, with this type."""
+        """Handle a server's header: it is running, with this type."""
         if self._closed:
             return
         self._due = time.monotonic() + _PROBE_S
@@ -862,7 +862,7 @@ def probe(
         core: The asking node.
         name: Absolute name of the service.
         location: Its location.
-        done: Called once in the loop's thread: with what the server announces, or None and why not.
+        done: Called once in the loop's thread: with the server's announcement, or None and why not.
 
     Raises:
         OSError: The system has no more sockets.

@@ -1,4 +1,4 @@
-"""The slave API: what a node answers the master, other nodes and tools such as ``rosnode``.
+"""The slave API: a node's answers to the master, other nodes and tools such as ``rosnode``.
 
 API: ROS wiki, "ROS/Slave_API"; getBusStats and getBusInfo as ``rosnode info`` reads them, and as
 rosgraph's ``graph.py`` and rospy fill them.

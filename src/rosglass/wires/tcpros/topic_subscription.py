@@ -89,7 +89,7 @@ class TopicSubscription(Member):
         #: By URI; changed in the loop's thread only.
         self._links: dict[str, PublisherLink] = {}
         self._closed = False
-        #: The number of the master that knows it, from 0, and of its lists of publishers.
+        #: The number of the master that lists it, from 0, and of its lists of publishers.
         self._epoch, self._updates = -1, 0
 
     def links(self) -> list[PublisherLink]:
@@ -137,7 +137,7 @@ class TopicSubscription(Member):
             link.set_eager(self.eager)
 
     def drain(self) -> None:
-        """Hand on what the sockets have; from any thread."""
+        """Hand on the sockets' data; from any thread."""
         for link in self.links():
             link.drain()
 
@@ -435,7 +435,7 @@ class TypeNegotiation(TopicMatching, Reader):
         self.topic.update_eager()
 
     def flush(self) -> None:
-        """Hand on what the sockets have; from any thread."""
+        """Hand on the sockets' data; from any thread."""
         if not self.topic.eager and not self._core.forked:
             self.topic.drain()
 
@@ -636,7 +636,7 @@ class PublisherLink:
         connection.set_urgent(eager or not self.header or self._rate > _IDLE_BYTES_PER_S)
 
     def drain(self) -> None:
-        """Hand on what the socket has; from any thread."""
+        """Hand on the socket's data; from any thread."""
         connection = self._connection
         if connection is not None:
             connection.drain()

@@ -143,7 +143,7 @@ class Topics:
             publication.drop(link)
 
     def publishers(self, topic: str) -> list[EndpointInfo]:
-        """Return a topic's publishers in the graph, with what their connections' headers tell."""
+        """Return a topic's publishers in the graph, with the data of their connections' headers."""
         ends = self._core.graph.endpoints(EndpointKind.PUBLISHER, topic)
         return [_described(end, self._known(topic, end.node)) for end in ends]
 
