@@ -248,7 +248,7 @@ class TerminalState(Enum):
     ABORTED = "aborted"
     #: Done.
     SUCCEEDED = "succeeded"
-    #: Unknown: the server has left, or does not know the goal (any more).
+    #: Unknown: the server has left, or does not have the goal (any more).
     LOST = "lost"
 
 

@@ -73,7 +73,7 @@ _log = logging.getLogger("rosglass.ros1")
 _SILENCE_S, _ANSWER_TIMEOUT_S = 5.0, 5.0
 #: The first seconds that do not fit into a time stamp, and their year.
 _END_OF_TIME = 2**32, 2106
-#: Time after which a connected server has published the status of all goals that it knows.
+#: Time after which a connected server has published the status of all its goals.
 _SETTLED_S = 1.0
 #: Time that a result may take once the server's status lacks the goal.
 _OVERDUE_S = 5.0
@@ -232,7 +232,7 @@ class ActionlibClientGoal(ClientGoal):
     def resend(self) -> None:
         """Send it again, for servers that may have missed it.
 
-        A server that knows it ignores this.
+        A server that has it already ignores this.
 
         Raises:
             Error: It has ended: send a new one.
@@ -245,7 +245,7 @@ class ActionlibClientGoal(ClientGoal):
         self._jobs.add(self._resend)
 
     def close(self) -> None:
-        """Stop following the goal, which goes on; safe to call twice."""
+        """Stop following the goal, which continues; safe to call twice."""
         self._state_listeners.clear()
         super().close()
 
@@ -485,7 +485,7 @@ class ActionlibClient(ActionClient, Member):
         self._topics = topics
         self._ends: _ClientTopics | None = None
         self._discovery: ActionDiscovery | None = None
-        #: The server that goals are sent to; empty while none is there.
+        #: The server that goals are sent to; empty without one.
         self._server, self._since, self._epoch = "", 0.0, 0
         #: By server, its last status message, and when it was last known to be alive.
         self._lists: dict[str, dict[str, Entry]] = {}

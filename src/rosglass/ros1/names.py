@@ -59,7 +59,7 @@ def expand(name: str, node: str, namespace: str) -> str:
         namespace: The node's absolute namespace.
 
     Raises:
-        InvalidNameError: `name` breaks ROS's rules; the message says where.
+        InvalidNameError: `name` breaks ROS's rules; the message names the place.
     """
     if not isinstance(name, str) or not name:
         raise InvalidNameError(f"a name must be a non-empty string, got {name!r}")

@@ -58,7 +58,7 @@ class Core(TcprosCore):
         name: The node's name.
         url: The URL it was connected with, for messages.
         options: Master, own address, remappings.
-        library: Where definitions come from; None for the shared library.
+        library: Library for definitions; None for the shared one.
 
     Raises:
         ConnectionLostError: This machine cannot listen for connections.
@@ -92,9 +92,9 @@ class Ros1Node(Node):
         url: The URL it was connected with, for messages.
         name: Base name.
         namespace: Absolute namespace.
-        library: Where definitions come from; None for the shared library.
+        library: Library for definitions; None for the shared one.
         parameters: Private parameters that the program was started with, by their names.
-        own_services: Whether to offer what every ROS 1 node does: its log, and services for its
+        own_services: Whether to offer the built-in services of ROS 1 nodes: the log, and those for
             log levels.
 
     Raises:
@@ -300,8 +300,8 @@ class Ros1Node(Node):
     def services(self) -> dict[str, list[str]]:
         """Return every service in the graph with its type.
 
-        Only a service's server knows its type: the first call probes the servers in the
-        background, and the graph changes as they answer.
+        Only a service's server has its type: the first call probes the servers in the background,
+        and the graph changes as they answer.
         """
         return self._services.listing()
 
@@ -312,7 +312,7 @@ class Ros1Node(Node):
     def ask_publishers(self, topic: str, timeout: float = 3.0) -> list[EndpointInfo]:
         """Request md5 sum and latching from the publishers of a topic; waits for the answers.
 
-        The master does not know them, and :meth:`publishers` returns them only for connected
+        The master does not have them, and :meth:`publishers` returns them only for connected
         publishers. This connects for a moment, without receiving messages.
 
         Args:

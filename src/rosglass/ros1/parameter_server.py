@@ -130,7 +130,7 @@ class ParameterServer(Handle):
         )
 
     def has(self, name: str, *, timeout: float = _TIMEOUT_S) -> bool:
-        """Return whether a parameter or namespace is there."""
+        """Return whether a parameter or namespace exists."""
         return bool(self._call("hasParam", self.resolve(name), timeout=timeout))
 
     def search(self, name: str, *, timeout: float = _TIMEOUT_S) -> str | None:
@@ -480,7 +480,7 @@ class MasterCallQueue:
 
 
 class StartParameters(Member):
-    """Sets the program's start parameters once the master is there.
+    """Sets the program's start parameters once the master answers.
 
     Args:
         server: The node's view of the parameter server.
@@ -571,9 +571,9 @@ class ParameterSubscription(Handle):
 class ParameterWatches:
     """The parameters that one node follows, each name subscribed to once.
 
-    A notification of the master only makes us read: it leaves out a caller's own changes and a
-    namespace that became a plain value, gives up after one attempt, and forgets all subscribers
-    when it is restarted. The I/O loop's thread owns the watches.
+    A notification only triggers a read: the master leaves out a caller's own changes and a
+    namespace that became a plain value, gives up after one attempt, and loses all subscribers when
+    it is restarted. The I/O loop's thread owns the watches.
 
     Args:
         core: The node.
@@ -623,7 +623,7 @@ class ParameterWatches:
         return self._watches.get(name)
 
     def touched(self, name: str) -> list[ParameterWatch]:
-        """Return the watches of a name, of what is in it, and of what it is in."""
+        """Return the watches of a name, of the names in it, and of the namespaces that it is in."""
         watches = list(self._watches.values())
         return [w for w in watches if _within(name, w.name) or _within(w.name, name)]
 
@@ -758,7 +758,7 @@ def to_wire(name: str, value: object) -> Any:
         value: A bool, int, float, str, bytes, datetime, or a list or dict of these.
 
     Raises:
-        ParameterError: It is not valid for a parameter; the message says why, and what to do.
+        ParameterError: It is not valid for a parameter; the message gives reason and fix.
     """
     return _to_wire(name, value, 0)
 

@@ -67,8 +67,8 @@ class Arguments:
                 ``-r chatter:=talk`` and ``-p speed:=1.5``.
 
         Raises:
-            RosArgumentError: An argument is not valid; the message says which, where and what to
-                write instead.
+            RosArgumentError: An argument is not valid; the message gives the argument, the place
+                and the correct form.
         """
         return _Parser(arguments).parse()
 

@@ -1,4 +1,4 @@
-"""What every node has in roscpp and rospy: parameters, ``/rosout``, log levels, simulated time.
+"""The built-in services of roscpp and rospy: parameters, ``/rosout``, log levels, simulated time.
 
 Behaviour: ROS wiki, "rosout", "Clock", "roscpp" and "rospy/Overview/Logging"; levels and fields are
 ``rosgraph_msgs/Log``'s. As in rospy and roscpp, ``name`` is the node's and ``topics`` are those
@@ -53,7 +53,7 @@ class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
     """The parameters, log, clock and log level services of a ROS 1 node.
 
     The clock follows ``/use_sim_time``. roscpp and rospy read that parameter once, as they start;
-    we follow it, so that a screen started before the simulation has its time, too.
+    this node follows it, so that a screen started before the simulation has its time, too.
 
     Args:
         node: The node.

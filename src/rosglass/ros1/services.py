@@ -35,7 +35,7 @@ class Services:
         core: The node.
 
     Attributes:
-        types: What other nodes' servers announce.
+        types: The types that other nodes' servers announce.
     """
 
     def __init__(self, core: TcprosCore) -> None:
@@ -148,7 +148,7 @@ class ServiceTypes(Member):
         self._following = self._closed = False
 
     def of(self, name: str) -> ServerInfo | None:
-        """Return what a service's server announces; None until it has answered.
+        """Return the announcement of a service's server; None until it has answered.
 
         The first time, the server is probed in the background; the graph changes when it has
         answered. From any thread.
@@ -163,7 +163,7 @@ class ServiceTypes(Member):
         return None
 
     def note(self, name: str, peer: ServerInfo) -> None:
-        """Remember what a server announced to a client; in the loop's thread."""
+        """Store the announcement that a client has received; in the loop's thread."""
         nodes = self._core.graph.services().get(name)
         if nodes == [peer.node]:
             self._known[name] = (nodes, peer)
@@ -174,7 +174,7 @@ class ServiceTypes(Member):
             self._core.loop.call(self._compare)
 
     def close(self) -> None:
-        """Probe no more servers."""
+        """Stop probing servers."""
         self._closed = True
         self._core.remove(self)
 
