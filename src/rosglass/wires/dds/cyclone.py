@@ -1,9 +1,9 @@
-"""Cyclone DDS's own C interface, as much of it as ROS 2 needs, without the GIL while it works.
+"""The part of Cyclone DDS's C interface that ROS 2 needs; calls release the GIL.
 
-The PyPI package `cyclonedds` brings the library; its Python layer is not used, as it holds the GIL
+The PyPI package `cyclonedds` contains the library. Its Python layer is not used: it holds the GIL
 while it copies samples, announces a type description that keeps plain ROS 2 endpoints from
-matching, and takes 0.2 s to import. Entities are the numbers that the library gives them. What is
-declared here follows the headers of Eclipse Cyclone DDS 11 (``dds/dds.h``, ``dds/ddsc/*.h``).
+matching, and takes 0.2 s to import. Entities are the library's numbers for them. The declarations
+follow the headers of Eclipse Cyclone DDS 11 (``dds/dds.h``, ``dds/ddsc/*.h``).
 
 In this order: the library and its entities, quality of service, events, discovered participants
 and endpoints. Samples are in ``cyclone_samples``.
@@ -88,14 +88,14 @@ __all__ = [
 ]
 
 _log = logging.getLogger("rosglass.ros2")
-#: The version that everything was tried with, and the series with the interface declared here.
+#: The tested version, and the series with the interface declared here.
 VERSION, _SERIES = "11.0.1", "11."
-#: No limit, where a time span in nanoseconds is wanted.
+#: A time span without limit, in nanoseconds.
 INFINITY = 2**63 - 1
 
 _entity, _entity_p = c_int32, POINTER(c_int32)
 _int_p, _long_p, _size_p = POINTER(c_int32), POINTER(c_int64), POINTER(c_size_t)
-#: Result and arguments of every function that is called.
+#: Result and argument types of every function that is called.
 _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "dds_create_domain": (_entity, [c_uint32, c_char_p]),
     "dds_create_participant": (_entity, [c_uint32, pointer, pointer]),
@@ -161,14 +161,14 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "dds_qget_userdata": (c_bool, [pointer, POINTER(pointer), _size_p]),
     "dds_qget_prop": (c_bool, [pointer, c_char_p, POINTER(pointer)]),
 }
-#: What a call returns for an entity that is being deleted.
+#: Return code for an entity that is being deleted.
 GONE = -9
-#: What a call returns that has timed out.
+#: Return code of a call that timed out.
 TIMEOUT = -10
-#: What it returns for an entity that was deleted, whose number means nothing, or something else, or
-#: to which not even a domain is left.
+#: Return codes for a deleted entity: its number is unused, or another entity's, or no domain is
+#: left.
 _WRONG_ENTITY = (-3, -4, -12)
-#: Return codes (``dds/ddsrt/retcode.h``): words, and the error that a caller can handle.
+#: Return codes (``dds/ddsrt/retcode.h``): the message, and the error to raise.
 _CODES: dict[int, tuple[str, type[Error]]] = {
     -2: ("it is not supported", UnsupportedError),
     -3: ("a parameter is not accepted", UnsupportedError),
@@ -186,16 +186,16 @@ _CODES: dict[int, tuple[str, type[Error]]] = {
 
 @cache
 def library() -> Any:
-    """Return the library, whose functions release the GIL.
+    """Return the library with functions that release the GIL.
 
     Raises:
-        UnsupportedError: The package is not installed, or has another interface.
+        UnsupportedError: The package is not installed, or its interface differs.
     """
     return _declare(ctypes.CDLL(library_path()))
 
 
 def strange_version() -> str:
-    """Return why private layouts cannot be used, empty with the known version.
+    """Return why private layouts cannot be used, empty with the tested version.
 
     The public interface works with every version of the series.
     """
@@ -205,17 +205,17 @@ def strange_version() -> str:
 
 @cache
 def keeping() -> Any:
-    """Return the library, whose functions keep the GIL: for short calls that take no lock.
+    """Return the library with functions that keep the GIL, for short calls that take no lock.
 
-    Releasing the GIL costs more than such a call, and up to a switch interval to acquire it again.
-    A function must not be called this way if it waits for a lock that a thread of the library
-    holds while it calls Python.
+    Releasing the GIL costs more than such a call, and acquiring it again up to a switch interval.
+    Do not call a function this way if it waits for a lock that a thread of the library holds while
+    it calls Python.
     """
     return _declare(ctypes.PyDLL(library_path()))
 
 
 def check_alive(result: int, call: str, place: str) -> int:
-    """Check a call as :func:`check` does, if it can only fail because its entity was deleted."""
+    """Check a call like :func:`check`, where it can only fail because the entity was deleted."""
     return check(GONE if result in _WRONG_ENTITY else result, call, place)
 
 
@@ -223,9 +223,9 @@ def check(result: int, call: str, place: str) -> int:
     """Return the result of a call, or raise its error if it is negative.
 
     Args:
-        result: What the call returned.
-        call: The call, e.g. ``dds_create_reader``.
-        place: The topic or service it was made for, e.g. ``topic /scan``.
+        result: The return value of the call.
+        call: The called function, e.g. ``dds_create_reader``.
+        place: The topic or service it was called for, e.g. ``topic /scan``.
 
     Raises:
         NodeClosedError: The entity was deleted.
@@ -240,12 +240,12 @@ def check(result: int, call: str, place: str) -> int:
 
 
 def create_domain(domain: int, config: str) -> int:
-    """Create a domain of this process, to be deleted after all that belongs to it.
+    """Create a domain of this process; delete it after everything that belongs to it.
 
     Args:
         domain: Its number.
         config: Cyclone's configuration as XML, or as comma-separated XML and ``file://`` names;
-            CYCLONEDDS_URI is not looked at.
+            CYCLONEDDS_URI is ignored.
 
     Raises:
         ConnectionLostError: The process has the domain already, or the configuration is wrong.
@@ -265,9 +265,9 @@ def create_participant(domain: int, qos: Qos | None) -> int:
 
 
 def create_topic(participant: int, name: str, type_name: str, *, own_type: bool = False) -> int:
-    """Create a topic of opaque payloads, whose type matches by its name alone.
+    """Create a topic of opaque payloads, whose type matches by name alone.
 
-    It announces no type information, and matches endpoints that do.
+    It announces no type information, and still matches endpoints that do.
 
     Args:
         participant: The participant it belongs to.
@@ -295,10 +295,10 @@ def create_writer(participant: int, topic: int, qos: Qos | None, place: str) -> 
 
 
 def delete(entity: int) -> None:
-    """Delete an entity and its children; an entity that was deleted is no error.
+    """Delete an entity and its children; deleting it twice is no error.
 
-    Waits for its callbacks to return: it must not be called from one of them, or while holding a
-    lock that they need.
+    Waits for its callbacks to return: do not call it from one of them, or while holding a lock that
+    they need.
     """
     library().dds_delete(entity)
 
@@ -311,7 +311,7 @@ def guid(entity: int) -> bytes:
 
 
 def handle(entity: int) -> int:
-    """Return the number by which samples and matches name a reader or writer."""
+    """Return the number that identifies a reader or writer in samples and matches."""
     value = c_uint64()
     result = library().dds_get_instance_handle(entity, ctypes.byref(value))
     check_alive(result, "dds_get_instance_handle", f"entity {entity}")
@@ -319,9 +319,9 @@ def handle(entity: int) -> int:
 
 
 def sertype(entity: int) -> int:
-    """Return the address of the type of a reader's, writer's or topic's samples.
+    """Return the address of the sample type (sertype) of a reader, writer or topic.
 
-    It lives as long as the entity does.
+    It is valid as long as the entity exists.
     """
     value = pointer()
     result = library().dds_get_entity_sertype(entity, ctypes.byref(value))
@@ -330,14 +330,14 @@ def sertype(entity: int) -> int:
 
 
 def start_at_first_sample(reader: int) -> str:
-    """Make a reliable reader request all samples that later matched writers have for it.
+    """Make a reliable reader request all samples that writers matched later have for it.
 
     Otherwise a volatile reader starts at the newest sample of another vendor's writer, and loses
-    those from before it discovered the writer. A writer sends volatile readers none from before it
-    discovered them; after a reconnection, samples may be received again.
+    those sent before it discovered the writer. A writer sends a volatile reader no samples from
+    before it discovered the reader; after a reconnection, samples may be received again.
 
     Returns:
-        Why it is not possible on this machine, empty if it is.
+        Why this is not possible on this machine, empty if it is.
     """
     if strange := strange_version():
         return strange
@@ -398,10 +398,10 @@ class _Descriptor(ctypes.Structure):
 
 
 #: One octet at offset 0, then the end (``dds/ddsc/dds_opcodes.h``): the library checks that a
-#: payload has it, and takes the rest of the payload as it is.
+#: payload has that octet, and leaves the rest alone.
 _OPS = (c_uint32 * 3)(0x01010000, 0, 0)
-#: Sizes of native samples, by which the library tells types of one name apart. They say nothing
-#: about payloads, and no native sample is ever made.
+#: Sizes of native samples, by which the library distinguishes types of one name. They are unrelated
+#: to payloads: no native sample is ever created.
 _own_sizes = itertools.count(2)
 
 
@@ -421,22 +421,22 @@ def _shared(type_name: str) -> _Descriptor:
     return _descriptor(type_name, 1)
 
 
-#: Where a ``dds_reader`` has the pointer to its ``ddsi_reader``: somewhere in these bytes.
+#: The bytes of a ``dds_reader`` that contain the pointer to its ``ddsi_reader``.
 _DDSI_READER = slice(400, 1000)
-#: Where the flags of a ``ddsi_reader`` are, from its pointer back to the ``dds_reader``: behind
-#: those to the history and the profile. Two of the flags.
+#: Offset of a ``ddsi_reader``'s flags from its pointer back to the ``dds_reader``: the pointers to
+#: the history and the profile are in between. Two of the flags.
 _FLAGS = 24
 _RELIABLE, _HANDLE_AS_TRANSIENT_LOCAL = 1, 2
-#: Where pointers of this process end.
+#: Upper limit of pointers in this process.
 _LAST_ADDRESS = 2**47
 
 
 def _reader_flags(address: int, identity: bytes) -> int | None:
-    """Return where the flags of a reliable reader are, by its ``dds_reader``; None when unknown.
+    """Return the address of a reliable reader's flags from its ``dds_reader``; None if not found.
 
-    Memory is read by way of the kernel, which refuses addresses that are not this process's.
+    Memory is read through the kernel, which refuses addresses outside this process.
     """
-    # A GUID is four numbers, big endian for others.
+    # A GUID is four numbers, sent in big endian.
     own = struct.pack("=4I", *struct.unpack(">4I", identity))
     back = struct.pack("=Q", address)
     with suppress(OSError), open("/proc/self/mem", "rb", buffering=0) as memory:  # noqa: PTH123
@@ -470,10 +470,10 @@ def _matched(call: str, entity: int) -> list[int]:
 
 
 def library_path() -> str:
-    """Return where the installed package has Cyclone DDS's library.
+    """Return the path of Cyclone DDS's library in the installed package.
 
     Raises:
-        UnsupportedError: It is not installed, or in a version that cannot be used.
+        UnsupportedError: It is not installed, or its version cannot be used.
     """
     remedy = 'install it with: pip install "rosglass[dds]"'
     try:
@@ -511,7 +511,7 @@ def _declare(loaded: Any) -> Any:
     return loaded
 
 
-#: The encoding of ROS 2's messages, as data representations are numbered (DDS-XTypes 1.3, 7.6.3.1).
+#: Data representation number of ROS 2's encoding (DDS-XTypes 1.3, 7.6.3.1).
 XCDR1 = 0
 
 _AUTOMATIC, _MANUAL_BY_TOPIC = 0, 2
@@ -519,7 +519,7 @@ _UNLIMITED = -1
 
 
 class Qos:
-    """A set of policies.
+    """A set of QoS policies.
 
     Args:
         borrowed: Address of policies that their owner frees; None for a new, empty set.
@@ -529,7 +529,7 @@ class Qos:
     """
 
     def __init__(self, borrowed: int | None = None) -> None:
-        # Last, as Ctrl-C may come in between: what was not created is not freed.
+        # Set last: after Ctrl-C in between, policies that were not created are not freed.
         self._owned = False
         self.address: int = library().dds_create_qos() if borrowed is None else borrowed
         self._owned = borrowed is None
@@ -543,7 +543,7 @@ class Qos:
         library().dds_qset_userdata(self.address, data, len(data))
 
     def set_history(self, depth: int | None) -> None:
-        """Keep the newest `depth` samples, or all with None."""
+        """Keep the newest `depth` samples; None keeps all."""
         library().dds_qset_history(self.address, int(depth is None), depth or 0)
 
     def wait_at_most(self, seconds: float) -> None:
@@ -551,7 +551,7 @@ class Qos:
         library().dds_qset_reliability(self.address, 1, round(seconds * 1e9))
 
     def user_data(self) -> bytes:
-        """Return the bytes attached to the entity, empty when there are none."""
+        """Return the bytes attached to the entity, empty if it has none."""
         value, size = c_void_p(), c_size_t()
         if not library().dds_qget_userdata(self.address, byref(value), byref(size)):
             return b""
@@ -562,7 +562,7 @@ class Qos:
         return data
 
     def property(self, name: str) -> str:
-        """Return a named property, empty when there is none."""
+        """Return a named property, empty if it is missing."""
         value = c_void_p()
         if not library().dds_qget_prop(self.address, name.encode(), byref(value)):
             return ""
@@ -582,7 +582,7 @@ class Qos:
         return found
 
     def profile(self) -> QoS:
-        """Return the policies that ROS 2 has; those not announced have DDS's defaults.
+        """Return the policies that exist in ROS 2, with DDS's defaults for those not announced.
 
         Discovery does not announce the depth of remote endpoints.
         """
@@ -594,7 +594,7 @@ class Qos:
         )
         if lib.dds_qget_reliability(self.address, byref(kind), byref(span)) and kind.value:
             reliability = Reliability.RELIABLE
-        # Transient and persistent are more than transient local.
+        # Transient and persistent are stronger than transient local.
         if lib.dds_qget_durability(self.address, byref(kind)) and kind.value:
             durability = Durability.TRANSIENT_LOCAL
         if lib.dds_qget_history(self.address, byref(kind), byref(depth)) and kind.value:
@@ -622,7 +622,7 @@ class Qos:
 
 
 def qos_of(profile: QoS, *, writer: bool, user_data: bytes = b"") -> Qos:
-    """Return the policies of a writer or reader with ROS 2's `profile`."""
+    """Return the DDS policies of a writer or reader with the ROS 2 profile `profile`."""
     qos, lib = Qos(), library()
     address = qos.address
     reliable = profile.reliability is Reliability.RELIABLE
@@ -649,7 +649,7 @@ def qos_of(profile: QoS, *, writer: bool, user_data: bytes = b"") -> Qos:
     )
     if writer:
         lib.dds_qset_writer_data_lifecycle(address, False)
-    # XCDR1 alone: ROS 2 knows no other encoding.
+    # XCDR1 alone: ROS 2 uses no other encoding.
     lib.dds_qset_data_representation(address, 1, byref(c_int16(XCDR1)))
     if user_data:
         qos.set_user_data(user_data)
@@ -660,12 +660,12 @@ def _duration(nanoseconds: int) -> Duration | None:
     return None if nanoseconds in (0, INFINITY) else Duration(nanoseconds)
 
 
-#: Conditions that a wait returns at most.
+#: Maximum number of conditions that a wait returns.
 _KEYS = 64
 
 
 class Event(IntFlag):
-    """What can happen to a reader or writer (``dds_status_id_t``)."""
+    """Events of a reader or writer (``dds_status_id_t``)."""
 
     NONE = 0
     SAMPLE_LOST = 1 << 5
@@ -702,12 +702,12 @@ def alive_writers(reader: int) -> int:
 
 
 def lost_samples(reader: int) -> int:
-    """Return how many samples a reader knows to be lost, in all; resets the event."""
+    """Return a reader's total number of lost samples; resets the event."""
     return _status(reader, "sample_lost")[0]
 
 
 def _status(entity: int, what: str) -> list[int]:
-    """Return the numbers that a status begins with (OMG DDS 1.4, section 2.2.4.1)."""
+    """Return the first numbers of a status (OMG DDS 1.4, section 2.2.4.1)."""
     numbers, call = (c_int32 * 8)(), f"dds_get_{what}_status"
     check_alive(getattr(library(), call)(entity, numbers), call, f"entity {entity}")
     return numbers[:]
@@ -717,7 +717,7 @@ class Waitset:
     """Waits, without the GIL, until one of several conditions holds.
 
     Args:
-        participant: Who owns it.
+        participant: The participant that owns it.
     """
 
     def __init__(self, participant: int) -> None:
@@ -731,28 +731,28 @@ class Waitset:
         self._wait = lib.dds_waitset_wait
 
     def attach(self, entity: int, key: int) -> None:
-        """Wait for a condition, or for an entity with a status mask, too; `key` must not be 0."""
+        """Also wait for a condition, or an entity with a status mask; `key` must not be 0."""
         check(library().dds_waitset_attach(self._entity, entity, key), "dds_waitset_attach", "")
 
     def wait(self, timeout: float | None) -> list[int]:
-        """Return the keys of what was triggered, empty after `timeout` seconds or :meth:`wake`."""
+        """Return the triggered keys, none after `timeout` seconds or :meth:`wake`."""
         keys = self._keys
         span = INFINITY if timeout is None else int(timeout * 1e9)
         count = self._wait(self._entity, keys, _KEYS, span)
         if count < 0:
             check(count, "dds_waitset_wait", "waitset")
-        found: list[int] = keys[:count]  # no more than there are
+        found: list[int] = keys[:count]  # `count` may exceed the room
         if 0 in found:
             library().dds_take_guardcondition(self._guard, ctypes.byref(c_bool()))
             found = [key for key in found if key]
         return found
 
     def wake(self) -> None:
-        """Make :meth:`wait` return, in another thread."""
+        """Make :meth:`wait` in another thread return."""
         library().dds_set_guardcondition(self._guard, True)
 
     def close(self) -> None:
-        """Delete it; no thread may be waiting."""
+        """Delete the waitset; no thread may be waiting."""
         for entity in (self._guard, self._entity):
             delete(entity)
 
@@ -776,14 +776,14 @@ class Discovered:
     Attributes:
         alive: Whether it exists; if not, only `guid` is known.
         guid: Its GUID, 16 bytes.
-        handle: Its number within this process, as with samples and matches.
+        handle: Its number within this process, as in samples and matches.
         participant: The GUID of its participant, or its own.
         user_data: The user data that it announces.
         topic: Its DDS topic, empty for a participant.
         type: Its DDS type, empty for a participant.
         qos: Its profile.
-        representations: The numbers of the encodings that a writer offers or a reader takes; empty
-            if none are announced, which stands for XCDR1 alone.
+        representations: The numbers of the encodings that a writer offers or a reader accepts;
+            empty if none are announced, which means XCDR1 alone.
         properties: Those of `__NetworkAddresses`, `__Hostname`, `__Pid` and `__ProcessName` that a
             participant announces.
     """
@@ -819,12 +819,12 @@ def take(reader: int, topic: BuiltinTopic, place: str) -> list[Discovered]:
 
 
 def matched_publication(reader: int, handle: int) -> Discovered | None:
-    """Return the matched writer of a reader with a handle, None if it has left."""
+    """Return a reader's matched writer by its handle, None if it has left."""
     return _matched_endpoint(library().dds_get_matched_publication_data(reader, handle), handle)
 
 
 def matched_subscription(writer: int, handle: int) -> Discovered | None:
-    """Return the matched reader of a writer with a handle, None if it has left."""
+    """Return a writer's matched reader by its handle, None if it has left."""
     return _matched_endpoint(library().dds_get_matched_subscription_data(writer, handle), handle)
 
 

@@ -1,25 +1,25 @@
 """Identities of samples over Cyclone DDS: the writer of a request, and the request of a reply.
 
-DDS implementations other than Cyclone do not touch a reply's payload: it carries the identity of
-its request among the inline QoS parameters of its RTPS submessage (OMG DDS-RPC 1.0, section 7.8.2;
-RTPS 2.5, sections 8.3.8.2, 9.4.2.11 and 9.6.3), which Cyclone DDS neither hands on nor writes.
-Functions that it makes and reads samples with are replaced, to do both:
+DDS implementations other than Cyclone leave a reply's payload alone: the identity of its request is
+among the inline QoS parameters of its RTPS submessage (OMG DDS-RPC 1.0, section 7.8.2; RTPS 2.5,
+sections 8.3.8.2, 9.4.2.11 and 9.6.3). Cyclone DDS neither passes these on nor writes them. This
+module replaces some of the functions with which it creates and serializes samples, to do both:
 
-- The one that makes a sample from packets (``from_ser``) notes what the first of them says: the
-  sample's number, and the inline QoS that says which request a reply answers.
-- A reply that is marked begins with its inline QoS. ``get_size`` leaves that out; ``to_ser_ref``,
-  asked for the bytes that follow a submessage's header, returns the inline QoS with them and sets
-  the header's flag for it; ``to_ser_unref`` takes them back. The library does the rest: fragments,
+- ``from_ser`` creates a sample from packets. The replacement records the sample's number from the
+  first packet, and the inline QoS with the request that a reply answers.
+- A marked reply begins with its inline QoS. ``get_size`` does not count it; ``to_ser_ref`` returns
+  the bytes that follow a submessage's header with the inline QoS in front, and sets the header's
+  flag for it; ``to_ser_unref`` releases them. The library does the rest: fragments,
   retransmissions, several networks.
 
 How functions are replaced: each topic's type points to a table of functions (``ddsi_serdata_ops``,
-meant for other languages' type support); a topic made here gets a type of its own, which points to
-a copy of that table with some functions replaced. That takes private layouts, those of Cyclone DDS
-11.0.1 on 64-bit Linux. They are tested once, on memory of our own, before anything relies on them.
+meant for other languages' type support). A topic created here gets its own type, which points to a
+copy of that table with some functions replaced. This needs private layouts, those of Cyclone DDS
+11.0.1 on 64-bit Linux. They are tested once, on our own memory, before anything relies on them.
 
-All types share one copy of each table. The library finds instances by the hash of a sample and by
-its table, and all samples without key have one hash: with a table for each type, the 33rd instance
-of that hash makes its hash table (hopscotch hashing with 32 slots) double until memory ends.
+All types share one copy of each table. The library finds instances by a sample's hash and table,
+and all samples without key have the same hash: with a table for each type, the 33rd instance of
+that hash makes its hash table (hopscotch hashing with 32 slots) double until memory runs out.
 
 A copy is never freed, as samples outlive readers, writers and topics.
 """
@@ -75,9 +75,9 @@ __all__ = [
 
 _log = logging.getLogger("rosglass.ros2")
 
-#: ``ddsi_serdata_kind`` of a sample that has data.
+#: ``ddsi_serdata_kind`` of a sample with data.
 SDK_DATA = 2
-#: ``ddsi_sertype.serdata_ops``, and how many functions it has.
+#: Place of ``ddsi_sertype.serdata_ops``, and the number of functions in that table.
 _OPS_OF_TYPE = 8
 _OPS = 17
 
@@ -86,7 +86,7 @@ _lock = threading.Lock()
 
 
 class Hook(ABC):
-    """Replaces functions of the types of topics."""
+    """Replaces serialization functions in the types of topics."""
 
     def __init__(self) -> None:
         self.problem = ""
@@ -95,7 +95,7 @@ class Hook(ABC):
         self._tables: dict[int, tuple[Any, dict[int, Any]]] = {}
 
     def create_topic(self, participant: int, name: str, type_name: str) -> int:
-        """Create a topic whose type has functions replaced; see `cyclone.create_topic`."""
+        """Create a topic whose type has replaced functions; see `cyclone.create_topic`."""
         with _lock:
             topic = cyclone.create_topic(participant, name, type_name, own_type=True)
             try:
@@ -119,19 +119,19 @@ class Hook(ABC):
                 self._install(sertype)
 
     def function(self, sertype: int, place: int) -> Any:
-        """Return what the library calls for a type, by the place in the table."""
+        """Return the function that the library calls for a type, by its place in the table."""
         return _table_of(sertype)[place]
 
     @abstractmethod
     def replace(self, originals: Any) -> dict[int, Any]:
-        """Return functions by their place in the table, which call the original ones."""
+        """Return the replacements, which call the original functions, by place in the table."""
 
     @abstractmethod
     def test(self, sertype: int) -> None:
-        """Raise when the functions do not do what they should with samples of a type."""
+        """Raise an error if the functions do not work with samples of a type."""
 
     def check(self, sertype: int) -> str:
-        """Replace a type's functions; return why that cannot be, empty when it is done."""
+        """Replace a type's functions; return why that is not possible, empty if it is."""
         if strange := cyclone.strange_version():
             return strange
         if sys.platform != "linux" or sys.byteorder != "little":
@@ -172,7 +172,7 @@ def _table_of(sertype: int) -> Any:
 
 
 def make_sample(sertype: int, data: bytes) -> int:
-    """Return the address of a new serdata, for tests; raises ValueError when there is none."""
+    """Return the address of a new serdata, for tests; raises ValueError if none is created."""
     part = (c_size_t * 2)(ctypes.cast(c_char_p(data), c_void_p).value or 0, len(data))
     made = keeping().ddsi_serdata_from_ser_iov(sertype, SDK_DATA, 1, part, len(data))
     if not made:
@@ -181,19 +181,19 @@ def make_sample(sertype: int, data: bytes) -> int:
 
 
 def expect(found: object, wanted: object) -> None:
-    """Raise ValueError when a test finds something else than wanted."""
+    """Raise ValueError if a test finds something other than `wanted`."""
     if found != wanted:
         raise ValueError(f"{found!r} instead of {wanted!r}")
 
 
 #: An unknown GUID.
 UNKNOWN_GUID = bytes(16)
-#: The sequence number of nothing (RTPS 2.5, section 8.3.5.4).
+#: SEQUENCENUMBER_UNKNOWN (RTPS 2.5, section 8.3.5.4).
 UNKNOWN_SEQUENCE = -(2**32)
 
 _DATA, _DATA_FRAG = 0x15, 0x16
 _LITTLE_ENDIAN, _INLINE_QOS = 0x01, 0x02
-#: Bytes from a submessage's beginning to where octetsToInlineQos counts from.
+#: Offset in a submessage from which octetsToInlineQos counts.
 _COUNTED_FROM = 8
 #: flags, octetsToInlineQos, writerId, writerSN of a DATA or DATA_FRAG submessage.
 _HEADER = struct.Struct("=xB4xH4xIiI")
@@ -207,8 +207,8 @@ class Identity(NamedTuple):
     """The identity of a sample.
 
     Attributes:
-        guid: Of its writer (a client may put its reader of replies in that place), 16 bytes.
-        sequence: Its number there.
+        guid: The writer's GUID (a client may give that of its reply reader instead), 16 bytes.
+        sequence: The writer's number for it.
     """
 
     guid: bytes
@@ -220,11 +220,11 @@ class Origin(NamedTuple):
 
     Attributes:
         entity: The last 4 bytes of its writer's GUID.
-        sequence: Its number there.
-        related: The request that it answers, or what a client tells of itself in a request; None
-            when it carries no such identity.
-        prefix: What its writer's GUID begins with, empty where that is not known.
-        taken: Whether it was handed on already, while it was received.
+        sequence: The writer's number for it.
+        related: The request that it answers, or the identity that a client gives in a request; None
+            if it has no such identity.
+        prefix: The beginning of its writer's GUID, empty if unknown.
+        taken: Whether it was already delivered on the receiving thread.
     """
 
     entity: bytes
@@ -235,11 +235,11 @@ class Origin(NamedTuple):
 
     @property
     def guid(self) -> bytes:
-        """Its writer's GUID, empty where that is not known."""
+        """Its writer's GUID, empty if unknown."""
         return self.prefix + self.entity if self.prefix else b""
 
     def may_be_of(self, guid: bytes) -> bool:
-        """Return whether its writer may be the one with a GUID."""
+        """Return whether its writer may be the one with the GUID `guid`."""
         return guid.startswith(self.prefix) and guid.endswith(self.entity)
 
 
@@ -252,12 +252,12 @@ def inline_qos(identity: Identity) -> bytes:
 
 
 def read_origin(submessage: bytes) -> Origin | None:
-    """Return what a submessage tells of the sample in it; None when it carries no sample.
+    """Return the origin of the sample in a submessage; None if it has no sample.
 
     Args:
-        submessage: A DATA or DATA_FRAG submessage up to its payload, as Cyclone DDS leaves it once
-            it has looked at it: the numbers of its fixed part in the machine's byte order, its
-            parameters as they came.
+        submessage: A DATA or DATA_FRAG submessage up to its payload, after Cyclone DDS has parsed
+            it: the numbers of its fixed part in the machine's byte order, its parameters as
+            received.
     """
     if len(submessage) < _HEADER.size or submessage[0] not in (_DATA, _DATA_FRAG):
         return None
@@ -271,7 +271,7 @@ def read_origin(submessage: bytes) -> Origin | None:
 
 
 def _find_related(data: bytes, at: int, order: str) -> Identity | None:
-    """Return the identity in a parameter list, which may be any bytes."""
+    """Return the identity in a parameter list; the list may be malformed."""
     parameter = struct.Struct(f"{order}HH")
     while at + parameter.size <= len(data):
         pid, size = parameter.unpack_from(data, at)
@@ -294,14 +294,14 @@ if TYPE_CHECKING:
 
 #: Place in ``ddsi_serdata_ops``.
 _FROM_SER = 2
-#: ``ddsi_rdata``: rmsg, nextfrag, min, maxp1, submsg_zoff, payload_zoff, keyhash_zoff; and where
-#: the packet begins that a ``ddsi_rmsg`` holds.
+#: ``ddsi_rdata``: rmsg, nextfrag, min, maxp1, submsg_zoff, payload_zoff, keyhash_zoff; and the
+#: offset of the packet in a ``ddsi_rmsg``.
 _RDATA = struct.Struct("=QQIIHHH2x")
 _PACKET = 48
 _RTPS_HEADER = 20
 _INFO_SOURCE = 0x0C
-#: Origins of a reader's samples that are kept until they are taken. Those of samples that
-#: it drops unread make room when their memory is used again, or here.
+#: Maximum number of origins kept for a reader's samples until they are taken. Origins of samples
+#: dropped unread are removed when their memory is reused, or by this limit.
 _MAX_ORIGINS = 16384
 
 _from_ser_type = c_void_p, c_void_p, c_int, c_void_p, c_size_t
@@ -314,8 +314,8 @@ _readers: dict[int, Origins] = {}
 class Origins:
     """The origins of a reader's samples.
 
-    Each reader has its own: a sample that is dropped unread leaves its origin behind, under an
-    address that may be another reader's sample's later.
+    Each reader has its own: a sample that is dropped unread leaves its origin behind, and its
+    address may later be that of another reader's sample.
     """
 
     def __init__(self) -> None:
@@ -330,15 +330,15 @@ class Origins:
         return topic
 
     def follow(self, sertype: int) -> None:
-        """Note the origins of the samples of a type, by its address."""
+        """Record the origins of samples of a type, by the type's address."""
         self._type = sertype
         _readers[sertype] = self
 
     def of(self, serdata: int) -> Origin | None:
         """Return and remove the origin of a sample; None if it was sent within this process.
 
-        A sample that came within this process may be given the origin of one that was dropped
-        unread: see :meth:`Origin.may_be_of`.
+        For a sample from this process, the result may be the origin of one that was dropped unread:
+        see :meth:`Origin.may_be_of`.
 
         Args:
             serdata: The sample's address, while the caller still holds a reference to it.
@@ -348,24 +348,24 @@ class Origins:
     def hasten(self, take: Take | None) -> None:
         """Deliver samples of other processes on the thread that receives them.
 
-        It saves waking a thread, a fifth of a service call's time. The library is in the middle of
-        something then, and waits: `take` must not call it but to write, nor wait for anything.
+        This saves waking a thread, a fifth of a service call's time. The library waits for `take`
+        in the middle of its work: `take` must not call it except to write, and must not block.
 
         Args:
-            take: Takes a sample's origin and payload; returns whether it did. What it did not take
-                comes later, with the same origin. None ends it.
+            take: Takes a sample's origin and payload, and returns whether it took them. Samples
+                that it declines are delivered later, with the same origin. None ends this.
         """
         self._take = take
 
     def close(self) -> None:
-        """Remove all origins; for a reader that was deleted."""
+        """Remove all origins, after the reader was deleted."""
         self._take = None
         if _readers.get(self._type) is self:
             del _readers[self._type]
         self._noted.clear()
 
     def note(self, serdata: int, fragments: int) -> None:
-        """Note the origin of a sample that was just made from fragments, and deliver it."""
+        """Record the origin of a sample just created from fragments, and deliver it."""
         self._noted.pop(serdata, None)
         found = _read(fragments)
         if found is None:
@@ -381,7 +381,7 @@ class Origins:
 
 
 class _Reading(Hook):
-    """Notes where samples come from."""
+    """Records the origins of received samples."""
 
     def replace(self, originals: Any) -> dict[int, Any]:
         small, big = _FromSer(originals[_FROM_SER]), _FromSerFree(originals[_FROM_SER])
@@ -411,7 +411,7 @@ class _Reading(Hook):
         rdata = ctypes.create_string_buffer(
             _RDATA.pack(place, 0, 0, len(data), 20, len(before), 0), _RDATA.size
         )
-        # Through the table, as the library does it.
+        # Called through the table, as in the library.
         from_ser = _FromSer(self.function(sertype, _FROM_SER))
         origins = Origins()
         origins.follow(sertype)
@@ -424,12 +424,12 @@ class _Reading(Hook):
         expect(found, {serdata: sent})
 
 
-#: What reads the origins of received samples; its `problem` says why it cannot.
+#: Reads the origins of received samples; `problem` is the reason why it cannot.
 reading = _Reading()
 
 
 def _read(fragments: int) -> Origin | None:
-    """Return the origin of a sample that was made from fragments, the first of which is given."""
+    """Return the origin of a sample from the address of its first fragment."""
     rmsg, _, first, _, submessage, end, _ = _RDATA.unpack(string_at(fragments, _RDATA.size))
     if first != 0 or not rmsg or end <= submessage:
         return None
@@ -439,7 +439,7 @@ def _read(fragments: int) -> Origin | None:
 
 
 def _prefix(rmsg: int, submessage: int) -> bytes:
-    """Return whose submessage it is; empty where that takes a closer look at the packet."""
+    """Return the sender's GUID prefix; empty if that would take parsing the whole packet."""
     packet = string_at(rmsg + _PACKET, submessage)
     at = _RTPS_HEADER
     while at + 4 <= submessage:
@@ -452,21 +452,21 @@ def _prefix(rmsg: int, submessage: int) -> bytes:
 
 #: Places in ``ddsi_serdata_ops``.
 _GET_SIZE, _TO_SER_REF, _TO_SER_UNREF = 1, 7, 8
-#: ``ddsi_xmsg``: maxsz, sz, have_params, refd_payload, which come before refd_payload_iov; and how
-#: far behind its beginning kind and data are.
+#: ``ddsi_xmsg``: maxsz, sz, have_params, refd_payload, which precede refd_payload_iov; and the
+#: offsets of kind and data.
 _XMSG = struct.Struct("=QQi4xQ")
 _XMSG_ROOM = 128
 _XMSG_KIND, _XMSG_DATA = 24, 112
 _XMSG_KINDS = (1, 2, 3)
-#: What an xmsg has before its payload, by whether that begins the sample and by its size: where the
-#: header of DATA or DATA_FRAG begins (a sample's first follows INFO_TS), its id, octetsToInlineQos.
+#: Headers before an xmsg's payload, by whether the payload begins the sample and by their size: the
+#: offset of DATA or DATA_FRAG (a sample's first follows INFO_TS), its id, octetsToInlineQos.
 _FORMS = {(True, 36): (12, 0x15, 16), (True, 48): (12, 0x16, 28), (False, 36): (0, 0x16, 28)}
-#: ``ddsi_xmsg_data``: where INFO_SRC and INFO_DST begin, with their ids, and then the rest.
+#: ``ddsi_xmsg_data``: offsets and ids of INFO_SRC and INFO_DST, then the offset of the rest.
 _INFOS = ((0, 0x0C), (24, 0x0E))
 _SUBMESSAGES = 40
 _INLINE_QOS = 0x02
-#: Begins a sample with inline QoS, the payload's own header coming after that: an encapsulation
-#: header with unused options, and the first parameter.
+#: Marks a sample that begins with inline QoS, followed by the payload with its own header: an
+#: encapsulation header with unused options, and the first parameter.
 _MARK = b"\x00\x01\xa5\x00"
 _MARKED = _MARK + b"\x83\x00\x18\x00"
 _QOS_SIZE = 60
@@ -482,17 +482,17 @@ _fragments: dict[int, Any] = {}
 
 
 def create_reply_topic(participant: int, name: str, type_name: str) -> int:
-    """Create a topic for a writer that :func:`prepare` is applied to; see `cyclone.create_topic`.
+    """Create a topic for :func:`prepare_reply_writer`'s writer; see `cyclone.create_topic`.
 
-    The writer must not be used in the main thread: an exception raised there by a signal would end
-    up in the library.
+    Do not use the writer in the main thread: an exception that a signal raises there would be lost
+    in the library.
     """
     return writing.create_topic(participant, name, type_name)
 
 
 def prepare_reply_writer(writer: int) -> None:
-    """Let a writer be given to :func:`write`, before it writes anything."""
-    # As its topic's type is not the library's usual one, it has a type of its own.
+    """Prepare a writer for :func:`write_reply`, before it writes anything."""
+    # As its topic's type is not the library's usual one, the writer has its own type.
     writing.prepare(cyclone.sertype(writer))
 
 
@@ -502,12 +502,12 @@ def write_reply(
     """Send a payload with inline QoS that relates it to another sample.
 
     Args:
-        writer: One that :func:`prepare` was applied to.
-        identity: What it relates to.
+        writer: A writer prepared by :func:`prepare_reply_writer`.
+        identity: The other sample's identity.
         parts: The payload in one piece or several; it begins with the encapsulation header.
 
     Returns:
-        Whether it was sent with inline QoS; not if no reader outside this process is matched.
+        Whether it was sent with inline QoS; False if no reader outside this process is matched.
     """
     _sending.identity = False
     begin = _MARK + inline_qos(identity)
@@ -517,9 +517,9 @@ def write_reply(
 
 
 class _Writing(Hook):
-    """Sends inline QoS with samples that are marked."""
+    """Sends inline QoS with marked samples."""
 
-    #: From a serdata's beginning to its encapsulation header.
+    #: Offset of the encapsulation header in a serdata.
     _header = 0
 
     def replace(self, originals: Any) -> dict[int, Any]:
@@ -552,14 +552,14 @@ class _Writing(Hook):
 
     @staticmethod
     def _give(marked: int, offset: int, size: int, part: int) -> None:
-        """Fill in where the bytes are that follow a submessage's header, and how many."""
+        """Fill in the address and size of the bytes that follow a submessage's header."""
         begin = marked + _BEFORE + offset
         if _flag(part, first=offset == 0):
             _sending.identity = True
             if offset == 0:
                 begin = marked + len(_MARK)
             else:
-                # Each fragment has it: RustDDS looks at the last one that it gets.
+                # Each fragment has it: RustDDS reads it from the last one that it receives.
                 qos = string_at(marked + len(_MARK), _QOS_SIZE)
                 held = ctypes.create_string_buffer(qos + string_at(begin, size), _QOS_SIZE + size)
                 begin = ctypes.addressof(held)
@@ -575,7 +575,7 @@ class _Writing(Hook):
         serdata = make_sample(sertype, _MARK + qos + data)
         lib = keeping()
         expect(lib.ddsi_serdata_size(serdata), len(data))
-        # What stays within this process has no header to be flagged.
+        # Samples within this process have no header to flag.
         expect(_bytes_of(serdata, 0, len(data), None), data)
         expect(_bytes_of(serdata, 4, 8, None), data[4:])
         for first, wanted in ((True, qos + data), (False, qos + data[4:])):
@@ -605,16 +605,16 @@ class _Writing(Hook):
         return string_at(serdata + self._header, len(_MARKED)) == _MARKED
 
 
-#: What writes inline QoS; its `problem` says why it cannot.
+#: Writes inline QoS; `problem` is the reason why it cannot.
 writing = _Writing()
 
 
 def _flag(part: int, *, first: bool) -> bool:
-    """Say in a submessage's header that inline QoS follows; returns False when there is no header.
+    """Flag in a submessage's header that inline QoS follows; return False if it has no header.
 
     Args:
-        part: Where the library wants the payload's address; an xmsg's refd_payload_iov, unless the
-            sample is about to be copied for a reader in this process.
+        part: The place for the payload's address: an xmsg's refd_payload_iov, unless the sample is
+            about to be copied for a reader in this process.
         first: Whether the payload begins the sample.
     """
     room, size, parameters, referred = _XMSG.unpack(string_at(part - _XMSG.size, _XMSG.size))
@@ -638,7 +638,7 @@ def _flag(part: int, *, first: bool) -> bool:
 
 
 def _bytes_of(serdata: int, offset: int, size: int, packet: bytearray | None) -> bytes:
-    """Return what is sent of a sample behind the headers in `packet`, if any."""
+    """Return the bytes of a sample that are sent after the headers in `packet`, if any."""
     room = ctypes.create_string_buffer(_XMSG.size + _XMSG_DATA + 8)
     part = ctypes.addressof(room) + _XMSG.size
     if packet is not None:

@@ -1,8 +1,8 @@
-"""Payloads in and out of Cyclone DDS, as they are on the wire.
+"""Reads and writes payloads of Cyclone DDS in their wire format.
 
-The library keeps a sample in a counted block of memory of its own (`serdata`). Reading hands such
-references over; :func:`payload` turns one into bytes, or into a view that gives the reference back
-when the last user of the view is gone. The block outlives reader, participant and domain.
+The library keeps a sample in a reference-counted block of memory (`serdata`). Reading returns such
+references; :func:`payload` turns one into bytes, or into a view that releases the reference with
+its last user. The block outlives reader, participant and domain.
 """
 
 from __future__ import annotations
@@ -21,32 +21,32 @@ if TYPE_CHECKING:
 
 __all__ = ["COPIED", "Batch", "Taken", "discard", "payload", "sample", "send"]
 
-#: Payloads up to this size in bytes are copied: a view costs more than that.
+#: Payloads up to this size in bytes are copied: a view would cost more.
 COPIED = 16 * 1024
 
 _ANY_STATE = 0x7F
 _SDK_DATA = 2
-#: Payload, time stamp and handle of the writer, and what `describe` returned.
+#: Payload, time stamp, handle of the writer, and the result of `describe`.
 Taken = tuple["bytes | memoryview", int, int, Any]
 #: ``dds_sample_info_t``: valid_data, source_timestamp, publication_handle of its 64 bytes.
 _INFO = struct.Struct("=12x?3xq8xQ24x")
-#: What ctypes.string_at() does, in one step.
+#: Does the same as ctypes.string_at(), in one step.
 _copy: Callable[[int, int], bytes] = ctypes.PYFUNCTYPE(ctypes.py_object, c_void_p, c_ssize_t)(
     ("PyBytes_FromStringAndSize", ctypes.pythonapi)
 )
 
 
 class Batch:
-    """Room for the samples that one call takes from a reader; not for several threads at once.
+    """A buffer for the samples that one call takes from a reader; for one thread at a time.
 
     Args:
         describe: Returns a description of a sample, by the address of its serdata, which is valid
             during the call.
-        size: Samples at most.
+        size: Maximum number of samples.
 
     Attributes:
-        full: Whether the last call filled all of it, so that there may be more: nothing tells of
-            samples that were left.
+        full: Whether the last call filled the buffer, so that more may wait: remaining samples are
+            not reported otherwise.
     """
 
     def __init__(self, describe: Callable[[int], Any] | None = None, size: int = 64) -> None:
@@ -57,20 +57,20 @@ class Batch:
         self._addresses = memoryview(self._serdata).cast("B").cast("Q")
         self._info_bytes = memoryview(self._infos).cast("B")
         self._at = ctypes.addressof(self._serdata), ctypes.addressof(self._infos)
-        # Its lock is held by no thread that calls us, and for no longer than this takes.
+        # No thread that calls Python holds its lock, and no other holds it longer than this call.
         self._take = keeping().dds_takecdr
 
     def take(self, reader: int, place: str) -> list[Taken]:
-        """Take what a reader holds, the oldest first.
+        """Take the samples that a reader holds, oldest first.
 
         Args:
             reader: The reader.
-            place: What it is for, in errors.
+            place: Its topic or service, for errors.
 
         Returns:
             For each sample its payload, as :func:`payload` returns it, the writer's time stamp in
-            nanoseconds since the Unix epoch, the handle of the writer, and what `describe` said.
-            Samples that only report a deleted writer are left out.
+            nanoseconds since the Unix epoch, the handle of the writer, and the result of
+            `describe`. Samples that only report a deleted writer are left out.
 
         Raises:
             NodeClosedError: The reader was deleted.
@@ -98,14 +98,14 @@ class Batch:
 
 
 def payload(serdata: int) -> bytes | memoryview:
-    """Return a sample's payload with its encapsulation header, and take over the reference to it.
+    """Return a sample's payload with its encapsulation header, and take over its reference.
 
     Returns:
-        Bytes when it is small, otherwise a read-only view of the library's own memory.
+        Bytes if it is small, otherwise a read-only view of the library's own memory.
     """
     lib, part = keeping(), _Part()
     size: int = lib.ddsi_serdata_size(serdata)
-    # From here on there are two references: the one handed over, and the one for the bytes.
+    # From here on there are two references: the one taken over, and the one for the bytes.
     lib.ddsi_serdata_to_ser_ref(serdata, 0, size, byref(part))
     lib.ddsi_serdata_unref(serdata)
     if size > COPIED:
@@ -118,7 +118,7 @@ def payload(serdata: int) -> bytes | memoryview:
 
 
 def discard(serdata: int) -> None:
-    """Give the reference to a sample back."""
+    """Release the reference to a sample."""
     keeping().ddsi_serdata_unref(serdata)
 
 
@@ -129,10 +129,10 @@ def sample(sertype: int, parts: Sequence[bytes | bytearray | memoryview], place:
         sertype: Type of the writer it is for, see :func:`rosglass.wires.dds.cyclone.sertype`; its
             topic must not be deleted before the sample is sent.
         parts: The payload in one piece or several; the first begins with the encapsulation header.
-        place: What it is for, in errors.
+        place: Its topic or service, for errors.
 
     Raises:
-        UnsupportedError: The payload is not of the wire format.
+        UnsupportedError: The payload is not in the wire format.
     """
     pieces: Any
     if len(parts) == 1 and type(parts[0]) is bytes:
@@ -153,11 +153,11 @@ def sample(sertype: int, parts: Sequence[bytes | bytearray | memoryview], place:
 
 
 def send(writer: int, serdata: int, place: str) -> bool:
-    """Send a sample; the reference to it stays with the caller.
+    """Send a sample; the caller keeps its reference.
 
     Returns:
-        False when it was not sent because the writer's memory stayed full for as long as its
-        profile says that it waits. It waits without the GIL.
+        False if it was not sent because the writer's memory stayed full for the blocking time of
+        its profile. It waits without the GIL.
 
     Raises:
         NodeClosedError: The writer was deleted.
@@ -170,7 +170,7 @@ def send(writer: int, serdata: int, place: str) -> bool:
     try:
         check_alive(result, "dds_writecdr", place)
     except NodeClosedError:
-        # In this case alone the call did not take the reference over.
+        # Only in this case does the call not take over the reference.
         discard(serdata)
         raise
     return True
@@ -193,7 +193,7 @@ class _Block:
 
     serdata: int
 
-    #: A view has a hash when what it is of has one, and then it is that of the same bytes.
+    #: A view is hashable if its object is, and then has the hash of the same bytes.
     __hash__ = object.__hash__
 
     def __del__(self) -> None:
@@ -228,7 +228,7 @@ class _Buffer(ctypes.Structure):
 
 
 def _pin(part: bytes | bytearray | memoryview) -> _Buffer:
-    """Return where `part` is; it stays there as long as the result lives."""
+    """Return the address of `part`, which stays valid as long as the result exists."""
     buffer = _Buffer()
     ctypes.pythonapi.PyObject_GetBuffer(ctypes.py_object(part), byref(buffer), 0)
     return buffer

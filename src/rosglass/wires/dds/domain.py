@@ -1,12 +1,12 @@
 """The DDS domains of this process, and their configuration from URL and environment.
 
-Cyclone DDS configures a domain once in a process. Errors in a configuration are printed instead of
-returned, and an unknown peer name ends the process: the user's configuration is therefore tried in
-a process of its own first, and peers are passed as addresses only.
+Cyclone DDS configures a domain once per process. It prints configuration errors instead of
+returning them, and an unknown peer name ends the process: the user's configuration is therefore
+tried in a separate process first, and peers are passed as addresses only.
 
 Elements: ``docs/manual/options.md`` of Eclipse Cyclone DDS. Ours come first, then the user's, which
-win. Discovery ranges become settings as in rmw_cyclonedds, so that a program of ours is found
-wherever a node of ROS 2 is.
+override them. Discovery ranges become the same settings as in rmw_cyclonedds, so that a rosglass
+node is found wherever any ROS 2 node is.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["MAX_DOMAIN", "DdsOptions", "DiscoveryRange", "Domain", "domain_config", "users_part"]
 
 _log = logging.getLogger("rosglass.ros2")
-#: Last domain whose ports, 7400 + 250 * domain and some more, exist (RTPS 2.5, section 9.6.2).
+#: Highest domain with valid ports: 7400 + 250 * domain and some more (RTPS 2.5, section 9.6.2).
 MAX_DOMAIN = 232
 _EXAMPLE = "as in dds://?domain=0 or dds://192.168.1.5?domain=0"
 _HOST = re.compile(r"[A-Za-z0-9_.-]+\Z")
@@ -62,14 +62,14 @@ class DdsOptions:
 
     Attributes:
         domain: ROS domain.
-        discovery: Where others are looked for without being named.
-        peers: Machines that are asked besides, by host name or IPv4 address; with ``:port`` only
-            the program there that listens on that port.
+        discovery: The range in which unnamed peers are discovered.
+        peers: Machines to contact as well, by host name or IPv4 address; with ``:port`` only the
+            program there that listens on that port.
         interfaces: Network interfaces to use, by name or address; none lets Cyclone DDS choose.
         humble: Whether to write 24-byte identities into the graph, as ROS 2 Humble does; None
             follows the others in the domain.
         config: The user's own Cyclone DDS configuration, as in ``CYCLONEDDS_URI``.
-        chosen: Names of the options that the URL itself gave.
+        chosen: Names of the options given in the URL.
     """
 
     domain: int = 0
@@ -82,13 +82,13 @@ class DdsOptions:
 
     @classmethod
     def parse(cls, url: str, env: Mapping[str, str]) -> DdsOptions:
-        """Return the options in `url`, completed by the environment `env`.
+        """Return the options in `url`, completed from the environment `env`.
 
         The environment is read as ROS 2 documents it: ROS_DOMAIN_ID, ROS_LOCALHOST_ONLY (which
-        wins over the next two), ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_STATIC_PEERS, CYCLONEDDS_URI.
+        overrides the next two), ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_STATIC_PEERS, CYCLONEDDS_URI.
 
         Raises:
-            ArgumentError: A part of the URL or a variable is not valid; it says which.
+            ArgumentError: A part of the URL or a variable is not valid; the message names it.
         """
         hosts, options = _split(url)
         peers = (*hosts, *_list(options, "peers", _PEER, "a host name or an IPv4 address", url))
@@ -202,11 +202,11 @@ def _domain(text: str, what: str, where: str) -> int:
 
 
 _EXISTS = -4
-#: Time that trying a configuration may take; it takes 0.05 s.
+#: Timeout for trying a configuration, which takes 0.05 s.
 _TRIAL_TIMEOUT_S = 10.0
-#: Time that looking up the names of peers may take together.
+#: Timeout for looking up the names of all peers together.
 _LOOK_UP_TIMEOUT_S = 3.0
-#: Ends at once, as there is nothing to be tidied up.
+#: Exits immediately, as there is nothing to clean up.
 _TRY = """
 import ctypes, os, sys
 library = ctypes.CDLL(sys.argv[1])
@@ -217,29 +217,29 @@ failed = library.dds_create_domain(domain, os.fsencode(sys.argv[3])) < 0
 failed = failed or library.dds_create_participant(domain, None, None) < 0
 os._exit(int(failed))
 """
-#: Time stamp, domain and thread, which begin a line of its log, and the place that ends some.
+#: Time stamp, domain and thread at the beginning of a log line, and the location that ends some.
 _PREFIX = re.compile(r"^\d+\.\d+ \[\w*\]\s+\S+?: ")
 _PLACE = re.compile(r" \((?:CYCLONEDDS_URI\+\d+ )?line \d+\)$")
 _NO_INTERFACE = re.compile(r"(\S+): does not match an available interface")
 _NO_INDEX, _CROWD = "free participant index", "120 programs of this machine"
 
-#: Big samples in few datagrams, and room for them in the socket: with 65 kB, a picture of 6 MB took
-#: 2.5 ms instead of 43, and none was lost. The kernel cuts the buffer at net.core.rmem_max.
-#: Datagrams stay below 32 kB with what the kernel adds, and what is sent again goes in small
+#: Large samples use few datagrams and a large socket buffer: with 65 kB, a picture of 6 MB took
+#: 2.5 ms instead of 43, and none was lost. The kernel caps the buffer at net.core.rmem_max.
+#: Datagrams with the kernel's overhead stay below 32 kB, and retransmissions are sent in small
 #: bursts: ROS 2 on Fast DDS receives into the default 208 kB, which the kernel counts in powers of
 #: two. Datagrams of 65 kB took 128 kB each, and most pictures never arrived.
 _DATAGRAMS = "<MaxMessageSize>31000B</MaxMessageSize><FragmentSize>30700B</FragmentSize>"
 _BUFFER = '<SocketReceiveBufferSize min="default" max="10MB"/>'
 _BURSTS = "<BurstSize><MaxRexmit>256kB</MaxRexmit></BurstSize>"
-#: Fast DDS 2.9 notices no reader, writer or participant of ours that goes without this.
+#: Without this, Fast DDS 2.9 does not notice when our readers, writers or participants leave.
 _KEYS = "<GenerateKeyhash>true</GenerateKeyhash>"
-#: Deleting a writer holds up no thread: all linger together (`participant.Lingering`).
+#: Deleting a writer blocks no thread: all linger together (`participant.Lingering`).
 _LINGER = "<WriterLingerDuration>0s</WriterLingerDuration>"
-#: Programs per machine that others can find by asking its ports; beyond, the ports are those of
+#: Last participant index that others can find by unicast to this machine; higher ports belong to
 #: the next domain (RTPS 2.5, section 9.6.2).
 _LAST_INDEX = 119
 _END = "</Domain></CycloneDDS>"
-#: Lets a program have any ports; it is found by multicast then, but not by its machine's name.
+#: Allows a program any ports: others then find it by multicast, but not by its machine's name.
 _ANY_PORTS = "<Discovery><ParticipantIndex>none</ParticipantIndex></Discovery>"
 
 _ADDRESS = re.compile(r"[0-9.]+\Z")
@@ -247,7 +247,7 @@ _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _OTHER_DOMAIN = re.compile(
     r"<domain\s[^>]*?\bid\s*=\s*[\"'](?!any)(\d+)[\"'].*?</domain\s*>", re.DOTALL | re.IGNORECASE
 )
-#: What the user's configuration must leave alone when the URL's option of that name is given.
+#: Elements that the user's configuration must not set together with a URL option, by its name.
 _CLAIMS = {
     "interface": ("Interfaces", "NetworkInterfaceAddress"),
     "range": ("AllowMulticast", "Tag"),
@@ -278,9 +278,9 @@ class Domain(Handle):
         number: The ROS domain.
 
     Raises:
-        ArgumentError: Cyclone DDS refuses the configuration; it says what is wrong.
+        ArgumentError: Cyclone DDS refuses the configuration; the message gives the reason.
         ConnectionLostError: A peer's name is unknown, or this machine cannot do it now.
-        UnsupportedError: The process is in the domain already with another configuration, or is a
+        UnsupportedError: The process is already in the domain with another configuration, or is a
             fork of one that uses DDS.
     """
 
@@ -308,7 +308,7 @@ class Domain(Handle):
                 joined.users += 1
 
     def close(self) -> None:
-        """Leave the domain after its last user, whose participants were deleted before."""
+        """Leave the domain after its last user, whose participants are already deleted."""
         with _lock:
             joined = joined_domains.get(self.number)
             if self._closed or joined is None or joined.process != os.getpid():
@@ -318,14 +318,14 @@ class Domain(Handle):
             if joined.users:
                 return
             del joined_domains[self.number]
-            # Others' participants would go with it.
+            # Deleting it would delete other users' participants.
             lib = cyclone.library()
             if joined.entity is not None and lib.dds_lookup_participant(self.number, 0, 0) < 1:
                 cyclone.delete(joined.entity)
 
 
 def _create(domain: int, config: str) -> int | None:
-    """Return the new domain; None when something else in this process has created it."""
+    """Return the new domain; None if something else in this process has created it."""
     if users_part(config) and (problem := _trial(domain, config)):
         _refuse(domain, config, problem)
     code = _create_quietly(domain, config)
@@ -341,7 +341,7 @@ def _create(domain: int, config: str) -> int | None:
     problem = _trial(domain, config)
     if _NO_INDEX in problem:
         problem = f"{_CROWD} are in it already ({problem})"
-        # Those who are to find it without multicast know no other ports.
+        # Programs that find it without multicast try no other ports.
         if not any(part in config for part in ("<Peer ", "<AllowMulticast>false")):
             code = _create_quietly(domain, f"{config},{_ANY_PORTS}")
     if code < 0:
@@ -352,9 +352,8 @@ def _create(domain: int, config: str) -> int | None:
 
 def _create_quietly(domain: int, config: str) -> int:
     lib = cyclone.library()
-    # It prints a line for each packet that a broken link refuses, and can only be set to print
-    # nothing. What it has against a configuration is found out in _trial(); a <Tracing> of the
-    # user's works all the same.
+    # It prints a line for each packet that a broken link refuses, and can only be silenced
+    # completely. _trial() reports configuration errors; the user's own <Tracing> still works.
     lib.dds_set_log_mask(0)
     code: int = lib.dds_create_domain(domain, config.encode())
     return code
@@ -373,7 +372,7 @@ def _refuse(domain: int, config: str, problem: str) -> None:
 def _trial(domain: int, config: str) -> str:
     """Return Cyclone DDS's errors in a configuration, empty if there are none."""
     if getattr(sys, "frozen", False) or not sys.executable:
-        return ""  # what would be started is no Python
+        return ""  # there is no Python interpreter to start
     library = cyclone.library()._name
     command = [sys.executable, "-I", "-S", "-c", _TRY, library, str(domain), config]
     try:
@@ -400,7 +399,7 @@ def domain_config(options: DdsOptions) -> str:
     """Return the configuration for Cyclone DDS; looks up the names of peers.
 
     Raises:
-        ArgumentError: The URL and the user's own configuration say different things.
+        ArgumentError: The URL and the user's own configuration contradict each other.
         ConnectionLostError: A peer's name is unknown.
     """
     for option, elements in _CLAIMS.items():
@@ -445,14 +444,14 @@ def _discovery(options: DdsOptions, peers: Sequence[str]) -> str:
             f"<Tag>ros_discovery_off_{os.getpid()}</Tag>"
             '<Peers AddLocalhost="false"/></Discovery>'
         )
-    # To Cyclone DDS this machine is the address of the interface it uses, never 127.0.0.1.
+    # Cyclone DDS reaches this machine by the address of its interface, never by 127.0.0.1.
     others = [peer for peer in peers if not peer.startswith("127.") or ":" in peer]
     localhost = options.discovery is DiscoveryRange.LOCALHOST or len(others) < len(peers)
-    # Asked for ever: a robot may be switched on hours after the cockpit.
+    # Contacted forever: a robot may be switched on hours after the cockpit.
     named = "".join(f'<Peer Address="{peer}" PruneDelay="inf"/>' for peer in others)
     around = f'<Peers AddLocalhost="{"true" if localhost else "default"}">{named}</Peers>'
-    # How long it takes to find who comes later, or back; Cyclone DDS takes up to 30 s. A named peer
-    # costs one packet for each port that a program may have there.
+    # Time to discover a peer that starts later or returns; Cyclone DDS's default is up to 30 s. A
+    # named peer costs one packet for each port that a program there may use.
     interval = "2s" if others else "1s"
     return (
         "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
@@ -467,7 +466,7 @@ def _says(options: DdsOptions, element: str) -> bool:
     for part in options.config.split(","):
         if part and "<" not in part and ">" not in part:
             file = os.path.expandvars(part.strip().removeprefix("file://"))
-            with suppress(OSError, ValueError):  # Cyclone DDS says what is wrong with it
+            with suppress(OSError, ValueError):  # Cyclone DDS reports the problem
                 texts.append(Path(file).read_text(errors="replace"))
     pattern = re.compile(rf"<\s*{element}\b", re.IGNORECASE)
     return any(
@@ -482,7 +481,7 @@ def _says(options: DdsOptions, element: str) -> bool:
 
 
 def _addresses(peers: Sequence[str]) -> list[str]:
-    """Return the IPv4 addresses of peers, each with its ``:port`` when it was given one.
+    """Return the IPv4 addresses of peers, with their ``:port`` where one was given.
 
     Raises:
         ConnectionLostError: A name is unknown, or no name server answers within 3 s.

@@ -1,4 +1,4 @@
-"""Writers and readers of a DDS participant, and those of ROS 2's topics."""
+"""Writers and readers of a DDS participant, and those of ROS 2 topics."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ if TYPE_CHECKING:
 
 __all__ = ["DdsReader", "DdsWriter", "SampleReader", "SampleWriter", "Taken", "topic_name"]
 
-#: Samples that a reader holds at least until they are delivered: a surplus is to be dropped in the
-#: subscription's inbox, where it is counted.
+#: Minimum number of undelivered samples that a reader holds: surplus samples are dropped in the
+#: subscription's inbox instead, where they are counted.
 _MIN_DEPTH = 128
-#: Samples per second above which a reader is polled more often, as it would lose some.
+#: Samples per second above which a reader is polled more often, to avoid losses.
 _FAST_HZ = 2000
-#: Batches that are taken in a row by :meth:`SampleReader.flush`.
+#: Maximum number of batches that :meth:`SampleReader.flush` takes in a row.
 _MAX_BATCHES = 64
 #: Seconds that a write blocks in the library, between checks for signals and closing.
 _WRITE_SLICE_S = 0.1
@@ -46,7 +46,7 @@ _WRITE_SLICE_S = 0.1
 _DELIVERY_TIMEOUT_S = 0.001
 #: Seconds that leaving the domain waits for a write in another thread.
 _STOP_TIMEOUT_S = 5.0
-#: Writers that a reader remembers; more appear only when a robot restarts for days.
+#: Writers that a reader remembers; only a robot that restarts for days has more.
 _MAX_WRITERS = 1024
 
 
@@ -63,10 +63,10 @@ class SampleWriter:
         topic: Its DDS topic.
         dds_type: Its DDS type.
         qos: Its profile.
-        user_data: What it announces with its discovery.
-        place: The topic or service it is for, in errors.
+        user_data: User data that it announces in discovery.
+        place: Its topic or service, for errors.
         make_topic: Creates the topic, instead of :func:`cyclone.create_topic`.
-        timeout_s: Seconds that a write may wait for reliable readers, None for ever.
+        timeout_s: Seconds that a write may wait for reliable readers; None waits forever.
 
     Attributes:
         entity: Cyclone's number for it.
@@ -90,7 +90,7 @@ class SampleWriter:
         self._participant, self._place = participant, place
         self._timeout_s = math.inf if timeout_s is None else timeout_s
         self._slice_s = min(self._timeout_s, _WRITE_SLICE_S)
-        #: Held by a write: the topic must not be deleted before it has ended.
+        #: Held by a write: the topic must not be deleted before the write ends.
         self._lock = threading.Lock()
         self._closed = False
         with participant.in_use():
@@ -110,7 +110,7 @@ class SampleWriter:
             participant.before_leaving(self.entity, self._stop)
 
     def write_parts(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
-        """Send a payload in one part or several; they are copied once, by Cyclone DDS.
+        """Send a payload in one or several parts; Cyclone DDS copies them once.
 
         Raises:
             NodeClosedError: The writer was closed.
@@ -139,7 +139,7 @@ class SampleWriter:
     def close(self) -> None:
         """Close the writer; a write that waits in another thread ends with an error.
 
-        It is deleted once its readers have everything, or a second later.
+        It is deleted once its readers have acknowledged everything, or after a second.
         """
         if self._closed:
             return
@@ -152,7 +152,7 @@ class SampleWriter:
     def _stop(self) -> None:
         """Wait for writes in other threads: the writer will be deleted with the participant."""
         self._closed = True
-        # With a timeout: this thread may hold the lock itself, interrupted by a signal.
+        # With a timeout: a signal may have interrupted this thread while it holds the lock.
         if self._lock.acquire(timeout=_STOP_TIMEOUT_S):
             self._lock.release()
 
@@ -172,12 +172,12 @@ class SampleReader:
         topic: Its DDS topic.
         dds_type: Its DDS type.
         qos: Its profile; samples beyond its depth are held until they are delivered.
-        user_data: What it announces with its discovery.
-        place: The topic or service it is for, in errors.
-        on_taken: Takes the samples, in batches and in order, and must return at once.
+        user_data: User data that it announces in discovery.
+        place: Its topic or service, for errors.
+        on_taken: Called with the samples, in batches and in order; must return at once.
         make_topic: Creates the topic, instead of :func:`cyclone.create_topic`.
-        describe: Returns what `on_taken` gets besides of a sample, by the address of its serdata.
-        on_matched: Called, on the pump's thread, when writers appeared or left.
+        describe: Returns extra data of a sample for `on_taken`, by the address of its serdata.
+        on_matched: Called on the pump's thread when writers have appeared or left.
 
     Attributes:
         entity: Cyclone's number for it.
@@ -225,12 +225,12 @@ class SampleReader:
                 raise
 
     def start(self) -> None:
-        """Start to deliver samples."""
+        """Start delivering samples."""
         events = self._events | Event.DATA_AVAILABLE
         self._participant.pump.watch(self.entity, events, self._serve)
 
     def set_eager(self, eager: bool) -> None:
-        """Set whether samples are delivered at once, or some thirty times a second."""
+        """Set whether samples are delivered at once or about thirty times a second."""
         if eager == self._eager or self._closed:
             return
         self._eager = eager
@@ -250,7 +250,7 @@ class SampleReader:
                     self._participant.pump.visit(self.entity, None)
 
     def _poll(self) -> bool:
-        """Deliver the waiting samples; return whether there are so many as to poll more often."""
+        """Deliver the waiting samples; return whether the rate requires faster polling."""
         if self._closed:
             self._participant.pump.forget(self.entity)
         before, count = self._polled, self._count
@@ -287,7 +287,7 @@ class SampleReader:
             more = self._deliver(1)
         finally:
             delivering.release()
-        # The status wakes the pump until it is read, which costs as much as taking a sample.
+        # An unread status keeps waking the pump; reading it costs as much as taking a sample.
         if self._on_matched is not None and self._count == count:
             with suppress(NodeClosedError):
                 if subscription_matched(self.entity):
@@ -295,7 +295,7 @@ class SampleReader:
         return more
 
     def _deliver(self, batches: int) -> bool:
-        """Deliver at most so many batches; return whether there may be more."""
+        """Deliver at most `batches` batches; return whether there may be more."""
         for _ in range(batches):
             if self._closed:
                 return False
@@ -328,11 +328,11 @@ class DdsWriter(SampleWriter, Writer):
         participant.add_writer(cyclone.handle(self.entity), self.gid, endpoint.type_hash)
 
     def write(self, data: bytes | bytearray) -> None:
-        """Send a payload; a reliable writer that keeps all waits for slow readers."""
+        """Send a payload; a reliable KEEP_ALL writer waits for slow readers."""
         self.write_parts((data,))
 
     def assert_liveliness(self) -> None:
-        """Show that the publisher is alive."""
+        """Assert the liveliness of the publisher."""
         cyclone.assert_liveliness(self.entity, self._place)
 
     def close(self) -> None:
@@ -376,7 +376,7 @@ class DdsReader(SampleReader, Reader):
             on_sample(data, received, sent, writer[0], -1, writer[1])
 
     def _identify(self, handle: int) -> tuple[bytes, str]:
-        """Return a writer's GUID and type hash; both empty if it was deleted before."""
+        """Return a writer's GUID and type hash; both empty if it is already deleted."""
         writer = self._participant.writers.get(handle)
         if writer is None:
             found = cyclone.matched_publication(self.entity, handle)

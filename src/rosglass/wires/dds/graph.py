@@ -1,7 +1,7 @@
-"""ROS 2's graph in a DDS domain, put together from what participants say of themselves.
+"""The ROS 2 graph of a DDS domain, assembled from the announcements of its participants.
 
-DDS announces participants and their readers and writers. ``ros_discovery_info`` says which of these
-belong to which node (``rmw_dds_common/msg/ParticipantEntitiesInfo``, DDS type
+DDS announces participants and their readers and writers. ``ros_discovery_info`` assigns these to
+nodes (``rmw_dds_common/msg/ParticipantEntitiesInfo``, DDS type
 ``rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_``); user data carries the enclave of a
 participant and the type hash of an endpoint. They may arrive in any order. Nothing here calls DDS.
 """
@@ -44,18 +44,18 @@ __all__ = [
     "parse_user_data",
 ]
 
-#: Its DDS topic; without prefix, as it is none of ROS 2's own.
+#: Its DDS topic; without prefix, as it is not a ROS 2 topic.
 TOPIC = "ros_discovery_info"
 #: Its DDS type, the same for both widths.
 TYPE = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"
-#: User data of its writers and readers since Iron: the hash of its type. rmw_cyclonedds logs a
+#: User data of its writers and readers since Iron: the type's hash. rmw_cyclonedds logs a
 #: warning for an endpoint without one.
 USER_DATA = b"typehash=RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e;"
-#: Profiles that rmw's implementations use for it.
+#: Profiles that the rmw implementations use for it.
 WRITER_QOS = QoS(depth=1, durability=Durability.TRANSIENT_LOCAL)
 READER_QOS = QoS(depth=1, durability=Durability.TRANSIENT_LOCAL, history=History.KEEP_ALL)
-#: Without an enclave, rmw's graphs leave a participant out. By the rest our participants know each
-#: other: they follow the width of identities that others use, and must not follow one another.
+#: rmw's graphs leave out a participant without enclave. The rest identifies rosglass participants
+#: to each other: they adopt the width of others' identities, and must not adopt one another's.
 PARTICIPANT_USER_DATA = b"enclave=/;client=rosglass;"
 
 _NAME = "rmw_dds_common/msg/ParticipantEntitiesInfo"
@@ -71,7 +71,7 @@ _LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 
 @dataclass(frozen=True)
 class NodeEntities:
-    """A node and the identities of what belongs to it.
+    """A node and the identities of its readers and writers.
 
     Attributes:
         node: Its name.
@@ -116,10 +116,11 @@ class ParticipantEntities:
     def decode(cls, data: bytes | memoryview) -> ParticipantEntities:
         """Decode a sample.
 
-        Its length shows the width of identities: only one of the two leaves at most padding over.
+        Its length shows the width of identities: only with the right one is no more than padding
+        left over.
 
         Raises:
-            DecodeError: It is no such sample.
+            DecodeError: It is not such a sample.
         """
         data = bytes(data)
         if len(data) < 4 or data[:2] not in (b"\x00\x00", b"\x00\x01"):
@@ -143,11 +144,11 @@ class _Reader:
         self._number = struct.Struct(f"{order}I")
 
     def read(self) -> ParticipantEntities:
-        """Return the whole sample; raises DecodeError, also when bytes are left over."""
+        """Return the whole sample; raises DecodeError, also if bytes are left over."""
         gid = self._gid()
         nodes = tuple(
             NodeEntities(self._node(), self._gids(), self._gids())
-            # A node takes 18 bytes at least.
+            # A node takes at least 18 bytes.
             for _ in range(self._count(18))
         )
         left = len(self._data) - self._at
@@ -205,7 +206,7 @@ def _put_string(body: bytearray, text: str) -> None:
 def parse_user_data(data: bytes) -> dict[str, str]:
     """Return the keys and values of ``key=value;`` user data; other parts are ignored.
 
-    Format: rmw's ``parse_key_value``. Values may have any bytes but ``;``.
+    Format: rmw's ``parse_key_value``. Values may contain any bytes but ``;``.
     """
     pairs: dict[str, str] = {}
     for item in data.split(b";"):
@@ -216,28 +217,28 @@ def parse_user_data(data: bytes) -> dict[str, str]:
 
 
 def format_user_data(pairs: Mapping[str, str]) -> bytes:
-    """Return user data with these keys and values; those without a value are left out."""
+    """Return user data with these keys and values, except those with an empty value."""
     return "".join(f"{key}={value};" for key, value in pairs.items() if value).encode()
 
 
 def hash_of(user_data: bytes) -> str:
-    """Return the type hash that an endpoint's user data announces, empty when it has none."""
+    """Return the type hash that an endpoint's user data announces, empty if it has none."""
     found = parse_user_data(user_data).get("typehash", "")
     return found if found.isprintable() else ""
 
 
 def is_rosglass(user_data: bytes) -> bool:
-    """Return whether a participant's user data says that it is one of ours."""
+    """Return whether a participant's user data identifies it as a rosglass participant."""
     return parse_user_data(user_data).get("client") == "rosglass"
 
 
-#: Namespace of the nodes that stand for participants which say nothing of nodes; hidden.
+#: Hidden namespace of the nodes that stand for participants which announce no nodes.
 UNKNOWN = "/_dds"
 #: A participant's readers and writers share the beginning of its GUID (RTPS 2.5, section 8.2.4.1).
 _PREFIX = 12
-#: What the user data of every participant of rmw_cyclonedds, rmw_fastrtps and rosglass has.
+#: Part of the user data of every participant of rmw_cyclonedds, rmw_fastrtps and rosglass.
 _ENCLAVE = b"enclave="
-#: Seconds that endpoints may come later than the nodes that they belong to.
+#: Seconds by which endpoints may arrive later than the nodes that they belong to.
 _ARRIVING_S = 1.0
 _REQUESTS = {
     ("rq", True): EndpointKind.SERVICE_SERVER,
@@ -245,13 +246,13 @@ _REQUESTS = {
     ("rr", False): EndpointKind.SERVICE_SERVER,
     ("rr", True): EndpointKind.SERVICE_CLIENT,
 }
-#: Participant, kind and name: what a service's requests and replies have in common.
+#: Participant, kind and name, which a service's request and reply endpoints share.
 _Call = tuple[bytes, EndpointKind, str]
 
 
 @dataclass
 class _Participant:
-    """A participant and what belongs to it."""
+    """A participant with its nodes and endpoints."""
 
     found: Discovered
     unknown: NodeName
@@ -259,7 +260,7 @@ class _Participant:
     info: ParticipantEntities | None = None
     #: Its nodes by their keys in the graph.
     nodes: dict[tuple[bytes, NodeName, int], NodeName] = field(default_factory=dict)
-    #: When the first of these came, monotonic.
+    #: Monotonic time when the first of these arrived.
     introduced: float = 0.0
     owners: dict[bytes, NodeName] = field(default_factory=dict)
     only: NodeName | None = None
@@ -272,15 +273,15 @@ class _Participant:
 class DdsGraph:
     """Fills a graph with the endpoints of a DDS domain; for one thread at a time.
 
-    Endpoints are in it under their GUID; a service's servers and clients under that of the reader
-    or writer of requests, once the participant also has the one of replies.
+    The key of an endpoint is its GUID. A service's server or client has that of its request reader
+    or writer, and is added once its participant also has the one of replies.
 
     Args:
         graph: The graph to fill.
         own: GUID of our own participant.
 
     Attributes:
-        moved: Monotonic time when the last of the others' readers and writers was found.
+        moved: Monotonic time of the latest discovery of another participant's reader or writer.
     """
 
     def __init__(self, graph: Graph, own: bytes) -> None:
@@ -300,14 +301,14 @@ class DdsGraph:
         return len(self._participants) - (self._own in self._participants)
 
     def prefixes(self) -> list[bytes]:
-        """Return what the GUIDs of each participant begin with, our own included."""
+        """Return the GUID prefixes of all participants, our own included."""
         return list(self._participants)
 
     @property
     def unnamed(self) -> int:
-        """How many other participants of ROS 2 have not announced their nodes, or just have.
+        """How many other ROS 2 participants have not announced their nodes, or only just did.
 
-        Fast DDS does so 1 to 4 s after it was discovered; endpoints may follow a moment later.
+        Fast DDS announces them 1 to 4 s after its discovery; endpoints may follow a moment later.
         """
         now = time.monotonic()
         return sum(
@@ -319,7 +320,7 @@ class DdsGraph:
 
     @property
     def humble(self) -> bool:
-        """Whether all other participants of ROS 2 use Humble's wide identities."""
+        """Whether all other ROS 2 participants use Humble's wide identities."""
         widths = [
             participant.info.humble
             for participant in self._participants.values()
@@ -333,13 +334,13 @@ class DdsGraph:
         return None if known is None else known.found
 
     def is_foreign(self, guid: bytes) -> bool:
-        """Return whether a reader or writer has no encoding in common with ours; thread-safe."""
+        """Return whether a reader or writer shares no encoding with ours; thread-safe."""
         return guid in self._foreign
 
     def put_participants(self, news: Iterable[Discovered]) -> None:
         """Update participants that appeared, changed or left.
 
-        All changes of one participant must be given together: it may have left and come back.
+        Pass all changes of a participant in one call: it may have left and returned.
         """
         for found in {item.guid: item for item in news}.values():
             prefix = found.guid[:_PREFIX]
@@ -397,8 +398,8 @@ class DdsGraph:
         self.moved = time.monotonic()
         carried = demangle_topic(found.topic)
         if carried is None:
-            return  # not of ROS 2
-        # A writer sends in the first encoding that it names.
+            return  # not from ROS 2
+        # A writer sends in the first encoding that it announces.
         known = found.representations or (XCDR1,)
         if XCDR1 not in (known if reader else known[:1]):
             self._foreign.add(found.guid)

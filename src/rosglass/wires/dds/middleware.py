@@ -1,4 +1,4 @@
-"""ROS 2 over DDS, by Cyclone DDS: interoperates with every rmw implementation that uses DDS."""
+"""ROS 2 over Cyclone DDS; interoperates with every rmw implementation that uses DDS."""
 
 from __future__ import annotations
 
@@ -53,10 +53,10 @@ class DdsDiscovery:
         participant: The participant.
         graph: The graph to fill.
         humble: Whether to announce its nodes as ROS 2 Humble does; None follows the others.
-        changed: Called when other participants appeared or left.
+        changed: Called when other participants have appeared or left.
 
     Attributes:
-        had_peers: Whether there have been other participants in the domain.
+        had_peers: Whether other participants have been in the domain.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class DdsDiscovery:
         changed: Callable[[], None],
     ) -> None:
         self._participant, self._humble, self._changed = participant, humble, changed
-        #: Guards the graph and the nodes: both change on users' threads, too.
+        #: Guards the graph and the nodes: both also change on users' threads.
         self._lock = threading.Lock()
         self._seen = DdsGraph(graph, participant.guid)
         own = participant.guid
@@ -103,15 +103,15 @@ class DdsDiscovery:
         return self._seen.unnamed
 
     def show(self, endpoint: EndpointInfo) -> None:
-        """Put an endpoint of ours into the graph; it is removed with its reader or writer.
+        """Add one of our endpoints to the graph; it is removed with its reader or writer.
 
-        A service's server or client has the GUID of its reader or writer of requests.
+        A service's server or client has the GUID of its request reader or writer.
         """
         with self._lock:
             self._seen.put_own(endpoint)
 
     def is_foreign(self, guid: bytes) -> bool:
-        """Return whether a reader or writer has no encoding in common with ours."""
+        """Return whether a reader or writer shares no encoding with ours."""
         return self._seen.is_foreign(guid)
 
     def participant(self, guid: bytes) -> Discovered | None:
@@ -119,7 +119,7 @@ class DdsDiscovery:
         return self._seen.participant(guid)
 
     def _take(self) -> bool:
-        """Take some discovered endpoints; return whether there may be more, after other events."""
+        """Take some discovered endpoints; return whether more may wait, after other events."""
         self._take_participants()
         more = False
         for topic in (BuiltinTopic.PUBLICATION, BuiltinTopic.SUBSCRIPTION):
@@ -137,7 +137,7 @@ class DdsDiscovery:
             _log.exception("the discovered DDS endpoint %s is not understood", found.guid.hex())
 
     def _take_participants(self) -> None:
-        """Take participants, always before the endpoints that belong to them."""
+        """Take participants, always before their endpoints."""
         news: list[Discovered] = []
         topic = BuiltinTopic.PARTICIPANT
         while found := take(self._readers[topic], topic, _PLACE):
@@ -181,7 +181,7 @@ class DdsDiscovery:
             return self._seen.put_entities(info)
 
     def _on_nodes(self, nodes: tuple[NodeEntities, ...]) -> None:
-        """Schedule an announcement, so that many changes at once make one."""
+        """Schedule an announcement; simultaneous changes share one."""
         with self._lock:
             self._nodes, self._scheduled = nodes, True
             self._seen.put_entities(ParticipantEntities(self._participant.guid, nodes))
@@ -246,7 +246,7 @@ class DdsMiddleware(Middleware):
         )
 
     def unnamed(self) -> int:
-        """Return how many participants of ROS 2 have not announced their nodes."""
+        """Return how many ROS 2 participants have not announced their nodes."""
         return 0 if self._discovery is None else self._discovery.unnamed
 
     def announce(self, node: NodeName) -> Handle:
@@ -278,14 +278,14 @@ class DdsMiddleware(Middleware):
         return replier
 
     def conflicts(self, endpoint: EndpointInfo) -> Mapping[str, str]:
-        """Return the conflict with an endpoint that has no encoding in common with ours."""
+        """Return the conflict with an endpoint that shares no encoding with ours."""
         if self._discovery is None or not self._discovery.is_foreign(endpoint.gid):
             return {}
         verb = "offered" if endpoint.kind is EndpointKind.PUBLISHER else "requested"
         return {"data representation": f"XCDR2 alone {verb}, but ROS 2's messages are XCDR1"}
 
     def describe_type(self, endpoint: EndpointInfo, timeout: float) -> Definition | None:
-        """Return the definition that an endpoint announces by XTypes."""
+        """Return the definition that an endpoint announces through XTypes."""
         from rosglass.wires.dds.type_lookup import announced_definition  # noqa: PLC0415 - rarely used
 
         provider = f"wire {endpoint.node} (TypeLookup)"
@@ -293,10 +293,10 @@ class DdsMiddleware(Middleware):
         return announced_definition(entity, endpoint.gid, provider, timeout)
 
     def poll(self) -> None:
-        """Do nothing: everything has events."""
+        """Do nothing: events report every change."""
 
     def close(self) -> None:
-        """Leave the domain with everything created here."""
+        """Leave the domain and close everything created here."""
         if self._closed:
             return
         self._closed = True
@@ -305,7 +305,7 @@ class DdsMiddleware(Middleware):
         self._changed()
 
     def _show(self, endpoint: EndpointInfo, gid: bytes) -> None:
-        """Put an endpoint of ours into our graph; discovery removes it."""
+        """Add one of our endpoints to our graph; discovery removes it."""
         if self._discovery is not None:
             self._discovery.show(replace(endpoint, gid=gid))
 

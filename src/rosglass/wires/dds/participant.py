@@ -25,17 +25,17 @@ if TYPE_CHECKING:
 __all__ = ["Participant"]
 
 _log = logging.getLogger("rosglass.ros2")
-#: Seconds that closing waits for users of the participant, which take milliseconds, and its pump.
+#: Seconds that closing waits for the participant's pump, and its users, which take milliseconds.
 _CLOSE_TIMEOUT_S = 5.0
-#: Poll interval of the pump in seconds: usually, and with many samples.
+#: Poll interval of the pump in seconds: normally, and at high sample rates.
 _IDLE_POLL_S, _BUSY_POLL_S = 0.03, 0.005
-#: Seconds until a handler of the pump that raised is repeated.
+#: Seconds until the pump calls a handler again that raised an exception.
 _BACKOFF_S = 0.1
-#: Seconds that readers have to acknowledge the last samples, as many as Cyclone DDS gives them.
+#: Seconds that readers have to acknowledge the last samples, as in Cyclone DDS.
 _ACKNOWLEDGE_TIMEOUT_S = 1.0
-#: Poll interval of lingering writers in seconds, while a participant is closed.
+#: Poll interval of lingering writers in seconds, while a participant is closing.
 _LINGER_POLL_S = 0.002
-#: Writers that are remembered; older ones are known as long as they are matched.
+#: Number of writers to remember; older ones are available while they are matched.
 _MAX_WRITERS = 1000
 #: Key of the lingering writers in the pump; no entity has that number.
 _LINGERING = 0
@@ -55,13 +55,13 @@ class Participant:
         lingering: The closed writers whose samples are not acknowledged yet.
         on_nodes: Called with all nodes when they or their endpoints change, one call at a time;
             set by discovery.
-        writers: GUIDs and type hashes of the last writers of topics, by their handles.
+        writers: GUIDs and type hashes of the most recent topic writers, by handle.
         seen: The graph of the domain; set by discovery.
 
     Raises:
         ConnectionLostError: This machine has no network interface to use, or no free port.
         ConversionError: The configuration is wrong.
-        UnsupportedError: The process is in the domain already with another configuration.
+        UnsupportedError: The process is already in the domain with another configuration.
     """
 
     def __init__(self, options: DdsOptions) -> None:
@@ -94,7 +94,7 @@ class Participant:
             return self._entities()
 
     def add_node(self, node: NodeName) -> None:
-        """Add a node; a node that is added twice must be removed twice."""
+        """Add a node; a node added twice must be removed twice."""
         with self._lock:
             self._nodes[node] = self._nodes.get(node, 0) + 1
             self._tell()
@@ -114,7 +114,7 @@ class Participant:
             self._tell()
 
     def add_writer(self, handle: int, guid: bytes, type_hash: str) -> None:
-        """Remember a topic's writer, whose samples may be read after it was deleted."""
+        """Remember a topic's writer: its samples may be read after its deletion."""
         with self._lock:
             if len(self.writers) >= _MAX_WRITERS:
                 del self.writers[next(iter(self.writers))]
@@ -128,7 +128,7 @@ class Participant:
 
     @contextmanager
     def in_use(self) -> Iterator[None]:
-        """Keep the participant, and memory of its entities, from being deleted.
+        """Keep the participant and the memory of its entities from being deleted.
 
         Raises:
             NodeClosedError: It is being closed.
@@ -145,7 +145,7 @@ class Participant:
                 self._lock.notify_all()
 
     def before_leaving(self, entity: int, end: Callable[[], None] | None) -> None:
-        """Register what to call before the entities are deleted; None removes it."""
+        """Register a function to call before the entities are deleted; None removes it."""
         with self._lock:
             if end is None:
                 self._leaving.pop(entity, None)
@@ -153,7 +153,7 @@ class Participant:
                 self._leaving[entity] = end
 
     def close(self) -> None:
-        """Delete the participant with its entities; nothing is called back afterwards."""
+        """Delete the participant with its entities; no callback runs afterwards."""
         with self._lock:
             if self._closed:
                 return
@@ -205,18 +205,18 @@ class Pump:
     def watch(self, entity: int, events: Event, act: Callable[[], bool | None]) -> None:
         """Call `act`, on the pump's thread, at each of `events` of an entity.
 
-        New data is reported once, and then only after some was taken: `act` returns whether there
-        may be more, and is called again after the other handlers. A status is reported until it is
-        read. Deleting the entity ends it; :meth:`forget` releases `act`.
+        New data is reported once, and again only after some was taken: `act` returns whether more
+        may wait, and is then called again after the other handlers. A status is reported until it
+        is read. Deleting the entity ends this; :meth:`forget` releases `act`.
         """
         set_events(entity, events)
         self._acts[entity] = act
         self._waitset.attach(entity, entity)
 
     def visit(self, entity: int, act: Callable[[], object] | None) -> None:
-        """Call `act` some thirty times a second; more often while it returns True.
+        """Call `act` about thirty times a second, more often while it returns True.
 
-        None ends that, and calls the entity's handler once, for data that arrived before.
+        None ends this, and calls the entity's handler once, for data that is already waiting.
         """
         if act is None:
             self._idle.pop(entity, None)
@@ -226,7 +226,7 @@ class Pump:
         self._waitset.wake()
 
     def forget(self, entity: int) -> None:
-        """Release the handlers of an entity that was deleted."""
+        """Release the handlers of a deleted entity."""
         self._acts.pop(entity, None)
         self._idle.pop(entity, None)
 
@@ -236,7 +236,7 @@ class Pump:
         return threading.current_thread() is self._thread
 
     def close(self) -> None:
-        """End the thread; no handler is called afterwards, except one that called this."""
+        """End the thread; no handler runs afterwards, except one that called this."""
         self._closed = True
         if self.current:
             return
@@ -275,26 +275,26 @@ class Pump:
 class Lingering:
     """The closed writers of a participant that linger until their samples are acknowledged.
 
-    Cyclone DDS can do that, too (``WriterLingerDuration``), but blocks the thread that deletes a
+    Cyclone DDS can do this itself (``WriterLingerDuration``), but blocks the thread that deletes a
     writer: for a second if a peer was killed, and for one writer after the other.
 
     Args:
-        pump: Polls them, some thirty times a second.
+        pump: Polls them, about thirty times a second.
     """
 
     def __init__(self, pump: Pump) -> None:
         self._pump = pump
-        #: Deadlines and deleters, by writer; added to by any thread.
+        #: Deadlines and deleters, by writer; any thread may add some.
         self._waiting: dict[int, tuple[float, Callable[[], None]]] = {}
 
     def add(self, writer: int, delete: Callable[[], None]) -> None:
-        """Call `delete` once a writer's samples are acknowledged, or a second later."""
+        """Call `delete` once a writer's samples are acknowledged, or after a second."""
         set_events(writer, Event.NONE)  # no thread handles them any more
         self._waiting[writer] = time.monotonic() + _ACKNOWLEDGE_TIMEOUT_S, delete
         self._pump.visit(_LINGERING, self._poll)
 
     def close(self) -> None:
-        """Wait until all are deleted; for the thread that has closed the pump."""
+        """Wait until all are deleted; called by the thread that has closed the pump."""
         while self._waiting:
             self._poll()
             time.sleep(_LINGER_POLL_S)

@@ -1,7 +1,7 @@
 """The two topics of a DDS service, and the matched peers on them.
 
-Names and user data are rmw_cyclonedds's, which are every rmw implementation's but for the ids that
-tell it which reader and writer belong together.
+Names and user data follow rmw_cyclonedds. Every rmw implementation uses the same, except for the
+ids by which rmw_cyclonedds pairs readers and writers.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ _log = logging.getLogger("rosglass.ros2")
 
 #: First two bytes of a GUID (RTPS 2.5, section 9.3.1.5).
 _CYCLONE = b"\x01\x10"
-#: The GUID of an unknown peer that used Cyclone DDS.
+#: GUID that stands for an unknown peer on Cyclone DDS.
 _DEPARTED = _CYCLONE.ljust(16, b"\0")
 _VENDORS = {
     b"\x01\x01": "RTI Connext",
@@ -63,41 +63,41 @@ _VENDORS = {
 }
 #: A participant's readers and writers share the beginning of its GUID.
 PREFIX = 12
-#: What to do about a peer that cannot be served.
+#: Remedy for a peer that cannot be served.
 REMEDY = "start it with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp, or use zenoh:// with rmw_zenoh_cpp"
-#: Requests and replies that are kept until they are acknowledged, or handed on.
+#: Number of requests and replies kept until they are acknowledged or delivered.
 _DEPTH = 1000
 #: Seconds that sending blocks the caller's thread for slow readers.
 _SEND_TIMEOUT_S = 0.01
-#: Seconds from when a writer of another vendor is matched until its first sample is sure to arrive;
-#: see :meth:`Ends._start_probe`. Cyclone DDS's own writers need none.
+#: Seconds after matching another vendor's writer until its first sample is sure to arrive; see
+#: :meth:`Ends._start_probe`. Cyclone DDS's own writers need none.
 _SETTLING_S = 0.2
-#: Seconds after joining the domain when everybody on a usual network has answered, and when others
-#: than Cyclone DDS have begun to tell of their endpoints: some do with their next heartbeat, each
-#: second. RustDDS then tells of ten a second, so they are known when it has been quiet for a while,
-#: or after a time that is long enough. A client that finds a server before the server knows it
-#: loses its first request.
+#: Seconds after joining the domain until all peers on a usual network have answered, and until
+#: those of other vendors have begun to announce endpoints: some wait for their next heartbeat, sent
+#: each second. RustDDS then announces ten a second: discovery is complete after a quiet time, or
+#: after a timeout. A client that discovers a server before the server discovers it loses its first
+#: request.
 _ANSWERED_S, _HEARTBEAT_S, _QUIET_S, _SYNC_TIMEOUT_S = 0.1, 1.2, 0.3, 4.0
 #: Peers whose malformed samples are logged, once each.
 _MAX_NAMED = 100
-#: Peers that left and are remembered, as their samples may be delivered later.
+#: Number of departed peers to remember: their samples may be delivered later.
 _MAX_DEPARTED = 256
 
 _numbers = itertools.count(1)
-#: What the GUIDs of this process's participants with services begin with, and how often.
+#: GUID prefixes of this process's participants with services, and how often each is in use.
 _here: Counter[bytes] = Counter()
 
 
 class Scheme(Enum):
-    """How a reply says which request it answers.
+    """The way in which a reply identifies its request.
 
-    Measured with, or read from, rmw_cyclonedds, rmw_fastrtps and RustDDS.
+    Measured with, or read in the source of, rmw_cyclonedds, rmw_fastrtps and RustDDS.
     """
 
-    #: rmw_cyclonedds's: payloads begin with 16 bytes behind the encapsulation header, a number of
-    #: the client's and one of the request's, which servers return as they are.
+    #: rmw_cyclonedds: payloads have 16 bytes after the encapsulation header, the client's number
+    #: and the request's, which servers return unchanged.
     HEADER = "header"
-    #: Everyone else's: plain payloads; a reply's inline QoS carries the identity of its request
+    #: All others: plain payloads; a reply's inline QoS carries the identity of its request
     #: (OMG DDS-RPC 1.0), see :mod:`rosglass.wires.dds.cyclone_identity`.
     IDENTITY = "identity"
 
@@ -120,7 +120,7 @@ class Matched:
         look_up: Returns the counterpart with a handle.
 
     Attributes:
-        all: The counterparts at the last :meth:`refresh`.
+        all: The counterparts as of the last :meth:`refresh`.
         by_guid: The same by their GUIDs.
     """
 
@@ -131,13 +131,13 @@ class Matched:
         look_up: Callable[[int, int], Discovered | None],
     ) -> None:
         self._entity, self._handles, self._look_up = entity, handles, look_up
-        #: With some that have left.
+        #: Includes some that have left.
         self._known: dict[int, Discovered] = {}
         self.all: tuple[Discovered, ...] = ()
         self.by_guid: dict[bytes, Discovered] = {}
 
     def get(self, handle: int) -> Discovered | None:
-        """Return the counterpart with a handle; None if it left, and was not seen lately."""
+        """Return the counterpart with a handle; None if it left and is no longer remembered."""
         known = self._known.get(handle)
         if known is None:
             known = self._look_up(self._entity, handle)
@@ -146,10 +146,10 @@ class Matched:
         return known
 
     def refresh(self) -> None:
-        """Update the counterparts; not by several threads at once."""
+        """Update the counterparts; for one thread at a time."""
         try:
             handles = self._handles(self._entity)
-        except Error:  # it was deleted
+        except Error:  # the entity was deleted
             handles = []
         here = {handle: found for handle in handles if (found := self.get(handle)) is not None}
         if len(self._known) > len(here) + _MAX_DEPARTED:
@@ -161,24 +161,24 @@ class Matched:
 class Ends:
     """The reader and the writer of a service's client or server.
 
-    A server's writer is created a little later if the participant has only just joined. Whatever
-    the profile, both hold many samples, so that no request or reply is lost.
+    A server's writer is created a little later if the participant has only just joined. Both hold
+    many samples, whatever the profile, so that no request or reply is lost.
 
     Args:
         participant: The participant they belong to.
-        graph: Has the names of peers.
+        graph: Source of the names of peers.
         endpoint: The client or server.
-        on_taken: Takes the received samples, from :meth:`start` on.
-        on_matched: Called, mostly on the participant's pump, when peers appeared, left or settled.
+        on_taken: Called with the received samples, after :meth:`start`.
+        on_matched: Called, mostly on the participant's pump, when peers appear, leave or settle.
 
     Attributes:
-        reader: Receives requests, or replies.
-        writer: Sends the others; None while it must not exist yet.
+        reader: Receives requests (of a server) or replies (of a client).
+        writer: Sends replies or requests; None while it must not exist yet.
         writers: The writers that the reader is matched with.
         readers: The readers that the writer is matched with.
         outbox: The samples that wait to be sent.
         origins: The origins of received samples.
-        depth: How many samples wait at most, unless the profile keeps all.
+        depth: Maximum number of waiting samples, unless the profile keeps all.
     """
 
     def __init__(
@@ -197,7 +197,7 @@ class Ends:
         self._started = False
         self._named: set[bytes] = set()
         self._since: dict[bytes, float] = {}
-        #: Held while matches are looked up, and while writer and probe are created or deleted.
+        #: Held to look up matches, and to create or delete writer and probe.
         self._lock = threading.RLock()
         self._probe: list[int] = []
         self.closed = False
@@ -238,7 +238,7 @@ class Ends:
                 raise
 
     def start(self) -> None:
-        """Start to deliver samples and to report matches."""
+        """Start delivering samples and reporting matches."""
         self._started = True
         self.reader.start()
         self.look()
@@ -246,7 +246,7 @@ class Ends:
             self._wake(False)
 
     def settled(self, writer: bytes) -> bool:
-        """Return whether all samples of a matched writer arrive, the first one included."""
+        """Return whether all samples of a matched writer arrive, including its first."""
         if scheme_of(writer) is Scheme.HEADER:
             return True
         return time.monotonic() - self._since.get(writer, math.inf) >= _SETTLING_S
@@ -256,7 +256,7 @@ class Ends:
         writer, readers = self.writer, self.readers
         if writer is None or readers is None:
             return
-        # Nothing of ours is called while the lock is held that this waits for.
+        # The lock that this waits for is never held while Python is called.
         count = keeping().dds_get_matched_subscriptions(writer.entity, None, 0)
         if count >= 0 and count != len(readers.all):
             self.look()
@@ -265,21 +265,21 @@ class Ends:
         """Return the writer of a sample, and the sample's origin.
 
         A peer that left right after sending may never have been matched, but its sample must not be
-        lost: of such a peer only the GUID may be known, or that it uses Cyclone DDS.
+        lost: the result then has the peer's GUID alone, or only shows that it uses Cyclone DDS.
 
         Args:
             handle: The writer's handle.
-            origin: The noted origin.
+            origin: The recorded origin.
 
         Returns:
-            The writer, None if it is unknown; and the origin, None if another sample's was noted.
+            The writer, None if it is unknown; and the origin, None if it is another sample's.
         """
         found = self.writers.get(handle)
         if found is not None:
             stale = origin is not None and not origin.may_be_of(found.guid)
             return found, None if stale else origin
         if origin is None:
-            # Samples from this process have no origin, and are Cyclone DDS's.
+            # A sample without origin is from this process, and so from Cyclone DDS.
             known = not cyclone_identity.reading.problem
             return (Discovered(False, _DEPARTED, handle) if known else None), None
         return (Discovered(False, origin.guid, handle) if origin.guid else None), origin
@@ -308,7 +308,7 @@ class Ends:
             _log.warning(f"%s: {text}", self._service, *values)
 
     def close(self) -> None:
-        """Delete both; safe to call twice."""
+        """Delete reader and writer; safe to call twice."""
         if self.closed:
             return
         self.closed = True
@@ -330,7 +330,7 @@ class Ends:
         with self._participant.in_use():
             if self._server:
                 # Clients that appear from now on find a complete server, and may call it before it
-                # discovers them. Clients from before may have called another server.
+                # discovers them. Earlier clients may have called another server.
                 problem = cyclone.start_at_first_sample(self.reader.entity)
                 if problem:
                     _warn_loss(problem)
@@ -340,7 +340,7 @@ class Ends:
                 self._qos,
                 self._user_data,
                 self._place,
-                # Requests need no identity beyond that which every sample has.
+                # Requests need no identity other than the one that every sample has.
                 cyclone_identity.create_reply_topic if self._server else cyclone.create_topic,
                 _SEND_TIMEOUT_S,
             )
@@ -360,7 +360,7 @@ class Ends:
             self._participant.add_endpoint(self._node, writer.guid, writer=True)
 
     def _synced(self) -> bool:
-        """Return whether clients that discover this server now are discovered here, too."""
+        """Return whether clients that discover this server now are already discovered here."""
         now, seen = time.monotonic(), self._participant.seen
         age = now - self._participant.born
         if seen is None or age < _ANSWERED_S or age >= _SYNC_TIMEOUT_S:
@@ -372,7 +372,7 @@ class Ends:
         """Look up the matched peers, and report changes."""
         if not self._started or self.closed:
             return
-        with self._lock:  # a thread must not overwrite what another looked up later
+        with self._lock:  # a thread must not overwrite another's newer result
             self.writers.refresh()
             if self.readers is not None:
                 self.readers.refresh()
@@ -394,15 +394,15 @@ class Ends:
     def _start_probe(self) -> None:
         """Create a second reader for a while.
 
-        A writer tells a reader that it discovers where its samples begin (its heartbeat). When it
-        discovered ours before we discovered it, that was lost, and Cyclone DDS drops the writer's
-        next sample, or, with :func:`cyclone.start_at_first_sample`, gets it with the next
-        heartbeat, 3 s later from Fast DDS. What it tells the second reader counts for both.
+        A writer sends each reader it discovers a heartbeat with its first sequence number. If it
+        discovered ours before we discovered it, that heartbeat was lost, and Cyclone DDS drops the
+        writer's next sample, or, with :func:`cyclone.start_at_first_sample`, gets it with the next
+        heartbeat, 3 s later from Fast DDS. The heartbeat to the second reader counts for both.
 
-        As long, rmw_fastrtps counts more readers of requests than writers of replies, and takes the
-        service for unavailable. A second writer would hide that, but then clients call: Fast DDS
-        tells the second reader to skip their first request, Cyclone DDS skips it for both, and what
-        the first reader did not get yet is lost (6 of 10,400 requests).
+        During that time, rmw_fastrtps counts more request readers than reply writers, and considers
+        the service unavailable. A second writer would hide that, but then clients call: Fast DDS
+        makes the second reader skip their first request, Cyclone DDS skips it for both, and samples
+        that the first reader has not received yet are lost (6 of 10,400 requests).
         """
         self._end_probe()
         try:
@@ -441,7 +441,7 @@ class Ends:
             self._wake(False)
 
     def _do_due(self) -> None:
-        """Do what is due; on the pump's thread, repeated until nothing is left."""
+        """Run the due work on the pump's thread, repeatedly until none is left."""
         if self.closed:
             self._participant.pump.forget(self.reader.entity)
             return
@@ -500,13 +500,13 @@ class Outbox:
     """Sends samples at once if possible, and keeps the others for a retry.
 
     Args:
-        wake: Called when :meth:`retry` is due, with whether it is at once.
+        wake: Called when :meth:`retry` is due; its argument is whether to retry at once.
         in_order: Whether samples are sent strictly in order.
     """
 
     def __init__(self, wake: Callable[[bool], None], *, in_order: bool) -> None:
         self._wake, self._in_order = wake, in_order
-        #: Added to by any thread, removed from by the one that retries.
+        #: Any thread appends; only the one that retries removes.
         self._items: deque[_Item] = deque()
         self._closed = False
 
@@ -522,9 +522,9 @@ class Outbox:
 
         Args:
             attempt: Sends it; returns False to be called again a little later.
-            timeout_s: Seconds after which it is given up.
-            expired: Called then, and when it cannot be sent at all.
-            now: Whether to try it in the calling thread, and raise its errors.
+            timeout_s: Seconds after which the sample is given up.
+            expired: Called then, and if the sample cannot be sent at all.
+            now: Whether to call `attempt` in the calling thread first, and raise its errors.
         """
         if now and not (self._in_order and self._items) and attempt():
             return
@@ -536,14 +536,14 @@ class Outbox:
         """Retry the waiting samples; return whether some are left. For one thread."""
         for item in self._items.copy():
             if self._try(item):
-                with suppress(ValueError):  # it was closed
+                with suppress(ValueError):  # the outbox was closed
                     self._items.remove(item)
             elif self._in_order:
                 break
         return bool(self._items)
 
     def drain(self, seconds: float) -> None:
-        """Wait until no sample is left, with a timeout; not in the thread that retries."""
+        """Wait up to `seconds` until no sample is left; not in the thread that retries."""
         until = time.monotonic() + seconds
         while self._items and time.monotonic() < until:
             time.sleep(0.005)
@@ -563,7 +563,7 @@ class Outbox:
             _log.warning(
                 "what was to be sent is lost: %s", error, exc_info=not isinstance(error, Error)
             )
-            item.expired()  # its caller must not wait for it
+            item.expired()  # its caller must not keep waiting
             return True
         if time.monotonic() < item.deadline:
             return False

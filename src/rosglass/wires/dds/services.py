@@ -1,9 +1,9 @@
 """Service clients and servers over DDS, for peers of every DDS implementation.
 
-A service's replies go to all its clients, which pick their own. How depends on the peer; see
-:class:`rosglass.wires.dds.service_endpoints.Scheme`. rmw_cyclonedds puts 16 bytes in front of
-requests and replies, behind the encapsulation header: a number of the client's, and one of the
-request's; a server returns them as they are. Being 16, they leave everything behind them aligned.
+A service sends each reply to all its clients, which pick their own. How depends on the peer; see
+:class:`rosglass.wires.dds.service_endpoints.Scheme`. rmw_cyclonedds inserts 16 bytes after the
+encapsulation header of requests and replies: the client's number and the request's, which a server
+returns unchanged. As they are 16, the rest of the payload stays aligned.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def pack_header(client: int, number: int) -> bytes:
 
 
 def unpack_header(data: bytes | memoryview) -> tuple[int, int] | None:
-    """Return the client's number and the request's; None when the payload is too short."""
+    """Return the client's number and the request's; None if the payload is too short."""
     if len(data) < _END:
         return None
     client, number = (_IDS if data[1] & 1 else _IDS_BIG).unpack_from(data, _ENCAPSULATION)
@@ -81,7 +81,7 @@ def header_of(data: bytes | memoryview) -> bytes:
 
 
 def with_header(data: bytes | bytearray, header: bytes) -> Parts:
-    """Return a payload with a header put in."""
+    """Return a payload with a header inserted."""
     if len(data) <= COPIED:
         return (b"".join((data[:_ENCAPSULATION], header, data[_ENCAPSULATION:])),)
     view = memoryview(data)
@@ -89,20 +89,20 @@ def with_header(data: bytes | bytearray, header: bytes) -> Parts:
 
 
 def without_header(data: bytes | memoryview) -> bytes:
-    """Return a payload with its header taken out."""
+    """Return a payload with its header removed."""
     return b"".join((data[:_ENCAPSULATION], data[_END:]))
 
 
 _log = logging.getLogger("rosglass.ros2")
-#: Seconds after which a reader of requests without writer of replies belongs to no server.
+#: Seconds after which a request reader without reply writer counts as not being a server's.
 _ANSWERLESS_S = 2.0
 
 
 class DdsRequester(Requester):
-    """The DDS writer and reader of a service client; arguments as :class:`Ends`'s.
+    """The DDS writer and reader of a service client; arguments as for :class:`Ends`.
 
     Attributes:
-        gid: Identity of its writer of requests, by which the client is known.
+        gid: Identity of its request writer, which identifies the client.
     """
 
     def __init__(
@@ -117,17 +117,17 @@ class DdsRequester(Requester):
         self._lock = threading.Lock()
         #: A random number in place of rmw_cyclonedds's instance handle; unique in the domain.
         self._id = secrets.randbits(64)
-        #: Numbers of calls, and the sequence number that each was sent with, 0 for none.
+        #: Sequence numbers of the sent requests by number of the call, 0 if not sent yet.
         self._calls: dict[int, int] = {}
         self._by_sequence: dict[int, int] = {}
         self._sequence = 0
-        #: Handles of the linked servers' readers of requests; after a reconnection, they differ.
+        #: Handles of the linked servers' request readers; they change with a reconnection.
         self._linked: dict[Scheme, frozenset[int]] = {}
-        #: Sent calls, and the readers that have been linked ever since.
+        #: For each sent call, the readers that have been linked ever since.
         self._asked: dict[int, frozenset[int]] = {}
-        #: How requests are sent now; None when no server is linked.
+        #: How requests are sent now; None if no server is linked.
         self._scheme: Scheme | None = None
-        #: When readers of requests that belong to no known server came, and when to look again.
+        #: When request readers without a known server appeared, and when to check them again.
         self._unlinked: dict[bytes, float] = {}
         self._recheck = math.inf
         self._ends = Ends(participant, graph, endpoint, self._on_replies, self._link)
@@ -154,7 +154,7 @@ class DdsRequester(Requester):
         return ""
 
     def ready(self) -> bool:
-        """Return whether a server's reader of requests and its writer of replies are matched."""
+        """Return whether a server's request reader and its reply writer are matched."""
         if time.monotonic() >= self._recheck:
             self._ends.look()
         return self._scheme is not None and not self._ends.closed
@@ -173,22 +173,22 @@ class DdsRequester(Requester):
             lambda: self._send(number, data),
             float("inf") if timeout is None else timeout,
             expired,
-            # A signal's exception in the main thread must not spoil the count of what was sent.
+            # An exception from a signal in the main thread must not spoil the sequence count.
             now=self._scheme is not Scheme.IDENTITY or not in_main_thread(),
         )
 
     def stranded(self, number: int) -> bool:
-        """Return whether a request's servers have left: their replies are lost."""
+        """Return whether a request's servers have left, so that their replies are lost."""
         asked = self._asked.get(number)
         return asked is not None and not asked
 
     def forget(self, number: int) -> None:
-        """Drop the reply to a request, should it still come."""
+        """Drop the reply to a request, if it still arrives."""
         with self._lock:
             self._drop(number)
 
     def close(self) -> None:
-        """Withdraw the client; replies that still come are dropped."""
+        """Withdraw the client; replies that still arrive are dropped."""
         if self._ends.closed:
             return
         self._ends.origins.hasten(None)
@@ -199,8 +199,8 @@ class DdsRequester(Requester):
             self._asked.clear()
 
     def _send(self, number: int, data: bytes | bytearray) -> bool:
-        """Send a request; return whether nothing more is to be done for it."""
-        # A server that has just appeared must not be sent what it would misread.
+        """Send a request; return False if it must be tried again."""
+        # A server that has just appeared must not get a request that it would misread.
         self._ends.catch_up()
         if self._scheme is Scheme.HEADER and self._ends.strangers():
             self._ends.look()
@@ -213,7 +213,7 @@ class DdsRequester(Requester):
         parts: Parts = (data,)
         if scheme is Scheme.HEADER:
             parts = with_header(data, pack_header(self._id, number))
-        # Replies are looked up under the lock, too: they may come before this returns.
+        # Replies are looked up under the same lock: they may arrive before this returns.
         with self._lock:
             if number not in self._calls:
                 return True
@@ -272,12 +272,12 @@ class DdsRequester(Requester):
         if claim is not None:
             self._answer(*claim, data)
         elif related is not None or server is None:
-            pass  # another client's, or forgotten
+            pass  # another client's reply, or one to a forgotten request
         elif scheme_of(server) is Scheme.IDENTITY:
             if not cyclone_identity.reading.problem:
                 text = "ignoring replies of %s, which do not say what they answer"
                 self._ends.name(server, text, self._ends.who(server))
-        # Within this process, replies for other clients carry no identity.
+        # Replies to other clients in this process carry no identity.
         elif unpack_header(data) is None and not in_this_process(server):
             text = "ignoring a reply of %s, which is too short for its header: %d bytes"
             self._ends.name(server, text, self._ends.who(server), len(data))
@@ -285,7 +285,7 @@ class DdsRequester(Requester):
     def _match(
         self, related: Identity | None, data: bytes | memoryview
     ) -> tuple[int, Scheme] | None:
-        """Return which open call a reply belongs to, and what shows that."""
+        """Return the open call that a reply answers, and the scheme that identifies it."""
         number, scheme = None, Scheme.IDENTITY
         if related is not None and related.guid in (self.gid, self._ends.reader.guid):
             number = self._by_sequence.get(related.sequence)
@@ -311,16 +311,16 @@ class DdsRequester(Requester):
             self._on_reply(number, None, error)
 
     def _route(self) -> Scheme | None:
-        """Return how to send requests; None when no server is linked."""
+        """Return how to send requests; None if no server is linked."""
         schemes = self._schemes()
         if schemes.get(Scheme.IDENTITY) is not None and not cyclone_identity.reading.problem:
-            # Servers on Cyclone DDS find such requests too short, mostly; the others would take
-            # a header for arguments: nothing is sent while they are about to be ready.
+            # Most servers on Cyclone DDS reject such requests as too short; the others would read a
+            # header as arguments: nothing is sent until they are ready.
             return Scheme.IDENTITY if schemes[Scheme.IDENTITY] else None
         return Scheme.HEADER if Scheme.HEADER in schemes else None
 
     def _schemes(self) -> dict[Scheme, bool]:
-        """Return the schemes of the linked servers, and whether their replies surely arrive."""
+        """Return the schemes of the linked servers, and whether replies are sure to arrive."""
         ends, now = self._ends, time.monotonic()
         answering = {_server_of(found): ends.settled(found.guid) for found in ends.writers.all}
         schemes: dict[Scheme, bool] = {}
@@ -329,13 +329,13 @@ class DdsRequester(Requester):
             scheme = scheme_of(found.guid)
             settled = answering.get(_server_of(found))
             if settled is None and scheme is Scheme.IDENTITY:
-                # Its writer of replies is about to be found, unless it is only listening.
+                # Its reply writer will be discovered soon, unless it only listens.
                 unlinked[found.guid] = since = self._unlinked.get(found.guid, now)
                 settled = None if now - since >= _ANSWERLESS_S else False
             if settled is not None:
                 schemes[scheme] = settled or schemes.get(scheme, False)
         if Scheme.IDENTITY not in schemes:
-            # A server that was announced may take requests before it is matched at this end.
+            # An announced server may take requests before it is matched here.
             for peer in ends.strangers():
                 unlinked[peer.gid] = since = self._unlinked.get(peer.gid, now)
                 if now - since < _ANSWERLESS_S:
@@ -344,7 +344,7 @@ class DdsRequester(Requester):
         return schemes
 
     def _readers(self) -> dict[Scheme, frozenset[int]]:
-        """Return the handles of the linked servers' readers of requests, by scheme."""
+        """Return the handles of the linked servers' request readers, by scheme."""
         answering = {_server_of(found) for found in self._ends.writers.all}
         readers: dict[Scheme, set[int]] = {scheme: set() for scheme in Scheme}
         for found in () if self._ends.readers is None else self._ends.readers.all:
@@ -371,23 +371,23 @@ def _server_of(found: Discovered) -> str | bytes:
     return parse_user_data(found.user_data).get("serviceid") or found.guid[:PREFIX]
 
 
-#: Seconds that a reply waits for its client's reader to be found, or to take something.
+#: Seconds that a reply waits for its client's reader to be discovered or to accept samples.
 _REPLY_TIMEOUT_S = 3.0
-#: Clients whose newest request is remembered, beside those that are there.
+#: Clients whose newest request is remembered; if there are more, departed ones are forgotten.
 _MAX_REMEMBERED = 1024
-#: Seconds that closing waits for replies that are on their way.
+#: Seconds that closing waits for pending replies.
 _DRAIN_TIMEOUT_S = 0.5
 
 
 @dataclass(frozen=True)
 class _Answer:
-    """What a reply needs.
+    """The data of a request that its reply needs.
 
     Attributes:
         client: The writer of the request.
         identity: The request's identity.
-        header: What its payload began with, where the reply's is to begin with it, too.
-        reader: The client's reader of replies, if it was announced.
+        header: The header of its payload, if the reply must repeat it.
+        reader: The client's reply reader, if it was announced.
     """
 
     client: Discovered
@@ -397,10 +397,10 @@ class _Answer:
 
 
 class DdsReplier(Replier):
-    """The DDS reader and writer of a service server; arguments as :class:`Ends`'s.
+    """The DDS reader and writer of a service server; arguments as for :class:`Ends`.
 
     Attributes:
-        gid: Identity of its reader of requests, by which the server is known.
+        gid: Identity of its request reader, which identifies the server.
     """
 
     def __init__(
@@ -411,14 +411,14 @@ class DdsReplier(Replier):
         on_request: OnRequest,
     ) -> None:
         self._service, self._on_request = endpoint.name, on_request
-        #: Clients whose readers of replies are matched, as found out since the last change.
+        #: Clients whose reply readers were found to be matched since the last change.
         self._hearing: set[bytes] = set()
         self._strangers = False
-        #: The newest request of each client that was taken, by its writer; not Cyclone DDS's.
+        #: The newest taken request of each client, by its writer; without Cyclone DDS's clients.
         self._newest: dict[bytes, int] = {}
-        #: Origins, by their identity, of requests left to the pump: none may overtake them.
+        #: Origins, by id(), of requests left to the pump, which no request may overtake.
         self._left: OrderedDict[int, Origin] = OrderedDict()
-        #: Guards them: requests are received on several threads.
+        #: Guards these origins: requests are received on several threads.
         self._leaving = threading.Lock()
         self._ends = Ends(participant, graph, endpoint, self._on_requests, self._link)
         self._pump = participant.pump
@@ -450,7 +450,7 @@ class DdsReplier(Replier):
             lambda: self._answer(answer, data),
             _REPLY_TIMEOUT_S,
             expired,
-            # See cyclone_identity.create_reply_topic() for what the main thread must not do.
+            # See cyclone_identity.create_reply_topic(): the main thread must not write.
             now=not in_main_thread(),
         )
 
@@ -492,7 +492,7 @@ class DdsReplier(Replier):
                 self._has_come(origin)
 
     def _has_come(self, origin: Origin) -> None:
-        """Stop waiting for a request that was left to the pump, and those before it: lost."""
+        """Stop waiting for a request left to the pump; earlier ones count as lost."""
         with self._leaving:
             waiting, gone = len(self._left), 0
             if id(origin) not in self._left:
@@ -519,7 +519,7 @@ class DdsReplier(Replier):
             why = cyclone_identity.reading.problem or "its requests have no identity"
             self._ends.name(client.guid, text, self._ends.who(client.guid), why, REMEDY)
         elif origin.sequence > self._newest.get(client.guid, 0):
-            # A client that was out of reach and is back sends what it holds once more.
+            # After an interruption, a client sends its history again.
             self._newest[client.guid] = origin.sequence
             given = origin.related
             reader = b"" if given is None or given.guid == UNKNOWN_GUID else given.guid
@@ -528,7 +528,7 @@ class DdsReplier(Replier):
             self._on_request(RequestId(client.guid, origin.sequence, answer), data)
 
     def _answer(self, answer: _Answer, data: bytes | bytearray) -> bool:
-        """Send a reply; return whether nothing more is to be done for it."""
+        """Send a reply; return False if it must be tried again."""
         if not self._hears(answer):
             # Its event may not have been handled yet.
             self._ends.look()
@@ -558,13 +558,13 @@ class DdsReplier(Replier):
         if len(self._newest) > _MAX_REMEMBERED:
             here = self._ends.writers.by_guid
             self._newest = {guid: last for guid, last in self._newest.items() if guid in here}
-        # RustDDS's clients fail when they get a reply without identity, whosever it is.
+        # RustDDS's clients fail on any reply without identity, even another client's.
         self._strangers = not cyclone_identity.writing.problem and any(
             scheme_of(found.guid) is Scheme.IDENTITY for found in readers
         )
 
     def _hears(self, answer: _Answer) -> bool:
-        """Return whether the client's reader of replies is matched."""
+        """Return whether the client's reply reader is matched."""
         hearing = self._hearing
         key = answer.reader or answer.client.guid
         if key in hearing:

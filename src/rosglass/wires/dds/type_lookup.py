@@ -1,13 +1,13 @@
-"""Definitions that DDS endpoints announce themselves: XTypes' TypeLookup.
+"""Type definitions that DDS endpoints announce themselves, read with XTypes TypeLookup.
 
-Nodes of ROS 2 announce none; programs that use Cyclone DDS directly do. DDS for Extensible Types
-1.3, section 7.3.4 (type representations) and annex B (type objects). Type objects are looked at as
-data: ``cyclonedds.dynamic`` would turn them into Python classes, and names from the network into
-Python code.
+ROS 2 nodes announce none; programs that use Cyclone DDS directly do. DDS for Extensible Types 1.3,
+section 7.3.4 (type representations) and annex B (type objects). Type objects are read as data:
+``cyclonedds.dynamic`` would turn them into Python classes, and names from the network into Python
+code.
 
-Limits: a ``char`` is taken for ``uint8``, which is the same on the wire. Wide strings, enumerations
-and unions, optional members, inheritance and the like are not ROS 2's and are refused. Constants,
-comments and defaults are not announced.
+Limits: a ``char`` is read as ``uint8``, which is the same on the wire. Wide strings, enumerations
+and unions, optional members, inheritance and the like do not exist in ROS 2 and are refused.
+Constants, comments and defaults are not announced.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
 __all__ = ["announced_definition", "describe_struct"]
 
-#: Endpoints that are read at once.
+#: Number of endpoints to read at once.
 _ROOM = 100
-#: Aliases that may lead to a type, one to the next.
+#: Maximum length of a chain of aliases.
 _MAX_ALIASES = 16
 #: Type ids of ``type_description_interfaces/msg/FieldType`` by the kind's number in XTypes.
 _PRIMITIVES = {
@@ -68,14 +68,14 @@ def announced_definition(
         participant: Cyclone DDS's number for our participant.
         guid: The endpoint's identity.
         provider: Recorded in the definition's source.
-        timeout: Seconds to wait for its participant to send what is not known here.
+        timeout: Seconds to wait for its participant to send missing type objects.
 
     Returns:
-        None when it announces none, or is gone.
+        None if it announces none, or has left.
 
     Raises:
         TimeoutError: Its participant does not send it.
-        DefinitionError: It is no message of ROS 2.
+        DefinitionError: It is not a ROS 2 message.
     """
     from cyclonedds import _clayer  # noqa: PLC0415 - takes 0.2 s to import
     from cyclonedds.idl._typesupport.DDS.XTypes import TypeObject  # noqa: PLC0415
@@ -102,11 +102,11 @@ def announced_definition(
 
 
 def _type_id(participant: int, guid: bytes) -> Any:
-    """Return the identifier of an endpoint's type, None when it announces none."""
+    """Return the identifier of an endpoint's type, None if it announces none."""
     from cyclonedds import builtin  # noqa: PLC0415 - as above
 
     key = UUID(bytes=guid)
-    owner: Any = SimpleNamespace(_ref=participant)  # all that is asked of it
+    owner: Any = SimpleNamespace(_ref=participant)  # no other attribute is used
     for topic in (builtin.BuiltinTopicDcpsPublication, builtin.BuiltinTopicDcpsSubscription):
         reader = builtin.BuiltinDataReader(owner, topic)
         while samples := reader.take(_ROOM):
@@ -124,13 +124,13 @@ def describe_struct(root: Any, fetch: Callable[[Any], Any]) -> dict[str, Any]:
         fetch: Returns the complete type object of an identifier.
 
     Raises:
-        DefinitionError: It uses what ROS 2 does not have.
+        DefinitionError: It uses features that ROS 2 does not have.
     """
     return _Describer(fetch).describe(root)
 
 
 class _Describer:
-    """Describes one struct and all that it needs."""
+    """Describes one struct and the structs that it uses."""
 
     def __init__(self, fetch: Callable[[Any], Any]) -> None:
         self._fetch = fetch
@@ -163,7 +163,7 @@ class _Describer:
         return found.struct_type
 
     def _struct(self, type_id: Any, where: str) -> str:
-        """Describe a struct, and what it needs; returns its name."""
+        """Describe a struct and the structs that it uses; return its name."""
         struct = self._object(type_id, where)
         if struct is None:
             raise DefinitionError("an alias cannot be a message", where)
@@ -225,7 +225,7 @@ class _Describer:
         }
 
     def _unaliased(self, type_id: Any, where: str) -> Any:
-        """Return what a type identifier stands for in the end."""
+        """Return the identifier of a type with its aliases resolved."""
         for _ in range(_MAX_ALIASES + 1):
             if type_id.discriminator != _COMPLETE or self._object(type_id, where) is not None:
                 return type_id
