@@ -1,8 +1,8 @@
 """A ROS graph inside one process: nodes exchange bytes by function calls, without a network.
 
-``rosglass.connect("local://NAME")`` joins it: for tests, for interfaces that are tried without a
-robot, and between parts of one program. Nodes that give the same name see each other. What is sent
-arrives in the thread that sends it.
+``rosglass.connect("local://NAME")`` joins it: for tests, to try an interface without a robot, and
+between parts of one program. Nodes with the same NAME see each other. Samples, requests and replies
+are delivered in the thread that sends them.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class _Network:
     Attributes:
         lock: Guards the graph and the state of its endpoints; held while the nodes' graphs are
             updated, so that they see changes in order, but never while a sample, request or reply
-            is handed on.
+            is delivered.
     """
 
     def __init__(self) -> None:
@@ -71,19 +71,19 @@ class _Network:
         self._endpoints: dict[tuple[EndpointKind, str, str], tuple[Any, ...]] = {}
 
     def join(self, graph: Graph) -> None:
-        """Keep a node's graph up to date from now on."""
+        """Start updating a node's graph."""
         with self.lock:
             self._graphs.append(graph)
             for member in self._members.values():
                 member.put_into(graph)
 
     def leave(self, graph: Graph) -> None:
-        """Update a node's graph no more."""
+        """Stop updating a node's graph."""
         with self.lock:
             self._graphs = [other for other in self._graphs if other is not graph]
 
     def add(self, member: _Member) -> None:
-        """Put a node or endpoint into all graphs; the lock is held."""
+        """Add a node or endpoint to all graphs; the lock is held."""
         self._members[member.key] = member
         for graph in self._graphs:
             member.put_into(graph)
@@ -95,7 +95,7 @@ class _Network:
                 graph.remove(member.key)
 
     def add_endpoint(self, endpoint: _Endpoint[Any]) -> tuple[Any, ...]:
-        """Add an endpoint that can be sent to; return its counterparts. The lock is held."""
+        """Add an endpoint that can receive; return its counterparts. The lock is held."""
         info = endpoint.info
         place = info.kind, info.name, info.type
         known = self._endpoints.get(place, ())
@@ -113,12 +113,12 @@ class _Network:
         return self.counterparts(info)
 
     def counterparts(self, info: EndpointInfo) -> tuple[Any, ...]:
-        """Return the endpoints that an endpoint of this topic or service talks to."""
+        """Return the endpoints that communicate with an endpoint of this topic or service."""
         return self._endpoints.get((_COUNTERPART[info.kind], info.name, info.type), ())
 
 
 class _Member(Handle):
-    """A node or endpoint that is in the graph until it is closed.
+    """A node or endpoint, which is in the graph until it is closed.
 
     Attributes:
         key: Its key in the nodes' graphs.
@@ -220,7 +220,7 @@ class _Endpoint(_Member, Generic[_Other]):
 
         Args:
             other: The counterpart.
-            calls: Takes what is to be called once the lock is released.
+            calls: Receives the functions to call once the lock is released.
         """
 
     def unlink(self, other: _Other, calls: list[_Call]) -> None:
@@ -242,14 +242,14 @@ class LocalWriter(_Endpoint["LocalReader"], Writer):
         self._numbers = itertools.count(1)
         self._keeps = qos.durability is Durability.TRANSIENT_LOCAL
         depth = None if qos.history is History.KEEP_ALL else qos.depth
-        #: The last samples, for late readers, each with the monotonic time at which it expires.
+        #: The last samples, for late readers, each with its monotonic time of expiry.
         self._kept: deque[tuple[float, _Sample]] = deque(maxlen=depth)
         lifespan = qos.lifespan
         self._lifespan_s = float("inf") if lifespan is None else lifespan.seconds
         self._open()
 
     def write(self, data: bytes | bytearray) -> None:
-        """Send a payload; it has arrived when this returns."""
+        """Send a payload; it is delivered when this returns."""
         received, sent = self._owner.stamp()
         with self._lock:
             self._check_open()
@@ -262,7 +262,7 @@ class LocalWriter(_Endpoint["LocalReader"], Writer):
             reader.deliver(sample)
 
     def link(self, other: LocalReader, calls: list[_Call]) -> None:
-        """Send to a reader from now on: the kept samples first, and each exactly once."""
+        """Start sending to a reader: the kept samples first, and each exactly once."""
         if other in self._readers:
             return
         if self._owner.matches_qos and other.info.qos.conflicts(self.info.qos):
@@ -277,22 +277,22 @@ class LocalWriter(_Endpoint["LocalReader"], Writer):
                 calls.append(partial(other.catch_up, self.gid))
 
     def unlink(self, other: LocalReader, calls: list[_Call]) -> None:  # noqa: ARG002
-        """Send to a reader no more."""
+        """Stop sending to a reader."""
         self._readers = tuple(one for one in self._readers if one is not other)
 
 
 class LocalReader(_Endpoint[LocalWriter], Reader):
-    """Hands the samples of all writers of the topic to one subscription."""
+    """Delivers the samples of all writers of the topic to one subscription."""
 
     def __init__(self, owner: LocalMiddleware, info: EndpointInfo, on_sample: OnSample) -> None:
         super().__init__(owner, info)
         self._on_sample = on_sample
-        #: The samples that wait for older ones of their writer to be handed on, by its identity.
+        #: The samples that wait for older ones of their writer to be delivered, by its identity.
         self._held: dict[bytes, list[_Sample]] = {}
         self._open()
 
     def deliver(self, sample: _Sample) -> None:
-        """Hand on a sample, after those that its writer has kept."""
+        """Deliver a sample, after those that its writer has kept."""
         if self._held:
             with self._lock:
                 held = self._held.get(sample[3])
@@ -309,7 +309,7 @@ class LocalReader(_Endpoint[LocalWriter], Reader):
         return is_new
 
     def catch_up(self, gid: bytes) -> None:
-        """Hand on the samples of a writer that are held, and those that follow until then."""
+        """Deliver the held samples of a writer, and those that arrive until they are delivered."""
         while True:
             with self._lock:
                 held, self._held[gid] = self._held[gid], []
@@ -332,7 +332,7 @@ class LocalRequester(_Endpoint["LocalReplier"], Requester):
         self._open()
 
     def ready(self) -> bool:
-        """Return whether there is a server."""
+        """Return whether a server exists."""
         return bool(self._network.counterparts(self.info))
 
     def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:  # noqa: ARG002 - the caller keeps it
@@ -353,7 +353,7 @@ class LocalRequester(_Endpoint["LocalReplier"], Requester):
             self._pending.pop(number, None)
 
     def handle_reply(self, number: int, data: bytes) -> None:
-        """Hand on the first reply to a request."""
+        """Deliver the first reply to a request."""
         if self._complete(number):
             self._on_reply(number, data, "")
 
@@ -368,12 +368,12 @@ class LocalRequester(_Endpoint["LocalReplier"], Requester):
             self._fail(number, reason)
 
     def link(self, other: LocalReplier, calls: list[_Call]) -> None:  # noqa: ARG002 - any will do
-        """Notify the client that a server is there."""
+        """Notify the client that a server is available."""
         if self.changed is not None:
             calls.append(self.changed)
 
     def unlink(self, other: LocalReplier, calls: list[_Call]) -> None:
-        """Fail the requests that only this server had."""
+        """Fail the requests that only this server could answer."""
         calls += [
             partial(self.handle_refusal, number, other, SERVER_LEFT)
             for number, servers in self._pending.items()
@@ -387,13 +387,13 @@ class LocalRequester(_Endpoint["LocalReplier"], Requester):
             self._on_reply(number, None, reason)
 
     def _complete(self, number: int) -> bool:
-        """Forget a request; return whether its client still waits for the reply."""
+        """Remove a request; return whether its client still waits for the reply."""
         with self._lock:
             return self._pending.pop(number, None) is not None and not self.closed
 
 
 class LocalReplier(_Endpoint[LocalRequester], Replier):
-    """Hands the requests of all clients to a service server."""
+    """Delivers the requests of all clients to a service server."""
 
     tells_failures = True
 
@@ -403,14 +403,14 @@ class LocalReplier(_Endpoint[LocalRequester], Replier):
         self._open()
 
     def handle_request(self, request: RequestId, data: bytes) -> None:
-        """Hand on a request."""
+        """Deliver a request to the server."""
         if self.closed:
             self.fail(request, SERVER_LEFT)
         else:
             self._on_request(request, data)
 
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:
-        """Answer a request."""
+        """Send the response to a request."""
         self._check_open()
         if isinstance(request.handle, LocalRequester):
             request.handle.handle_reply(request.sequence, bytes(data))
@@ -432,7 +432,7 @@ class LocalMiddleware(Middleware):
         network: The graph that it shares with the other nodes of that name.
 
     Raises:
-        ArgumentError: The URL has more than a name.
+        ArgumentError: The URL has more parts than a name.
     """
 
     matches_qos = True
@@ -443,14 +443,14 @@ class LocalMiddleware(Middleware):
             expected = "local://NAME with a name of letters, digits, '_', '-' and '.', no options"
             raise ArgumentError("url", url, expected)
         self._name, self.wire = name, wire
-        #: What is open, and whether this is closed; both guarded by the network's lock.
+        #: The open members, and whether this is closed; both guarded by the network's lock.
         self._open_members: dict[_Member, None] = {}
         self._graph: Graph | None = None
         self._closed = False
 
     def open(self, graph: Graph, changed: Callable[[], None]) -> None:  # noqa: ARG002 - it never does
         """Join the graph."""
-        # Not sooner: a node whose name is refused is never opened, nor closed.
+        # Not earlier: a node whose name is refused is never opened or closed.
         with _networks_lock:
             self.network = networks.setdefault(self._name, _Network())
             _members[self._name] = _members.get(self._name, 0) + 1
@@ -464,9 +464,9 @@ class LocalMiddleware(Middleware):
         return Status(ConnectionState.CONNECTED, "in this process")
 
     def stamp(self) -> tuple[int, int | None]:
-        """Return the times of reception and sending for a sample that is sent now.
+        """Return the reception and sending times for a sample that is sent now.
 
-        Both in nanoseconds since the Unix epoch; the latter is None where it is unknown.
+        Both are in nanoseconds since the Unix epoch; the latter is None if unknown.
         """
         now = time.time_ns()
         return now, now
@@ -479,33 +479,33 @@ class LocalMiddleware(Middleware):
         return announcement
 
     def create_writer(self, endpoint: EndpointInfo) -> LocalWriter:
-        """Announce a publisher and return its sending end."""
+        """Announce a publisher and return its writer."""
         return LocalWriter(self, endpoint)
 
     def create_reader(self, endpoint: EndpointInfo, on_sample: OnSample) -> LocalReader:
-        """Announce a subscription and hand what arrives to `on_sample`."""
+        """Announce a subscription and deliver its samples to `on_sample`."""
         return LocalReader(self, endpoint, on_sample)
 
     def create_requester(self, endpoint: EndpointInfo, on_reply: OnReply) -> LocalRequester:
-        """Announce a service client and return its sending end."""
+        """Announce a service client and return its requester."""
         return LocalRequester(self, endpoint, on_reply)
 
     def create_replier(self, endpoint: EndpointInfo, on_request: OnRequest) -> LocalReplier:
-        """Announce a service server and hand its requests to `on_request`."""
+        """Announce a service server and deliver its requests to `on_request`."""
         return LocalReplier(self, endpoint, on_request)
 
     def poll(self) -> None:
         """Do nothing: every change takes effect at once."""
 
     def add(self, member: _Member) -> None:
-        """Close `member` together with this; raises NodeClosedError after closing."""
+        """Register a member to close together with this; raises NodeClosedError after closing."""
         with self.network.lock:
             if self._closed:
                 raise NodeClosedError(f"local://{self._name} is closed; connect again")
             self._open_members[member] = None
 
     def remove(self, member: _Member) -> None:
-        """Remove something that was closed."""
+        """Remove a closed member."""
         with self.network.lock:
             self._open_members.pop(member, None)
 
@@ -528,7 +528,7 @@ class LocalMiddleware(Middleware):
                 del _members[self._name], networks[self._name]
 
 
-#: The graphs of this process by name, and how many nodes each has; guarded by the lock.
+#: The graphs of this process by name, and the number of nodes in each; guarded by the lock.
 networks: dict[str, _Network] = {}
 _members: dict[str, int] = {}
 _networks_lock = threading.Lock()
