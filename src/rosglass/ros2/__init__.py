@@ -1,7 +1,7 @@
 """ROS 2's protocols above a wire: topics, services, actions, parameters, types.
 
-Import what you need from the modules: those of :mod:`rosglass.wires.zenoh` bring in the
-``eclipse-zenoh`` package, those of :mod:`rosglass.wires.dds` ``cyclonedds``, the others neither.
+Import from the modules: those of :mod:`rosglass.wires.zenoh` import the ``eclipse-zenoh`` package,
+those of :mod:`rosglass.wires.dds` ``cyclonedds``, the others neither.
 """
 
 from __future__ import annotations

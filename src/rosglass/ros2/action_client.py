@@ -74,14 +74,14 @@ __all__ = ["Ros2ActionClient", "Ros2ClientGoal"]
 _log = logging.getLogger("rosglass.ros2")
 #: First second beyond the range of a time stamp, and its year.
 _END_OF_TIME = 2**31, 2038
-#: Seconds until a result is requested again, after a failed request or a status of its end.
+#: Seconds until a result is requested again, after a failed request or a final status.
 _RETRY_S = 1.0
-#: The same after a status of its end, from then on.
+#: Seconds between further requests after a final status.
 _OVERDUE_S = 5.0
-#: Profile of the subscriptions. The status topic's latched array is not requested: a client needs
-#: none from before its goals, and some servers' topic is volatile.
+#: Profile of the subscriptions. They do not request the status topic's latched array: a client
+#: needs no status from before its goals, and some servers' topic is volatile.
 _QOS = QoS()
-#: The bytes of a feedback message that are the goal's id, behind the encapsulation header.
+#: The bytes of the goal's id in a feedback message, after the encapsulation header.
 _ID = slice(4, 20)
 
 _RANK = {
@@ -124,20 +124,20 @@ class Ros2ClientGoal(ClientGoal):
 
     @property
     def accepted(self) -> Time | None:
-        """When the server accepted it, by the server's clock; None before."""
+        """The time of acceptance, by the server's clock; None before."""
         return self._accepted
 
     # -- for its client --------------------------------------------------------------------------
 
     def _send(self) -> None:
-        """Send it, as soon as a server is there; again when the type has changed."""
+        """Send the goal as soon as a server is available; again if the type has changed."""
         left = None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
         call = self._client._ask_goal(self, left)
         self._sending = call
         call.add_done_callback(lambda _: self._jobs.add(lambda: self._on_answer(call)))
 
     def _take_back(self, service: ActionServiceClient) -> bool:
-        """Take the goal back if its request was not sent yet; return whether it was not."""
+        """Withdraw the goal if its request was not sent yet; return whether that was so."""
         call, self._sending = self._sending, None  # the call's end must not end the goal
         if call is None or service.withdraw(call):
             return call is not None
@@ -149,7 +149,7 @@ class Ros2ClientGoal(ClientGoal):
     def _send_again(self, kind: MessageType) -> None:
         """Send the goal with another version of its type."""
         try:
-            assert self.goal is not None  # it waited to be sent
+            assert self.goal is not None  # an unsent goal has its message
             self.goal = kind.create(self.goal.to_dict())
             self._send()
         except Error as error:
@@ -203,7 +203,7 @@ class Ros2ClientGoal(ClientGoal):
         if isinstance(error, ServiceUnavailableError):
             return self._client._unsent(seconds)
         if isinstance(error, (TimeoutError, ConnectionLostError)):
-            # It may have been accepted, or be later: no goal is to run without its client.
+            # It may have been accepted, or be later: no goal may run without its client.
             self._client._ask_cancel(self.id, Time(), Promise(cancellable=False), 10.0)
         if isinstance(error, TimeoutError):
             return TimeoutError(
@@ -241,7 +241,7 @@ class Ros2ClientGoal(ClientGoal):
         known = self._status
         self._advance(status)
         if known.is_active and not status.is_active:
-            # The response should have been sent; it can be lost with a link.
+            # The server has sent the result, which can be lost with a link.
             self._later(_RETRY_S, lambda: self._jobs.add(self._ask_again))
 
     def _on_feedback(self, feedback: Message) -> None:
@@ -253,12 +253,12 @@ class Ros2ClientGoal(ClientGoal):
             self._add_feedback(feedback)
 
     def _alive(self) -> None:
-        """Note that a server has the goal, the former one or another."""
+        """Record that the goal has a server again, the former one or another."""
         if self._lost_at is not None:
             self._lost_at, self._servers = None, self._client._servers()
 
     def _advance(self, status: GoalStatus) -> None:
-        """Take a status that is later than the current one; ignore others."""
+        """Adopt a status that is later than the current one; ignore others."""
         if _RANK.get(status, _END) > _RANK.get(self._status, _END):
             self._set_status(status)
 
@@ -298,7 +298,7 @@ class Ros2ClientGoal(ClientGoal):
         if self._lost_at is None:
             self._lost_at = now
         if here - self._queried:
-            # A server that replaced the one that had the goal reports it as unknown.
+            # A server that replaced the goal's server reports the goal as unknown.
             self._queried |= here
             self._ask_again()
         status = self._client._core.status()
@@ -317,7 +317,7 @@ class Ros2ClientGoal(ClientGoal):
     # -- the result ------------------------------------------------------------------------------
 
     def _ask_soon(self, delay: float) -> None:
-        """Request the result later, and not on a thread of the middleware."""
+        """Request the result after `delay` seconds, not on a thread of the middleware."""
         self._later(delay, lambda: self._jobs.add(self._ask))
 
     def _ask_again(self) -> None:
@@ -368,7 +368,7 @@ class Ros2ClientGoal(ClientGoal):
             self._ask_soon(_RETRY_S)
 
     def _closing(self, error: BaseException) -> BaseException:
-        """Return the goal's error: a request may fail before the goal is closed by its client."""
+        """Return the goal's error: a request may fail before the client closes the goal."""
         if isinstance(error, NodeClosedError) and self._client.closed:
             return self._client._ended()
         return error
@@ -396,8 +396,8 @@ class Ros2ActionClient(ActionClient, NodeMember):
     Args:
         core: The node it belongs to.
         name: Absolute action name.
-        wanted: The type, or its name: then the version that the server announces is taken if the
-            library has it; None takes whatever type the server announces.
+        wanted: The type, or its name to use the version that the server announces if the library
+            has it; None uses whatever type the server announces.
     """
 
     _core: Core
@@ -485,7 +485,7 @@ class Ros2ActionClient(ActionClient, NodeMember):
         self._once_typed(ask)
 
     def _take_back(self, call: Call) -> bool:
-        """Withdraw a goal request that was not sent yet; return whether it was not."""
+        """Withdraw a goal request that was not sent yet; return whether that was so."""
         ends = self._ends
         return ends is not None and ends.send_goal.withdraw(call)
 
@@ -502,7 +502,7 @@ class Ros2ActionClient(ActionClient, NodeMember):
 
     def _empty_result(self) -> Message:
         """Return a result with the type's defaults."""
-        assert self.type is not None  # there are goals
+        assert self.type is not None  # goals exist only with a type
         return self.type.result.create()
 
     def _replaced(self) -> ConnectionLostError:
@@ -553,7 +553,7 @@ class Ros2ActionClient(ActionClient, NodeMember):
             goal._jobs.add(goal._watch)
 
     def _replace_endpoints(self, types: ActionTypes) -> None:
-        """Replace the endpoints by those of a version of the type."""
+        """Replace the endpoints with those for a version of the type."""
         ends = _ClientEndpoints(self._core, self.name, types, self._goals)
         with self._lock:
             old, self._ends = self._ends, ends
@@ -667,7 +667,7 @@ class _ClientEndpoints(Handle):
         return core.middleware.create_reader(endpoint, self._taker(topic, kind))
 
     def _taker(self, topic: str, kind: MessageType) -> OnSample:
-        """Return the function that takes a topic's samples."""
+        """Return the function that receives a topic's samples."""
         ours, repeats, feedback = kind.rihs01, Repeats(), topic == FEEDBACK
 
         def receive(

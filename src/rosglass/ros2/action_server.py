@@ -47,11 +47,11 @@ __all__ = ["Ros2ActionServerProtocol"]
 _log = logging.getLogger("rosglass.ros2")
 #: Seconds for which results are kept for late requests, as in Humble's rcl_action.
 _RESULT_TIMEOUT_S = 900.0
-#: Ended goals that are kept at most.
+#: Maximum number of ended goals to keep.
 _MAX_ENDED = 500
-#: Requests for one goal's result that are kept; more only of a client gone wild.
+#: Maximum number of pending requests for one goal's result; only a faulty client sends more.
 _MAX_WAITING = 1000
-#: Seconds from acceptance in which a client requests a goal's result: closing waits for that.
+#: Seconds after acceptance within which a client requests the result: closing waits for that.
 _ASK_TIMEOUT_S = 1.0
 #: ``action_msgs/srv/CancelGoal``'s return codes.
 _NONE, _REJECTED, _UNKNOWN, _TERMINATED = range(4)
@@ -66,7 +66,7 @@ class _KeptGoal:
         asked: Whether its result was requested.
         ended: Monotonic time of its end, None before.
         response: The response to requests for its result, None before its end.
-        waiting: The pending requests for it.
+        waiting: The pending requests for its result.
     """
 
     def __init__(self, goal: ServerGoal) -> None:
@@ -101,7 +101,7 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
         """Create services and publishers."""
         self._server = server
         core, name, types = self._core, self.name, self._types
-        #: Runs the protocol, independent of the middleware's threads and users' callbacks.
+        #: Runs the protocol, independently of the middleware's threads and users' callbacks.
         self._desk = Dispatcher(f"{name} goals")
         self._feedback = Publisher(core, part(name, FEEDBACK), types.feedback, FEEDBACK_QOS)
         self._status = Publisher(core, part(name, STATUS), types.status, STATUS_QOS)
@@ -116,7 +116,7 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
         core.add(self)
 
     def withdraw(self) -> None:
-        """Close services and publishers, after clients could request the results."""
+        """Close services and publishers, after giving clients time to request the results."""
         self._await_questions()
         for end in (*self._services, self._feedback, self._status):
             end.close()
@@ -124,7 +124,7 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
         self._core.remove(self)
 
     def close(self) -> None:
-        """Close the server, with its node."""
+        """Close the server together with its node."""
         self._server.close()
 
     def problems(self) -> list[str]:
@@ -144,11 +144,11 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
                     del self._kept[kept.goal.id]
 
     def post(self, job: Callable[[], None]) -> None:
-        """Run a job that follows a decision on the protocol's own thread."""
+        """Run the job that follows a decision, on the protocol's own thread."""
         self._desk.post(job)
 
     def _await_questions(self) -> None:
-        """Wait for result requests of goals that were accepted just now."""
+        """Wait for result requests for goals that were only just accepted."""
         with self.lock:
             goals = list(self._kept.values())
         if self._desk.is_current or not goals:
@@ -159,17 +159,17 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
         ) < _ASK_TIMEOUT_S and graph.endpoints(EndpointKind.SERVICE_CLIENT, name):
             time.sleep(0.005)
         answered = threading.Event()
-        self._desk.post(answered.set)  # behind the last answer
+        self._desk.post(answered.set)  # after the last answer
         answered.wait(_ASK_TIMEOUT_S)
 
     # -- feedback, status, results ---------------------------------------------------------------
 
     def publish_feedback(self, goal: ServerGoal, feedback: Message) -> None:
-        """Publish feedback of a goal."""
+        """Publish feedback for a goal."""
         self._feedback.publish({"goal_id": {"uuid": goal.id}, "feedback": feedback})
 
     def publish_status(self) -> None:
-        """Publish the status of all goals, as of now."""
+        """Publish the current status of all goals."""
         self._publishing.add(self._publish_status)
 
     def _publish_status(self) -> None:
@@ -179,11 +179,11 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
             {"goal_info": goal_info(goal.id, goal.accepted), "status": CODES[goal.status]}
             for goal in goals
         ]
-        with suppress(NodeClosedError):  # clients see that the server is gone
+        with suppress(NodeClosedError):  # clients notice that the server has left
             self._status.publish(status_list=entries)
 
     def on_end(self, goal: ServerGoal, text: str) -> None:  # noqa: ARG002 - ROS 2 has no room for it
-        """Note that a goal has ended."""
+        """Record that a goal has ended."""
         kept = self._kept.get(goal.id)
         if kept is not None:
             kept.ended = time.monotonic()
@@ -221,7 +221,7 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
         return answer
 
     def accept(self, goal: ServerGoal) -> bool:
-        """Note that a goal is accepted."""
+        """Record that a goal is accepted."""
         goal.accepted = self._core.clock.now()
         self._kept[goal.id] = _KeptGoal(goal)
         return True
@@ -262,7 +262,7 @@ class Ros2ActionServerProtocol(ActionServerProtocol[ServerGoal], NodeMember):
         """Cancel goals; return the response."""
         canceled = [goal for goal in goals if goal._request_cancel()]
         if goals and not canceled:
-            code = _TERMINATED  # they have ended since
+            code = _TERMINATED  # they have ended in between
         if canceled:
             self.publish_status()
         infos = [goal_info(goal.id, goal.accepted) for goal in canceled]
@@ -293,8 +293,8 @@ def _cancelable(
 ) -> tuple[list[ServerGoal], int]:
     """Return the goals that a request to cancel selects, and the return code.
 
-    An id alone means one goal; a stamp means all accepted until then, and the goal with the id, if
-    there is one; neither means all (``rcl_action_process_cancel_request``).
+    An id alone selects one goal; a stamp selects all accepted until then, and also the goal with
+    the id, if one is given; neither selects all (``rcl_action_process_cancel_request``).
     """
     if goal_id != NO_ID and stamp == Time():
         found = [goal for goal in goals if goal.id == goal_id]

@@ -60,7 +60,7 @@ STATUSES = {
 }
 CODES = {status: code for code, status in STATUSES.items()}
 
-#: ``action_msgs/srv/CancelGoal``'s return codes, for people.
+#: ``action_msgs/srv/CancelGoal``'s return codes in words.
 CANCEL_REASONS = {
     0: "there was no goal to cancel",
     1: "the server refuses to cancel",
@@ -82,7 +82,7 @@ class ActionTypes:
     """An action's type and those of its services and topics.
 
     Attributes:
-        action: The action's.
+        action: The action's type.
         send_goal: The service type for sending goals.
         get_result: The service type for requesting results.
         cancel_goal: The service type for cancelling goals.
@@ -99,7 +99,7 @@ class ActionTypes:
 
     @classmethod
     def of(cls, action: ActionType, types: Types) -> ActionTypes:
-        """Return the types that an action implies; raises TypeNotFoundError without action_msgs."""
+        """Return the types derived from an action; raises TypeNotFoundError without action_msgs."""
         from rosglass.messages import MessageType, ServiceType  # noqa: PLC0415 - numpy
 
         send_goal, get_result = (
@@ -122,7 +122,7 @@ def assemble(
 ) -> ActionType:
     """Return the action whose goal, result and feedback are those of the derived types.
 
-    A robot's version of an action shows by the hashes of its parts, each by itself.
+    A robot announces its version of an action by the hash of each part.
     """
     from rosglass.messages import ActionType  # noqa: PLC0415 - numpy
 
@@ -158,7 +158,7 @@ def _service(action: ActionType, suffix: str) -> ServiceDefinition:
 
 
 def _complete(definition: Definition) -> Definition:
-    """Return a derived message with the definitions of the fields that actions add."""
+    """Return a derived message, completed with the definitions of the fields that actions add."""
     names = {field.type.name for field in definition.fields} & _BUILT_IN.keys()
     added = {name: parse_message(_BUILT_IN[name], name) for name in names}
     return replace(definition, nested={**definition.nested, **added})
@@ -167,15 +167,14 @@ def _complete(definition: Definition) -> Definition:
 class ActionVersion:
     """The type of an action, in the version that its server announces.
 
-    Two versions of an action often differ in one part only, and each part has a hash of its own:
-    the goal's shows at the service ``send_goal``, the result's at ``get_result``, the feedback's
-    at the topic.
+    Two versions of an action often differ in one part only, and each part has its own hash: the
+    service ``send_goal`` has the goal's, ``get_result`` the result's, the topic the feedback's.
 
     Args:
         core: The node.
         name: Absolute name of the action.
-        wanted: The type, or its name: then the announced version of it is taken; None takes
-            whatever type is announced.
+        wanted: The type, or its name to use the announced version; None uses whatever type is
+            announced.
 
     Attributes:
         types: The types in use; None while they are unknown.
@@ -198,13 +197,13 @@ class ActionVersion:
             self._begin(core.types.action(wanted))
 
     def follow(self, *, retry: bool) -> bool:
-        """Take the type and version that the server announces.
+        """Adopt the type and version that the server announces.
 
         Args:
             retry: Whether to search again for definitions that were not found before.
 
         Returns:
-            Whether it has changed.
+            Whether the type has changed.
         """
         before = self.types
         try:
@@ -274,7 +273,7 @@ class ActionVersion:
         if not any(changed):
             return
         goal, result, feedback = self._send_goal.type, self._get_result.type, self._feedback.type
-        assert goal is not None  # each began with a type
+        assert goal is not None  # each was created with a type
         assert result is not None
         assert feedback is not None
         self.types = ActionTypes.of(assemble(action, goal, result, feedback), self._core.types)

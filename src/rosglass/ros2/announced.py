@@ -42,14 +42,14 @@ class Announced(Generic[_T]):
 
     Args:
         core: The node.
-        load: Returns the type of a name and hash; raises an Error when there is none.
-        given: The type that was given; None to take what peers announce.
-        fixed: Whether it stays as given whatever peers announce.
+        load: Returns the type with a name and hash; raises an Error if there is none.
+        given: The type that the user gave; None to use the one that peers announce.
+        fixed: Whether the given type stays, whatever peers announce.
 
     Attributes:
         type: The type; None while it is unknown.
         hash: Its own hash, empty without type.
-        hashes: The hashes that peers announce it by; see
+        hashes: The hashes by which peers announce it; see
             :func:`rosglass.interfaces.hashes.announced_hashes`.
         failure: Why the announced version is not available; empty if it is.
         pending: Whether it is being fetched.
@@ -69,11 +69,11 @@ class Announced(Generic[_T]):
             self._set(given)
 
     def follow(self, name: str, peers: Sequence[EndpointInfo], retry: bool) -> bool:
-        """Take the version of the type `name` that `peers` announce.
+        """Adopt the version of the type `name` that `peers` announce.
 
         Args:
             name: The type's name, as peers spell it.
-            peers: Peers; those with another type are ignored.
+            peers: The peers; those with another type are ignored.
             retry: Whether to search again for a definition that was not found before.
 
         Returns:
@@ -101,13 +101,13 @@ class Announced(Generic[_T]):
         return True
 
     def difference(self, peer: EndpointInfo) -> str:
-        """Return how a peer's version differs from ours, in hashes."""
+        """Return in words how a peer's version differs from ours, with both hashes."""
         if peer.type_hash in self.hashes and peer.response_hash:
             return f"of its response: {peer.response_hash}, ours is {self._response_hash}"
         return f"{peer.type_hash}, ours is {self.hash}"
 
     def fits(self, peer: EndpointInfo) -> bool:
-        """Return whether a peer has this type in this version, as far as it announces that."""
+        """Return whether a peer uses this type in this version, as far as it announces them."""
         return (
             self.type is not None
             and peer.type == self.type.name
@@ -115,7 +115,7 @@ class Announced(Generic[_T]):
         )
 
     def _version(self, peer: EndpointInfo) -> str:
-        """Return the hash by which a peer's version differs from ours, or equals it."""
+        """Return a peer's hash to compare with ours: its response's if only that differs."""
         if peer.type_hash in self.hashes and peer.response_hash not in self.hashes:
             return peer.response_hash or peer.type_hash
         return peer.type_hash
@@ -147,7 +147,7 @@ def missing(
     Args:
         core: The node; its members follow when the definition is received.
         name: The type's name.
-        hash: The hash that peers announce it by, empty if they do not.
+        hash: The hash by which peers announce it, empty if they announce none.
         peers: The peers that use it.
         error: Why the library does not have it.
 
@@ -166,7 +166,7 @@ def missing(
 
 
 def choose(names: Iterable[str], current: str, example: str) -> tuple[str, str]:
-    """Return the name of the type to use, and the problem if there are several.
+    """Return the name of the type to use, and the problem if peers announce several.
 
     Args:
         names: The names that peers announce.
@@ -185,7 +185,7 @@ def choose(names: Iterable[str], current: str, example: str) -> tuple[str, str]:
 def mismatches(
     announced: Announced[Any], peers: Sequence[EndpointInfo], verb: str, effect: str
 ) -> list[str]:
-    """Return the mismatches of peers with a type, and their effect, one sentence each.
+    """Return the mismatches between peers and a type, and their effect, one sentence each.
 
     Args:
         announced: Our type.
@@ -217,7 +217,7 @@ def rivals(servers: Sequence[EndpointInfo], name: str) -> list[str]:
 
 
 def identity(peer: EndpointInfo) -> bytes | str:
-    """Return the identity of a peer, which differs from that of a successor."""
+    """Return the identity of a peer; its successor has a different one."""
     return peer.gid or peer.node.full
 
 

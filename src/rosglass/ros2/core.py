@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["REQUEST_LIMIT", "Core", "RequestWindow"]
 
 _log = logging.getLogger("rosglass.ros2")
-#: Requests that are open at a time, or replies in a burst: two less than the peer's queue holds.
+#: Maximum number of open requests, and of replies in a burst: two less than a peer's queue holds.
 REQUEST_LIMIT = 8
 
 
@@ -43,7 +43,7 @@ class Core(NodeCore):
         arguments: The program's ``--ros-args``.
 
     Attributes:
-        graph: What is seen of the ROS graph.
+        graph: The ROS graph as discovered so far.
         types: Finds types.
         windows: The open requests to each service, shared by all its clients.
 
@@ -92,7 +92,7 @@ class Core(NodeCore):
 
         Args:
             name: Absolute, relative or private name.
-            kind: ``topic`` or ``service``: some rules are for one of them only. An action's name
+            kind: ``topic`` or ``service``: some rules apply to one of them only. An action's name
                 is resolved as a topic's.
 
         Raises:
@@ -102,7 +102,7 @@ class Core(NodeCore):
         return self._new_names[kind].get(full, full)
 
     def expand(self, name: str) -> str:
-        """Return the absolute name of anything, not remapped; raises InvalidNameError."""
+        """Return the absolute form of any name, not remapped; raises InvalidNameError."""
         return expand(name, self.name.name, self.name.namespace)
 
     def _state(self) -> Status:
@@ -130,7 +130,7 @@ class RequestWindow:
     """The open requests of a node to one service: at most :data:`REQUEST_LIMIT`.
 
     Args:
-        stall_s: Seconds without an answer after which an open request counts as taken.
+        stall_s: Seconds after which an open request without response counts as taken.
     """
 
     def __init__(self, stall_s: float) -> None:
@@ -147,7 +147,7 @@ class RequestWindow:
 
         Args:
             request: The request; it is open until :meth:`leave`.
-            retry: Returned by :meth:`leave` when there is room again.
+            retry: Returned by :meth:`leave` once the window has room again.
         """
         now = time.monotonic()
         with self._lock:
@@ -161,7 +161,7 @@ class RequestWindow:
         return True
 
     def leave(self, request: Hashable) -> list[Callable[[], None]]:
-        """Remove a request; return the callbacks to call now that there is room."""
+        """Remove a request; return the callbacks of waiting requesters, for the caller to call."""
         with self._lock:
             if self._open.pop(request, None) is None or not self._waiting:
                 return []

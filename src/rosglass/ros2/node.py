@@ -53,7 +53,7 @@ class Ros2Node(Node):
         namespace: Absolute namespace.
         library: Source of type definitions; None for the shared library.
         arguments: The program's ``--ros-args``; already applied to name and namespace.
-        own_services: Whether to offer what every ROS 2 node offers: its parameters, its log and
+        own_services: Whether to offer the services of every ROS 2 node: its parameters, its log and
             descriptions of its types.
 
     Raises:
@@ -92,7 +92,7 @@ class Ros2Node(Node):
     def _receive(
         self, subscription: Subscription, type: str | MessageType | None, ignore_local: bool
     ) -> None:
-        """Connect a new subscription with its publishers."""
+        """Connect a new subscription to its publishers."""
         ignored = self._core.local_gids if ignore_local else frozenset[bytes]()
         matching = GraphMatching(self._core, type, ignored)
         self._core.add(SubscriptionFeed(self._core, subscription, matching, ignored))
@@ -194,7 +194,7 @@ class Ros2Node(Node):
         return self._core.graph.duplicate_nodes()
 
     def unnamed_programs(self) -> int:
-        """Return how many programs are unnamed; see :meth:`rosglass.comm.Node.unnamed_programs`."""
+        """Return the number of programs without node names; see :class:`rosglass.comm.Node`."""
         return self._core.middleware.unnamed()
 
     def services(self) -> dict[str, list[str]]:
@@ -202,7 +202,7 @@ class Ros2Node(Node):
         return self._core.graph.services()
 
     def actions(self) -> dict[str, list[str]]:
-        """Return every action in the graph with its announced types."""
+        """Return every action in the graph, with its announced types."""
         return self._core.graph.actions()
 
 
@@ -215,7 +215,7 @@ _FATAL = 50
 
 
 class RclServices(BuiltinProtocol["Ros2Parameters"]):
-    """What every ROS 2 node has by itself.
+    """The built-in services of a ROS 2 node.
 
     Args:
         node: The node.
@@ -226,7 +226,7 @@ class RclServices(BuiltinProtocol["Ros2Parameters"]):
         self._node, self._core = node, core
 
     def open(self, services: BuiltinServices[Ros2Parameters]) -> None:
-        """Set the levels of the library's loggers, and follow simulated time if requested."""
+        """Set the levels of the library's loggers, and use simulated time if requested."""
         arguments, name = self._core.arguments, self._core.name
         for logger, level in arguments.logger_levels.items():
             if logger.partition(".")[0] == "rosglass":
@@ -235,7 +235,7 @@ class RclServices(BuiltinProtocol["Ros2Parameters"]):
             _ = services.parameters
 
     def create_parameters(self, services: BuiltinServices[Ros2Parameters]) -> Ros2Parameters:
-        """Return the parameters; from now on, the clock follows ``use_sim_time``."""
+        """Return the parameters; from here on, the clock follows ``use_sim_time``."""
         from rosglass.ros2.parameters import Ros2Parameters  # noqa: PLC0415
 
         core, full = self._core, self._core.name.full
@@ -255,7 +255,7 @@ class RclServices(BuiltinProtocol["Ros2Parameters"]):
         return parameters
 
     def create_log(self, services: BuiltinServices[Ros2Parameters]) -> NodeLog:  # noqa: ARG002
-        """Return the log; its logger is named as by rcl: ``/arm/gripper`` logs as arm.gripper."""
+        """Return the log; its logger has rcl's name: ``/arm/gripper`` logs as arm.gripper."""
         from rosglass.comm.log import NodeLog, RosoutTopic  # noqa: PLC0415
 
         core, arguments = self._core, self._core.arguments

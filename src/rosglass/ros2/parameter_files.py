@@ -1,8 +1,8 @@
-"""Parameter files of ROS 2, as ``ros2 param dump`` and ``load`` and ``--params-file`` have them.
+"""ROS 2 parameter files, as used by ``ros2 param dump`` and ``load`` and ``--params-file``.
 
-Rules: ``rcl_yaml_param_parser`` (which nodes read such files with), whose idea of a scalar is not
-quite YAML's; rclcpp's ``parameter_map`` (wildcards in node names); ros2cli's ``ros2 param dump``
-(what is written); design article "ROS Command Line Arguments" (which value wins).
+Rules: ``rcl_yaml_param_parser`` (with which nodes read such files), whose scalars differ a little
+from YAML's; rclcpp's ``parameter_map`` (wildcards in node names); ros2cli's ``ros2 param dump``
+(output format); design article "ROS Command Line Arguments" (which value wins).
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 __all__ = ["ParameterFile", "dump", "parse", "parse_value", "read", "write"]
 
 _KEY = "ros__parameters"
-#: Nested mappings in a file; more would only be an attack on the stack.
+#: Maximum depth of nested mappings in a file; only an attack on the stack has more.
 _MAX_DEPTH = 64
-#: Bytes of a file; the biggest seen in the wild have some 100 kB.
+#: Maximum size of a file in bytes; the largest seen in the wild have about 100 kB.
 _MAX_SIZE = 16 * 1024 * 1024
 _TRUE = frozenset(["Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"])
 _FALSE = frozenset(["N", "n", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"])
 _NULL = frozenset(["null", "Null", "NULL", "~"])
-#: What C's strtoll takes with base 0, and strtod; infinity and NaN also as YAML writes them.
+#: Numbers that C's strtoll (base 0) and strtod accept, and infinity and NaN as in YAML.
 _INTEGER = re.compile(r"([+-]?)(?:0[xX]([0-9a-fA-F]+)|(0[0-7]*)|([1-9][0-9]*))\Z")
 _DOUBLE = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?\Z")
 _HEX_DOUBLE = re.compile(
@@ -49,10 +49,10 @@ _STR_TAG, _BINARY_TAG = "tag:yaml.org,2002:str", "tag:yaml.org,2002:binary"
 
 @dataclass(frozen=True)
 class ParameterFile:
-    """What a parameter file says.
+    """The contents of a parameter file.
 
     Attributes:
-        label: Where it came from, for messages.
+        label: The file's path or another source, for messages.
         entries: Pairs of a node's full name, which may have wildcards, and its parameters by
             dotted name, in the file's order.
     """
@@ -63,7 +63,7 @@ class ParameterFile:
     def for_node(self, node: str) -> dict[str, ParameterValue]:
         """Return the parameters for the node with the full name `node`.
 
-        What is said of the node itself wins over what wildcards say; otherwise the last wins.
+        Entries for the node itself win over those with wildcards; otherwise the last wins.
         """
         values: dict[str, ParameterValue] = {}
         for exact in (False, True):
@@ -74,7 +74,7 @@ class ParameterFile:
 
 
 def matches(pattern: str, node: str) -> bool:
-    """Return whether a node's full name is meant by `pattern`.
+    """Return whether a node's full name matches `pattern`.
 
     ``/*`` stands for one part of a name, ``/**`` for any number of parts, none included.
     """
@@ -96,27 +96,27 @@ def parse(text: str, label: str = "<text>") -> ParameterFile:
 
     Args:
         text: The text.
-        label: Where it came from, for messages.
+        label: The file's path or another source, for messages.
 
     Raises:
-        ParameterError: It is no parameter file; the message has file, line and column.
+        ParameterError: It is not a parameter file; the message has file, line and column.
     """
     return ParameterFile(label, tuple(_Reader(text, label).nodes()))
 
 
 def parse_value(text: str, label: str) -> ParameterValue:
-    """Return the value that `text` has as YAML, by the rules for parameter files.
+    """Return the value of `text` as YAML, by the rules for parameter files.
 
     Raises:
-        ParameterError: It is no value of a parameter.
+        ParameterError: It is not a parameter value.
     """
     return _Reader(text, label).value()
 
 
 def dump(nodes: Mapping[str, Mapping[str, ParameterValue]]) -> str:
-    """Return a parameter file's text, laid out as ``ros2 param dump`` does.
+    """Return a parameter file's text in the layout of ``ros2 param dump``.
 
-    Texts that nodes would take for something else (``1e5``, ``nan``) are quoted, which that tool
+    Strings that nodes would read as another type (``1e5``, ``nan``) are quoted, which that tool
     forgets.
 
     Args:
@@ -127,7 +127,7 @@ def dump(nodes: Mapping[str, Mapping[str, ParameterValue]]) -> str:
 
 
 def write(path: str | os.PathLike[str], nodes: Mapping[str, Mapping[str, ParameterValue]]) -> None:
-    """Write a parameter file, in one go; raises ParameterError when that is not possible."""
+    """Write a parameter file atomically; raises ParameterError if that is not possible."""
     write_text(path, dump(nodes))
 
 
@@ -157,7 +157,7 @@ class _Reader:
         return found
 
     def _next(self) -> Any:
-        """Return the next event; aliases are refused, as nodes do."""
+        """Return the next event; aliases are refused, as in nodes."""
         try:
             event = next(self._events)
         except yaml.YAMLError as error:
@@ -174,7 +174,7 @@ class _Reader:
         return ParameterError(f"{self._label}:{mark.line + 1}:{mark.column + 1}: {problem}")
 
     def _pairs(self) -> Iterator[tuple[Any, str, Any]]:
-        """Read a mapping's keys, each with the event that begins its value."""
+        """Read a mapping's keys, each with the first event of its value."""
         while not isinstance(key := self._next(), yaml.MappingEndEvent):
             if not isinstance(key, yaml.ScalarEvent):
                 raise self._error(key, "a key must be a name, not a list or a mapping")
@@ -281,7 +281,7 @@ class _Reader:
 
 
 def _number(text: str) -> int | float | str:
-    """Return the number that C's strtoll and strtod read in all of `text`, or `text`."""
+    """Return the number that C's strtoll or strtod reads in all of `text`, or else `text`."""
     match = _INTEGER.match(text)
     if match:
         sign, hexadecimal, octal, decimal = match.groups()
@@ -318,13 +318,13 @@ def _name_of(value: object) -> str:
 
 
 def _nested(parameters: Mapping[str, ParameterValue]) -> dict[str, Any]:
-    """Return parameters as nested dicts, cut at the dots of their names."""
+    """Return parameters as nested dicts, split at the dots of their names."""
     root: dict[str, Any] = {}
     for name, value in sorted(parameters.items()):
         place, rest = root, name
         while "." in rest:
             first, _, tail = rest.partition(".")
-            # A parameter beside a group of the same name: what is in the group keeps its dots.
+            # A parameter has the name of a group: the names in the group keep their dots.
             if not first or not tail or not isinstance(place.get(first, {}), dict):
                 break
             place, rest = place.setdefault(first, {}), tail
@@ -333,14 +333,14 @@ def _nested(parameters: Mapping[str, ParameterValue]) -> dict[str, Any]:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes texts such that nodes read them as texts, and lists as often as they come."""
+    """Writes strings that nodes read as strings, and repeats equal lists without aliases."""
 
     def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - PyYAML's
-        """Write equal values anew: nodes refuse aliases."""
+        """Write equal values in full: nodes refuse aliases."""
         return True
 
     def text(self, data: str) -> yaml.ScalarNode:
-        """Quote what is not a text for ``rcl_yaml_param_parser``, though it is for YAML."""
+        """Quote strings for YAML that ``rcl_yaml_param_parser`` would read as another type."""
         ambiguous = data in _TRUE or data in _FALSE or _looks_like_number(data)
         style = "'" if ambiguous else None
         return self.represent_scalar(_STR_TAG, data, style=style)

@@ -1,6 +1,6 @@
-"""Parameters of ROS 2: a node's own, the services that offer them, and those of other nodes.
+"""ROS 2 parameters: a node's own, the services that offer them, and those of other nodes.
 
-Rules: rclcpp's documentation of ``Node::declare_parameter`` and its relatives, and the design
+Rules: rclcpp's documentation of ``Node::declare_parameter`` and related functions, and the design
 article "ROS 2 Parameter API": parameters are declared before they are used, and keep their type.
 Services and ``/parameter_events``: rclcpp's ``ParameterService`` and ``NodeParameters``, rmw's
 ``rmw_qos_profile_parameters`` and ``rmw_qos_profile_parameter_events``, ``rcl_interfaces``.
@@ -66,8 +66,8 @@ __all__ = [
 ]
 
 _log = logging.getLogger("rosglass.ros2")
-#: A parameter that every node has, besides :data:`USE_SIM_TIME`: whether the node describes its
-#: types to others. Only to be given at the start.
+#: A parameter that every node has, like :data:`USE_SIM_TIME`: whether the node describes its types
+#: to others. It can only be set at the start.
 DESCRIBE_TYPES = "start_type_description_service"
 #: Names of the types, as ROS's own tools print them.
 TYPE_NAMES = {
@@ -96,13 +96,13 @@ _ARRAYS = {
 }
 _ARRAY_TYPES = frozenset(_ARRAYS.values()) | {ParameterType.BYTE_ARRAY}
 _INT_LIMITS = (-(2**63), 2**63 - 1)
-#: Units in the last place that two doubles may differ by and count as equal, as in rclcpp.
+#: Units in the last place by which two equal doubles may differ, as in rclcpp.
 _ULPS = 100
 _NUMBERS = (ParameterType.INTEGER, ParameterType.DOUBLE)
 
 
 class TypedValue(NamedTuple):
-    """A value together with its type, which an empty list does not show.
+    """A value with its type, which an empty list does not show.
 
     Attributes:
         type: The type.
@@ -113,7 +113,7 @@ class TypedValue(NamedTuple):
     value: ParameterValue
 
     def copy(self) -> ParameterValue:
-        """Return the value, a list as a copy of its own."""
+        """Return the value; a list is copied."""
         return list(self.value) if isinstance(self.value, list) else self.value  # type: ignore[return-value]
 
     def is_already(self, value: ParameterValue) -> bool:
@@ -131,7 +131,7 @@ class _Entry:
 
 
 class Change(NamedTuple):
-    """Parameters that were changed together, with their types."""
+    """Parameters that changed together, with their types."""
 
     new: Mapping[str, TypedValue]
     changed: Mapping[str, TypedValue]
@@ -143,7 +143,7 @@ class Ros2Parameters(Parameters):
 
     Args:
         node: The node's full name.
-        executor: Where callbacks run that bring no executor of their own.
+        executor: Runs callbacks that are registered without an executor.
         overrides: Values that the program was started with.
     """
 
@@ -151,7 +151,7 @@ class Ros2Parameters(Parameters):
         self, node: str, executor: Executor, overrides: Mapping[str, ParameterValue] | None = None
     ) -> None:
         self.node = node
-        #: Notified of each change as it is made, types included.
+        #: Notified of each change when it is made, with types.
         self.changes: Listeners[Change] = Listeners()
         self._executor = executor
         self._overrides = dict(overrides or {})
@@ -236,7 +236,7 @@ class Ros2Parameters(Parameters):
         self._notify()
 
     def get(self, name: str) -> ParameterValue:
-        """Return its value, None when it has none; raises ParameterError when not declared."""
+        """Return a value, None if it is not set; raises ParameterError if not declared."""
         self._check_open()
         with self._lock:
             return self._entry(name).value.copy()
@@ -252,7 +252,7 @@ class Ros2Parameters(Parameters):
             raise ParameterError(f"{self.node}: {reason}")
 
     def describe(self, name: str) -> ParameterDescriptor:
-        """Return the descriptor; raises ParameterError when not declared."""
+        """Return the descriptor; raises ParameterError if not declared."""
         self._check_open()
         with self._lock:
             return self._entry(name).descriptor
@@ -263,14 +263,14 @@ class Ros2Parameters(Parameters):
         return sorted(self._entries)
 
     def find(self, prefixes: Iterable[str] = (), depth: int = 0) -> list[str]:
-        """Return the names below `prefixes` (all without), up to `depth` levels (0: all)."""
+        """Return the names below `prefixes` (none: all names), up to `depth` levels (0: all)."""
         prefixes = list(prefixes)
         if not prefixes:
             return [n for n in sorted(self._entries) if not depth or n.count(".") < depth]
         return [n for n in sorted(self._entries) if any(_below(n, p, depth) for p in prefixes)]
 
     def typed_value(self, name: str) -> TypedValue:
-        """Return the value with its type; type NOT_SET for what is not declared or has no value."""
+        """Return the value with its type; type NOT_SET if it is not declared or has no value."""
         entry = self._entries.get(name)
         return NOT_SET if entry is None else entry.value
 
@@ -320,14 +320,14 @@ class Ros2Parameters(Parameters):
         return self.changes.add(on_change, executor or self._executor)
 
     def load(self, path: str | PathLike[str]) -> None:
-        """Set the parameters that a file has for this node; see the base class."""
+        """Set the parameters that a file contains for this node; see the base class."""
         self._check_open()
         from rosglass.ros2 import parameter_files  # noqa: PLC0415 - yaml
 
         values = parameter_files.read(path).for_node(self.node)
         if not values:
             raise ParameterError(f"{path} has no parameters for {self.node}")
-        # Read-only parameters may be in the file, with the values they have.
+        # The file may contain read-only parameters with their current values.
         now = self.snapshot()
         wanted = {
             name: value
@@ -414,7 +414,7 @@ class Ros2Parameters(Parameters):
         self._waiting.append(Change({}, changed, tuple(deleted)))
 
     def _notify(self) -> None:
-        """Notify of changes in the order they were made, without holding a lock."""
+        """Report changes in the order they were made, without holding a lock."""
         with self._lock:
             if self._notifying:
                 return
@@ -512,7 +512,7 @@ def _below(name: str, prefix: str, depth: int) -> bool:
 
 
 def check_name(name: object) -> str:
-    """Return `name` if a parameter can have it; raises ParameterError."""
+    """Return `name` if it is a valid parameter name; raises ParameterError."""
     if not isinstance(name, str) or not name:
         raise ParameterError(f"a parameter's name must be a non-empty string, got {name!r}")
     _check_text(f"the parameter name {name!r}", name)
@@ -520,17 +520,17 @@ def check_name(name: object) -> str:
 
 
 def typed(name: str, value: object, known: ParameterType = ParameterType.NOT_SET) -> TypedValue:
-    """Return a Python value with the parameter type that it has.
+    """Return a Python value with its parameter type.
 
     Numpy's scalars and arrays, tuples, bytearrays and the like become plain values and lists.
 
     Args:
         name: The parameter's name, for messages.
         value: The value.
-        known: The type the parameter has already; an empty list takes it over.
+        known: The parameter's current type; an empty list gets this type.
 
     Raises:
-        ParameterError: The value can be no parameter's.
+        ParameterError: The value cannot be a parameter's.
     """
     if not isinstance(value, (bool, int, float, str, bytes, bytearray, memoryview, list, tuple)):
         plain = getattr(value, "tolist", None)
@@ -599,7 +599,7 @@ def _typed_scalar(what: str, value: object) -> TypedValue:
     if parameter_type is ParameterType.STRING:
         assert isinstance(value, str)
         _check_text(what, value)
-    # Subclasses (IntEnum, numpy's float64) would surprise its reader.
+    # Instances of subclasses (IntEnum, numpy's float64) become plain values.
     return TypedValue(parameter_type, kind(value))
 
 
@@ -617,8 +617,8 @@ def _check_text(what: str, text: str) -> None:
 def in_range(allowed: Range, value: float) -> str:
     """Return why a number is not allowed, empty if it is.
 
-    The rules are rclcpp's (``node_parameters.cpp``): both ends are allowed, and between them the
-    steps counted from the lower one; doubles may be off by rounding.
+    The rules are rclcpp's (``node_parameters.cpp``): both bounds are allowed, and between them the
+    steps counted from the lower one; doubles may deviate by rounding.
     """
     low, high, step = allowed
     if isinstance(value, float):
@@ -643,7 +643,7 @@ def _same(one: float, other: float) -> bool:
 
 EVENTS, EVENT_TYPE = "/parameter_events", "rcl_interfaces/msg/ParameterEvent"
 EVENTS_QOS = SERVICES_QOS = QoS(depth=1000)
-#: The services' names below the node's, and their types.
+#: The services' names relative to the node's, and their types.
 SERVICES = {
     "describe_parameters": "rcl_interfaces/srv/DescribeParameters",
     "get_parameter_types": "rcl_interfaces/srv/GetParameterTypes",
@@ -670,7 +670,7 @@ class ParameterServices(Handle):
         self._made: list[Handle] = []
 
     def offer(self) -> Iterator[None]:
-        """Create publisher and services, in steps of a millisecond or so."""
+        """Create publisher and services, in steps of about a millisecond."""
         node, parameters = self._node, self._parameters
         events = node.create_publisher(EVENTS, EVENT_TYPE, EVENTS_QOS)
 
@@ -743,7 +743,7 @@ class ParameterServices(Handle):
 
 
 class RemoteParameterServices(OtherNode, RemoteParameters):
-    """Another node's parameters, over its parameter services.
+    """Another node's parameters, accessed through its parameter services.
 
     Args:
         owner: The node that calls the services.
@@ -808,7 +808,7 @@ class RemoteParameterServices(OtherNode, RemoteParameters):
         return self._subscribe(EVENTS, EVENT_TYPE, receive, EVENTS_QOS, executor)
 
     def load(self, path: str | PathLike[str], deadline: Deadline) -> list[str]:
-        """Set the parameters that a file has for the node, wildcards included."""
+        """Set the parameters that a file contains for the node, including wildcards."""
         from rosglass.ros2 import parameter_files  # noqa: PLC0415 - yaml
 
         given = parameter_files.read(path).for_node(self.node)
@@ -818,7 +818,7 @@ class RemoteParameterServices(OtherNode, RemoteParameters):
         results = self.set(values, deadline)
         refused = [name for name, result in results.items() if not result.successful]
         if refused:
-            # Read-only parameters are in saved files, too.
+            # Saved files also contain read-only parameters.
             now = self.values(refused, deadline)
             refused = [
                 name
@@ -846,7 +846,7 @@ class RemoteParameterServices(OtherNode, RemoteParameters):
         found = self._call(service, {"names": wanted}, deadline)[field]
         if len(found) == len(wanted):
             return dict(zip(wanted, found, strict=True))
-        # rclcpp's nodes respond with nothing if one of the parameters is not declared.
+        # rclcpp's nodes send an empty response if one of the parameters is not declared.
         declared = set(self.find([], 0, deadline))
         known = [name for name in wanted if name in declared]
         found = self._call(service, {"names": known}, deadline)[field] if known else []
@@ -866,7 +866,7 @@ class RemoteParameterServices(OtherNode, RemoteParameters):
         ]
 
     def _types(self, names: list[str], deadline: Deadline) -> dict[str, ParameterType]:
-        """Return the types of parameters that are to become empty lists."""
+        """Return the types of parameters to be set to empty lists."""
         response = self._call("get_parameter_types", {"names": names}, deadline)
         found = [int(number) for number in response.types]
         if len(found) != len(names) or not all(0 < n <= max(ParameterType) for n in found):
@@ -901,7 +901,7 @@ def value_from_message(message: Message, label: str = "") -> TypedValue:
         label: The parameter, for messages.
 
     Raises:
-        ParameterError: Its type is none of ROS's.
+        ParameterError: Its type is unknown in ROS.
     """
     parameter_type = _type(message["type"], label)
     if parameter_type is ParameterType.NOT_SET:

@@ -1,10 +1,9 @@
-"""Services of ROS 2 above a middleware's requesters and repliers.
+"""ROS 2 services above a middleware's requesters and repliers.
 
 A client follows the version of the type that servers announce, a server reports clients of other
-versions. Neither sends faster than its peers take: a server of ROS 2 keeps the last 10 requests
-that it has not taken, of all its clients together, and a client the last 10 replies
-(``rmw_qos_profile_services_default``, in every middleware). What comes beyond that displaces the
-oldest, and neither side is informed.
+versions. Neither sends faster than its peers read: a ROS 2 server queues the last 10 requests of
+all its clients together, and a client the last 10 replies (``rmw_qos_profile_services_default``, in
+every middleware). Further ones displace the oldest, without an error on either side.
 """
 
 from __future__ import annotations
@@ -49,24 +48,24 @@ __all__ = [
 ]
 
 _log = logging.getLogger("rosglass.ros2")
-#: Seconds that a server may be missing from the graph before its calls end: a router that is
-#: restarted hides all nodes for one or two.
+#: Seconds that a server may be missing from the graph before its calls end: restarting a router
+#: hides all nodes for one or two.
 _GRACE_S = 3.0
-#: Seconds between looks at a server that is in the graph but not linked yet.
+#: Poll interval in seconds of a server that is in the graph but not linked yet.
 _RETRY_S = 0.05
 
 
 def create_service_client(
     core: Core, name: str, wanted: ServiceType | str | None, qos: QoS | None = None
 ) -> ServiceClient:
-    """Return a client of a service in a ROS 2 node.
+    """Return a service client for a ROS 2 node.
 
     Args:
         core: The node.
         name: Absolute service name.
-        wanted: The type, or its name: then the version that the server announces is taken if the
-            library has it; None takes whatever type the server announces.
-        qos: Profile of requests and replies; None for the usual one.
+        wanted: The type, or its name to use the version that the server announces if the library
+            has it; None uses whatever type the server announces.
+        qos: Profile of requests and replies; None for the default.
     """
     profile = qos or QoS.services()
     return ServiceClient(core, name, profile, partial(Ros2Requester, core, name, wanted, profile))
@@ -79,8 +78,8 @@ class ActionServiceClient(ServiceClient):
         core: The node it belongs to.
         name: Absolute service name.
         type: The type.
-        waits_for_reconnect: Whether calls survive the loss of their server; such a server is
-            expected to hold requests for long.
+        waits_for_reconnect: Whether calls survive the loss of their server; its requests may stay
+            open for long.
     """
 
     _requester: Ros2Requester
@@ -102,7 +101,7 @@ class ActionServiceClient(ServiceClient):
 
     @property
     def middleware_problem(self) -> str:
-        """Why its middleware cannot call some servers in the graph; empty when it can."""
+        """Why its middleware cannot call some servers in the graph; empty if it can."""
         return self._requester.middleware_problem
 
     def server_ids(self) -> frozenset[bytes | str]:
@@ -110,7 +109,7 @@ class ActionServiceClient(ServiceClient):
         return self._requester.server_ids()
 
     def withdraw(self, call: Call) -> bool:
-        """Cancel a call if its request was not sent yet; return whether that was so."""
+        """Cancel a call if its request was not sent yet; return whether it was cancelled."""
         return self._withdraw(call)
 
 
@@ -120,8 +119,8 @@ class _Route:
 
     Attributes:
         requester: The requester that sent it.
-        servers: Identities of the servers that were in the graph then.
-        lost_at: Monotonic time at which the last of them left; None while one may answer.
+        servers: Identities of the servers in the graph at that time.
+        lost_at: Monotonic time when the last of them left; None while one may answer.
     """
 
     requester: Requester
@@ -140,7 +139,7 @@ class Ros2Requester(ServiceRequester):
         wanted: The type, its name, or None; see :func:`create_service_client`.
         qos: Profile of requests and replies.
         pending: The calls that have not ended, by number.
-        on_reply: Takes the outcome of each request.
+        on_reply: Called with the outcome of each request.
         on_change: Called when a server may have appeared or left.
         waits_for_reconnect: See :class:`ActionServiceClient`.
         quiet: Whether the client's owner logs conflicts.
@@ -192,7 +191,7 @@ class Ros2Requester(ServiceRequester):
 
     @property
     def middleware_problem(self) -> str:
-        """Why the middleware cannot call some servers in the graph; empty when it can."""
+        """Why the middleware cannot call some servers in the graph; empty if it can."""
         requester = self._requester
         return "" if requester is None else requester.problem
 
@@ -209,7 +208,7 @@ class Ros2Requester(ServiceRequester):
         return frozenset(map(identity, self._fitting(self._servers())))
 
     def server_name(self) -> str:
-        """Return the names of the service's nodes, for messages."""
+        """Return the names of the nodes that offer the service, for messages."""
         return nodes_of(self._fitting(self._servers())) or "its server"
 
     def _servers(self) -> list[EndpointInfo]:
@@ -225,14 +224,14 @@ class Ros2Requester(ServiceRequester):
         if not problems:
             servers = self._servers()
             problems = mismatches(self._announced, servers, "offers", "it cannot be called")
-            # Where several servers conflict, the middleware knows more about it.
+            # The middleware's reason is more precise than the one about several servers.
             others = rivals(self._fitting(servers), self._name)
             problem = self.middleware_problem
             problems += [problem] if problem and not problems else others
         return problems
 
     def absence(self) -> str:
-        """Return why no server is available when there is no conflict."""
+        """Return why no server is available although none conflicts."""
         servers = self._fitting(self._servers())
         if servers:
             return f"{nodes_of(servers)} offers it, but is not linked yet"
@@ -253,7 +252,7 @@ class Ros2Requester(ServiceRequester):
         """Do nothing: servers are discovered by the graph."""
 
     def delay(self, pending: PendingCall) -> str:  # noqa: ARG002 - the same for all
-        """Return why a request was not sent when there is no conflict."""
+        """Return why a request was not sent although no server conflicts."""
         if self.ready():
             return (
                 f"{REQUEST_LIMIT} requests before it still wait for {self.server_name()} to answer"
@@ -271,7 +270,7 @@ class Ros2Requester(ServiceRequester):
         self._flush()
 
     def withdraw(self, pending: PendingCall) -> bool:
-        """Take a request back; return False if it was sent already."""
+        """Withdraw a request; return False if it was already sent."""
         with self._lock:
             if pending not in self._queue:
                 return False
@@ -308,7 +307,7 @@ class Ros2Requester(ServiceRequester):
             self._flushing = False
             raise
         if self._queue and not self._retrying and self._fitting(self._servers()):
-            # In the graph, but not linked yet, or holding requests: no event reports the change.
+            # The server is not linked yet, or holds requests: no event reports the change.
             self._retrying = True
             self._core.timers.after(_RETRY_S, self._retry)
 
@@ -347,7 +346,7 @@ class Ros2Requester(ServiceRequester):
             error = ServiceError(f"{self._name}: the request could not be sent: {problem}")
         else:
             if pending.call.done() and not pending.answered:
-                requester.forget(pending.number)  # it was cancelled while it was sent
+                requester.forget(pending.number)  # cancelled while it was sent
             return
         pending.call.set_exception(error)
 
@@ -359,11 +358,11 @@ class Ros2Requester(ServiceRequester):
             pending = self._pending.get(number)
             route = None if pending is None else pending.route
             if route is not None and route.servers and not route.servers & self.server_ids():
-                error = SERVER_LEFT  # more telling than the middleware's reason
+                error = SERVER_LEFT  # clearer than the middleware's reason
         self._on_reply(number, data, error)
 
     def _is_quick(self, number: int) -> bool:
-        """Return whether a reply may be taken on a receiving thread: it runs no user code."""
+        """Return whether a reply may be taken on a receiving thread, as it runs no user code."""
         pending = self._pending.get(number)
         return pending is not None and pending.private
 
@@ -383,7 +382,7 @@ class Ros2Requester(ServiceRequester):
         self._end_lost_calls()
 
     def _adopt(self, *, retry: bool) -> bool:
-        """Take the type that servers announce; return whether it has changed."""
+        """Adopt the type that servers announce; return whether it has changed."""
         servers = self._servers()
         name = "" if self._announced.type is None else self._announced.type.name
         self._choice = ""
@@ -393,7 +392,7 @@ class Ros2Requester(ServiceRequester):
         return bool(name) and self._announced.follow(name, servers, retry)
 
     def _connect(self, kind: ServiceType) -> None:
-        """Replace the requester by one for `kind`."""
+        """Replace the requester with one for the type `kind`."""
         core, known = self._core, self._announced.hash
         requester = core.middleware.create_requester(
             EndpointInfo(
@@ -418,7 +417,7 @@ class Ros2Requester(ServiceRequester):
                     self._on_reply(pending.number, None, SERVER_LEFT)
 
     def _end_lost_calls(self) -> None:
-        """End the calls whose servers have been gone for :data:`_GRACE_S`."""
+        """End the calls whose servers have been missing for :data:`_GRACE_S`."""
         if not self._pending:
             return
         here = self.server_ids()
@@ -463,16 +462,16 @@ def create_service_server(
     qos: QoS | None = None,
     executor: Executor | None = None,
 ) -> ServiceServer:
-    """Return a server of a service in a ROS 2 node.
+    """Return a service server for a ROS 2 node.
 
     Args:
         core: The node.
         name: Absolute service name.
         type: The type, or its name.
         callback: Called with each request; see :meth:`Node.create_service_server`.
-        qos: Profile of requests and replies; None for the usual one.
-        executor: Where `callback` runs; None for the node's dispatcher, or for the running event
-            loop when `callback` is a coroutine function.
+        qos: Profile of requests and replies; None for the default.
+        executor: Runs `callback`; None for the node's dispatcher, or for the running event loop if
+            `callback` is a coroutine function.
     """
     kind, profile = core.types.service(type), qos or QoS.services()
     create = partial(Ros2Replier, core, name, kind, profile)
@@ -518,7 +517,7 @@ class Ros2Replier(Replier, NodeMember):
 
     @property
     def problem(self) -> str:  # type: ignore[override]
-        """Why some clients cannot be served, in words; empty when all can."""
+        """Why some clients cannot be served, in words; empty if all can."""
         graph = self._core.graph
         clients = graph.endpoints(EndpointKind.SERVICE_CLIENT, self._name)
         problems = mismatches(self._announced, clients, "calls", "it is not served")
@@ -567,7 +566,7 @@ class Ros2Replier(Replier, NodeMember):
             _log.error("%s: cannot answer %s: %s", self._name, self.client_name(request), error)
 
     def fail(self, request: RequestId, reason: str) -> None:
-        """Report to the client that there will be no response, where the middleware can."""
+        """Report to the client that no response will be sent, if the middleware can."""
         self._pacer.on_failure(request.client)
         self._replier.fail(request, reason)
 
@@ -589,15 +588,15 @@ class Ros2Replier(Replier, NodeMember):
         self._core.remove(self)
 
 
-#: Seconds without an answer after which an open request counts as taken: its server holds it until
-#: later, or it is lost.
+#: Seconds after which an open request without response counts as taken: its server holds it, or it
+#: is lost.
 STALL_S = 30.0
-#: The same for requests that a server is known to hold, such as those for an action's result.
+#: The same for requests that servers hold by design, such as those for an action's result.
 HOLD_S = 0.1
 #: Seconds from one burst of replies to a client to the next.
 _BURST_S = 0.04
-#: Clients whose open requests are counted, and delayed replies to one client: a client that sends
-#: requests faster than it takes replies loses most of what is beyond.
+#: Maximum numbers of clients whose open requests are counted, and of delayed replies to one client:
+#: a client that sends requests faster than it reads replies loses most further ones.
 _MAX_CLIENTS = _MAX_WAITING = 1000
 
 
@@ -607,7 +606,7 @@ class _Client:
 
     Attributes:
         open: Number of open requests.
-        paced: Whether more were open than replies that it can take at once.
+        paced: Whether more requests were open than a burst has replies.
         burst: Replies sent since the monotonic time `since`.
         waiting: Delayed replies, in order.
         sending: Whether a thread or timer is sending them.
@@ -690,7 +689,7 @@ class ReplyPacer:
                     known.waiting.pop(0)()
 
     def _send_waiting(self, known: _Client) -> None:
-        """Send what the client can take now, and the rest later."""
+        """Send the replies that the client can take now, and schedule the others."""
         while True:
             with self._lock:
                 if not known.waiting:

@@ -1,8 +1,8 @@
 """The command line arguments after ``--ros-args``: names, parameters, log levels.
 
 Grammar and precedence: design articles "ROS Command Line Arguments" and "Remapping Names", and
-``rcl``'s argument parser. Where the two differ, rcl counts: wildcards in remapping rules are in
-the design, but were never built.
+``rcl``'s argument parser. Where they differ, this follows rcl: wildcards in remapping rules were
+designed, but never implemented.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _BEGIN, _END = "--ros-args", "--"
 _NODE_PREFIX = re.compile(r"([A-Za-z_]\w*):(?!=|//)", re.ASCII)
 _SCHEMES = {"rostopic://": "topic", "rosservice://": "service"}
 _SWITCHES = ("rosout", "stdout", "external-lib")
-#: Options for what is left to Python's logging; accepted, because launch files pass them.
+#: Options that Python's logging replaces; accepted, because launch files pass them.
 _WITHOUT_EFFECT = ("--log-file-name", "--log-config-file")
 _EXAMPLES = {
     "--remap": "-r chatter:=talk",
@@ -56,9 +56,9 @@ class RemapRule(NamedTuple):
     """One remapping rule.
 
     Attributes:
-        kind: What it renames: ``name`` (topics and services), ``topic``, ``service``, ``__node``
+        kind: The kind of names: ``name`` (topics and services), ``topic``, ``service``, ``__node``
             or ``__ns``.
-        node: Base name of the node it is for, empty for all.
+        node: Base name of the node that it applies to, empty for all.
         match: The name to replace, as written; empty for a node's name and namespace.
         replacement: The name to use, as written.
     """
@@ -73,7 +73,7 @@ class _Assignment(NamedTuple):
     """Parameters for the nodes that `target` names, in a file or with ``-p``.
 
     Attributes:
-        target: A full name, maybe with wildcards; or a base name, without a slash.
+        target: A full name, possibly with wildcards; or a base name, without a slash.
         values: The parameters.
     """
 
@@ -87,10 +87,10 @@ class Arguments:
 
     Attributes:
         rules: Remapping rules, in order; the first that matches counts.
-        log_level: Least severe level that the node's logger lets pass; None when not given.
-        logger_levels: The same for single loggers, by name.
-        rosout: Whether log messages go to ``/rosout``.
-        stdout: Whether log messages go to Python's log handlers, and so to the terminal.
+        log_level: Minimum level of the node's logger; None if not given.
+        logger_levels: The same for individual loggers, by name.
+        rosout: Whether log messages are published on ``/rosout``.
+        stdout: Whether log messages are passed to Python's log handlers, and so to the terminal.
         others: The remaining arguments, in order.
     """
 
@@ -107,12 +107,12 @@ class Arguments:
         """Read a command line.
 
         Args:
-            arguments: As in ``sys.argv``, with or without the program's name. What stands between
-                ``--ros-args`` and ``--`` (or the end) is read, any number of times.
+            arguments: As in ``sys.argv``, with or without the program's name. Sections from
+                ``--ros-args`` to ``--`` (or the end) are read; there may be any number of them.
 
         Raises:
-            RosArgumentError: An argument is not valid; the message says which, where and what to
-                write instead. Also when a parameter file is not valid.
+            RosArgumentError: An argument is not valid; the message has the argument, its place and
+                what to write instead. Also if a parameter file is not valid.
         """
         return _Parser(arguments).parse()
 
@@ -234,7 +234,7 @@ class _Parser:
     def _option(self, argument: str) -> None:
         if self._switch(argument):
             return
-        # Also --param=name:=value, as people write options.
+        # --param=name:=value is accepted, too, as users expect it.
         written, equals, value = argument.partition("=")
         glued = bool(equals) and written.startswith("--") and not written.endswith(":")
         option = _OPTIONS.get(written if glued else argument)
@@ -278,7 +278,7 @@ class _Parser:
         return RosArgumentError(f"{_BEGIN}, argument {self._place + 1}: {problem}")
 
     def _split(self, text: str, option: str) -> tuple[str, str, str, int]:
-        """Return node, left and right side of ``node:left:=right``, and where right begins."""
+        """Return node, left, right of ``node:left:=right``, and the position of right."""
         left, separator, right = text.partition(":=")
         example = _EXAMPLES[option]
         if not separator:
@@ -329,7 +329,7 @@ class _Parser:
         if name == "~" or "{" in name or "}" in name:
             raise self._error(f"{where} is no name; write '~/name' for a private one")
         try:
-            # With the shortest names possible: what a rule does to a node is checked later.
+            # With the shortest names possible: the rule's effect on a node is checked later.
             expand(name, "n", "/")
         except InvalidNameError as error:
             raise self._error(f"{text!r}: {error}") from None

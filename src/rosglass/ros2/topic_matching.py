@@ -1,6 +1,6 @@
-"""Matching of ROS 2 subscriptions: types and profiles as the graph announces them.
+"""Matches ROS 2 subscriptions with publishers by the types and profiles in the graph.
 
-Beside the matching itself: which publishers are alive, and which samples came twice or never.
+Also monitors the liveliness of publishers, and detects repeated and lost samples.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 __all__ = ["GraphMatching", "Repeats", "TopicTypes"]
 
 _PUBLISHER = EndpointKind.PUBLISHER
-#: Publishers remembered; more come only from a robot that restarts for days.
+#: Number of publishers to remember; only a robot that restarts for days has more.
 _MAX_PUBLISHERS = 1024
-#: Gaps in the numbering that are remembered per publisher, in samples.
+#: Missing sequence numbers to remember per publisher.
 _MAX_MISSING = 64
 #: Number and time stamp of the last sample of an unknown publisher.
 _NO_SAMPLE = (-3, 0)
@@ -41,8 +41,8 @@ class GraphMatching(TopicMatching):
 
     Args:
         core: The node it belongs to.
-        wanted: Type or type name that was given; None to take what is published.
-        ignored: GIDs of publishers that are ignored.
+        wanted: The given type or type name; None to accept the published type.
+        ignored: GIDs of publishers to ignore.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class GraphMatching(TopicMatching):
         self._types: TopicTypes
 
     def open(self, feed: SubscriptionFeed, publishers: Sequence[EndpointInfo]) -> None:
-        """Choose the profile, and read as soon as the type is known."""
+        """Choose the profile, and start reading as soon as the type is known."""
         self._feed, self._topic, self._wanted = feed, feed.topic, feed.qos
         self._liveness = Liveness(self._core.timers, self._repeats, feed.request_update)
         self._types = TopicTypes(
@@ -137,14 +137,14 @@ class GraphMatching(TopicMatching):
     # -- quality of service ----------------------------------------------------------------------
 
     def _profile(self, publishers: Sequence[EndpointInfo]) -> QoS:
-        """Return the profile to request: the one in use, unless a publisher conflicts with it."""
+        """Return the profile to request: the current one, unless a publisher conflicts with it."""
         current = self._feed.qos
         if self._wanted.is_decided:
             return current
         offers = self._offers(publishers)
         first = self._without_publisher and bool(offers)
         self._without_publisher = not offers
-        # The first publisher after a time without any may offer a stronger profile.
+        # The first publisher, also after a time without any, may offer a stronger profile.
         if offers and (first or any(current.conflicts(offered) for offered in offers)):
             return self._wanted.for_subscription(offers)
         return current
@@ -172,7 +172,7 @@ class GraphMatching(TopicMatching):
     # -- reading ---------------------------------------------------------------------------------
 
     def _read(self, message_type: MessageType) -> None:
-        """Create a reader for `message_type`, in place of the one before."""
+        """Create a reader for `message_type` in place of the previous one."""
         self._feed.set_type(message_type)
         self._repeats.guarded = self.reader is not None
         endpoint = EndpointInfo(
@@ -229,8 +229,8 @@ class Liveness:
 
     Args:
         timers: Schedule the next check.
-        repeats: Has the last sample of each publisher.
-        look: Called when it is time to :meth:`follow` again.
+        repeats: Provides the last sample of each publisher.
+        look: Called when :meth:`follow` is due.
     """
 
     def __init__(self, timers: Timers, repeats: Repeats, look: Callable[[], None]) -> None:
@@ -239,7 +239,7 @@ class Liveness:
         self._timer: Handle | None = None
 
     def follow(self, there: Sequence[EndpointInfo], reader: Reader | None) -> list[EndpointInfo]:
-        """Return those of the publishers in the graph that are alive."""
+        """Return the publishers in the graph that are alive."""
         manual = [
             (endpoint, endpoint.qos.lease_duration.seconds)
             for endpoint in there
@@ -255,7 +255,7 @@ class Liveness:
         silent = [endpoint for endpoint, lease in manual if now - signs[endpoint.gid] > lease]
         alive = None if reader is None else reader.alive()
         if alive is not None:
-            # The middleware knows how many, but not which: assume those that sent last.
+            # The middleware only reports how many: assume the most recent senders.
             manual.sort(key=lambda one: signs[one[0].gid])
             silent = [endpoint for endpoint, _ in manual[: max(0, len(there) - alive)]]
         self.close()
@@ -282,14 +282,14 @@ class Repeats:
 
     A sample can be received twice: over an old and a new route while links change, from a
     publisher's history after a reconnection, or under two keys if a publisher serves two
-    distributions. Late samples that were not received before are no repeats. Several threads may
+    distributions. Late samples that were not received before are not repeats. Several threads may
     use it: the worst effect of a race is that a repeat passes.
 
     Attributes:
-        lost: How many numbers were skipped so far.
-        guarded: Whether samples without number are compared by their time stamps: while a reader
-            is replaced, whose last samples may be received again. Not longer, as a publisher's
-            clock may be set back.
+        lost: The number of skipped sequence numbers so far.
+        guarded: Whether samples without number are compared by their time stamps: only while a
+            reader is replaced, whose last samples may be received again, as a publisher's clock may
+            be set back.
     """
 
     def __init__(self) -> None:
@@ -316,7 +316,7 @@ class Repeats:
         return self._last.get(gid, _NO_SAMPLE)
 
     def _judge(self, gid: bytes, sequence: int, sent: int, last: tuple[int, int]) -> bool:
-        """Return whether a sample that is not simply the next one is a repeat."""
+        """Return whether a sample that does not directly follow the last one is a repeat."""
         if sequence < 0:
             repeated = self.guarded and sent <= last[1]
             if not repeated:
@@ -351,28 +351,29 @@ class Repeats:
             self._missing[gid] = set(sorted(missing)[-_MAX_MISSING:])
 
 
-#: Unannounced hashes that are remembered and reported.
+#: Maximum number of unannounced hashes to remember and report.
 _MAX_UNANNOUNCED = 16
 
 
 class TopicTypes:
-    """The type of a topic, as it was given and as publishers announce it.
+    """The type of a topic, as the user gave it and as publishers announce it.
 
-    Given by name, or not at all, every version is accepted that the library has or the publishers'
-    nodes send. Without a definition, the type becomes opaque if the subscription takes bytes.
+    If only a name or nothing is given, every version is accepted that the library has or the
+    publishers' nodes send. Without a definition, the type becomes opaque if the subscription
+    accepts bytes.
 
     Args:
         topic: The topic, for messages.
         types: Finds definitions.
-        wanted: A type, which stays; a type's name; or None to take what is published.
+        wanted: A type, which is fixed; a type's name; or None to accept the published type.
         known: The type of that name, if the library has it.
-        opaque: Whether the subscription takes bytes that cannot be decoded.
+        opaque: Whether the subscription accepts bytes that cannot be decoded.
         changed: Called, from any thread, when :meth:`follow` should be called again.
 
     Attributes:
         type: The type to receive; None while it is unknown.
-        accepted: The type for each hash that samples may have; the empty hash is that of
-            publishers that announce none.
+        accepted: The type for each hash that samples may have; the empty hash stands for publishers
+            that announce none.
         problems: The problems that :meth:`follow` found, in words.
     """
 
@@ -395,7 +396,7 @@ class TopicTypes:
         self._failures: dict[tuple[str, str], _Failure] = {}
         #: Hashes of received samples that no publisher announced.
         self._unannounced: set[str] = set()
-        #: Hashes that are accepted as opaque, as their definition is missing.
+        #: Hashes that are accepted as opaque because their definition is missing.
         self._undefined: set[str] = set()
         self.type: MessageType | None = None
         self.accepted: dict[str, MessageType] = {}
@@ -404,17 +405,17 @@ class TopicTypes:
             self._take(known)
 
     def accepts(self, endpoint: EndpointInfo) -> bool:
-        """Return whether the samples of a publisher are accepted, as far as it is announced."""
+        """Return whether a publisher's samples are accepted, as far as it announces its type."""
         ours = self.type
         if ours is None or endpoint.type != ours.name:
             return False
         return not self._hash or endpoint.type_hash in self.accepted
 
     def find_type(self, type_hash: str) -> MessageType | None:
-        """Return the type for samples with an unknown hash; from any thread, at once."""
+        """Return the type for samples with an unknown hash; thread-safe, does not block."""
         ours = self.type
         if ours is not None and not self._hash:
-            # Opaque without hash: any is accepted, and kept for republishing the samples.
+            # Opaque without hash: any hash is accepted, and kept to republish the samples.
             if len(self.accepted) <= _MAX_UNANNOUNCED:
                 self.accepted[type_hash] = self._types.opaque(
                     ours.name, type_hash, getattr(ours, "reason", "")
@@ -461,7 +462,7 @@ class TopicTypes:
         return ours
 
     def _choose(self, name: str, publishers: Sequence[EndpointInfo], retry: bool) -> None:
-        """Choose the version that is published; the library's own if there are several."""
+        """Choose the published version; the library's own if there are several."""
         hashes = sorted({p.type_hash for p in publishers if p.type_hash})
         ours = self.type if self.type is not None and self.type.name == name else None
         if (

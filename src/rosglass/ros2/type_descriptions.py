@@ -1,8 +1,8 @@
-"""Type descriptions between nodes: REP 2016's service ``~/get_type_description``, both ends of it.
+"""Client and server of REP 2016's service ``~/get_type_description``.
 
-Nodes since ROS 2 Iron answer it. A received definition is accepted only if it has the announced
-hash; then it is added to the library, and cached on disk. ``rcl``'s ``node.c`` looks types up by
-their hash alone, among those that its node uses; here the types of the library are described, too.
+Nodes since ROS 2 Iron offer it. A received definition is accepted only if it has the announced
+hash; then it is added to the library, and cached on disk. ``rcl``'s ``node.c`` looks up types by
+hash alone, among those that its node uses; this server also describes the library's types.
 """
 
 from __future__ import annotations
@@ -80,23 +80,23 @@ __all__ = [
 ]
 
 _log = logging.getLogger("rosglass.ros2")
-#: The service's name below the node's.
+#: The service's name relative to the node's.
 SERVICE = "get_type_description"
 _TYPE = "type_description_interfaces/srv/GetTypeDescription"
 #: The parts of an action that are in the graph, with hashes; the action itself is not.
 ACTION_PARTS = ("_SendGoal", "_GetResult", "_FeedbackMessage")
 
 _GOAL_PARTS = ("_Goal", "_Result", "_Feedback")
-#: Key in ``extra_information`` of those whose texts are as people wrote them; see
+#: Key in ``extra_information`` of types whose source texts are original; see
 #: :func:`rosglass.interfaces.add_type_sources`.
 _VERBATIM = "rosglass"
 _HASH = re.compile(r"RIHS[0-9]{2}_[0-9a-f]{64}")
-#: Largest answer that is read, in bytes; those of real types have less than a hundredth of it.
+#: Maximum size of an accepted answer in bytes; real types need less than a hundredth of it.
 _MAX_ANSWER = 8 << 20
 
 
 def service_type() -> ServiceType:
-    """Return the type of the service, whatever the node's own library has."""
+    """Return the type of the service, independent of the node's own library."""
     from rosglass.messages import ServiceType, load  # noqa: PLC0415 - numpy
 
     found = load(_TYPE)
@@ -105,7 +105,7 @@ def service_type() -> ServiceType:
 
 
 def is_hash(text: object) -> bool:
-    """Return whether something is a type hash, as a text."""
+    """Return whether a value is a type hash as a string."""
     return isinstance(text, str) and _HASH.fullmatch(text) is not None
 
 
@@ -154,13 +154,13 @@ def describe(types: Types, name: str, type_hash: str, *, sources: bool) -> dict[
 
     Args:
         types: The node's types.
-        name: Name of the asked type; empty when only the hash is known.
-        type_hash: Its hash, or for a service that of its request; empty takes the definition in
-            use here.
+        name: Name of the requested type; empty if only the hash is known.
+        type_hash: Its hash, or for a service that of its request; empty for the definition in use
+            here.
         sources: Whether to add the definitions' texts.
 
     Raises:
-        Error: There is no such type.
+        Error: The type does not exist.
     """
     if type_hash and not is_hash(type_hash):
         raise DefinitionError(f"{type_hash!r:.90} is no RIHS01 hash", "the request")
@@ -170,7 +170,7 @@ def describe(types: Types, name: str, type_hash: str, *, sources: bool) -> dict[
         texts = type_sources(definition)
         known = {text["type_name"] for text in texts}
         for owner, _ in derived_from(definition.name, 2):
-            # The constants of a goal or request are in the text of its action or service only.
+            # Only the text of the action or service has the constants of its goal or request.
             with suppress(Error):
                 texts += [
                     text
@@ -206,7 +206,7 @@ def read_answer(answer: Message, name: str, wanted: str, node: str) -> Interface
     Args:
         answer: The response.
         name: Full name of the requested type.
-        wanted: The hash that was announced for it.
+        wanted: The announced hash.
         node: The node's name.
 
     Raises:
@@ -234,14 +234,14 @@ def read_answer(answer: Message, name: str, wanted: str, node: str) -> Interface
 
 
 def compose_action(name: str, parts: Mapping[str, InterfaceDefinition]) -> ActionDefinition:
-    """Compose an action of the parts that are in the graph.
+    """Compose an action from the parts that are in the graph.
 
     Args:
         name: The action's full name.
         parts: The definition of each of :data:`ACTION_PARTS`.
 
     Raises:
-        DefinitionError: They are not the parts of one action.
+        DefinitionError: They are not the parts of a single action.
     """
     nested: dict[str, Definition] = {}
     for part in parts.values():
@@ -260,22 +260,22 @@ def compose_action(name: str, parts: Mapping[str, InterfaceDefinition]) -> Actio
     return action
 
 
-#: Seconds that a node has to answer a query, and until the next node is queried besides.
+#: Seconds that a node has to answer a query, and until the next node is queried in parallel.
 _QUERY_TIMEOUT_S, _HEDGE_S = 5.0, 1.0
-#: Seconds that the graph has to become complete: a node's service may show after its publishers.
+#: Seconds that the graph has to become complete: a node's service may appear after its publishers.
 _GRACE_S = 1.0
 #: The same while participants have not announced their nodes: Fast DDS takes 1 to 4 s, and until
 #: then its services belong to no node that could be queried.
 _INTRODUCTION_S = 8.0
-#: Seconds until a node that did not answer is queried again: at first, and at most (it doubles).
+#: Seconds until a node that did not answer is queried again: initially, and at most (it doubles).
 _RETRY_S, _MAX_RETRY_S = 5.0, 60.0
-#: Seconds for which a definition is still fetched after it was requested last.
+#: Seconds after its last request for which a definition is still fetched.
 _INTEREST_S = 30.0
 #: Seconds for which an unused service client is kept.
 _LINGER_S = 5.0
-#: Pending queries, and definitions fetched in all: more only in a graph gone wild.
+#: Maximum pending queries, and definitions fetched in total; only a faulty graph needs more.
 _MAX_PENDING, _MAX_FETCHED = 16, 2000
-#: Seconds that an endpoint has to answer a lookup, and how many endpoints are looked up.
+#: Seconds that an endpoint has to answer a lookup, and the number of endpoints to look up.
 _LOOKUP_TIMEOUT_S, _MAX_LOOKUPS = 2.0, 3
 _TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
 
@@ -294,8 +294,8 @@ class TypeFetcher(NodeMember):
         self._core = core
         #: Changed in rounds only.
         self._requests: dict[tuple[str, str, str], TypeRequest] = {}
-        #: What was requested since the last round, from any thread: a type's key, the endpoints
-        #: that use it, a listener and a promise.
+        #: Requests since the last round, from any thread: a type's key, the endpoints that use it,
+        #: a listener and a promise.
         self._new: deque[_NewRequest] = deque()
         self._answers: deque[tuple[TypeRequest, bytes | str, Future[Any]]] = deque()
         #: Clients of ``get_type_description``, and monotonic times of their last use, by service.
@@ -326,7 +326,7 @@ class TypeFetcher(NodeMember):
         self._put((key, tuple(endpoints), on_done, None))
         request = self._requests.get(key)
         if request is None or any(endpoint.node not in request.nodes for endpoint in endpoints):
-            return ""  # the problem is that of nodes queried before
+            return ""  # the problem comes from nodes queried earlier
         return request.problem
 
     def knows(self, name: str) -> bool:
@@ -362,13 +362,13 @@ class TypeFetcher(NodeMember):
             self._schedule()
 
     def close(self) -> None:
-        """Fail what is pending; safe to call twice. The clients are closed with the node."""
+        """Fail pending requests; safe to call twice. The clients are closed with the node."""
         self._closed = True
         self._fail_all()
         self._core.remove(self)
 
     def _fail_all(self) -> None:
-        """Fail every promise; also called by a round that runs while the node closes."""
+        """Fail all promises; also called by a round that runs while the node closes."""
         promises = []
         while self._new:
             with suppress(IndexError):  # another thread took it
@@ -423,7 +423,7 @@ class TypeFetcher(NodeMember):
             self._core.own_dispatcher.post(self._round)
 
     def _round(self) -> None:
-        self._scheduled = False  # first: requests from here on have a round of their own
+        self._scheduled = False  # first: requests from here on schedule another round
         while self._new and not self._closed:
             key, endpoints, listener, promise = self._new.popleft()
             self._request(key).add(endpoints, listener, promise)
@@ -451,7 +451,7 @@ class TypeFetcher(NodeMember):
             self._fail_all()
 
     def _advance(self, request: TypeRequest, users: _Users, now: float) -> None:
-        """Do what can be done now to get a definition."""
+        """Take the next possible steps to get a definition."""
         name = next(iter(find_full_names(request.name, users)), request.name)
         if name.split("/")[1] == "action" and name not in users and not request.hash:
             self._advance_action(request, name, users, now)
@@ -467,7 +467,7 @@ class TypeFetcher(NodeMember):
     def _continue_as(
         self, request: TypeRequest, name: str, announced: str, users: _Users, now: float
     ) -> None:
-        """Continue with the request for the version that the graph has."""
+        """Continue with the request for the version in the graph."""
         if not request.searched_library:
             request.searched_library = True
             with suppress(Error):
@@ -488,7 +488,7 @@ class TypeFetcher(NodeMember):
             request.notify()
 
     def _find_hash(self, request: TypeRequest, name: str, users: _Users, now: float) -> str:
-        """Return the one hash that the graph has for a type; empty if it has none or several."""
+        """Return the only hash that the graph has for a type; empty if it has none or several."""
         known: dict[str, set[str]] = {}
         for user in users.get(name, ()):
             if user.type_hash and request.node in ("", user.node.full):
@@ -500,7 +500,7 @@ class TypeFetcher(NodeMember):
             problem = f"the graph has several versions ({versions}); choose one by its hash or node"
             self._settle(request, DefinitionConflictError(f"{name}: {problem}"), problem)
         elif request.promises and now - self._started > _GRACE_S and self._fulfil(request, name):
-            pass  # no other version is announced: the library's is right
+            pass  # no other version is announced: use the library's
         elif (name in users or request.endpoints) and not self._look_up(request, name, users):
             self._give_up(
                 request,
@@ -512,7 +512,7 @@ class TypeFetcher(NodeMember):
         return ""
 
     def _advance_action(self, request: TypeRequest, name: str, users: _Users, now: float) -> None:
-        """Compose an action of its parts, the only ones that are announced with hashes."""
+        """Compose an action from its parts: only these are announced with hashes."""
         parts: dict[str, InterfaceDefinition] = {}
         problems: list[str] = []
         for suffix in ACTION_PARTS:
@@ -642,7 +642,7 @@ class TypeFetcher(NodeMember):
         *,
         retry: bool = True,
     ) -> None:
-        """Remember why a node did not help, and when to query it again, if ever."""
+        """Record why a node's query failed, and when to repeat it, if ever."""
         before = request.failed.get(key)
         attempts = 1 if before is None else before.attempts + 1
         pause = min(_RETRY_S * 2.0 ** (attempts - 1), _MAX_RETRY_S) if retry else math.inf
@@ -651,7 +651,7 @@ class TypeFetcher(NodeMember):
         self._schedule()
 
     def _look_up(self, request: TypeRequest, name: str, users: _Users) -> bool:
-        """Look a message up in the middleware; return whether that succeeded or goes on."""
+        """Look up a message in the middleware; return whether that succeeded or is pending."""
         lookup = request.lookup
         if lookup is None or time.monotonic() - lookup.started > _MAX_RETRY_S:
             endpoints = (*request.endpoints, *users.get(name, ()))
@@ -687,13 +687,13 @@ class TypeFetcher(NodeMember):
     # -- outcomes ----------------------------------------------------------------------------------
 
     def _on_definition(self, request: TypeRequest, found: InterfaceDefinition) -> None:
-        """Complete a request whose definition is in the library now."""
+        """Complete a request whose definition is now in the library."""
         self._drop(request)
         self._fulfil(request, found.name, rihs01(found))
         request.notify()
 
     def _fulfil(self, request: TypeRequest, name: str, type_hash: str = "") -> bool:
-        """Fulfil the promises if the library has a type; return whether it has."""
+        """Fulfil the promises if the library has the type; return whether it has."""
         try:
             found = self._load(name, type_hash)
         except Error as error:
@@ -728,7 +728,7 @@ class TypeFetcher(NodeMember):
 
 
 class PendingQuery(NamedTuple):
-    """A query that a node has not answered yet; `started` is monotonic."""
+    """A query that a node has not answered yet; `started` is a monotonic time."""
 
     server: EndpointInfo
     name: str
@@ -745,26 +745,26 @@ class QueryResult(NamedTuple):
 
 
 class TypeRequest:
-    """A requested definition, and how far the search for it is.
+    """A requested definition, and the state of the search for it.
 
     Args:
         name: The type's name.
-        type_hash: The hash that is announced for it; empty for the one that the graph has.
+        type_hash: The announced hash; empty for the one in the graph.
         node: Full name of the node whose version is meant; empty for any.
 
     Attributes:
-        key: Tells requests apart.
+        key: Identifies the request.
         endpoints: The endpoints that use it.
         listeners: Called when it is found, or cannot be.
         promises: Fulfilled when it is found.
         nodes: The nodes that have used it.
-        since: Monotonic time from which the graph has time to become complete.
+        since: Monotonic start of the time that the graph has to become complete.
         used: Monotonic time of the last request by an endpoint.
         queries: Pending queries, by the server's identity.
         failed: Failures of earlier queries, likewise.
         problem: Why it cannot be found; empty while it may be.
         searched_library: Whether the library was searched for the version in the graph.
-        searched_cache: Whether the cache on disk was.
+        searched_cache: Whether the cache on disk was searched.
         lookup: The last lookup in the middleware.
     """
 
@@ -784,7 +784,7 @@ class TypeRequest:
 
     @property
     def lookup_problem(self) -> str:
-        """Why the lookup failed, to be appended to a reason; empty if it did not."""
+        """Why the lookup failed, to append to a reason; empty if it did not."""
         return f"; {self.lookup.problem}" if self.lookup is not None and self.lookup.problem else ""
 
     def add(
@@ -793,7 +793,7 @@ class TypeRequest:
         listener: Callable[[], None] | None,
         promise: Promise[AnyType] | None,
     ) -> None:
-        """Add what one more caller gave."""
+        """Add the endpoints, listener and promise of another caller."""
         now = time.monotonic()
         if endpoints is not None:
             self.endpoints, self.used = endpoints, now
@@ -805,10 +805,10 @@ class TypeRequest:
             self.promises.append(promise)
 
     def on_nodes(self, nodes: set[NodeName], now: float) -> None:
-        """Start anew if a node uses the type that did not before."""
+        """Restart the search if another node uses the type."""
         if not nodes <= self.nodes:
             self.nodes |= nodes
-            # Its service may show later, and what failed before says nothing about it.
+            # Its service may appear later, and earlier failures do not apply to it.
             self.since, self.problem = now, ""
 
     def notify(self) -> None:
@@ -823,10 +823,10 @@ class TypeRequest:
 
 
 def find_full_names(name: str, known: Container[str]) -> list[str]:
-    """Return the full names that a type's name may stand for, of those that are known.
+    """Return the known full names that a type's name may stand for.
 
     Args:
-        name: Full, or ``pkg/Type``.
+        name: Full name, or ``pkg/Type``.
         known: Full names. An action's is implied by those of its parts.
     """
     package, kind, base = split_name(name)
@@ -840,7 +840,7 @@ def find_full_names(name: str, known: Container[str]) -> list[str]:
 
 
 class Lookup:
-    """A lookup of a message's definition in the middleware, on a thread of its own.
+    """A lookup of a message's definition in the middleware, on its own thread.
 
     Args:
         middleware: The middleware.
@@ -852,7 +852,7 @@ class Lookup:
         started: Monotonic time of its start.
         done: Whether it has ended.
         found: The definition, if there was one.
-        problem: Why there is none although an endpoint announces one.
+        problem: Why none was found although an endpoint announces one.
     """
 
     def __init__(
