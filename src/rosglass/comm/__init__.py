@@ -1,4 +1,4 @@
-"""What a robot offers: the abstract node and everything the worlds have in common."""
+"""The abstract node and everything that ROS 1 and ROS 2 have in common."""
 
 from __future__ import annotations
 
@@ -216,7 +216,7 @@ _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 
 def __getattr__(name: str) -> object:
-    # Imported on first use: a program that shows an interface needs few of them before the screen.
+    # Imported on first use: a user interface needs few of them before its first frame.
     if name not in _HOME_OF:
         raise AttributeError(f"module 'rosglass.comm' has no attribute {name!r}")
     value: object = getattr(import_module(f"rosglass.comm.{_HOME_OF[name]}"), name)

@@ -1,7 +1,7 @@
-"""Sending goals to an action: the client, and its goals.
+"""Action clients and their goals.
 
 The course of a goal depends on the protocol: ``ros1/actionlib_client.py`` and
-``ros2/action_client.py`` follow it, and put here what users see of it.
+``ros2/action_client.py`` implement it, and update the classes here, which users see.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ __all__ = [
     "GoalStatus",
 ]
 
-#: Most feedback messages that wait for a slow callback.
+#: Maximum number of feedback messages that wait for a slow callback.
 FEEDBACK_DEPTH = 10
 #: How long a goal's server may be unavailable before the goal counts as lost.
 GRACE_S = 5.0
@@ -80,7 +80,7 @@ _ACTIVE = (GoalStatus.PENDING, GoalStatus.ACCEPTED, GoalStatus.EXECUTING, GoalSt
 
 
 class ActionResult(NamedTuple):
-    """How a goal ended.
+    """The outcome of a goal.
 
     Attributes:
         status: SUCCEEDED, CANCELED or ABORTED.
@@ -97,7 +97,7 @@ class CancelAnswer(NamedTuple):
 
     Attributes:
         accepted: Ids of the goals that are being cancelled.
-        reason: Why there are none, in words; empty if there are any.
+        reason: Why no goal is being cancelled, in words; empty if one is.
     """
 
     accepted: tuple[bytes, ...]
@@ -123,7 +123,7 @@ class ClientGoal(Handle):
         log: Where problems are logged.
 
     Attributes:
-        id: 16 bytes (a UUID) in ROS 2; a text in UTF-8 in ROS 1.
+        id: 16 bytes (a UUID) in ROS 2; a UTF-8 string in ROS 1.
         goal: The goal message; None while the action's type is not discovered yet.
     """
 
@@ -169,7 +169,7 @@ class ClientGoal(Handle):
     def id_text(self) -> str:
         """The id as ROS's tools print it.
 
-        In ROS 2, 32 hexadecimal digits (some logs put dashes in); in ROS 1, the text that it is.
+        In ROS 2, 32 hexadecimal digits (some logs insert dashes); in ROS 1, the string itself.
         """
         return self.id.hex()
 
@@ -185,7 +185,7 @@ class ClientGoal(Handle):
     @property
     @abstractmethod
     def accepted(self) -> Time | None:
-        """When the server accepted it, by the server's clock; None before."""
+        """The time of acceptance, by the server's clock; None before."""
 
     @property
     def feedback(self) -> Message | None:
@@ -194,7 +194,7 @@ class ClientGoal(Handle):
 
     @property
     def acceptance(self) -> Promise[bool]:
-        """The server's decision: True if it accepts the goal, or the error if it did not answer."""
+        """The server's decision: True if it accepts the goal; an error if it did not answer."""
         return self._acceptance
 
     @property
@@ -335,7 +335,7 @@ class ClientGoal(Handle):
             self._client._core.timers.after(timeout, lambda: answer.set_exception(error))
 
     def _too_late(self) -> CancelAnswer:
-        """Return the answer to a request to cancel it that comes after its end."""
+        """Return the answer to a request to cancel the goal that arrives after its end."""
         return CancelAnswer((), f"the goal has ended already: {self._status.value}")
 
     def _without_result(self) -> ServiceUnavailableError:
@@ -347,7 +347,7 @@ class ClientGoal(Handle):
 
 @hint_at_members
 class ActionClient(Client):
-    """Sends goals to an action; made by :meth:`Node.create_action_client`.
+    """Sends goals to an action; created by :meth:`Node.create_action_client`.
 
     After closing it, its goals continue at the server: cancel them first if they must not.
 
@@ -370,7 +370,7 @@ class ActionClient(Client):
         self._end_of_time = end_of_time
         #: Guards the goals, and that none is added after closing.
         self._lock = threading.Lock()
-        #: Those that have not ended, by id; of the protocol's own class.
+        #: Goals that have not ended, by id; of the protocol's own class.
         self._goals: dict[bytes, Any] = {}
 
     def __repr__(self) -> str:
@@ -398,7 +398,7 @@ class ActionClient(Client):
         executor: Executor | None = None,
         timeout: float | None = 10.0,
     ) -> ClientGoal:
-        """Send a goal as soon as there is a server; does not wait.
+        """Send a goal as soon as a server is available; does not wait.
 
         If the server does not answer within `timeout`, the goal ends, and the server is requested
         to cancel it in case it has accepted it, so that no unobserved goal runs.
@@ -503,7 +503,7 @@ class ActionClient(Client):
 
     @abstractmethod
     def _begin(self, goal: Any) -> None:
-        """Send a goal, now or once there is a server."""
+        """Send a goal, now or once a server is available."""
 
     @abstractmethod
     def _cancel_many(self, until: Time | None, timeout: float | None) -> Promise[CancelAnswer]:
@@ -545,7 +545,7 @@ class ActionClient(Client):
         )
 
     def _no_server(self, offered: Iterable[str]) -> str:
-        """Say that the action has no server, with a hint at a similar one that has."""
+        """Return the message that the action has no server, with a hint at a similar one."""
         kind = "" if self.type is None else f" [{self.type.name}]"
         return (
             f"no server offers the action {self.name}{kind} on {self._core.url} "

@@ -1,4 +1,4 @@
-"""Serving actions: the server, its goals, and the protocol by which they arrive."""
+"""Action servers, their goals, and the protocol by which goals arrive."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["ActionServer", "ActionServerProtocol", "Result", "ServerGoal"]
 
 _Goal = TypeVar("_Goal", bound="ServerGoal")
-#: What executing a goal returns.
+#: The result that `execute` returns.
 Result: TypeAlias = "Message | dict[str, Any] | None"
 
 #: How long closing waits for the goals' threads to end, in all.
@@ -118,7 +118,7 @@ class ServerGoal(Handle):
     Closing it aborts it, unless it has ended: ``with goal:`` always ends the goal.
 
     Attributes:
-        id: 16 bytes (a UUID) in ROS 2; a text in UTF-8 in ROS 1.
+        id: 16 bytes (a UUID) in ROS 2; a UTF-8 string in ROS 1.
         goal: The goal message.
         accepted: When it was accepted.
     """
@@ -147,7 +147,7 @@ class ServerGoal(Handle):
     def id_text(self) -> str:
         """The id as ROS's tools print it.
 
-        In ROS 2, 32 hexadecimal digits (some logs put dashes in); in ROS 1, the text that it is.
+        In ROS 2, 32 hexadecimal digits (some logs insert dashes); in ROS 1, the string itself.
         """
         return self.id.hex()
 
@@ -214,7 +214,7 @@ class ServerGoal(Handle):
         """End it as cancelled, after a request to cancel; as :meth:`succeed`.
 
         Raises:
-            Error: There was no request to cancel it: use abort() to end it without.
+            Error: No cancel was requested: use abort() to end it without a request.
         """
         self._end(GoalStatus.CANCELED, result)
 
@@ -248,7 +248,7 @@ class ServerGoal(Handle):
         return True
 
     def _supersede(self) -> None:
-        """Preempt it by a newer goal: it may end as cancelled without a client's request."""
+        """Preempt it for a newer goal: it may end as cancelled without a client's request."""
         self._superseded = True
         self._cancel_request.set_result(None)
 
@@ -306,9 +306,9 @@ class ServerGoal(Handle):
 
 @hint_at_members
 class ActionServer(Handle):
-    """Serves an action; made by :meth:`Node.create_action_server`.
+    """Serves an action; created by :meth:`Node.create_action_server`.
 
-    Closing it aborts the goals that run, and notifies their clients.
+    Closing it aborts the running goals, and notifies their clients.
 
     Args:
         core: The node it belongs to.
@@ -347,9 +347,9 @@ class ActionServer(Handle):
         self._execute, self._accept, self._cancel = execute, accept, cancel
         self._decider = chosen
         given = executor is not None or isinstance(chosen, LoopExecutor)
-        #: Where goals run; None for one thread each.
+        #: Runs goals; None for one thread each.
         self._executor = chosen if given else None
-        #: Those that have not ended; ended ones are removed when the next one is accepted.
+        #: Goals that have not ended; ended ones are removed when the next one is accepted.
         self._goals: dict[bytes, ServerGoal] = {}
         self._threads: set[threading.Thread] = set()
         protocol.open(self)
@@ -377,7 +377,7 @@ class ActionServer(Handle):
         return "; ".join(dict.fromkeys(problem for problem in problems if problem))
 
     def close(self) -> None:
-        """Abort the goals that run, notify their clients, and withdraw; safe to call twice."""
+        """Abort the running goals, notify their clients, and withdraw; safe to call twice."""
         with self._protocol.lock:
             if self._protocol.closed:
                 return
@@ -459,7 +459,7 @@ class ActionServer(Handle):
             then(goals)
 
     def _decide_later(self, decide: Callable[[], None]) -> bool:
-        """Run a callback of the user's; return False if its executor raises."""
+        """Run a user's callback; return False if its executor raises."""
         try:
             self._decider.post(decide)
         except Exception:

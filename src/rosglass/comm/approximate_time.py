@@ -1,4 +1,4 @@
-"""Synchronizing messages of several topics by their time stamps.
+"""Synchronizes messages of several topics by their time stamps.
 
 The policy is that of ROS's message_filters (``sync_policies::ApproximateTime``, described at
 https://wiki.ros.org/message_filters/ApproximateTime): sets depend on stamps only, not on the order
@@ -28,7 +28,7 @@ class ApproximateTime(Generic[_T]):
 
     Args:
         count: Number of topics, at least two.
-        queue_size: Most messages of a topic that wait; beyond it, the oldest is dropped.
+        queue_size: Maximum number of waiting messages per topic; more drop the oldest.
         slop: Longest time span of a set in nanoseconds.
 
     Attributes:
@@ -47,7 +47,7 @@ class ApproximateTime(Generic[_T]):
             raise ArgumentError("slop", slop, "a time of 0 or more")
         self._size, self._slop = queue_size, slop
         self._queues: list[deque[tuple[int, _T]]] = [deque() for _ in range(count)]
-        #: Messages passed over since the candidate was found, starting with its own.
+        #: Messages skipped since the candidate was found, starting with its own.
         self._past: list[list[tuple[int, _T]]] = [[] for _ in range(count)]
         self._newest: list[int | None] = [None] * count
         #: By topic, whether messages were dropped that could have made a better set.

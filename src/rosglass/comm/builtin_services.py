@@ -1,8 +1,8 @@
-"""What every ROS node has by itself: parameters, a log, simulated time, and services for them.
+"""The built-in parts of every ROS node: parameters, log, simulated time, and their services.
 
 Each is created at its first use. The services that other nodes expect are offered shortly after
 connecting, one at a time, so that they delay neither the connection nor a user interface's first
-frame. A :class:`BuiltinProtocol` defines what they are in ROS 1 and in ROS 2.
+frame. A :class:`BuiltinProtocol` implements them for ROS 1 or ROS 2.
 
 Simulated time: ROS wiki, "Clock"; design article "Clock and Time"; rclcpp's ``TimeSource``. In
 ROS 1 all nodes share one parameter ``use_sim_time``, on the parameter server; in ROS 2 each node
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["USE_SIM_TIME", "BuiltinProtocol", "BuiltinServices", "SimTime"]
 
 _log = logging.getLogger("rosglass.comm")
-#: From connecting until the services are offered, and between two of them.
+#: Delay from connecting until the services are offered, and pause between two of them.
 _OFFER_DELAY_S, _OFFER_PAUSE_S = 0.2, 0.01
 #: The name of the parameter.
 USE_SIM_TIME = "use_sim_time"
@@ -45,11 +45,11 @@ _Parameters = TypeVar("_Parameters", bound="Parameters")
 
 
 class BuiltinProtocol(ABC, Generic[_Parameters]):
-    """What a node has by itself in ROS 1, or in ROS 2."""
+    """The built-in parts of a node in ROS 1 or ROS 2."""
 
     @abstractmethod
     def open(self, services: BuiltinServices[_Parameters]) -> None:
-        """Start what does not wait for its first use."""
+        """Start the parts that do not wait for their first use."""
 
     @abstractmethod
     def create_parameters(self, services: BuiltinServices[_Parameters]) -> _Parameters:
@@ -74,7 +74,7 @@ class BuiltinServices(NodeMember, Generic[_Parameters]):
 
     Args:
         core: The core of the node.
-        protocol: What these are in ROS 1 or in ROS 2.
+        protocol: Implements them for ROS 1 or ROS 2.
     """
 
     def __init__(self, core: NodeCore, protocol: BuiltinProtocol[_Parameters]) -> None:
@@ -88,7 +88,7 @@ class BuiltinServices(NodeMember, Generic[_Parameters]):
         self._closed = False
 
     def open(self, offered: bool) -> None:
-        """Start; other nodes find the services only if they are `offered`."""
+        """Start the services; other nodes find them only if they are `offered`."""
         self._core.add(self)
         self._protocol.open(self)
         if offered:
@@ -209,7 +209,7 @@ class SimTime(Handle):
         self._core.clock.advance(Time(sample.message().clock.nanoseconds))
 
     def _warn_no_time(self) -> None:
-        """Log why time stands still, if it does."""
+        """Log the reason if time stands still."""
         if self.following and not self._core.clock.now().nanoseconds:
             _log.warning(
                 "%s: %s is set, but nothing was received on /clock: time stands still at zero "

@@ -1,4 +1,4 @@
-"""What clients of services and of actions have in common: they follow whether there is a server."""
+"""The common part of service and action clients: monitoring whether a server is available."""
 
 from __future__ import annotations
 
@@ -54,11 +54,11 @@ class Client(Handle):
 
     @abstractmethod
     def _conflicts(self) -> list[str]:
-        """Return the problems that a person has to fix, in words."""
+        """Return the problems that the user has to fix, in words."""
 
     @abstractmethod
     def _absence(self) -> str:
-        """Return why there is no server, if there are no conflicts."""
+        """Return why no server is available, if there are no conflicts."""
 
     @property
     def problem(self) -> str:
@@ -90,7 +90,7 @@ class Client(Handle):
         return self._readiness.add(callback, executor)
 
     def _log_conflicts(self, log: logging.Logger, level: int = logging.WARNING) -> None:
-        """Log the problems that a person has to fix, once."""
+        """Log the problems that the user has to fix, once."""
         conflicts = "; ".join(self._conflicts())
         if conflicts and conflicts != self._logged_conflicts:
             log.log(level, "%s: %s", self.name, conflicts)
@@ -103,12 +103,12 @@ class Client(Handle):
 
 
 class Readiness:
-    """Whether a server is available: to be read, waited for and listened to.
+    """The availability of a server, to read, wait for or listen to.
 
     Args:
         name: Name of the service or action, for errors.
         ready: Returns whether a server is available.
-        check_open: Raises NodeClosedError if waiting is of no use any more.
+        check_open: Raises NodeClosedError if waiting has become pointless.
         default: Executor of callbacks that are added without one.
     """
 
@@ -151,7 +151,7 @@ class Readiness:
         return self._listeners.add(callback, executor or self._default)
 
     def update(self) -> None:
-        """Check for a change, and notify listeners and waiting threads; by one thread only."""
+        """Check for a change, and notify listeners and waiting threads; for one thread only."""
         self._wake()
         self._listeners.update()
 

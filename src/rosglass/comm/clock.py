@@ -67,7 +67,7 @@ class Clock(Unique):
 
     def __init__(self, name: str, executor: Executor, timers: Timers) -> None:
         self._name, self._executor, self._timers = name, executor, timers
-        #: Guards all that follows, and wakes sleeping threads.
+        #: Guards all members below, and wakes sleeping threads.
         self._changed = threading.Condition()
         self._simulated = False
         self._time = 0
@@ -76,7 +76,7 @@ class Clock(Unique):
         self._watchers: list[_Watcher] = []
         #: The open timers.
         self._periodic: list[Timer] = []
-        #: Fires the next due timers; None if there are none, or only simulated time decides when.
+        #: Fires the next due timers; None without timers, or if only simulated time decides when.
         self._alarm: Handle | None = None
 
     def __repr__(self) -> str:
@@ -89,13 +89,14 @@ class Clock(Unique):
         return self._simulated
 
     def now(self) -> Time:
-        """Return the time; zero until a simulated clock received one."""
+        """Return the time; zero until a simulated clock has received one."""
         return Time(self._time) if self._simulated else Time(time.time_ns())
 
     def sleep(self, duration: Duration | float) -> bool:
         """Wait until `duration` (seconds, or a Duration) has passed on this clock.
 
-        Waits for as long as simulated time stands still, and again for what it jumps back.
+        Keeps waiting while simulated time stands still, and waits again for the time that it jumps
+        back.
 
         Returns:
             True; False if the clock changed between system and simulated time while sleeping.
@@ -283,7 +284,7 @@ class Clock(Unique):
 
 
 class _Watcher(Handle):
-    """Notifies one callback of the jumps that it asked for."""
+    """Notifies one callback of the jumps that it was registered for."""
 
     def __init__(self, watchers: list[_Watcher], forward: Duration | None) -> None:
         self.listeners: Listeners[Jump] = Listeners()

@@ -1,4 +1,4 @@
-"""The core of a node: its threads, listeners and members, and how they end."""
+"""The core of a node: its threads, listeners and members, and their shutdown."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ __all__ = [
     "NodeMember",
 ]
 
-#: Closed publishers whose GIDs are kept.
+#: Number of closed publishers whose GIDs are kept.
 _MAX_CLOSED_GIDS = 1000
-#: Between two regular calls of each member's :meth:`NodeMember.follow`.
+#: Interval of the regular calls of each member's :meth:`NodeMember.follow`.
 _POLL_S = 1.0
-#: How long closing waits until listeners were notified that another node closed this one.
+#: How long closing waits for listeners to be notified that another node closed this one.
 _NOTIFY_TIMEOUT_S = 1.0
 
 
@@ -73,21 +73,21 @@ class NodeCore(ABC):
             the callbacks of the clock's timers.
         graph_listeners: Notified after each change of the graph.
         status_listeners: Notified of each new status.
-        local_gids: GIDs of the node's own publishers, and of those closed last.
+        local_gids: GIDs of the node's own publishers, including those recently closed.
         servers: The services that the node offers.
     """
 
     #: Wire format of the node's messages, ``cdr`` or ``ros1``.
     wire: str
-    #: What is seen of the ROS graph.
+    #: The ROS graph as discovered so far.
     graph: GraphView
     #: Finds types.
     types: Any
-    #: Moves the bytes; a ROS 1 node has none, and none of its endpoints asks for it.
+    #: Transports the bytes; a ROS 1 node has none, and none of its endpoints uses it.
     middleware: Middleware
     #: Announces a publisher of a type and returns its writer.
     create_writer: Callable[[EndpointInfo, MessageType], Writer]
-    #: Calls :meth:`_follow`; started by subclasses once all that this needs is there.
+    #: Calls :meth:`_follow`; subclasses start it once everything that it needs exists.
     _worker: Worker
 
     def __init__(self, name: NodeName, url: str, log: logging.Logger) -> None:
@@ -98,7 +98,7 @@ class NodeCore(ABC):
         self.own_dispatcher = Dispatcher(f"{name.name} services")
         self.timers = Timers(f"{name.name} timers")
         self.clock = Clock(name.name, self.dispatcher, self.timers)
-        #: Guards the members, and the moment of closing.
+        #: Guards the members, and closing.
         self._lock = threading.Lock()
         self._closed = self._moved = False
         self._process = os.getpid()
@@ -131,7 +131,7 @@ class NodeCore(ABC):
             raise NodeClosedError(f"node {self.name} is closed; connect again")
 
     def add(self, member: Handle, follow: Callable[[bool, bool], None] | None = None) -> None:
-        """Add a member, which follows the graph from now on, soon for the first time.
+        """Add a member, which follows the graph from now on; its first call is soon.
 
         Args:
             member: Closed with the node.
@@ -182,7 +182,7 @@ class NodeCore(ABC):
 
         Args:
             name: Absolute, relative or private name.
-            kind: ``topic`` or ``service``: some of ROS 2's rules are for one of them only.
+            kind: ``topic`` or ``service``: some of ROS 2's rules apply to one of them only.
 
         Raises:
             InvalidNameError: The name breaks ROS's rules.
@@ -190,7 +190,7 @@ class NodeCore(ABC):
 
     @abstractmethod
     def expand(self, name: str) -> str:
-        """Return the absolute name of anything, not remapped; raises InvalidNameError."""
+        """Return the absolute form of any name, not remapped; raises InvalidNameError."""
 
     def runs_here(self) -> bool:
         """Return whether the calling thread is one of the node's own."""
@@ -201,8 +201,8 @@ class NodeCore(ABC):
         """Close every member, leave the graph and end the threads; safe to call twice.
 
         Args:
-            reason: Why, for the last status, if it was not the program that asked for it.
-            killed: As of the status.
+            reason: Why, for the last status, if not at the program's request.
+            killed: As in :class:`Status`.
         """
         if self.forked:
             self._closed = True  # threads and connections are the parent's
@@ -217,7 +217,7 @@ class NodeCore(ABC):
         for member in reversed(members):
             try:
                 member.close()
-            except Exception:  # noqa: PERF203 - the others must be closed all the same
+            except Exception:  # noqa: PERF203 - the others must be closed nevertheless
                 self.log.exception("%s cannot be closed", member)
         self.timers.close()
         self._disconnect()

@@ -1,6 +1,6 @@
 """Events of publishers and subscriptions: matches, incompatible QoS, deadlines, losses.
 
-The kinds of events are rmw's (``rmw/events_statuses``), and DDS's behind them (OMG DDS 1.4, section
+The kinds of events are those of rmw (``rmw/events_statuses``) and of DDS (OMG DDS 1.4, section
 2.2.4.1).
 """
 
@@ -79,8 +79,8 @@ class DeadlineMissed:
     """Nothing was received, or published, within the deadline.
 
     Attributes:
-        change: Deadlines missed since the last event.
-        total: Deadlines missed in all.
+        change: Number of deadlines missed since the last event.
+        total: Total number of missed deadlines.
     """
 
     change: int
@@ -121,7 +121,7 @@ class SamplesLost:
 
     Attributes:
         change: Number lost since the last event.
-        total: Number lost in all.
+        total: Total number lost.
     """
 
     change: int
@@ -164,11 +164,11 @@ class Appearances(Generic[_E]):
         event: Callable[[EndpointInfo, int, int, int], _E | None],
         left: Sequence[EndpointInfo] = (),
     ) -> None:
-        """Notify the listeners of what changed; always called by the same thread.
+        """Notify the listeners of changes; always called by the same thread.
 
         Args:
-            endpoints: The present endpoints. One with the same GID is the same, even if the name of
-                its node has become known since.
+            endpoints: The present endpoints. One with the same GID is the same, even if its node's
+                name has become known since.
             event: Called with an endpoint, the change (1 or -1), the current number and the total
                 number; returns the event, None for none.
             left: Endpoints that left since the last call, in that order; those that had also
@@ -252,9 +252,9 @@ class TopicEndpoint(Handle):
         exist already are reported first.
 
         Args:
-            callback: Called with the endpoint, and how many match now.
-            executor: Where it runs; None for where the subscription's own callbacks run, or for the
-                dispatcher thread of the publisher's node.
+            callback: Called with the endpoint and the current number of matches.
+            executor: Runs `callback`; None for the executor of the subscription's own callbacks, or
+                the dispatcher thread of the publisher's node.
 
         Raises:
             ArgumentError: The callback is not callable, or the executor is not an Executor.
@@ -275,8 +275,8 @@ class TopicEndpoint(Handle):
     ) -> Handle:
         """Call `callback` each time that no message was received, or sent, within the deadline.
 
-        Time runs while a publisher matches the subscription, and from the first message of a
-        publisher. Arguments as for :meth:`on_matched`.
+        A subscription's deadline counts while a publisher matches, a publisher's from its first
+        message. Arguments as for :meth:`on_matched`.
         """
         return self._listen(self._deadline_listeners, callback, executor)
 
@@ -291,7 +291,7 @@ class TopicEndpoint(Handle):
 
     @abstractmethod
     def _request_update(self) -> None:
-        """Request an update soon, which notifies new listeners of what exists already."""
+        """Request an update soon, which notifies new listeners of existing endpoints."""
 
     def _listen(
         self,
@@ -336,7 +336,7 @@ def conflicts(
 
     Args:
         middleware: The middleware that connects them.
-        endpoint: The remote one of the two.
+        endpoint: The remote endpoint of the two.
         requested: The subscription's profile.
         offered: The publisher's profile.
     """

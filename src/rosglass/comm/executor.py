@@ -54,7 +54,7 @@ def run_job(job: Callable[[], None]) -> None:
 
 
 def let_exit(error: BaseException) -> None:
-    """Raise `error` if it is a SystemExit in the main thread; other threads must not end by it."""
+    """Raise `error` if it is a SystemExit in the main thread; it must not end other threads."""
     if isinstance(error, SystemExit) and threading.current_thread() is threading.main_thread():
         raise error
 
@@ -70,7 +70,7 @@ class ImmediateExecutor(Executor):
         """Run `job` now; logs an exception that it raises, SystemExit included."""
         try:
             run_job(job)
-        except SystemExit:  # in the main thread, which is in the middle of the node's own code
+        except SystemExit:  # must not interrupt the node's own code in the main thread
             _log.exception("a callback failed")
 
 
@@ -148,7 +148,7 @@ class RetryingExecutor(Executor):
 
     Args:
         executor: The executor, often a user's.
-        name: What posts, for the log.
+        name: The owner of the jobs, for the log.
         give_up_s: Seconds after which rejected jobs are dropped with an error in the log; for jobs
             without an owner that closes this.
     """

@@ -131,7 +131,7 @@ class GraphView(Protocol):
 class Graph:
     """Nodes and endpoints by the middleware's keys; thread-safe.
 
-    Entries with names that ROS's rules forbid are left out, as they would be of no use; see
+    Entries with names that ROS's rules forbid are left out, as they could not be used; see
     :meth:`invalid_names`.
 
     Args:
@@ -150,7 +150,7 @@ class Graph:
         self._watchers: dict[str, list[Callable[[EndpointInfo], None]]] = {}
 
     def watch(self, name: str, on_endpoint_removed: Callable[[EndpointInfo], None]) -> None:
-        """Report each endpoint of a topic or service that is removed, however briefly it existed.
+        """Report each removed endpoint of a topic or service, however briefly it existed.
 
         Args:
             name: Name of the topic or service.
@@ -270,7 +270,7 @@ class Graph:
         return found
 
     def clear(self) -> None:
-        """Remove all entries, so that nothing out of reach looks alive."""
+        """Remove all entries, so that unreachable endpoints do not look alive."""
         with self._lock:
             self._nodes.clear()
             self._invalid.clear()

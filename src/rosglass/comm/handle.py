@@ -1,4 +1,4 @@
-"""Base classes of what users hold and pass in: handles and executors; and checks of arguments."""
+"""Base classes for handles and executors, and checks of arguments."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ __all__ = [
 ]
 
 _H = TypeVar("_H", bound="Handle")
-#: Modules in which the threads that receive start.
+#: Modules that start the receiving threads.
 _RECEIVING = ("rosglass.wires.dds.", "rosglass.wires.zenoh.", "rosglass.wires.tcpros.io_loop")
-#: Modules in which the threads start that follow the graph and run timers.
+#: Modules that start the threads that follow the graph and run timers.
 _FOLLOWING = ("rosglass.comm.timers",)
 
 
@@ -68,7 +68,7 @@ class Handle(Unique, ABC):
 def check_flag(value: object, name: str, where: str = "") -> bool:
     """Return a boolean option; raises ArgumentError.
 
-    Any text is true in Python, "no" and "false" included.
+    Any nonempty string is true in Python, including "no" and "false".
     """
     if value is not True and value is not False:
         raise ArgumentError(name, value, "True or False", where)
@@ -82,8 +82,8 @@ def check_may_wait(name: str, *, following: bool = False) -> None:
         name: The service, action or topic that the caller is about to wait for.
         following: Whether threads that follow the graph and run timers may wait.
     """
-    # The stack tells: Zenoh's threads are not Python's, and marking them would cost something
-    # with every sample.
+    # Recognized by the stack: Zenoh's threads are not Python's, and marking them would add a cost
+    # per sample.
     frame: FrameType | None = sys._getframe()
     first = ""
     while frame is not None:

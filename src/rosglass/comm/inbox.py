@@ -1,6 +1,6 @@
 """Received samples, and the inbox that keeps and counts them until they are taken.
 
-All of it runs for each sample of the fastest topics, so that it is written for speed.
+All of it runs for each sample of the fastest topics, and is therefore written for speed.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ __all__ = ["INBOX_LIMIT", "ImmediateInbox", "Inbox", "Sample"]
 _log = logging.getLogger("rosglass.comm")
 #: Default limit of a keep-all inbox in bytes.
 INBOX_LIMIT = 256 * 1024 * 1024
-#: Memory of a waiting sample besides its data, in bytes, approximately.
+#: Approximate memory of a waiting sample in addition to its data, in bytes.
 _SAMPLE_OVERHEAD_BYTES = 500
 #: Shortest time between two log lines about a consumer that is too slow.
 _LOG_PERIOD_S = 10.0
-#: Most samples that are taken out for a callback at once.
+#: Maximum number of samples taken out for a callback at once.
 _MAX_BATCH = 256
 #: Time after which a callback yields its executor to other jobs.
 _MAX_TURN_S = 0.01
-#: Rates are measured between at most so many marks ...
+#: Rates are measured between at most this many marks ...
 _MAX_MARKS = 30
 #: ... which are at least this long apart.
 _MARK_PERIOD_S = 1 / 30
@@ -59,7 +59,7 @@ class Sample(NamedTuple):
         data: The bytes as received, encapsulation header included; large payloads may be a
             read-only view of the middleware's own buffer.
         wire: Their format, ``cdr`` or ``ros1``.
-        type: Their type; an :class:`OpaqueType` if no definition of it is available.
+        type: Their type; an :class:`OpaqueType` if no definition is available.
         received_ns: System time of reception, nanoseconds since the Unix epoch; up to a tenth of a
             second late in subscriptions that receive in batches.
         sent_ns: The publisher's time stamp by the publisher's clock; None if the wire carries none.
@@ -93,7 +93,7 @@ class Sample(NamedTuple):
 
         Raises:
             DecodeError: The bytes are not a message of the type.
-            TypeNotFoundError: The type is opaque; the error says why.
+            TypeNotFoundError: The type is opaque; the message gives the reason.
         """
         return self.type.decode(self.data, wire=self.wire)
 
@@ -107,7 +107,7 @@ class Inbox:
     Args:
         topic: The topic's name, for log lines and errors.
         qos: The profile with history and depth.
-        executor: Where `call` runs.
+        executor: Runs `call`.
         call: Called with each sample; None if samples are taken with :meth:`pop`.
         call_decoded: Called with messages in place of `call`, if that only decodes the samples:
             decoding many at once is faster.
@@ -164,7 +164,7 @@ class Inbox:
         self._add(given, sum(map(len, map(_data, given))))
 
     def _add(self, given: Sequence[Sample], size: int) -> None:
-        """Add samples with `size` bytes in all."""
+        """Add samples with `size` bytes in total."""
         waiters: Sequence[Callable[[], object]] = ()
         dropped = 0
         with self._lock:
@@ -273,7 +273,7 @@ class Inbox:
             self._shrink(limit)
 
     def statistics(self, lost: int) -> Statistics:
-        """Return the current counts and rates; `lost` is the number of samples lost on the way."""
+        """Return the current counts and rates; `lost` is the number of samples lost in transit."""
         now = time.monotonic()
         with self._lock:
             return self._meter.read(
@@ -286,7 +286,7 @@ class Inbox:
             return self._meter.lateness(sample)
 
     def close(self) -> bool:
-        """Discard all samples, accept no more and wake all waiters; return False if closed."""
+        """Discard and refuse all samples and wake all waiters; return False if already closed."""
         with self._lock:
             if self._closed:
                 return False
@@ -307,7 +307,7 @@ class Inbox:
     # -- the callback ----------------------------------------------------------------------------
 
     def _run_callback(self) -> None:
-        """Call back for what is waiting now, but yield the executor after a while."""
+        """Call back for the waiting samples, but yield the executor after a while."""
         left, end = len(self._samples), time.monotonic() + _MAX_TURN_S
         try:
             while left > 0 and (samples := self._pop_batch(min(left, self._batch))):
@@ -327,7 +327,7 @@ class Inbox:
                 self._executor.post(self._run_callback)
 
     def _pop_batch(self, limit: int) -> list[Sample]:
-        """Remove and return the oldest samples, `limit` at most."""
+        """Remove and return the oldest samples, at most `limit`."""
         with self._lock:
             pop = self._samples.popleft
             samples = [pop() for _ in range(min(limit, len(self._samples)))]
@@ -348,7 +348,7 @@ class Inbox:
                 self._log_failure()
 
     def _prepare(self, samples: Sequence[Sample]) -> tuple[Callable[[Any], None], Sequence[Any]]:
-        """Return what to call, and the arguments: the samples, or the messages in them."""
+        """Return the callback and its arguments: the samples, or their messages."""
         assert self._call is not None
         if self._call_decoded is not None and len(samples) > 1:
             kind = samples[0][2]
@@ -366,7 +366,7 @@ class Inbox:
 class ImmediateInbox(Inbox):
     """Passes samples to a callback in the thread that puts them, one at a time.
 
-    Samples wait only while a call is in progress: those of other threads, and those that the
+    Samples wait only while a call is in progress: those from other threads, and those that the
     callback itself causes.
     """
 
@@ -379,12 +379,12 @@ class ImmediateInbox(Inbox):
     ) -> None:
         super().__init__(topic, qos, IMMEDIATE, call, call_decoded)
         self._call_one = call
-        #: Held, never waited for, by the thread that calls back; it guards the counters as well.
+        #: Held by the thread that calls back, never waited for; also guards the counters.
         self._turn = threading.Lock()
 
     def put(self, sample: Sample) -> None:
         """Call back with a sample; if a call is in progress, leave it to that thread."""
-        # Not by way of put_many(), which takes twice as long for one sample.
+        # Not through put_many(), which takes twice as long for one sample.
         turn = self._turn
         if not self._samples and turn.acquire(False):
             try:
@@ -410,7 +410,7 @@ class ImmediateInbox(Inbox):
             self._handle_stored()
 
     def _handle_stored(self) -> None:
-        """Call back for stored samples, unless another thread is at it: it checks again."""
+        """Call back for stored samples, unless another thread is doing so: it checks again."""
         turn = self._turn
         while self._samples and turn.acquire(False):
             try:
@@ -421,7 +421,7 @@ class ImmediateInbox(Inbox):
                 turn.release()
 
     def _handle_one(self, sample: Sample) -> None:
-        """Call back; the turn is held."""
+        """Call back with a sample; the turn is held."""
         if self._closed:
             return
         self._count(sample, 1, len(sample[0]))
@@ -431,7 +431,7 @@ class ImmediateInbox(Inbox):
             self._log_failure()
 
     def _handle(self, given: list[Sample]) -> list[Sample]:
-        """Call back for each; return those that must wait for samples stored in between.
+        """Call back with each sample; return those that must wait for samples stored in between.
 
         The turn is held.
         """
@@ -470,9 +470,9 @@ class ImmediateInbox(Inbox):
 
 
 class _Meter:
-    """Measures the rates of an inbox: it keeps where its counters stood at some thirty moments.
+    """Measures the rates of an inbox from the values of its counters at about thirty times.
 
-    So samples may arrive one by one or in batches.
+    Samples may therefore arrive one by one or in batches.
     """
 
     def __init__(self) -> None:
@@ -486,13 +486,13 @@ class _Meter:
 
         Args:
             now: Monotonic time at which `sample` arrived.
-            last: The same of the sample before.
-            count: How many samples had arrived before `sample`.
+            last: Monotonic time of the previous sample.
+            count: Number of samples that had arrived before `sample`.
             size: Their bytes.
             sample: The sample that has just arrived.
         """
         if self._marks and self._rate(now, last, count) == 0:
-            # After a pause the rates start anew.
+            # After a pause, the rates start from scratch.
             self._marks.clear()
         elif count:
             self._marks.append((last, count, size))

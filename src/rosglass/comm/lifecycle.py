@@ -79,9 +79,9 @@ class TransitionEvent(NamedTuple):
 
 
 class LifecycleClient(OtherNode):
-    """Drives a lifecycle node; made by :meth:`Node.create_lifecycle_client`.
+    """Drives a lifecycle node; created by :meth:`Node.create_lifecycle_client`.
 
-    Methods that call the node take `timeout`, the seconds to wait in all (None for no limit), and
+    Methods that call the node take `timeout`, the total seconds to wait (None for no limit), and
     raise ServiceUnavailableError if the node is not available or not a lifecycle node, TimeoutError
     if it does not answer, and NodeClosedError.
 
@@ -127,7 +127,7 @@ class LifecycleClient(OtherNode):
         Args:
             transition: Its name, e.g. ``configure`` (``shutdown`` stands for those of all states),
                 or its number.
-            timeout: Seconds to wait in all.
+            timeout: Total seconds to wait.
 
         Raises:
             TransitionError: It is not possible in the current state (the message lists those that

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["ChangeListeners", "Listener", "Listeners"]
 
 _T = TypeVar("_T")
-#: Most values that wait for a callback, as its executor may never run it.
+#: Maximum number of values that wait for a callback, as its executor may never run it.
 _MAX_WAITING = 1000
 
 
@@ -25,7 +25,7 @@ class Listeners(Generic[_T]):
     Args:
         merge: Whether a waiting callback is called only with the newest value, so that a burst of
             changes costs one call.
-        depth: How many values, the newest, wait for a slow callback; None for 1000.
+        depth: Number of newest values that wait for a slow callback; None for 1000.
         where: What the callbacks listen to, e.g. a topic; for errors.
     """
 
@@ -41,7 +41,7 @@ class Listeners(Generic[_T]):
         """Call `callback` with each new value on `executor`, until the handle is closed.
 
         Raises:
-            ArgumentError: `callback` is no plain function, or `executor` no Executor.
+            ArgumentError: `callback` is not a plain function, or `executor` not an Executor.
         """
         check_plain(callback, self._where)
         if not isinstance(executor, Executor):
@@ -73,7 +73,7 @@ class ChangeListeners(Listeners[_T]):
     """A list of callbacks that are notified when a value has changed.
 
     A program that reads the value and then registers a callback is notified of every later change,
-    even if the value has changed back before :meth:`update` looked.
+    even if the value has changed back before the next :meth:`update`.
 
     Args:
         compute: Returns the value, which is hashable.
@@ -100,7 +100,7 @@ class ChangeListeners(Listeners[_T]):
             Whether they were notified.
         """
         read = self._read.copy()
-        self._read.difference_update(read)  # what is read from here on is for the next update
+        self._read.difference_update(read)  # later reads belong to the next update
         value = self._compute()
         if value == self._reported and read <= {value}:
             return False
@@ -137,7 +137,7 @@ class Listener(Handle, Generic[_T]):
         with self._lock:
             self._waiting.append(value)
             if len(self._waiting) > self._depth:
-                # Its run was posted already, and takes the next value instead.
+                # Its run is already posted, and will take the next value instead.
                 del self._waiting[0]
                 return False
         self._executor.post(self._run)

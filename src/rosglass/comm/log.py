@@ -40,9 +40,9 @@ __all__ = [
 ]
 
 _TOPIC = "/rosout"
-#: Most messages that wait to be published, and that are published per second.
+#: Maximum number of messages that wait to be published, and that are published per second.
 _MAX_WAITING = _MAX_RATE = 1000
-#: Most characters of a message.
+#: Maximum length of a message in characters.
 _MAX_TEXT = 32 * 1024
 #: Longest pause of the publishing thread, which each record wakes.
 _IDLE_POLL_S = 3600.0
@@ -166,13 +166,13 @@ class NodeLogger(logging.Logger):
 class RosoutHandler(logging.Handler, NodeMember):
     """Publishes log records; never waits, never raises.
 
-    Messages beyond 1000 per second, or faster than they can be sent, are dropped and counted; long
-    ones are cut.
+    Messages above 1000 per second, or faster than they can be sent, are dropped and counted; long
+    ones are truncated.
 
     Args:
-        core: What the node consists of.
-        name: The node's logger, for what the handler has to say itself.
-        topic: What a message looks like.
+        core: The core of the node.
+        name: Name of the node's logger, for the handler's own messages.
+        topic: The messages of ``/rosout``.
     """
 
     def __init__(self, core: NodeCore, name: str, topic: RosoutTopic) -> None:
@@ -182,8 +182,8 @@ class RosoutHandler(logging.Handler, NodeMember):
         self._waiting: deque[dict[str, Any]] = deque()
         self._lost = 0
         self._second, self._count = 0, 0
-        #: Guards the creation of publisher and worker. Reentrant: a node that is closing closes the
-        #: handler when that adds its publisher.
+        #: Guards the creation of publisher and worker. Reentrant: a closing node closes the handler
+        #: when the handler adds its publisher.
         self._start = threading.RLock()
         self._publisher: Publisher | None = None
         self._worker: Worker | None = None
@@ -211,7 +211,7 @@ class RosoutHandler(logging.Handler, NodeMember):
             self._lost += 1
 
     def close(self) -> None:
-        """Publish waiting messages, and end; safe to call twice."""
+        """Publish waiting messages, and stop; safe to call twice."""
         with self._start:
             closed, self._closed = self._closed, True
             worker, self._worker = self._worker, None
@@ -277,12 +277,12 @@ class RosoutHandler(logging.Handler, NodeMember):
 
 
 class LibraryLog(logging.Handler):
-    """Publishes the library's warnings that a node's own threads log, as they are about the node.
+    """Publishes the library's warnings from a node's own threads, which concern that node.
 
     It is active until it is closed.
 
     Args:
-        handler: Publishes them.
+        handler: The handler that publishes them.
         runs_here: Whether the calling thread is one of the node's own.
     """
 
@@ -309,14 +309,14 @@ def message_of(record: logging.LogRecord) -> str:
 
 
 def clean(text: str) -> str:
-    """Return `text` as a ROS string can carry it: cut, and without invalid characters."""
+    """Return `text` as a valid ROS string: truncated, and without invalid characters."""
     if len(text) > _MAX_TEXT:
         text = f"{text[:_MAX_TEXT]}... (cut; {len(text)} characters)"
     return text.replace("\0", "\\0").encode("utf-8", "backslashreplace").decode()
 
 
 class _TerminalHandler(logging.Handler):
-    """Takes the place of `logging.lastResort`, which is inactive if a logger has any handler.
+    """Replaces `logging.lastResort`, which is inactive if a logger has any handler.
 
     A node's logger always has one, for /rosout.
 

@@ -1,4 +1,4 @@
-"""Keeping repeated faults from filling the log: log each once, or at most one every 10 s."""
+"""Limits for repeated faults in the log: each is logged once, or at most one every 10 s."""
 
 from __future__ import annotations
 
@@ -20,16 +20,17 @@ class LogOnce:
     """Remembers which faults were logged, so that each is logged once; thread-safe.
 
     Args:
-        limit: Faults to log in all: a peer that keeps changing its identity must not fill the log.
+        limit: Total number of faults to log: a peer that keeps changing its identity must not fill
+            the log.
     """
 
     def __init__(self, limit: int = 100) -> None:
         self._limit = limit
-        #: By fault, the call that logs it: of two threads at the same fault, one is the first.
+        #: The call that logs each fault: of two threads with the same fault, only one is first.
         self._owners: dict[Hashable, object] = {}
 
     def is_first(self, fault: Hashable) -> bool:
-        """Return True the first time that `fault` is given, as long as the limit allows."""
+        """Return True the first time that `fault` occurs, as long as the limit allows."""
         if fault in self._owners or len(self._owners) >= self._limit:
             return False
         call = object()

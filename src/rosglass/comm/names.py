@@ -96,7 +96,7 @@ def is_valid_node(full: str) -> bool:
 def expand(name: str, node: str, namespace: str) -> str:
     """Return the absolute topic or service name that `name` stands for in a node.
 
-    Relative names get the namespace in front, ``~`` and ``~/rest`` the node's full name;
+    Relative names are prefixed with the namespace, ``~`` and ``~/rest`` with the node's full name;
     ``{node}``, ``{ns}`` and ``{namespace}`` are replaced.
 
     Args:
@@ -135,7 +135,7 @@ def expand(name: str, node: str, namespace: str) -> str:
 def hidden(name: str) -> bool:
     """Return whether a topic, service or node is hidden: a part of its name begins with ``_``.
 
-    Listings omit such names, those of an action's topics and services included.
+    Listings omit such names, including those of an action's topics and services.
     """
     return "/_" in f"/{name}"
 
@@ -230,9 +230,9 @@ _numbers = itertools.count(1)
 def anonymous_name(name: str) -> str:
     """Return a unique node name that begins with `name`.
 
-    As in rospy and roscpp, host, process and time in milliseconds are appended. Process numbers
-    alone are not unique: programs in containers often have the same. In ROS 1 a second node of a
-    name ends the first one.
+    As in rospy and roscpp, host, process id and time in milliseconds are appended. Process ids
+    alone are not unique: programs in containers often have the same one. In ROS 1, a second node
+    with a name shuts down the first one.
     """
     import socket  # noqa: PLC0415 - only needed to connect
 
@@ -256,5 +256,5 @@ def similar(name: str, known: Iterable[str]) -> str:
 
 
 def _plain(name: str) -> str:
-    """Return a name without differences of spelling, as between frameId and frame_id."""
+    """Return a name without differences in spelling, such as frameId and frame_id."""
     return name.replace("_", "").lower()

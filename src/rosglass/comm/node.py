@@ -75,7 +75,7 @@ class Node(Handle):
 
         Args:
             topic: Absolute, relative or private (``~name``) topic name.
-            type: Type name or type; an :class:`rosglass.messages.OpaqueType` to pass on bytes.
+            type: Type name or type; an :class:`rosglass.messages.OpaqueType` to forward bytes.
             qos: Profile; an integer is the depth of a reliable, volatile profile.
 
         Raises:
@@ -103,15 +103,15 @@ class Node(Handle):
 
         Args:
             topic: Absolute, relative or private topic name.
-            type: Type name or type; None takes the type that publishers announce, as soon as
-                there is one.
+            type: Type name or type; None uses the type that publishers announce, as soon as one
+                does.
             callback: Called with each message, on `executor`. Without callbacks, samples wait in
                 the subscription until they are taken.
             qos: Profile; an integer is the depth of a reliable, volatile profile.
             raw_callback: Called with each :class:`Sample` instead: bytes, stamps, origin. Samples
                 of a type without a definition have an :class:`rosglass.messages.OpaqueType`.
-            executor: Where callbacks run; None for the node's own dispatcher thread.
-            ignore_local: Whether to leave out what this node publishes itself.
+            executor: Runs callbacks; None for the node's own dispatcher thread.
+            ignore_local: Whether to ignore messages that this node itself publishes.
 
         Raises:
             InvalidNameError: The topic name breaks ROS's rules.
@@ -136,10 +136,10 @@ class Node(Handle):
     def _receive(
         self, subscription: Subscription, type: str | MessageType | None, ignore_local: bool
     ) -> None:
-        """Connect a new subscription with its publishers."""
+        """Connect a new subscription to its publishers."""
 
     def _profile(self, qos: QoS | int, place: str) -> QoS:
-        """Return the profile that a user gave; errors as of :func:`check_profile`."""
+        """Return the profile that the user gave; errors as for :func:`check_profile`."""
         return check_profile(qos, place)
 
     def wait_for_message(
@@ -153,13 +153,13 @@ class Node(Handle):
 
         Args:
             topic: Absolute, relative or private topic name.
-            type: Type name or type; None takes the type that publishers announce.
-            timeout: Seconds to wait, None for ever.
+            type: Type name or type; None uses the type that publishers announce.
+            timeout: Seconds to wait; None waits forever.
             qos: Profile; None for the strongest that is available, so that a latched message is
                 received at once.
 
         Raises:
-            TimeoutError: No message arrived in time; the error says why.
+            TimeoutError: No message arrived in time; the message gives the reason.
             NodeClosedError: The node is closed, or is closed while waiting.
             InvalidNameError: The topic name breaks ROS's rules.
             TypeNotFoundError: No definition of the type is known.
@@ -180,12 +180,12 @@ class Node(Handle):
     def create_service_client(
         self, name: str, type: str | ServiceType | None = None, qos: QoS | None = None
     ) -> ServiceClient:
-        """Return a client of a service, whether it exists yet or not.
+        """Return a client of a service, which need not exist yet.
 
         Args:
             name: Absolute, relative or private service name.
-            type: Type name or type; None takes the type that the server announces, as soon as it is
-                there.
+            type: Type name or type; None uses the type that the server announces, as soon as it is
+                available.
             qos: Profile of requests and replies; None for ROS's default for services.
 
         Raises:
@@ -214,7 +214,7 @@ class Node(Handle):
                 and, where the wire supports it, reported to the caller. A coroutine function runs
                 in the event loop in which the server is created.
             qos: Profile of requests and replies; None for ROS's default for services.
-            executor: Where `callback` runs; None for the node's own dispatcher thread.
+            executor: Runs `callback`; None for the node's own dispatcher thread.
 
         Raises:
             InvalidNameError: The name breaks ROS's rules.
@@ -250,8 +250,8 @@ class Node(Handle):
             accept: Receives the goal and returns True to accept it. None accepts all goals.
             cancel: Receives the goal and returns True to accept the request to cancel it. None
                 accepts all requests, and so does a callback that fails.
-            executor: Where `execute`, `accept` and `cancel` run; None for a thread per goal and,
-                for the latter two, the node's dispatcher.
+            executor: Runs `execute`, `accept` and `cancel`; None for a thread per goal and, for the
+                latter two, the node's dispatcher.
 
         Raises:
             InvalidNameError: The name breaks ROS's rules.
@@ -294,7 +294,7 @@ class Node(Handle):
         return self._core.clock.now()
 
     def steady(self) -> float:
-        """Return a monotonic time in seconds, by which the ages of messages are measured.
+        """Return a monotonic time in seconds, which measures the ages of messages.
 
         It stands still while a recording that replaces a robot is paused.
         """
@@ -313,7 +313,7 @@ class Node(Handle):
             period: Seconds, or a Duration, between two calls.
             callback: Called without arguments. Ticks are skipped while a call is still waiting or
                 running.
-            executor: Where it runs; None for the node's own dispatcher thread.
+            executor: Runs `callback`; None for the node's own dispatcher thread.
 
         Raises:
             ArgumentError: The period is not above zero.
@@ -333,20 +333,20 @@ class Node(Handle):
     ) -> MessageType | ServiceType | ActionType:
         """Return a type in the version that the robot uses, requesting it from the robot if needed.
 
-        Subscriptions do so themselves, without waiting. A fetched type is in the library
-        afterwards, so that its name is enough everywhere else.
+        Subscriptions do so themselves, without waiting. A fetched type is added to the library, so
+        that its name suffices everywhere else.
 
         Args:
             name: ``pkg/msg/Type``, ``pkg/srv/Type``, ``pkg/action/Type``, or ``pkg/Type``.
             hash: RIHS01 hash (ROS 1: md5 sum) of the version, if the robot uses several.
             node: Full name of the node whose version is wanted.
-            timeout: Seconds to wait in all, for an endpoint that uses the type to appear and for
-                the answer; None for ever.
+            timeout: Total seconds to wait, for an endpoint that uses the type to appear and for the
+                answer; None waits forever.
 
         Raises:
-            InvalidNameError: `name` is no type name, or `hash` no hash.
-            TypeNotFoundError: No endpoint uses the type, or none sends it; says which were asked,
-                and why not.
+            InvalidNameError: `name` is not a type name, or `hash` not a hash.
+            TypeNotFoundError: No endpoint uses the type, or none sends it; the message lists the
+                queried nodes and their failures.
             DefinitionConflictError: Several versions are in use.
             NodeClosedError: The node is closed, or is closed while waiting.
         """
@@ -396,19 +396,19 @@ class Node(Handle):
         return {}
 
     def unnamed_programs(self) -> int:
-        """Return how many programs were discovered that have not announced their nodes yet.
+        """Return the number of discovered programs that have not announced their nodes yet.
 
-        Over DDS, nodes on Fast DDS do so up to four seconds after they were discovered; until then
-        the graph is not complete. Over Zenoh it is 1 until the router has sent its graph, which
-        takes seconds with thousands of topics. Always 0 elsewhere.
+        Over DDS, nodes on Fast DDS announce them up to four seconds after discovery; until then the
+        graph is not complete. Over Zenoh it is 1 until the router has sent its graph, which takes
+        seconds with thousands of topics. Always 0 elsewhere.
         """
         return 0
 
     def invalid_names(self) -> list[str]:
         """Return the announced names that are left out of the graph, sorted.
 
-        They break ROS's rules, so that nothing could be done with them; control characters in
-        them are as they were sent.
+        They break ROS's rules, so that they could not be used; they are unchanged, including
+        control characters.
         """
         return self._core.graph.invalid_names()
 
@@ -465,8 +465,8 @@ class Node(Handle):
     def spin(self) -> None:
         """Wait until the node is closed, or until Ctrl-C, which closes it.
 
-        For programs that have nothing else to do: callbacks run on threads of their own, whether
-        or not a program waits here.
+        For programs that have nothing else to do: callbacks run on their own threads, whether or
+        not the program waits here.
         """
         check_may_wait(f"{self!r} is not closed")
         try:
@@ -484,7 +484,7 @@ class Node(Handle):
 
 
 class OtherNode(Handle):
-    """Clients of the services that another node has by itself, and subscriptions to its events.
+    """Clients of another node's built-in services, and subscriptions to its events.
 
     Args:
         owner: The node that the clients belong to.
@@ -505,7 +505,7 @@ class OtherNode(Handle):
     ) -> None:
         self.node = node
         self._owner, self._services, self._qos = owner, services, qos
-        #: Every use is atomic; what is added while another thread closes them is closed there.
+        #: Every use is atomic; additions while another thread closes this are closed at once.
         self._clients: dict[str, ServiceClient] = {}
         self._subscriptions: dict[Subscription, None] = {}
         self._closed = False

@@ -140,7 +140,7 @@ class Parameters(Handle):
 
         Args:
             name: Its name; dots group parameters, as in ``camera.exposure``.
-            default: Its value, unless the program was started with another one.
+            default: Its value, unless the program was started with a different one.
             descriptor: Its other properties. The type is that of `default`; without a default, set
                 it here, or allow any type with `dynamic_typing`.
 
@@ -176,9 +176,9 @@ class Parameters(Handle):
         """Validate values before they are set.
 
         Args:
-            validate: Returns why the values must not be set; an empty string accepts them. An
-                exception refuses them, too. It runs in the thread that sets them, before anything
-                changes; if another node sets them, on a thread of this node's own.
+            validate: Returns why the values must not be set; an empty string accepts them, an
+                exception refuses them. It runs in the thread that sets them, before anything
+                changes; if another node sets them, on one of this node's threads.
         """
 
     @abstractmethod
@@ -192,7 +192,7 @@ class Parameters(Handle):
 
         Raises:
             ParameterError: The file cannot be read, names a parameter that is not declared, or
-                has a value that is refused; the message says where.
+                has a value that is refused; the message gives the place.
         """
         raise UnsupportedError(f"{type(self).__name__} has no parameter files")
 
@@ -230,13 +230,13 @@ class RemoteParameters(Handle):
 
     @abstractmethod
     def values(self, names: list[str] | None, deadline: Deadline) -> dict[str, ParameterValue]:
-        """Return values by name, without `names` of all parameters; None for those not set."""
+        """Return values by name (`names` None: of all parameters); None for those not set."""
 
     @abstractmethod
     def descriptors(
         self, names: list[str] | None, deadline: Deadline
     ) -> dict[str, ParameterDescriptor]:
-        """Return descriptors by name, without `names` of all parameters."""
+        """Return descriptors by name (`names` None: of all parameters)."""
 
     @abstractmethod
     def set(self, values: Mapping[str, ParameterValue], deadline: Deadline) -> dict[str, SetResult]:
@@ -244,7 +244,7 @@ class RemoteParameters(Handle):
 
     @abstractmethod
     def set_atomically(self, values: Mapping[str, ParameterValue], deadline: Deadline) -> SetResult:
-        """Set parameters, all or none; raises as :meth:`set`, or UnsupportedError."""
+        """Set parameters, all or none; raises the errors of :meth:`set`, or UnsupportedError."""
 
     @abstractmethod
     def watch(
@@ -254,7 +254,7 @@ class RemoteParameters(Handle):
 
     @abstractmethod
     def load(self, path: str | PathLike[str], deadline: Deadline) -> list[str]:
-        """Set the parameters that a file has for the node; return their names."""
+        """Set the parameters that a file contains for the node; return their names."""
 
     @abstractmethod
     def save(self, path: str | PathLike[str], deadline: Deadline) -> None:
@@ -262,17 +262,16 @@ class RemoteParameters(Handle):
 
 
 class ParameterClient(Handle):
-    """Reads and sets another node's parameters; made by :meth:`Node.create_parameter_client`.
+    """Reads and sets another node's parameters; created by :meth:`Node.create_parameter_client`.
 
-    Methods that call the node take `timeout`, the seconds to wait in all (None for no limit), and
+    Methods that call the node take `timeout`, the total seconds to wait (None for no limit), and
     raise ServiceUnavailableError if the node or its parameters are not available, TimeoutError if
     it does not answer, and NodeClosedError.
 
     In ROS 1, parameters are on the master's parameter server, whether the node runs or not, and so
-    are those of any other namespace, ``/`` included. Groups are namespaces there:
-    ``camera/exposure``. Values may also be namespaces as dicts, lists of several types, and dates;
-    None deletes. If the master does not answer within `timeout`, 5 s at most, ConnectionLostError
-    is raised.
+    are those of any other namespace, including ``/``. Groups are namespaces: ``camera/exposure``.
+    Values may also be namespaces as dicts, lists of several types, and dates; None deletes. If the
+    master does not answer within `timeout`, at most 5 s, ConnectionLostError is raised.
 
     Args:
         remote: The protocol by which the parameters are reached.
@@ -290,11 +289,11 @@ class ParameterClient(Handle):
 
     @property
     def ready(self) -> bool:
-        """Whether the node, in ROS 1 the master, is available and serves parameters."""
+        """Whether the node (in ROS 1, the master) is available and serves parameters."""
         return not self._closed and self._remote.ready
 
     def wait_for_server(self, timeout: float | None = None) -> bool:
-        """Wait for the node, in ROS 1 for the master; return whether it is available."""
+        """Wait for the node (in ROS 1, the master); return whether it is available."""
         self._check_open()
         return self._remote.wait_for_server(timeout)
 
@@ -329,7 +328,7 @@ class ParameterClient(Handle):
     ) -> dict[str, ParameterDescriptor]:
         """Return the properties of parameters by name; without `names`, of all.
 
-        The type is NOT_SET if a parameter is not declared. ROS 1 has no properties but the type.
+        The type is NOT_SET if a parameter is not declared. In ROS 1, the type is the only property.
         """
         deadline = self._deadline(timeout)
         return self._remote.descriptors(self._names(names), deadline)
@@ -339,8 +338,8 @@ class ParameterClient(Handle):
     ) -> dict[str, SetResult]:
         """Set parameters one by one; return the node's answer by name.
 
-        Types matter: a node refuses 1 for a parameter that is 1.0. For an empty list, the node is
-        asked for the type first.
+        Types matter: a node refuses 1 for a parameter that is 1.0. For an empty list, this first
+        requests the type from the node.
 
         Raises:
             ParameterError: A value has a type that parameters cannot have; nothing is sent.
@@ -368,7 +367,7 @@ class ParameterClient(Handle):
     ) -> Handle:
         """Call `callback` with each change of the node's parameters.
 
-        In ROS 1 this waits for the current values, to compare with, and changes in quick succession
+        In ROS 1 this waits for the current values to compare with, and changes in quick succession
         may be merged.
         """
         self._check_open()

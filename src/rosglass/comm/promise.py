@@ -27,7 +27,7 @@ __all__ = [
 _T = TypeVar("_T")
 #: Longest uninterrupted wait: on Windows, Ctrl-C does not interrupt one for a lock.
 _MAX_BLOCK_S = 0.2
-#: How long a callback is posted again to an executor that raises.
+#: How long a callback is re-posted to an executor that raises.
 _MAX_RETRY_S = 30.0
 
 
@@ -99,8 +99,8 @@ class Promise(Future[_T]):
         """Call `callback` with this promise once it is completed or cancelled.
 
         Args:
-            callback: Called at once if it is done already.
-            executor: Where it runs; None for the node's own dispatcher thread.
+            callback: Called immediately if the promise is already done.
+            executor: Runs `callback`; None for the node's own dispatcher thread.
         """
         if not callable(callback):
             raise ArgumentError("callback", callback, "something that can be called", "on_done")
@@ -112,12 +112,12 @@ class Promise(Future[_T]):
             self.add_done_callback(lambda _: poster.post(lambda: run_job(lambda: callback(self))))
 
     def set_result(self, value: _T) -> None:
-        """Complete it with `value`, unless it is done already."""
+        """Complete it with `value`, unless it is already done."""
         with suppress(InvalidStateError):
             super().set_result(value)
 
     def set_exception(self, error: BaseException | None) -> None:
-        """Complete it with an error, unless it is done already."""
+        """Complete it with an error, unless it is already done."""
         with suppress(InvalidStateError):
             super().set_exception(error)
 
@@ -146,7 +146,7 @@ def _notify_cancel(promise: Future[Any]) -> None:
 
 
 class Deadline:
-    """A point in time up to which an operation of several steps may take.
+    """The point in time by which an operation of several steps must end.
 
     Args:
         timeout: Seconds from now; None for no limit.
@@ -161,6 +161,6 @@ class Deadline:
         self._end = None if timeout is None else time.monotonic() + timeout
 
     def left(self) -> float | None:
-        """Return the seconds left; None without limit."""
+        """Return the remaining seconds; None for no limit."""
         # Rounded, because errors quote it.
         return None if self._end is None else max(0.0, round(self._end - time.monotonic(), 2))

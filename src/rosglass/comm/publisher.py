@@ -1,4 +1,4 @@
-"""Publishing a topic."""
+"""Publishers of topics."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ _NO_MESSAGE: Any = object()
 
 @hint_at_members
 class Publisher(TopicEndpoint):
-    """Sends messages of one type on one topic; made by :meth:`Node.create_publisher`.
+    """Sends messages of one type on one topic; created by :meth:`Node.create_publisher`.
 
     Args:
         core: The node.
         topic: Absolute topic name.
         type: The message type.
-        qos: The quality of service to offer, which may leave policies open.
+        qos: The quality of service to offer; policies may be left open.
 
     Attributes:
         topic: As given.
@@ -79,7 +79,7 @@ class Publisher(TopicEndpoint):
         self._left: deque[EndpointInfo] = deque(maxlen=_MAX_LEFT)
         self._big = False
         self._liveliness_listeners: Listeners[LivelinessLost] = Listeners(where=topic)
-        #: Guards the watchdogs, and that one thread alone closes the writer.
+        #: Guards the watchdogs, and ensures that only one thread closes the writer.
         self._lock = threading.Lock()
         self._watchdogs: dict[str, Watchdog] = {}
         self._missed = self._lost = 0
@@ -92,7 +92,7 @@ class Publisher(TopicEndpoint):
         self._writer = core.create_writer(endpoint, type)
         if self._writer.gid:
             core.local_gids.add(self._writer.gid)
-        # Where the wire does not know its subscribers, the graph does.
+        # If the wire does not count its subscribers, the graph does.
         self._graph = core.graph if self._writer.subscribers() is None else None
         core.add(self, self._follow)  # closes this publisher if the node is closed
         if isinstance(self._graph, Graph):
@@ -111,8 +111,9 @@ class Publisher(TopicEndpoint):
     def publish(self, message: Message | dict[str, Any] = _NO_MESSAGE, /, **fields: Any) -> None:
         """Send a message.
 
-        In ROS 1, as with rospy and roscpp, ``header.seq`` of the message sent is a sequence number
-        of the node's messages on the topic, from 1 on, if the message begins with a header.
+        In ROS 1, as in rospy and roscpp, ``header.seq`` of the sent message is set to a sequence
+        number of the node's messages on the topic, starting at 1, if the message begins with a
+        header.
 
         Args:
             message: A :class:`Message`, or a dict of fields; missing fields get their defaults.
@@ -156,7 +157,7 @@ class Publisher(TopicEndpoint):
 
         Args:
             data: The bytes, in ROS 2 with their 4-byte encapsulation header, or a received sample
-                to pass on.
+                to forward.
 
         Raises:
             ArgumentError: The argument is neither bytes nor a sample.
@@ -267,7 +268,7 @@ class Publisher(TopicEndpoint):
     def subscription_count(self) -> int:
         """Return the number of matching subscriptions; 0 after closing.
 
-        In ROS 1, those are the connected subscribers.
+        In ROS 1, these are the connected subscribers.
         """
         if self._closed:
             return 0
@@ -276,7 +277,7 @@ class Publisher(TopicEndpoint):
 
     @property
     def dropped(self) -> int:
-        """How many messages on the topic were dropped because a subscriber is too slow.
+        """The number of messages on the topic that were dropped because a subscriber is too slow.
 
         Always 0 on wires that do not count them: DDS, Zenoh.
         """
@@ -332,7 +333,7 @@ class Publisher(TopicEndpoint):
         return found
 
     def _has_same_hash(self, endpoint: EndpointInfo) -> bool:
-        """Return whether a subscription's type has our hash, or one of the two is not announced."""
+        """Return whether a subscription's type hash equals ours, or one of them is unknown."""
         return not self._hash or endpoint.type_hash in ("", self._hash)
 
     def _receives(self, endpoint: EndpointInfo) -> bool:
@@ -350,7 +351,7 @@ class Publisher(TopicEndpoint):
     def _conflicts(
         self, subscriptions: Sequence[EndpointInfo]
     ) -> dict[EndpointInfo, dict[str, str]]:
-        """Return the policies in conflict of the subscriptions whose type would receive us."""
+        """Return the conflicting policies of subscriptions whose type matches ours."""
         middleware = self._core.middleware
         found = {
             one: conflicts(middleware, one, one.qos, self.qos)
@@ -405,7 +406,7 @@ class Publisher(TopicEndpoint):
         return self._listen(self._liveliness_listeners, callback, executor)
 
     def _start_watchdogs(self) -> None:
-        """Watch the limits that have a listener, from the first message on."""
+        """Monitor the limits that have a listener, from the first message on."""
         limit, lease = self.qos.deadline, self.qos.lease_duration
         manual = self.qos.liveliness is Liveliness.MANUAL_BY_TOPIC
         timers, known = self._core.timers, self._watchdogs

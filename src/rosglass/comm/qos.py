@@ -26,7 +26,7 @@ BEST_AVAILABLE = Duration(2**63 - 2)
 
 
 class Reliability(Enum):
-    """Whether lost samples are sent again."""
+    """Whether lost samples are retransmitted."""
 
     RELIABLE = "reliable"
     BEST_EFFORT = "best_effort"
@@ -197,10 +197,10 @@ class QoS:
 
     @classmethod
     def preset(cls, name: str) -> QoS:
-        """Return the preset of a name, e.g. ``sensor_data``.
+        """Return the preset with a name, e.g. ``sensor_data``.
 
         Raises:
-            ArgumentError: There is no preset of that name; the message lists them.
+            ArgumentError: No preset has that name; the message lists them.
         """
         if not isinstance(name, str) or name not in _PRESETS:
             raise ArgumentError("name", name, f"one of {', '.join(_PRESETS)}", "QoS.preset()")
@@ -269,7 +269,7 @@ class QoS:
         deadline: Duration | None,
         lease_duration: Duration | None,
     ) -> QoS:
-        """Replace default policies, and best-available ones by the given values."""
+        """Replace default policies, and best-available ones with the given values."""
         return replace(
             self,
             reliability=_decide(self.reliability, Reliability.RELIABLE, reliability),
@@ -335,7 +335,7 @@ _PRESETS: dict[str, Callable[[], QoS]] = {
 
 
 def check_profile(qos: QoS | int, place: str) -> QoS:
-    """Return the profile for a `qos` argument, which may be the depth of a default profile.
+    """Return the profile for a `qos` argument, which may also be the depth of a default profile.
 
     Raises:
         ArgumentError: It is neither; the message names the place, such as a topic.
@@ -358,7 +358,7 @@ def _limit(
     choose: Callable[[list[Duration]], Duration],
     weakest: bool = False,
 ) -> Duration | None:
-    """Choose one of the limits; None if there are none, or with `weakest`, if one is missing."""
+    """Choose one of the limits; None if there are none or, with `weakest`, if one is missing."""
     given = [limit for limit in limits if limit is not None and limit != BEST_AVAILABLE]
     if not given or (weakest and len(given) < len(limits)):
         return None

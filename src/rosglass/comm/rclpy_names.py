@@ -180,7 +180,7 @@ FUNCTIONS = {
 class _Missing:
     """A member that only rclpy's or rospy's class has; raises AttributeError with a hint.
 
-    A class's ``__getattr__`` would do, too, but slows down all attributes: 19 ns instead of 4.
+    A class's ``__getattr__`` would also work, but slows down all attributes: 19 ns instead of 4.
     """
 
     def __init__(self, error: str) -> None:
@@ -203,22 +203,22 @@ def hint_at_members(kind: type[_T]) -> type[_T]:
 
 
 def _present(self: object) -> list[str]:
-    """Return the members without hints; a class's ``__dir__``."""
+    """Return the members without the hints; used as a class's ``__dir__``."""
     names = object.__dir__(self)
     return [n for n in names if not isinstance(inspect.getattr_static(self, n, None), _Missing)]
 
 
 def hint_at_function(name: str) -> str:
-    """Return the replacement of a function of the modules rclpy and rospy; empty for none."""
+    """Return the replacement for a function of the modules rclpy and rospy; empty for none."""
     return FUNCTIONS.get(name, "")
 
 
 def check_order(method: str, name: object, type: object) -> None:
-    """Raise an error for rclpy's order of arguments, the type first, or for rclpy's classes.
+    """Raise an error for rclpy's argument order (the type first), or for rclpy's classes.
 
     Args:
         method: The method that was called, e.g. ``create_subscription``.
-        name: Its argument for the name of a topic, service or action.
+        name: Its argument for the name of the topic, service or action.
         type: Its argument for the type.
 
     Raises:
@@ -243,7 +243,7 @@ def check_order(method: str, name: object, type: object) -> None:
 
 
 def _is_type(text: str, *, strictly: bool = False) -> bool:
-    """Return whether a text can be a type's name; strictly, whether it is unlikely a topic's."""
+    """Return whether a string can be a type's name; with `strictly`, and hardly a topic's."""
     try:
         base = split_name(text)[2]
     except InvalidNameError:

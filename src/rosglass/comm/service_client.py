@@ -1,4 +1,4 @@
-"""Calling services: the client, its pending calls, and the services of another node."""
+"""Service clients and their pending calls."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ _log = logging.getLogger("rosglass.comm")
 class Call(Promise["Message"]):
     """The promise of a service's response.
 
-    ``result(timeout)`` waits for it, ``await call`` does in asyncio, :meth:`on_done` calls back.
+    ``result(timeout)`` waits for it, ``await call`` does so in asyncio, :meth:`on_done` calls back.
     ``cancel()`` cancels the call: a request that waits for a server is not sent, and the response
-    to a sent one is ignored (the server does not learn of it: ROS has no message for that).
+    to a sent one is ignored (the server is not notified: ROS has no message for that).
     """
 
 
@@ -59,10 +59,10 @@ class PendingCall:
         value: The encoded request, or the value to encode while the type is unknown.
         type: The type it is encoded for; None while that is unknown.
         max_size: Largest size of a request in bytes; None for no limit.
-        deadline: Monotonic time at which it ends without response; None for never.
+        deadline: Monotonic time at which it ends without response; None for no limit.
         timer: Ends it at its deadline; None in :meth:`ServiceClient.call`, which does so itself.
         sent: Monotonic time at which its requester sent the request, None before.
-        answered: Whether a reply, or a reason why there is none, was received.
+        answered: Whether a reply, or the reason for a missing one, was received.
         private: Whether the caller waits in :meth:`ServiceClient.call`: its end runs no callback.
         route: Private data of its requester.
     """
@@ -103,10 +103,10 @@ def encode_request(kind: ServiceType, value: Any, max_size: int | None) -> bytes
 
 
 class ServiceRequester(ABC):
-    """Finds a service's servers and sends them a client's requests, as the wire's protocol does it.
+    """Finds a service's servers and sends them a client's requests by the wire's protocol.
 
-    It sends each request as soon as there is a server, in the order of the calls, and reports its
-    outcome. Timeouts are up to the client.
+    It sends each request as soon as a server is available, in the order of the calls, and reports
+    its outcome. The client handles timeouts.
 
     Attributes:
         type: The service type; None while it is not discovered yet.
@@ -126,11 +126,11 @@ class ServiceRequester(ABC):
 
     @abstractmethod
     def conflicts(self) -> list[str]:
-        """Return the problems that a person has to fix, in words."""
+        """Return the problems that the user has to fix, in words."""
 
     @abstractmethod
     def absence(self) -> str:
-        """Return why there is no server, if there are no conflicts."""
+        """Return why no server is available, if there are no conflicts."""
 
     @abstractmethod
     def server_name(self) -> str:
@@ -138,14 +138,14 @@ class ServiceRequester(ABC):
 
     @abstractmethod
     def send(self, pending: PendingCall) -> None:
-        """Send a request as soon as there is a server; from any thread, without waiting.
+        """Send a request as soon as a server is available; from any thread, without waiting.
 
-        Sets :attr:`PendingCall.sent` when it does.
+        Sets :attr:`PendingCall.sent` when the request is sent.
         """
 
     @abstractmethod
     def withdraw(self, pending: PendingCall) -> bool:
-        """Cancel the sending of a request; return False if it was sent already."""
+        """Cancel the sending of a request; return False if it was already sent."""
 
     @abstractmethod
     def forget(self, pending: PendingCall) -> None:
@@ -153,7 +153,7 @@ class ServiceRequester(ABC):
 
     @abstractmethod
     def delay(self, pending: PendingCall) -> str:
-        """Return why a request was not sent although there is a server."""
+        """Return why a request was not sent although a server is available."""
 
     @abstractmethod
     def find_server(self) -> None:
@@ -170,7 +170,7 @@ class ServiceRequester(ABC):
 
 @hint_at_members
 class ServiceClient(Client):
-    """Calls a service; made by :meth:`Node.create_service_client`.
+    """Calls a service; created by :meth:`Node.create_service_client`.
 
     Args:
         core: The node it belongs to.
@@ -264,7 +264,7 @@ class ServiceClient(Client):
 
         Args:
             request: A message or a dict of fields; missing fields, and None, get the defaults.
-            timeout: Seconds to wait in all, for a server and for its response; None for no limit.
+            timeout: Total seconds to wait for a server and its response; None for no limit.
 
         Raises:
             ConversionError: A value does not fit its field; nothing is sent.
@@ -290,7 +290,7 @@ class ServiceClient(Client):
                 try:
                     return pending.call.result(timeout)
                 except TimeoutError:
-                    # Raised by the call, or by the wait for it: then it ends here.
+                    # Raised by the call, or by the wait for it; in the latter case it ends here.
                     self._expire(pending, timeout)
             return pending.call.result()
         except BaseException:
@@ -302,9 +302,9 @@ class ServiceClient(Client):
     ) -> Call:
         """Call the service without waiting; return the promise of the response.
 
-        A request waits for a server, and is sent as soon as there is one, in the order of the
-        calls. In ROS 1 the order holds for persistent clients only: otherwise each call has its own
-        connection, and calls run in parallel.
+        A request is sent as soon as a server is available, in the order of the calls. In ROS 1 the
+        order holds for persistent clients only: otherwise each call has its own connection, and
+        calls run in parallel.
 
         Arguments and errors as in :meth:`call`. A ConversionError is raised immediately, unless the
         type is not known yet.
@@ -321,7 +321,7 @@ class ServiceClient(Client):
         """Register and return a new pending call; raises ConversionError."""
         self._check_open()
         kind, max_size = self.type, self._requester.max_request
-        # Encoded, or copied, now: the caller may change it while the call waits for a server.
+        # Encoded or copied now: the caller may change it while the call waits for a server.
         taken = (
             copy_value(value, self.name) if kind is None else encode_request(kind, value, max_size)
         )
@@ -354,7 +354,7 @@ class ServiceClient(Client):
     # -- the end of a call -----------------------------------------------------------------------
 
     def _on_end(self, pending: PendingCall) -> None:
-        """Clean up after a call; on any thread."""
+        """Clean up after a call, on any thread."""
         if pending.timer is not None:
             pending.timer.close()
         self._pending.pop(pending.number, None)
@@ -380,7 +380,7 @@ class ServiceClient(Client):
         pending.call.set_exception(error)
 
     def _on_reply(self, number: int, data: bytes | memoryview | None, error: str | Error) -> None:
-        """End a call with its response or its error; called on a thread that receives."""
+        """End a call with its response or its error; called on a receiving thread."""
         pending = self._pending.get(number)
         if pending is None:
             return

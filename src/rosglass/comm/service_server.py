@@ -1,4 +1,4 @@
-"""Serving services: requests, and their responses by a callback, a coroutine or a future."""
+"""Service servers, which answer requests with a callback, a coroutine or a future."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ if TYPE_CHECKING:
 __all__ = ["Answer", "ServiceServer", "decode_checked", "served_by_this_thread"]
 
 _log = logging.getLogger("rosglass.comm")
-#: What answers a request: a response, or a future of one.
+#: The answer to a request: a response, or a future of one.
 Answer: TypeAlias = (
     "Message | dict[str, Any] | Future[Message] | Future[dict[str, Any] | None] | None"
 )
-#: Most requests that wait for the callback; more are refused.
+#: Maximum number of requests that wait for the callback; more are refused.
 _MAX_WAITING = 1000
 
 
 @hint_at_members
 class ServiceServer(Handle):
-    """Offers a service; made by :meth:`Node.create_service_server`.
+    """Offers a service; created by :meth:`Node.create_service_server`.
 
     Args:
         core: The node it belongs to.
@@ -46,10 +46,10 @@ class ServiceServer(Handle):
         type: The service type.
         callback: Called with each request; see :meth:`Node.create_service_server`.
         qos: The quality of service of requests and replies.
-        executor: Where `callback` runs; None for the node's dispatcher, or for the running event
-            loop if `callback` is a coroutine function.
+        executor: Runs `callback`; None for the node's dispatcher, or for the running event loop if
+            `callback` is a coroutine function.
         create_replier: Announces the service; called with the handler of its requests, and whether
-            that only passes them to another thread (:attr:`Replier.quick`).
+            that handler only passes them to another thread (:attr:`Replier.quick`).
 
     Attributes:
         name: Absolute service name.
@@ -70,7 +70,7 @@ class ServiceServer(Handle):
         self._core, self.name, self.type, self.qos = core, name, type, qos
         self._executor = executor_for(callback, executor, core.dispatcher, name)
         self._callback = callback
-        #: Guards the members below, and that nothing is added to them after closing.
+        #: Guards the members below, to which nothing may be added after closing.
         self._lock = threading.Lock()
         self._closed = False
         self._waiting = 0
@@ -122,7 +122,7 @@ class ServiceServer(Handle):
         self._post(request, data)
 
     def _post_early(self) -> None:
-        """Hand on the early requests; those received until then wait behind them."""
+        """Pass on the early requests; later ones wait behind them until this is done."""
         while True:
             with self._lock:
                 if not self._early:
@@ -173,7 +173,7 @@ class ServiceServer(Handle):
             with self._lock:
                 closed = self._closed
                 self._running.add(answer)
-            if closed:  # by another thread, after this one looked
+            if closed:  # by another thread, after this one checked
                 answer.cancel()
         if isinstance(answer, Future):
             answer.add_done_callback(lambda future: self._finish(request, future))
@@ -232,7 +232,7 @@ class ServiceServer(Handle):
         """Log that the callback failed, and report it to the client if the wire can."""
         client = self._replier.client_name(request)
         if isinstance(error, ServiceError) and self._replier.has_refusals:
-            # Raised on purpose, like rospy's ServiceException: not a failure of the server.
+            # Raised deliberately, like rospy's ServiceException: not a failure of the server.
             _log.info("%s: the request of %s is refused: %s", self.name, client, error)
         else:
             # Our own errors need no traceback.
@@ -257,14 +257,14 @@ class ServiceServer(Handle):
 
 def decode_checked(kind: MessageType, data: bytes | memoryview) -> Message:
     """Return the request or response in `data`; raises DecodeError if it is invalid."""
-    # Each ROS 2 implementation pads empty messages with another number of bytes.
+    # Each ROS 2 implementation pads empty messages with a different number of bytes.
     if kind.fields or kind.wire == "ros1":
         kind.validate(data)
     return kind.decode(data)
 
 
 def served_by_this_thread(core: NodeCore, name: str) -> bool:
-    """Return whether a service has no server but one that runs on the calling thread."""
+    """Return whether a service's only server runs on the calling thread."""
     for server in list(core.servers):
         if not isinstance(server, ServiceServer) or server.name != name:
             continue

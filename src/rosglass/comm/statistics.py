@@ -1,4 +1,4 @@
-"""The statistics of a subscription: counts, rates, and the latency of what it receives."""
+"""The statistics of a subscription: counts, rates, and the latency of its samples."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["LatencyEstimator", "Statistics", "fading_rate", "note_time", "rate_o
 _LATE_PERIODS = 1.5
 #: ... and is 0 this many periods or seconds after that, whichever is longer.
 _FADE_PERIODS, _FADE_S = 2.0, 2.0
-#: Most publishers to remember; only a robot that restarts for days has more.
+#: Number of publishers to remember; only a robot that restarts for days has more.
 _MAX_PUBLISHERS = 256
 #: Largest drift between two clocks; NTP slews a clock by at most 500 ppm.
 _MAX_DRIFT = 500e-6
@@ -38,14 +38,14 @@ def fading_rate(period: float, age: float) -> float:
 
 
 def rate_of(times: Sequence[float], now: float) -> float:
-    """Return the rate of an event in hertz, given its last times; see :func:`fading_rate`."""
+    """Return the rate of an event in hertz from its last times; see :func:`fading_rate`."""
     if len(times) < 2 or times[-1] <= times[0]:
         return 0.0
     return fading_rate((times[-1] - times[0]) / (len(times) - 1), now - times[-1])
 
 
 def note_time(times: deque[float], now: float) -> None:
-    """Append a time for :func:`rate_of`; after a pause the rate is measured anew."""
+    """Append a time for :func:`rate_of`; after a pause, restart measuring."""
     if len(times) > 1 and rate_of(times, now) == 0:
         times.clear()
     times.append(now)
@@ -62,12 +62,12 @@ class Statistics:
             0 after 3.5 s without any, or after 3.5 periods if they are longer than a second.
         bandwidth: Bytes per second over the same samples.
         age: Time since the last sample; None before the first.
-        lost: Samples that were sent, by the publishers' sequence numbers, and did not arrive.
-        latency: Time from sending to reception, the median of the same samples. Publisher and
-            receiver each have their own clock, so that it may be wrong by their difference, and
-            even be negative. None if publishers do not stamp their samples.
+        lost: Samples that were sent, by the publishers' sequence numbers, but not received.
+        latency: Median time from sending to reception of the same samples. Publisher and receiver
+            have different clocks, so that it may be wrong by their difference, and even negative.
+            None if publishers do not stamp their samples.
         lateness: How much longer the last sample took than the fastest one of its publisher,
-            independent of the clocks: large after an outage, when a link delivers what it held up.
+            independent of the clocks: large after an outage, when a link delivers delayed samples.
     """
 
     received: int
@@ -96,14 +96,14 @@ class _Publisher(NamedTuple):
 class LatencyEstimator:
     """Measures how much longer than usual samples took, without comparing two clocks.
 
-    After an outage of ten seconds a link may deliver, all at once, the samples of that time: new by
-    their reception, old by their contents. The stamps of publisher and receiver are by two clocks,
-    so that their difference alone says nothing. But the fastest sample of a publisher took about
-    no time, and the lateness of another one is how much longer it took.
+    After an outage of ten seconds, a link may deliver all samples of that time at once: just
+    received, but with old contents. The stamps of publisher and receiver come from two clocks, so
+    that their difference alone is meaningless. But the fastest sample of a publisher took almost
+    no time, and the lateness of another one is the time that it took longer.
 
-    A publisher's first sample may be late itself; that cannot be known. Clocks may be set: a step
-    of this machine's clock is measured, a step back of the publisher's shows in its stamps, and one
-    forward makes its samples look faster than any before.
+    A late first sample of a publisher cannot be detected. Clocks may be set: a step of this
+    machine's clock is measured, a step back of the publisher's shows in its stamps, and one forward
+    makes its samples look faster than any before.
     """
 
     def __init__(self) -> None:
@@ -111,7 +111,7 @@ class LatencyEstimator:
         self._offset = _offset()
 
     def add(self, publisher: bytes, received: int, sent: int) -> int:
-        """Take a sample into account and return its lateness; times in nanoseconds."""
+        """Add a sample and return its lateness; times in nanoseconds."""
         self._follow_clock()
         took = received - sent
         known = self._publishers.get(publisher)
@@ -149,7 +149,7 @@ class LatencyEstimator:
 def _offset() -> int:
     """Return the difference between the system's clock and a steady one, in nanoseconds.
 
-    The steady one goes on while the machine sleeps, if the system has such a clock.
+    The steady one continues while the machine is suspended, if the system has such a clock.
     """
     clock = getattr(time, "CLOCK_BOOTTIME", None)
     steady = time.monotonic_ns() if clock is None else time.clock_gettime_ns(clock)

@@ -1,4 +1,4 @@
-"""Receiving a topic: the subscription that users hold, and the feed that connects it to a wire."""
+"""Subscriptions of topics, and the feeds that connect them to a wire."""
 
 from __future__ import annotations
 
@@ -67,11 +67,11 @@ _MAX_LEFT = 1000
 
 @hint_at_members
 class Subscription(TopicEndpoint):
-    """Receives the messages of one topic; made by :meth:`Node.create_subscription`.
+    """Receives the messages of one topic; created by :meth:`Node.create_subscription`.
 
     ``for sample in subscription`` and ``async for sample in subscription`` wait for each sample and
-    end when the subscription is closed. A closed subscription has no samples; :attr:`closed` tells
-    a polling loop when to end.
+    end when the subscription is closed. A closed subscription has no samples; a polling loop should
+    end when :attr:`closed` is true.
 
     Attributes:
         topic: Absolute topic name.
@@ -130,8 +130,8 @@ class Subscription(TopicEndpoint):
     def problem(self) -> str:
         """Why messages cannot be received, in words; empty if there is no problem.
 
-        That includes publishers that left, and a lost connection. While there has never been a
-        publisher, see :attr:`hint`.
+        This includes publishers that left, and a lost connection. Until the first publisher
+        appears, see :attr:`hint`.
         """
         return self._problem
 
@@ -230,8 +230,8 @@ class Subscription(TopicEndpoint):
     def set_batching(self, batching: bool) -> None:
         """Allow callbacks to run a tenth of a second late, for several samples at a time.
 
-        For callbacks that need a fast topic's data only now and then: receiving costs a fraction of
-        the time if the middleware does not have to deliver each sample at once.
+        For callbacks that need a fast topic's data only occasionally: receiving costs a fraction of
+        the time if the middleware need not deliver each sample at once.
 
         Raises:
             ArgumentError: The value is neither True nor False.
@@ -256,11 +256,11 @@ class Subscription(TopicEndpoint):
     def set_inbox_limit(self, limit: int) -> None:
         """Limit the memory of an inbox that keeps all samples; the default is 256 MiB.
 
-        Beyond it the oldest samples are dropped and counted, and the log names the slow consumer.
-        Without effect with keep-last history, which is limited by its depth.
+        Above it, the oldest samples are dropped and counted, and the log names the slow consumer.
+        No effect with keep-last history, which is limited by its depth.
 
         Args:
-            limit: Bytes; each sample counts as its data and about 500 bytes more.
+            limit: Bytes; each sample counts as its data plus about 500 bytes.
 
         Raises:
             ArgumentError: The limit is not a positive number of bytes.
@@ -292,14 +292,14 @@ class Subscription(TopicEndpoint):
         """Call `callback` when a publisher becomes alive, or is no longer alive.
 
         A publisher is alive while it is in the graph; one with manual liveliness (by topic), while
-        it asserts that in time. Arguments as for :meth:`on_matched`.
+        it asserts its liveliness in time. Arguments as for :meth:`on_matched`.
         """
         return self._listen(self._liveliness_listeners, callback, executor)
 
     def on_samples_lost(
         self, callback: Callable[[SamplesLost], None], executor: Executor | None = None
     ) -> Handle:
-        """Call `callback` when samples were lost on the way; arguments as for :meth:`on_matched`.
+        """Call `callback` when samples were lost in transit; arguments as for :meth:`on_matched`.
 
         Samples that a full inbox drops are not lost in this sense; :meth:`statistics` counts them.
         """
@@ -324,7 +324,7 @@ class Subscription(TopicEndpoint):
 
     @property
     def _awaited(self) -> bool:
-        """Whether samples are awaited: by a callback, or by a wait now or within a second."""
+        """Whether samples are awaited: by a callback, a current wait or one in the last second."""
         recent = time.monotonic() - self._last_wait < _AWAITED_S
         return (self._has_callback and not self._batching) or bool(self._waits) or recent
 
@@ -364,7 +364,7 @@ def find_subscribed_type(
     """Return the type that a subscription was created with; None if publishers define it.
 
     Raises:
-        TypeNotFoundError: There is no definition, and the topic is not in the graph with that type.
+        TypeNotFoundError: No definition is known, and no endpoint of the topic has that type.
         UnsupportedError: It is a type of the other ROS version.
     """
     if wanted is None:
@@ -394,12 +394,12 @@ class Problem(NamedTuple):
 
 
 class TopicMatching(ABC):
-    """Matches a subscription with publishers, and reads from them, as a wire's protocol does it.
+    """Matches a subscription with publishers, and reads from them, by a wire's protocol.
 
     Attributes:
         reader: Receives the samples; None while their type is unknown.
-        outlives_discovery: Whether samples continue to arrive while the node's connection is lost,
-            over connections of their own.
+        outlives_discovery: Whether samples use separate connections, and so continue to arrive
+            while the node's connection is lost.
     """
 
     reader: Reader | None = None
@@ -462,7 +462,7 @@ class SubscriptionFeed(NodeMember):
     Attributes:
         subscription: As given.
         topic: Absolute topic name.
-        decodes: Whether the callback takes messages: bytes without definition are of no use to it.
+        decodes: Whether the callback takes messages, and so needs the type's definition.
         deliver: Takes a received sample, from any thread.
         deliver_many: Takes samples that arrived together, at least one.
     """
@@ -480,7 +480,7 @@ class SubscriptionFeed(NodeMember):
         self.deliver, self.deliver_many = self._inbox.put, self._inbox.put_many
         self._core, self._matching, self._ignored = core, matching, ignored
         self._loss_monitor = PublisherLossMonitor(core.name, core.status)
-        #: Held, never waited for, while the reader is switched between eager and lazy.
+        #: Held while the reader is switched between eager and lazy; never waited for.
         self._eagerness_lock = threading.Lock()
         self._eagerness_changed = False
         #: The reader while no sample is awaited.
@@ -518,7 +518,7 @@ class SubscriptionFeed(NodeMember):
 
     @property
     def waiting(self) -> int:
-        """How many samples wait to be taken, or for their callback."""
+        """The number of samples that wait to be taken, or for their callback."""
         return self._inbox.waiting
 
     def on_publisher_left(self, endpoint: EndpointInfo) -> None:
@@ -532,7 +532,7 @@ class SubscriptionFeed(NodeMember):
     def update_eagerness(self) -> None:
         """Switch the reader to eager delivery while samples are awaited; from any thread."""
         self._eagerness_changed = True
-        # Never blocks: flush() may lead back here. The thread that holds the lock checks again.
+        # Never blocks: flush() may call this again. The thread that holds the lock checks again.
         while self._eagerness_changed and self._eagerness_lock.acquire(False):
             try:
                 self._eagerness_changed = False
@@ -576,7 +576,7 @@ class SubscriptionFeed(NodeMember):
         return self._matching.lost()
 
     def end(self) -> None:
-        """Stop reading, as the subscription is closed; safe to call twice."""
+        """Stop reading after the subscription was closed; safe to call twice."""
         self._closed, self._lazy_reader = True, None
         self._matching.close()
         self._watch_deadline(published=False)
@@ -607,7 +607,7 @@ class SubscriptionFeed(NodeMember):
         self.update_eagerness()
         if idle:
             self._report_losses()
-        if self._closed:  # by another thread in the meantime
+        if self._closed:  # another thread has closed it
             self.end()
 
     def close(self) -> None:
@@ -625,7 +625,7 @@ class SubscriptionFeed(NodeMember):
     ) -> None:
         losses = self._loss_monitor.follow(publishers)
         if not (received and self._matching.outlives_discovery):
-            # INFO: that a publisher left is not an error.
+            # INFO: a publisher that leaves is not an error.
             problems = problems + [Problem(text, logging.INFO) for text in losses]
         self.subscription._set_problem(
             _joined(problems),
@@ -697,7 +697,7 @@ class PublisherLossMonitor:
 
     def __init__(self, own: NodeName, status: Callable[[], Status]) -> None:
         self._own, self._status = own, status
-        #: Names of the last publishers, and the time of day since when there are none.
+        #: Names of the last publishers, and the time of day when the last one left.
         self._last = self._since = ""
 
     def follow(self, publishers: Sequence[EndpointInfo]) -> list[str]:
@@ -706,7 +706,7 @@ class PublisherLossMonitor:
         if publishers:
             self._last, self._since = ", ".join(sorted(others)), ""
         elif self._last and not self._since:
-            # Not an age: that would change the text, and have it reported again, every second.
+            # Not an age, which would change the text, and so repeat the report, every second.
             self._since = time.strftime("%H:%M:%S")
         problems = []
         if self._since:

@@ -1,4 +1,4 @@
-"""Parameter files: read whole and replaced atomically; and YAML within limits."""
+"""Reads and atomically replaces parameter files, and loads YAML within limits."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from rosglass.errors import ParameterError
 
 __all__ = ["check_yaml", "explain_yaml_error", "load_yaml", "read_text", "write_text"]
 
-#: Most values of a YAML text, with aliases expanded: ``&a [*b, *b]`` makes small texts large.
+#: Maximum number of values in a YAML text, after expanding aliases (``&a [*b, *b]``).
 _MAX_VALUES = 1_000_000
-#: Most levels of nesting; the loaders of libyaml and PyYAML recurse.
+#: Maximum levels of nesting; the loaders of libyaml and PyYAML recurse.
 _MAX_DEPTH = 100
 
 
@@ -96,7 +96,7 @@ def read_text(path: str | os.PathLike[str], most: int) -> tuple[str, str]:
 
     Args:
         path: The file.
-        most: Its largest size in bytes.
+        most: Its maximum size in bytes.
 
     Raises:
         ParameterError: It cannot be read, is too large, or is not UTF-8.

@@ -34,7 +34,7 @@ _SWEEP_COUNT = 64
 class Timers:
     """Runs jobs after a delay, on one daemon thread that starts with the first job.
 
-    Jobs must return quickly: they hold up all others.
+    Jobs must return quickly: each delays all others.
     """
 
     def __init__(self, name: str) -> None:
@@ -98,7 +98,7 @@ class Timers:
                         self._cancelled = max(0, self._cancelled - 1)
             try:
                 job()
-            except BaseException:  # sys.exit() in one job must not end all others
+            except BaseException:  # sys.exit() in one job must not end the others
                 _log.exception("%s: a job failed", self._name)
 
 
@@ -124,7 +124,7 @@ class Worker:
     Args:
         name: The thread's name.
         job: Called with True for a regular run, False for a wake-up. Exceptions are logged.
-        pause: Seconds between two regular runs, however often it is woken.
+        pause: Seconds between two regular runs, independent of wake-ups.
     """
 
     def __init__(self, name: str, job: Callable[[bool], None], pause: float) -> None:
@@ -217,5 +217,5 @@ class Watchdog(Handle):
             self._missed(count)
         left = self._since + self._period - time.monotonic()
         self._timer = self._timers.after(max(0.0, left), self._check)
-        if self._closed:  # by another thread just now, which may have closed the previous timer
+        if self._closed:  # another thread may just have closed it with the previous timer
             self._timer.close()

@@ -1,4 +1,4 @@
-"""Looking up the types of topics, services and actions."""
+"""Looks up the types of topics, services and actions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["Fetcher", "Types"]
 
 #: How long a create_...() method waits for the robot to send a definition.
 _FETCH_TIMEOUT_S = 2.0
-#: By ROS version: how its types are loaded, and an example of each kind.
+#: By ROS version: the call that loads its types, and an example of each kind.
 _LOADED = {1: "rosglass.load(..., ros=1)", 2: "rosglass.load()"}
 _EXAMPLES = {
     1: {
@@ -63,7 +63,7 @@ class Types:
     """Looks up types for one node, in its library.
 
     Args:
-        library: Where definitions come from; None for the shared library.
+        library: Source of definitions; None for the shared library.
         url: The node's URL, for messages.
         ros: The ROS version of the types.
 
@@ -80,7 +80,7 @@ class Types:
 
     @property
     def library(self) -> Library:
-        """Where definitions come from."""
+        """The source of definitions."""
         from rosglass.messages import default_library  # noqa: PLC0415 - numpy
 
         return default_library() if self._library is None else self._library
@@ -126,15 +126,15 @@ class Types:
         endpoints: Sequence[EndpointInfo],
         on_done: Callable[[], None],
     ) -> str:
-        """Request a definition that the library does not have from the robot; does not wait.
+        """Request a definition missing in the library from the robot; does not wait.
 
-        To be called again, with the same arguments, while the definition is missing.
+        Call it again with the same arguments while the definition is missing.
 
         Args:
             name: Full name of the message, service or action.
             hash: Its announced RIHS01 hash; empty if none was announced.
-            endpoints: The endpoints that use it; their nodes are asked.
-            on_done: Called, from any thread, when there is an answer: then the library has the
+            endpoints: The endpoints that use it; their nodes are queried.
+            on_done: Called, from any thread, when an answer has arrived: the library then has the
                 definition, or another call returns why not.
 
         Returns:
@@ -150,7 +150,8 @@ class Types:
         For create_...() methods: waits up to 2 s, and only if a node in the graph uses the type.
 
         Raises:
-            TypeNotFoundError: No node that uses it sends its definition; the message says why.
+            TypeNotFoundError: No node that uses it sends its definition; the message has the
+                reason.
         """
         if not isinstance(wanted, str) or self.fetcher is None:
             return
@@ -163,7 +164,7 @@ class Types:
             pass  # it exists; the error is raised when it is used
 
     def in_use(self, hash: str) -> InterfaceDefinition | None:
-        """Return the definition, of those in use here, that has an announced hash."""
+        """Return the definition in use here that has an announced hash."""
         found = self._by_hash.get(hash)
         if found is None:
             while True:
