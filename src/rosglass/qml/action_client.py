@@ -1,4 +1,4 @@
-"""Action clients: what both modules share, and the one of ``Ros2.createActionClient``."""
+"""Action clients of ``Ros 1.0`` and ``Ros2 1.0``, and the code that they share."""
 # ruff: noqa: N802, N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -35,40 +35,40 @@ _CALLBACKS = ("onGoalResponse", "onFeedback", "onResult")
 
 
 class GoalSender(ClientElement):
-    """Sends goals, and exists until they have ended even without references in JavaScript.
+    """Sends goals; stays alive until they have ended, even if JavaScript drops it.
 
     Args:
         runtime: The engine's runtime.
         name: Action name, as in QML.
-        type_name: Action type; empty takes the one that the server announces.
+        type_name: Action type; empty uses the server's.
     """
 
-    #: With the reason: nothing is cancelled, although all goals, or those until a time, were to be.
+    #: A request to cancel all goals, or those up to a time, failed for this reason.
     cancelFailed = Signal(str)
 
     _HANDLE: ClassVar[type[GoalHandle]] = GoalHandle
     _endpoint: Sender | None
-    #: Time that goals wait for a server.
+    #: Milliseconds that goals wait for a server.
     _timeout_ms = CONNECTION_TIMEOUT_MS
 
     def __init__(self, runtime: Runtime, name: str, type_name: str) -> None:
         super().__init__(runtime, name, type_name, self.DIALECT)
         self._goals: list[GoalHandle] = []
-        #: Keeps JavaScript from collecting it while goals run.
+        #: Keeps JavaScript from collecting the client while goals run.
         self._held = QJSValue()
         goals, executor = self._goals, runtime.session.executor
         self._cleanup["goals"] = lambda: executor.post(lambda: _end_all(goals, _CLOSED))
 
     @Slot()
     def cancelAllGoals(self) -> None:
-        """Ask the server to cancel all its goals, other clients' too."""
+        """Ask the server to cancel all its goals, including those of other clients."""
         for handle in list(self._goals):
             if not handle.sent:
                 handle.cancel()
         self._ask_cancel(lambda client: client.cancel_all())
 
     def _cancel_until(self, value: QJSValue) -> None:
-        """Ask the server to cancel what it accepted at or before a time."""
+        """Ask the server to cancel the goals that it accepted at or before a time."""
         from rosglass.qml.js_values import time_from_js  # noqa: PLC0415 - few interfaces ask
 
         try:
@@ -99,10 +99,10 @@ class GoalSender(ClientElement):
     # Sending.
 
     def _send(self, goal: QJSValue | None, callbacks: GoalCallbacks) -> QJSValue:
-        """Send a goal as soon as there is a server; one that does not fit throws into JavaScript.
+        """Send a goal as soon as a server appears; an invalid goal throws into JavaScript.
 
         Returns:
-            The handle; undefined when something was thrown.
+            The handle; undefined after an exception.
         """
         runtime = self._runtime
         assert runtime is not None
@@ -147,7 +147,7 @@ class GoalSender(ClientElement):
                     handle.end(GoalStatus.REJECTED, None, str(error))
 
     def _give_up(self, handle: GoalHandle) -> None:
-        """End a goal for which there is no client, or no type, yet."""
+        """End a goal that still has no client or no type."""
         if is_alive(self) and handle in self._goals and not handle.sent:
             why = self._problem or self._missing()
             seconds = (self._timeout_ms or 0) / 1000
@@ -172,7 +172,7 @@ class GoalSender(ClientElement):
             self._runtime.throw(self._dialect.spelled(f"action {self._name}: {error}"))
 
     def _check_functions(self, functions: dict[str, QJSValue | None]) -> bool:
-        """Return whether these are functions, or left out; throws into JavaScript otherwise."""
+        """Return whether each is a function or was omitted; otherwise throw into JavaScript."""
         for what, value in functions.items():
             if value is None or value.isCallable() or value.isUndefined() or value.isNull():
                 continue
@@ -196,7 +196,7 @@ def _end_all(goals: list[GoalHandle], reason: str) -> None:
 
 
 class ActionClient(GoalSender):
-    """What ``Ros2.createActionClient`` returns."""
+    """The action client that ``Ros2.createActionClient`` returns."""
 
     ready = ReadOnly(bool, False, notify="serverReadyChanged")
     name = Property(str, lambda self: self._name, constant=True)
@@ -208,7 +208,7 @@ class ActionClient(GoalSender):
 
     @property
     def label(self) -> str:
-        """What error messages call this element."""
+        """The element's name in error messages."""
         return f"action {self._name}"
 
     def _on_timeout_changed(self) -> None:
@@ -216,18 +216,18 @@ class ActionClient(GoalSender):
 
     @Slot(result=bool)
     def isServerReady(self) -> bool:
-        """Return whether a server is there."""
+        """Return whether a server is available."""
         return self.ready
 
     @Slot(QJSValue, result=QJSValue)
     @Slot(QJSValue, QJSValue, result=QJSValue)
     def sendGoalAsync(self, goal: QJSValue, options: QJSValue | None = None) -> QJSValue:
-        """Send a goal and return its handle; a goal that does not fit throws.
+        """Send a goal and return its handle; an invalid goal throws.
 
         Args:
             goal: An object with the goal's fields.
-            options: Functions ``onGoalResponse(handle)``, with null when the server does not accept
-                it, ``onFeedback(handle, feedback)`` and ``onResult({goalId, code, result})``.
+            options: Functions ``onGoalResponse(handle)``, called with null if the server rejects
+                the goal, ``onFeedback(handle, feedback)`` and ``onResult({goalId, code, result})``.
         """
         runtime = self._runtime
         assert runtime is not None
@@ -265,7 +265,7 @@ class ActionClient(GoalSender):
     def sendGoal(self, goal: QJSValue | None = None) -> QJSValue:
         """Send a goal and return a promise of ``{goalId, code, result}``.
 
-        It is rejected when there is no result: the server does not accept it, or went away.
+        The promise is rejected if there is no result: the server rejected the goal, or disappeared.
         """
         runtime = self._runtime
         assert runtime is not None
@@ -292,7 +292,7 @@ class RosActionClient(GoalSender):
     Args:
         runtime: The engine's runtime.
         name: Action name, as in QML.
-        type_name: Action type as ROS 1 calls it, ``pkg/DoAction``.
+        type_name: Action type in ROS 1 spelling, ``pkg/DoAction``.
     """
 
     DIALECT = Dialect.ROS1
@@ -311,7 +311,7 @@ class RosActionClient(GoalSender):
 
     @Slot(result=bool)
     def isServerConnected(self) -> bool:
-        """Return whether a server is there."""
+        """Return whether a server is available."""
         return self.connected
 
     @Slot(QJSValue, result=QJSValue)
@@ -326,9 +326,9 @@ class RosActionClient(GoalSender):
         """Send a goal and return its handle; null while no server is connected.
 
         Args:
-            goal: An object with the goal's fields; one that does not fit throws.
-            transition: Called with the handle whenever its ``commState`` has changed.
-            feedback: Called with the handle and each feedback.
+            goal: An object with the goal's fields; an invalid one throws.
+            transition: Called with the handle after each change of its ``commState``.
+            feedback: Called with the handle and the feedback, for each feedback message.
         """
         runtime = self._runtime
         assert runtime is not None

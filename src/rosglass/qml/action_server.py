@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 __all__ = ["ActionServer", "RosActionServer", "action_type", "server_functions"]
 
 _log = logging.getLogger("rosglass.qml")
-#: How ROS 1 calls an action type.
+#: An action type in ROS 1 spelling.
 _ROS1_TYPE = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)Action\Z")
 _GONE = "the interface that offered this action is gone"
 
 
 class _Goals:
-    """The goals of one server while it exists.
+    """The goals of one server, for the lifetime of the server.
 
     Args:
         answers: Calls the JavaScript functions.
@@ -43,9 +43,9 @@ class _Goals:
 
     def __init__(self, answers: Answers) -> None:
         self.answers = answers
-        #: What the node's callbacks know this by.
+        #: Identifies this object in the node's callbacks.
         self.key = object()
-        #: Goals received before the server was created here.
+        #: Goals that arrived before the worker thread had returned the server.
         self.early: list[Callable[[Server], object]] = []
         self.handles: dict[bytes, ServerGoalHandle] = {}
 
@@ -80,7 +80,7 @@ class ActionServer(Element):
 
     @property
     def label(self) -> str:
-        """What error messages call this element."""
+        """The element's name in error messages."""
         return f"action {self.name}"
 
     def _full_type(self) -> str:
@@ -98,7 +98,7 @@ class ActionServer(Element):
         assert runtime is not None
         goals = self._goals = _Goals(Answers(runtime, f"execute of {self.label}"))
         self._cleanup["goals"] = goals.close
-        # What the node holds does not keep the goals, either: JavaScript has their handles.
+        # The node holds only the key, not the goals: JavaScript has their handles.
         key = goals.key
         on_goal, accepts = (
             weak_callback(self._on_goal, Error(_GONE)),
@@ -129,10 +129,10 @@ class ActionServer(Element):
             goals.close()
         report(self, ready=False, activeGoals=0)
 
-    # What the node asks, on the GUI thread.
+    # The node's requests, on the GUI thread.
 
     def _goals_of(self, key: object) -> _Goals | None:
-        """Return the goals of the present server; None for those of an earlier one."""
+        """Return the goals of the current server; None if the key is an earlier server's."""
         goals = self._goals if is_alive(self) else None
         return goals if goals is not None and goals.key is key else None
 
@@ -161,7 +161,7 @@ class ActionServer(Element):
             raise Error(_GONE)
         if self._endpoint is not None:
             return self._begin(goals, self._endpoint, goal)
-        # A client waited for the action, and sent a goal before the worker thread had returned it.
+        # A waiting client sent a goal before the worker thread had returned the server.
         ended: Future[Any] = Future()
         goals.early.append(lambda server: self._begin(goals, server, goal, ended))
         return ended
@@ -198,10 +198,10 @@ class ActionServer(Element):
 
 
 def server_functions(given: QJSValue) -> dict[str, QJSValue]:
-    """Return the functions that ``createActionServer`` was given, by name.
+    """Return the functions passed to ``createActionServer``, by name.
 
     Args:
-        given: ``execute``, or an object of ``execute`` and optionally ``accept`` and ``cancel``.
+        given: ``execute``, or an object with ``execute`` and optionally ``accept`` and ``cancel``.
 
     Raises:
         Error: It is neither.
@@ -222,13 +222,13 @@ def server_functions(given: QJSValue) -> dict[str, QJSValue]:
 
 
 def action_type(name: str) -> str:
-    """Return ``pkg/action/Do`` for ``pkg/DoAction``, as ROS 1 calls it, and for ``pkg/Do``."""
+    """Return ``pkg/action/Do`` for ``pkg/DoAction`` (ROS 1) and for ``pkg/Do``."""
     match = _ROS1_TYPE.match(name)
     return full_type(f"{match[1]}/{match[2]}" if match else name, "action")
 
 
 class RosActionServer(ActionServer):
-    """Offers an action; goals follow the habits of ``Ros 1.0``, types are ``pkg/DoAction``."""
+    """Offers an action in the style of ``Ros 1.0``, with types such as ``pkg/DoAction``."""
 
     DIALECT = Dialect.ROS1
 

@@ -24,47 +24,47 @@ if TYPE_CHECKING:
 
 __all__ = ["Application"]
 
-#: After this time a program that received a signal ends, whatever the robot does.
+#: Seconds after a signal by which the program ends, even if the robot does not respond.
 _QUIT_TIMEOUT_S = 1.7
 
 
 class Application(Handle):
-    """An interface, the window it is in, and the node it talks through.
+    """A QML interface with its window and its node.
 
-    The file is read by :meth:`load` or :meth:`run`; what QML is to find is made known before::
+    :meth:`load` or :meth:`run` reads the file; objects that QML uses must be passed before::
 
         app = Application("cockpit.qml", url="ros1://robot:11311", context={"arm": arm})
         sys.exit(app.run())
 
-    Must be made in the main thread. Makes the Qt application unless there is one.
+    Must be created in the main thread. Creates the Qt application unless one exists.
 
     Args:
         file: The QML file; ``package://name/path`` for one in a ROS package.
         url: Address of the robot; empty for ``ROSGLASS_URL``.
         name: Node name, instead of the one in the file.
-        session: The node to talk through, instead of one of its own; it is left open at the end.
-        context: Objects that QML finds by name: QObjects, or plain values.
+        session: The node to use instead of creating one; it stays open at the end.
+        context: Objects that QML can use by name: QObjects, or plain values.
         import_paths: Further folders with QML modules; ``package://`` as well.
-        arguments: What the interface finds in ``Qt.application.arguments``.
+        arguments: The contents of ``Qt.application.arguments``.
         ros_arguments: Arguments of the node, ``--ros-args`` included; see :func:`rosglass.connect`.
-        watch: Show it anew whenever a file in its folder is saved.
+        watch: Reload the interface whenever a file in its folder is saved.
         fullscreen: Fill the screen.
-        kiosk: Fill the screen, and prevent closing it by accident: Alt-F4 is ignored, the pointer
-            disappears while it is not moved; ``Qt.quit()``, Ctrl-C and SIGTERM end it.
-        renderer: What draws: "opengl", "software" (Qt's own, without shaders), or "auto" for the
-            software renderer where there is no graphics card and the file needs none.
-        allow_network: Let Qt fetch what QML and texts name on other machines: pictures, files of
-            QML, modules. Otherwise it cannot in this process, from now on.
+        kiosk: Fill the screen, and prevent closing it by accident: Alt-F4 is ignored, and an idle
+            pointer is hidden. ``Qt.quit()``, Ctrl-C and SIGTERM end the program.
+        renderer: "opengl", "software" (Qt's own renderer, without shaders), or "auto" for the
+            software renderer if there is no graphics card and the file needs none.
+        allow_network: Let Qt fetch pictures, QML files and modules that QML and rich text name on
+            other machines. Otherwise network access is blocked in this process from now on.
 
     Raises:
-        QmlError: There is no such file or folder, or it is none of QML.
+        QmlError: The file or folder does not exist, or is not QML.
         UnsupportedError: There is no display.
         RosArgumentError: One of `ros_arguments` is not valid.
-        Error: This is not the main thread, or the Qt application is one without windows; `session`
-            is given together with what describes one; a name in `context` is none that QML can
-            write; there is no such `renderer`, or another window has chosen another one.
-        SystemExit: Ctrl-C was pressed while it was made (130), or SIGTERM came (143); not where the
-            program has a handler of its own for it, which is called.
+        Error: This is not the main thread; the Qt application cannot show windows; `session` is
+            given together with arguments that describe one; a name in `context` is not a valid
+            QML name; `renderer` is unknown, or another window has chosen a different one.
+        SystemExit: Ctrl-C (130) or SIGTERM (143) arrived during construction; if the program has
+            its own handler for the signal, that is called instead.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class Application(Handle):
         for word in context or ():
             if not word.isidentifier() or word[0].isupper():
                 raise Error(f"context: QML cannot use the name {word!r}: expected e.g. {'arm'!r}")
-        # KeyboardInterrupt, raised in what Qt calls, would be swallowed there.
+        # Qt would swallow a KeyboardInterrupt raised in a function that it calls.
         with _signals_deferred():
             path = interface_file(file)
             warn_on_terminal(LocationFormatter())
@@ -102,7 +102,7 @@ class Application(Handle):
                     "the program's Qt application can open no window: make a QGuiApplication"
                 )
             self._owns_session = session is None
-            #: The node that QML talks through.
+            #: The node that QML uses.
             self.session = session or Session(
                 url or os.environ.get("ROSGLASS_URL", ""), name, arguments=ros_arguments
             )
@@ -121,7 +121,7 @@ class Application(Handle):
             except Error:
                 self._close_session()
                 raise
-            # QML does not keep them.
+            # QML does not keep them alive.
             self._context = dict(context or {})
             for word, value in self._context.items():
                 self.engine.rootContext().setContextProperty(word, value)
@@ -139,13 +139,13 @@ class Application(Handle):
 
     @property
     def windows(self) -> list[QtQuick.QQuickWindow]:
-        """All windows of the interface, those it hides included."""
+        """All windows of the interface, including hidden ones."""
         return self._runner.windows()
 
     def load(self) -> None:
-        """Show the interface; :meth:`run` does it when this was not called.
+        """Show the interface; :meth:`run` calls this if it has not been called.
 
-        A file with errors that is watched is shown once they are mended.
+        If the file has errors and is watched, it is shown as soon as they are fixed.
 
         Raises:
             QmlError: The file has errors; the message lists them as ``file:line:column: text``.
@@ -159,32 +159,32 @@ class Application(Handle):
             self._runner.load()
 
     def reload(self) -> bool:
-        """Reload the file; with errors, keep the present interface and show them over it."""
+        """Reload the file; if it has errors, keep the current interface and show them over it."""
         self.load()
         return self._runner.reload()
 
     def grab(self) -> QtGui.QImage:
-        """Return a picture of the window; a null image when there is none."""
+        """Return an image of the window; a null image if there is no window."""
         return self._runner.grab()
 
     def quit(self, code: int = 0) -> None:
-        """Have :meth:`run` return; from any thread."""
+        """Make :meth:`run` return; thread-safe."""
         self.session.executor.post(lambda: self._runner.exit(code))
 
     def run(self, *, end_process: bool = False) -> int:
         """Show the interface until it is closed, then close everything.
 
         Args:
-            end_process: End the whole process within 2 s of the interface's end, also while a
-                thread of it hangs; for programs that do nothing afterwards.
+            end_process: End the whole process within 2 s of the interface's end, even if a thread
+                hangs; for programs that do nothing afterwards.
 
         Returns:
-            The exit code: 0, what QML gave to ``Qt.exit()``, 128 and the signal's number after
+            The exit code: 0, the argument of ``Qt.exit()``, or 128 plus the signal's number after
             Ctrl-C (130) or SIGTERM (143).
 
         Raises:
             QmlError: The file has errors.
-            Error: It was closed before, or Qt's event loop runs already.
+            Error: The application was closed, or Qt's event loop is already running.
         """
         if self._closed:
             raise Error("this application has been closed; make another one")
@@ -200,7 +200,7 @@ class Application(Handle):
             try:
                 self._load()
                 code = self._runner.exit_code
-                # A waiting call may have been asked to end before there was a loop to end.
+                # A waiting call may have been asked to end before the event loop started.
                 if code is None:
                     code = run_event_loop(self.qt)
                 if signals:
@@ -212,7 +212,7 @@ class Application(Handle):
         return code
 
     def close(self) -> None:
-        """Take the interface down and close its node; safe to call twice."""
+        """Close the interface and its node; safe to call twice."""
         if self._closed:
             return
         self._closed = True
@@ -226,12 +226,12 @@ class Application(Handle):
 
 @contextmanager
 def _signals_deferred() -> Iterator[None]:
-    """Defer Ctrl-C and SIGTERM until the end, for at most :data:`_QUIT_TIMEOUT_S`.
+    """Defer Ctrl-C and SIGTERM to the end of the block, for at most :data:`_QUIT_TIMEOUT_S`.
 
-    Handlers of the program's own stay, and answer at once.
+    The program's own signal handlers stay installed and run immediately.
 
     Raises:
-        SystemExit: One came; with its exit code, as :meth:`Application.run` returns it.
+        SystemExit: A signal arrived; with its exit code from :meth:`Application.run`.
     """
     received: list[int] = []
     with QuitOnSignal(received.append, _QUIT_TIMEOUT_S, keep_handlers=True):

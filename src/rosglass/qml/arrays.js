@@ -1,5 +1,5 @@
-// Arrays of messages: real JavaScript arrays with the methods of the plugins' Array type, and long
-// ones that fetch what they are asked for. `host` packs what no typed array of the engine holds.
+// Arrays in messages: JavaScript arrays with the methods of the plugins' Array type; long ones
+// fetch elements on access. `host` packs types for which the engine has no typed array.
 (function (prototype, host) {
     "use strict"
 
@@ -8,7 +8,7 @@
         int16: Int16Array, uint16: Uint16Array, int32: Int32Array, uint32: Uint32Array,
         float32: Float32Array, float64: Float64Array
     }
-    // No message has longer ones; filling up to what is beyond would freeze the screen.
+    // Maximum length in messages; filling a longer array would freeze the screen.
     const LONGEST = 1 << 24
     const WIDE = ["int64", "uint64"]
 
@@ -18,7 +18,7 @@
         return i
     }
 
-    // Elements that were skipped by a growing length are defaults, as they are when sent.
+    // Elements skipped when the length grew are defaults, as in the sent message.
     function filled(list) {
         const made = Array.from(list)
         for (let i = 0; i < made.length; ++i)
@@ -61,7 +61,7 @@
 
     const lists = {}
 
-    // The prototype of an array by the kind of its elements; messages bring their own.
+    // The prototype of an array by its element type; message types have their own.
     function prototypeOf(kind, shape) {
         const holder = shape ? shape : lists
         const name = shape ? "list" : kind
@@ -73,8 +73,8 @@
     const CHANGING = ["push", "pop", "shift", "unshift", "splice", "sort", "reverse", "fill",
                       "copyWithin", "append", "replace", "spliceList"]
 
-    // A long array: looks like an array and fetches from `source` what is asked for. Methods that
-    // look at all elements, and changes, work on a real array that is made once.
+    // A long array: behaves like an array and fetches elements from `source` on access. Methods
+    // that read all elements, and changes, use a real array that is created once.
     function lazy(source, index, length, kind, shape) {
         const typed = kind === "bool" ? undefined : TYPED[kind]
         const list = prototypeOf(kind, shape)
@@ -132,7 +132,7 @@
                 if (key === "#index") return index
                 const found = list[key]
                 if (typeof found !== "function" || key === "constructor") return found
-                // The engine's own methods do not ask a Proxy, they look into its target.
+                // The engine's own methods bypass the Proxy and read its target.
                 return found.bind(CHANGING.includes(key) ? change() : whole())
             },
             set: function (target, key, value) {

@@ -1,4 +1,4 @@
-"""Calls of JavaScript functions, promises for JavaScript, and answers from it."""
+"""Calls of JavaScript functions, promises for JavaScript, and answers from JavaScript."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ _ENDED = "new Error('the function was ended because it blocked the interface')"
 
 
 class JsCalls(QtCore.QObject):
-    """Calls functions in the thread of their engine, without the GIL.
+    """Calls JavaScript functions in the thread of their engine, without holding the GIL.
 
-    QJSValue.call keeps Python's lock until the function has returned: one that never does could
-    not even be ended. Sending a signal does not.
+    QJSValue.call holds the GIL until the function returns, so that the watchdog could not end an
+    endless function. Sending a signal releases the GIL.
 
     Args:
         engine: The engine.
@@ -57,7 +57,7 @@ class JsCalls(QtCore.QObject):
         script.call([engine.newQObject(self), self._jobs])
 
     def call(self, function: QJSValue, arguments: Sequence[QJSValue]) -> QJSValue:
-        """Return what a function returns, or the error that it throws, or that it was ended."""
+        """Return the function's result; a JavaScript error if it threw or was ended."""
         self._number = (self._number + 1) % 2**31
         name = str(self._number)
         job, passed = self._engine.newObject(), self._engine.newArray(len(arguments))
@@ -81,12 +81,12 @@ def call_back(runtime: Runtime, callback: QJSValue, *arguments: QJSValue) -> QJS
     """Call a JavaScript function; log the error that it throws, with file and line.
 
     Args:
-        runtime: The engine's runtime; when the engine is gone, nothing happens.
-        callback: The function; anything else is ignored.
-        arguments: What it is given.
+        runtime: The engine's runtime; if the engine no longer exists, nothing is called.
+        callback: The function; other values are ignored.
+        arguments: The arguments of the call.
 
     Returns:
-        What the function returned; undefined when it threw.
+        The function's result; undefined if it threw.
     """
     if runtime.engine is None or not callback.isCallable():
         return QJSValue()
@@ -101,14 +101,14 @@ def call_back(runtime: Runtime, callback: QJSValue, *arguments: QJSValue) -> QJS
 
 
 def weak_callback(method: Callable[..., Any], otherwise: Any = None) -> Callable[..., Any]:
-    """Return a callback that does not keep a QML object, for what other threads hold.
+    """Return a callback for other threads that does not keep its QML object alive.
 
-    PySide crashes when a thread drops the last reference to an object that the GUI thread is
-    deleting.
+    PySide crashes if a thread drops the last reference to an object while the GUI thread deletes
+    it.
 
     Args:
         method: A method of the object, called on the GUI thread.
-        otherwise: What the callback returns, or the error it raises, when the object is gone.
+        otherwise: Return value, or the error to raise, if the object no longer exists.
     """
     reference = WeakMethod(method)
 
@@ -124,17 +124,17 @@ def weak_callback(method: Callable[..., Any], otherwise: Any = None) -> Callable
 
 
 class Deferred:
-    """A JavaScript promise and its functions to settle it; on the GUI thread only.
+    """A JavaScript promise and the functions that settle it; on the GUI thread only.
 
     Args:
         runtime: The engine's runtime.
-        what: What was asked for, for the log: a rejection that no QML handles would go unnoticed.
+        what: The request, for the log: a rejection that QML does not handle is logged.
     """
 
     def __init__(self, runtime: Runtime, what: str) -> None:
         self._runtime, self._what = runtime, what
         self._caller = runtime.caller()
-        #: What JavaScript holds.
+        #: The promise for JavaScript.
         self.promise, self._resolve, self._reject = runtime.promise()
 
     def resolve(self, value: QJSValue) -> None:
@@ -182,11 +182,11 @@ class _Settler(QtCore.QObject):
 
 
 class Answers:
-    """Calls a JavaScript function and returns its answer, now or later; on the GUI thread only.
+    """Calls a JavaScript function for an immediate or later answer; on the GUI thread only.
 
     Args:
         runtime: The engine's runtime.
-        what: The function, for errors: ``the handler of service /lamp``.
+        what: The function's name in errors, e.g. ``the handler of service /lamp``.
     """
 
     def __init__(self, runtime: Runtime, what: str) -> None:
@@ -196,18 +196,18 @@ class Answers:
     def ask(
         self, handler: QJSValue, arguments: list[QJSValue], take: Callable[[QJSValue], Any]
     ) -> Any:
-        """Return the answer, or the future of it.
+        """Return the answer, or a future of it.
 
-        A function that declares one more parameter than it is given is handed a function to answer
-        with, and may do so after it has returned; so may one that returns a promise.
+        A function may answer after it has returned: it returns a promise, or declares one more
+        parameter, which receives a function to answer with.
 
         Args:
             handler: The function.
-            arguments: What it is given.
-            take: Makes of the JavaScript value what is wanted; raises Error when it cannot.
+            arguments: The arguments of the call.
+            take: Converts the JavaScript value; raises Error if it cannot.
 
         Raises:
-            Error: There is no function, it threw, or its answer cannot be taken.
+            Error: There is no function, it threw, or its answer cannot be converted.
         """
         engine = self._runtime.engine
         if engine is None or not handler.isCallable():
@@ -232,7 +232,7 @@ class Answers:
         return future
 
     def later(self, queue: list[Callable[[], None]], ask: Callable[[], Any]) -> Future[Any]:
-        """Return the future of what `ask` will return, or raise, when the queue's job runs."""
+        """Queue a call of `ask`; return a future of its result or error."""
         future: Future[Any] = Future()
         self._pending.add(future)
         future.add_done_callback(self._pending.discard)
@@ -254,7 +254,7 @@ class Answers:
         return future
 
     def give_up(self) -> None:
-        """Fail every answer that is outstanding: the function is gone."""
+        """Fail every outstanding answer: the function no longer exists."""
         for future in list(self._pending):
             if not future.done():
                 future.set_exception(Error(f"{self._what} was closed before it answered"))

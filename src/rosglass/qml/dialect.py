@@ -13,21 +13,21 @@ if TYPE_CHECKING:
 
 __all__ = ["Dialect", "resolve_namespace", "within_namespace"]
 
-#: ROS 1's primitives that are messages in ROS 2.
+#: Primitive types of ROS 1 that are messages in ROS 2.
 _PRIMITIVE_TIMES = {
     "time": "builtin_interfaces/msg/Time",
     "duration": "builtin_interfaces/msg/Duration",
 }
-#: Fields of ROS 1 that are lower case in ROS 2, in all types that both distribute (Noetic's
-#: definitions against all of ROS 2's): looking types up takes longer than a screen may stand still.
+#: Fields that are upper case in ROS 1 and lower case in ROS 2, of all types that both distribute
+#: (Noetic compared with all of ROS 2). A table, because looking types up would freeze the screen.
 _CAPITALS = {"sensor_msgs/msg/CameraInfo": "DKRP", "stereo_msgs/msg/DisparityImage": "T"}
 
 
 class Dialect(Enum):
-    """The QML module that an interface imports; the robot may speak either ROS all the same.
+    """The QML module that an interface imports; works with robots of either ROS version.
 
-    ``Ros 1.0`` shows times as ``{sec, nsec}`` with ``toSec()``, durations as milliseconds and types
-    as ``pkg/Type``; ``Ros2 1.0`` shows ``{sec, nanosec}`` with ``seconds()``, and ``pkg/msg/Type``.
+    ``Ros 1.0`` has times as ``{sec, nsec}`` with ``toSec()``, durations in milliseconds and types
+    as ``pkg/Type``; ``Ros2 1.0`` has ``{sec, nanosec}`` with ``seconds()``, and ``pkg/msg/Type``.
     """
 
     ROS1 = "Ros 1.0"
@@ -35,16 +35,16 @@ class Dialect(Enum):
 
     @property
     def ros(self) -> int:
-        """The ROS version whose names it uses: 1 or 2."""
+        """The ROS version whose names the module uses: 1 or 2."""
         return 1 if self is Dialect.ROS1 else 2
 
     @property
     def time_fields(self) -> tuple[str, str]:
-        """What the two parts of a time are called."""
+        """The field names of a time's seconds and nanoseconds."""
         return ("sec", "nsec") if self is Dialect.ROS1 else ("sec", "nanosec")
 
     def type_name(self, name: str) -> str:
-        """Return a full type name as the module writes it."""
+        """Return a full type name in the module's spelling."""
         if name in _PRIMITIVE_TIMES:
             return name if self is Dialect.ROS1 else _PRIMITIVE_TIMES[name]
         if self is Dialect.ROS2:
@@ -53,7 +53,7 @@ class Dialect(Enum):
         return f"{package}/{rest.rpartition('/')[2]}"
 
     def spelled(self, text: str) -> str:
-        """Return a text with the names of types in it as the module writes them."""
+        """Return a text with its type names in the module's spelling."""
         if self is Dialect.ROS2 or not text:
             return text
         from rosglass.interfaces.names import spelled_ros1  # noqa: PLC0415 - not at start-up
@@ -61,12 +61,12 @@ class Dialect(Enum):
         return spelled_ros1(text)
 
     def names(self, schema: Schema) -> dict[str, str]:
-        """Return the fields that the module's ROS calls otherwise than the robot's.
+        """Return the fields whose names differ between the module's ROS version and the robot's.
 
         ``sensor_msgs/CameraInfo`` has ``K`` in ROS 1 and ``k`` in ROS 2.
 
         Returns:
-            The module's name by the robot's.
+            The module's name for each of the robot's names.
         """
         if schema.ros == self.ros:
             return {}
@@ -75,9 +75,9 @@ class Dialect(Enum):
 
 
 def resolve_namespace(node: Node | None, namespace: str) -> str:
-    """Return a namespace as a node resolves it; as it is without a node, or when it is wrong.
+    """Return the resolved namespace; unchanged without a node or if it is invalid.
 
-    An empty one is the node's own.
+    An empty namespace is the node's own.
     """
     if node is None:
         return namespace
@@ -90,8 +90,8 @@ def resolve_namespace(node: Node | None, namespace: str) -> str:
 def within_namespace(namespace: str, name: str) -> str:
     """Return `name` within `namespace`, as a NodeHandle of that namespace resolves it.
 
-    Absolute (``/x``) and private (``~x``) names, and an empty namespace, leave it as it is. See
-    http://wiki.ros.org/Names, section 1.2.
+    Absolute (``/x``) and private (``~x``) names, and names in an empty namespace, are unchanged.
+    See http://wiki.ros.org/Names, section 1.2.
     """
     if not namespace or not name or name.startswith(("/", "~")):
         return name

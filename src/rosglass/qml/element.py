@@ -1,4 +1,4 @@
-"""Bases of all QML elements: session, properties, and the endpoint on the node behind them."""
+"""Base classes of all QML elements: session, properties, and the endpoint on the node."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ __all__ = [
     "single_shot",
 ]
 
-#: Time without a peer after which the name of a topic may be a mistake.
+#: Milliseconds without a peer after which the topic's name may be misspelt.
 NO_PEER_MS = 5000
-#: Time until a missing type is looked up again.
+#: Milliseconds until a missing type is looked up again.
 RETRY_MS = 1000
-#: Time without data after which it counts as stale.
+#: Milliseconds without new data after which an element is stale.
 DEFAULT_TIMEOUT_MS = 3000
 
 
@@ -57,30 +57,30 @@ def single_shot(parent: QtCore.QObject, on_timeout: Callable[[], None]) -> QtCor
 
 
 class Element(QtCore.QObject):
-    """A QML object that uses the session's node, usually through one endpoint on it.
+    """A QML object that uses the session's node, usually through one endpoint.
 
     Properties may be set in any order and before there is a node: every change only schedules
-    :meth:`_update`, which runs from the event loop. It compares what :meth:`_wanted` returns with
-    what the present endpoint was created with; where they differ, it closes that endpoint, and
-    has the worker thread call what :meth:`_factory` returns.
+    :meth:`_update`, which runs from the event loop. If :meth:`_wanted` returns other arguments than
+    those of the current endpoint, it closes that endpoint, and the worker thread calls the function
+    that :meth:`_factory` returns.
 
     Args:
         parent: The parent object.
-        runtime: The engine's runtime, for objects that a function of QML returns.
+        runtime: The engine's runtime, for objects returned by a function called from QML.
     """
 
-    #: How values and types are written in QML.
+    #: The module whose spelling of values and types applies.
     DIALECT: ClassVar[Dialect] = Dialect.ROS2
     #: Attributes with messages and pictures, deleted when QML destroys the object: PySide 6.11
-    #: never frees the Python half of what QML has made.
+    #: never frees the Python half of an object created by QML.
     _HOLDS: tuple[str, ...] = ()
-    #: What the endpoint was, or is being, created with; None for nothing.
+    #: Arguments of the endpoint that exists or is being created; None without one.
     _config: tuple[Any, ...] | None = None
     #: The endpoint; None until it is created.
     _endpoint: Any = None
 
     problemChanged = Signal()  # noqa: N815 - QML's name
-    #: What is wrong; empty when nothing is.
+    #: Error text for the user; empty without a problem.
     problem = ReadOnly(str, read="_get_problem")
 
     def __init__(
@@ -88,30 +88,30 @@ class Element(QtCore.QObject):
     ) -> None:
         super().__init__(parent)
         self._runtime = runtime
-        #: The place in QML that called the function that returned it.
+        #: The QML line that called the function that returned this object.
         self._origin = runtime.caller() if runtime is not None else None
         self._session: Session | None = None
         self._scheduled = False
         self._problem = self._announced_problem = ""
         self._limit = RateLimit()
         self._retry: QtCore.QTimer | None = None
-        #: What remains to be done when QML destroys the object, by name.
+        #: Functions to call when QML destroys the object, by name.
         self._cleanup: dict[str, Callable[[], None]] = {}
         self._schedule()
 
     @property
     def label(self) -> str:
-        """What error messages call this element."""
+        """The element's name in error messages."""
         return type(self).__name__.removeprefix("Ros")
 
     @property
     def node(self) -> Node | None:
-        """The node; None while there is none."""
+        """The node, if it exists."""
         return self._session.node if self._session is not None else None
 
     @property
     def _executor(self) -> GuiExecutor:
-        """The GUI thread; only once there is a node."""
+        """The executor of the GUI thread; available only once there is a node."""
         assert self._session is not None
         return self._session.executor
 
@@ -122,17 +122,17 @@ class Element(QtCore.QObject):
         return None
 
     def _factory(self, *wanted: Any) -> Callable[[], Any]:
-        """Return a function for the worker thread, which returns a new endpoint.
+        """Return a function that creates the endpoint, for the worker thread.
 
-        An endpoint is what has a ``close`` method, or what :meth:`_dispose` closes otherwise.
+        An endpoint has a ``close`` method, unless :meth:`_dispose` closes it in another way.
         """
         raise NotImplementedError
 
     def _on_created(self, endpoint: Any) -> None:
-        """Use an endpoint that was created."""
+        """Start using a new endpoint."""
 
     def _on_create_failed(self, error: Error) -> None:
-        """Show why there is no endpoint; look for an unknown type again after a while."""
+        """Show why there is no endpoint; retry an unknown type after a while."""
         self._set_problem(f"{self.label}: {error}")
         if isinstance(error, TypeNotFoundError):
             if self._retry is None:
@@ -212,7 +212,7 @@ class Element(QtCore.QObject):
         self._update()
 
     def _steady(self) -> float:
-        """Return the time by which ages are measured, in seconds."""
+        """Return the time in seconds by which ages are measured."""
         session = self._session
         return session.steady() if session is not None else time.monotonic()
 
@@ -236,7 +236,7 @@ class Element(QtCore.QObject):
         state, held = self.__dict__, self._HOLDS
 
         def end() -> None:
-            # At the end of the program the session may be gone before the last element.
+            # At the end of the program the session may be destroyed before the last element.
             for job in list(cleanup.values()) if is_alive(session) else ():
                 job()
             cleanup.clear()
@@ -253,7 +253,7 @@ class Element(QtCore.QObject):
 
     @Slot()
     def _on_node(self) -> None:
-        """Update at once when the node is gone, which must not be used any longer."""
+        """Update immediately if the node is gone, so that it is no longer used."""
         if self._session is None or self._session.node is None:
             self._run_update()
         else:
@@ -277,7 +277,7 @@ class Element(QtCore.QObject):
         return self._problem
 
     def _set_problem(self, problem: str, level: int = logging.WARNING) -> None:
-        """Set the problem; log a new one, the same one at most every 5 s."""
+        """Set the problem and log it; log the same problem at most every 5 s."""
         problem = self.DIALECT.spelled(problem)
         if problem == self._problem:
             return
@@ -286,14 +286,14 @@ class Element(QtCore.QObject):
         self._announce_problem()
 
     def _announce_problem(self) -> None:
-        """Emit problemChanged if :meth:`_get_problem` returns another one than before."""
+        """Emit problemChanged if the result of :meth:`_get_problem` has changed."""
         problem = self._get_problem()
         if problem != self._announced_problem:
             self._announced_problem = problem
             self.problemChanged.emit()
 
     def _log(self, text: str, level: int) -> None:
-        """Log what has no line of QML as its cause, with the file that declares the object."""
+        """Log a message without a QML line of its own, with the file that declares the object."""
         if not text or not self._limit.allows((text, level)):
             return
         origin = self._origin
@@ -304,17 +304,17 @@ class Element(QtCore.QObject):
         log_from_qml("", level, text, origin)
 
     def _refuse(self, message: str) -> None:
-        """Log that a property was set to an impossible value, with the place in QML."""
+        """Log that a property was set to an invalid value, with the QML line."""
         runtime = self._find_runtime()
         caller = runtime.caller() if runtime is not None else Caller("<unknown>", 0, "")
         log_from_qml("", logging.ERROR, message, caller)
 
 
 class TopicElement(Element):
-    """An element that receives a topic and knows whether what it shows is live."""
+    """An element that receives a topic and detects stale data."""
 
     staleChanged = Signal()  # noqa: N815 - QML's name
-    #: Whether there is nothing to show, or nothing that still holds.
+    #: Whether there is no data, or only data that is out of date.
     stale = ReadOnly(bool, True)
 
     def __init__(
@@ -322,17 +322,17 @@ class TopicElement(Element):
     ) -> None:
         super().__init__(parent, runtime)
         self._topic, self._resolved = "", ""
-        #: Where relative topic names begin, for elements with a property for it; and as resolved.
+        #: Namespace of relative topic names, for elements with such a property; and as resolved.
         self._namespace = self._shown_namespace = ""
-        #: Whether what is shown is of a publisher or a connection that is gone.
+        #: Whether the data shown is from a publisher or connection that is gone.
         self._outdated = False
         self._publishers = 0
-        #: Which publishers of the topic cannot be distinguished; empty for none.
+        #: Names the publishers of the topic that cannot be distinguished; empty for none.
         self._mixing = ""
         self._no_publisher = single_shot(self, self._log_no_publisher)
 
     def _expect_publishers(self) -> None:
-        """Log a topic that has no publisher after a while."""
+        """Log a topic that still has no publisher after a while."""
         self._no_publisher.start(NO_PEER_MS)
 
     @Slot()
@@ -341,7 +341,7 @@ class TopicElement(Element):
         connected = session is not None and session.state == "connected"
         if node is None or not connected or self._count_publishers():
             return
-        # A node that has just been closed answers nothing.
+        # The node may just have been closed.
         with suppress(Error):
             hint = similar(self._resolved, node.topics())
             level = logging.WARNING if hint else logging.INFO
@@ -370,7 +370,7 @@ class TopicElement(Element):
             self._schedule()
 
     def _clear_shown(self) -> None:
-        """Clear what is shown: it belongs to another topic."""
+        """Clear the data shown, which belongs to another topic."""
 
     def _count_publishers(self) -> int:
         node = self.node
@@ -402,14 +402,14 @@ class TopicElement(Element):
     def _on_graph(self) -> None:
         before, self._publishers = self._publishers, self._count_publishers()
         if before and not self._publishers:
-            # The robot is gone: what is on the screen is the past, however recent.
+            # The robot is disconnected: the data on the screen is out of date, however recent.
             self._outdated = True
         else:
             self._recheck_outdated()
         self._update_stale()
 
     def _recheck_outdated(self) -> None:
-        """Clear :attr:`_outdated` if the graph shows that what is shown still holds."""
+        """Clear :attr:`_outdated` if the graph shows that the data shown is still valid."""
 
     @Slot()
     def _on_tick(self) -> None:
@@ -423,24 +423,24 @@ class TopicElement(Element):
         report(self, stale=self._outdated or self._is_old())
 
     def _is_old(self) -> bool:
-        """Return whether there is nothing to show, or nothing new within the timeout."""
+        """Return whether there is no data, or none that is newer than the timeout."""
         raise NotImplementedError
 
 
-#: Time that requests wait for a server.
+#: Milliseconds that requests wait for a server.
 CONNECTION_TIMEOUT_MS = 10_000
-#: Time in which a server that is not found is not worth a warning.
+#: Milliseconds to find a server before its absence is logged as a warning.
 _SEARCH_MS = 2000
 
 
 class ClientElement(Element):
-    """Has a client of a service or an action while there is a node.
+    """An element with a client of a service or an action while there is a node.
 
     Args:
         runtime: The engine's runtime.
         name: Name of the service or action, as in QML.
-        type_name: Full type name; empty takes the one that the server announces.
-        dialect: How values are written in QML.
+        type_name: Full type name; empty uses the server's.
+        dialect: The module whose spelling of values applies.
     """
 
     def __init__(self, runtime: Runtime, name: str, type_name: str, dialect: Dialect) -> None:
@@ -450,16 +450,16 @@ class ClientElement(Element):
 
     @property
     def label(self) -> str:
-        """What error messages call this element."""
+        """The element's name in error messages."""
         return self._name
 
     @abstractmethod
     def _submit_waiting(self) -> None:
-        """Send the requests that waited until the client knows its type."""
+        """Send the requests that waited for the client's type."""
 
     @abstractmethod
     def _fail_all(self, error: Error) -> None:
-        """End every request that has no answer yet."""
+        """Fail every request that has no reply yet."""
 
     def _wanted(self) -> tuple[Node] | None:
         return None if self.node is None else (self.node,)
@@ -472,7 +472,7 @@ class ClientElement(Element):
             self._fail_all(error)
 
     def _fetch_type(self, node: Node) -> None:
-        """Request a type that is unknown here from the robot."""
+        """Request a type without a local definition from the robot."""
 
         def again() -> None:
             if is_alive(self) and self.node is node:
@@ -489,14 +489,14 @@ class ClientElement(Element):
 
     def _on_created(self, endpoint: Any) -> None:
         self._watch = endpoint.on_ready_change(weak_callback(self._on_ready), self._executor)
-        # A client that has just started to look for its server has not found it yet.
+        # A new client has not yet had the time to find its server.
         self._set_problem(endpoint.problem, logging.DEBUG)
         QtCore.QTimer.singleShot(_SEARCH_MS, lambda: self._warn(endpoint))
         self._on_ready(endpoint.ready)
         self._submit_waiting()
 
     def _warn(self, client: Any) -> None:
-        """Log why there is no server, unless it was found soon."""
+        """Log why there is no server, unless one has been found in the meantime."""
         if is_alive(self) and self._endpoint is client:
             self._log(self._problem, logging.WARNING)
 
@@ -508,7 +508,7 @@ class ClientElement(Element):
         self._set_ready(ready)
 
     def _set_ready(self, ready: bool) -> None:
-        """Announce whether a server is connected."""
+        """Set whether a server is connected, and notify QML of a change."""
         report(self, ready=ready)
 
     def _on_closed(self, endpoint: Any) -> None:
@@ -521,13 +521,13 @@ class ClientElement(Element):
 
 
 def named(name: str, error: BaseException) -> str:
-    """Return an error's text, with the name of its topic, service or action in it."""
+    """Return an error's text, including the name of its topic, service or action."""
     text = str(error)
     return text if name in text else f"{name}: {text}"
 
 
 def given_fields(value: QJSValue, type: MessageType, dialect: Dialect) -> dict[str, object]:
-    """Return the fields of a request or goal of QML; raises as :func:`fields_from_js`."""
+    """Return the fields of a request or goal from QML; raises like :func:`fields_from_js`."""
     from rosglass.messages.schema import schema_of  # noqa: PLC0415 - loaded by now
     from rosglass.qml.from_js import fields_from_js  # noqa: PLC0415
 

@@ -1,4 +1,4 @@
-"""Enumerations in QML: states of goals, and kinds of clocks."""
+"""Enumerations in QML: goal states and clock types."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ __all__ = [
 
 
 class ActionGoalStatus(QtCore.QObject):
-    """What has become of a goal; the numbers of ``action_msgs/msg/GoalStatus``."""
+    """The status of a goal; same numbers as ``action_msgs/msg/GoalStatus``."""
 
     @QtCore.QEnum
     class Status(IntEnum):
-        """``Unknown`` until the server has accepted it, and once the outcome cannot be known."""
+        """``Unknown`` until the server accepts the goal, and if the outcome is unknown."""
 
         Unknown = 0
         Accepted = 1
@@ -40,11 +40,11 @@ class ActionGoalStatus(QtCore.QObject):
 
 
 class ActionCommStates(QtCore.QObject):
-    """The communication state of a goal; actionlib's ``CommState``."""
+    """The communication state of a goal, as actionlib's ``CommState``."""
 
     @QtCore.QEnum
     class State(IntEnum):
-        """The states, in the order in which a goal passes them."""
+        """The states, in the order in which a goal goes through them."""
 
         WAITING_FOR_GOAL_ACK = 0
         PENDING = 1
@@ -57,11 +57,11 @@ class ActionCommStates(QtCore.QObject):
 
 
 class ActionTerminalStates(QtCore.QObject):
-    """How a goal ended; actionlib's ``TerminalState``, and UNKNOWN while it has not ended."""
+    """The final state of a goal, as actionlib's ``TerminalState``; UNKNOWN until it ends."""
 
     @QtCore.QEnum
     class State(IntEnum):
-        """The server's verdict, or LOST."""
+        """The outcome that the server reported, or LOST."""
 
         RECALLED = 0
         REJECTED = 1
@@ -77,7 +77,7 @@ _Status, _Comm, _Terminal = (
     ActionCommStates.State,
     ActionTerminalStates.State,
 )
-#: By the values of GoalStatus. A rejected goal counts as aborted, as in the reference.
+#: Values of GoalStatus -> codes. A rejected goal counts as aborted, as in the reference plugin.
 _CODES = {
     "accepted": _Status.Accepted,
     "executing": _Status.Executing,
@@ -103,12 +103,12 @@ _TERMINAL = {
 
 
 def status_code(status: GoalStatus) -> ActionGoalStatus.Status:
-    """Return what ``Ros2 1.0`` calls a status."""
+    """Return the code of a status in ``Ros2 1.0``."""
     return _CODES.get(status.value, _Status.Unknown)
 
 
 def comm_state_of(status: GoalStatus) -> ActionCommStates.State:
-    """Return the state that actionlib would be in for a goal of a ROS 2 robot."""
+    """Return the actionlib state that corresponds to the status of a ROS 2 goal."""
     return _COMM.get(status.value, _Comm.WAITING_FOR_RESULT)
 
 
@@ -116,8 +116,8 @@ def terminal_state_of(status: GoalStatus, executed: bool) -> ActionTerminalState
     """Return actionlib's terminal state of a goal.
 
     Args:
-        status: What has become of it.
-        executed: Whether it was executed: otherwise a cancelled one was recalled.
+        status: The goal's status.
+        executed: Whether it was executed; a goal cancelled before that was recalled.
     """
     if status.value == "canceled" and not executed:
         return _Terminal.RECALLED
@@ -125,9 +125,9 @@ def terminal_state_of(status: GoalStatus, executed: bool) -> ActionTerminalState
 
 
 class ClockTypes(QtCore.QObject):
-    """Kinds of clocks; their numbers are rcl's (``rcl_clock_type_t``).
+    """Clock types, numbered as in rcl (``rcl_clock_type_t``).
 
-    They are what ``clockType`` of a time is, as property (Qt 5's plugin) and as function (Qt 6's).
+    Values of a time's ``clockType``, a property in the Qt 5 plugin and a function in the Qt 6 one.
     """
 
     def _get(self, number: int) -> QJSValue:

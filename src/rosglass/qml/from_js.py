@@ -1,9 +1,9 @@
-"""Values on their way from QML into a message, guided by the message's type.
+"""Conversion of QML values to message fields, by the message's type.
 
-Nothing is guessed: what a field cannot take is left as it is, so that the codec refuses it with
-the field's path. Translated is what JavaScript has no word for (integral numbers for integer
-fields, decimal text for 64-bit integers, milliseconds and dates for times, typed arrays), and what
-the plugins take without loss.
+Nothing is guessed: a value that does not fit its field stays unchanged, and the codec refuses it
+with the field's path. Converted are values that JavaScript has no type for (integral numbers for
+integer fields, decimal text for 64-bit integers, milliseconds and dates for times, typed arrays),
+and values that the plugins accept without loss.
 """
 
 from __future__ import annotations
@@ -56,9 +56,9 @@ _TYPED = {
     "Float32Array": "<f4",
     "Float64Array": "<f8",
 }
-#: Arrays longer than this cross into Python in one call instead of one call per element.
+#: Longer arrays are passed to Python in one call instead of one call per element.
 _BULK = 32
-#: Longer arrays than this are a mistake (``a.length = 4e9``) that would freeze the screen.
+#: Longer arrays are mistakes (``a.length = 4e9``) that would freeze the screen.
 _LONGEST = 1 << 24
 _HEADER = "std_msgs/msg/Header"
 
@@ -66,18 +66,18 @@ _HEADER = "std_msgs/msg/Header"
 def fields_from_js(
     value: QJSValue, schema: Schema, path: str = "", dialect: Dialect = Dialect.ROS2
 ) -> dict[str, Any]:
-    """Return the fields of a message in a JavaScript value; undefined ones are left out.
+    """Return the message fields in a JavaScript value, without undefined ones.
 
     Args:
-        value: An object, a message received before, a QML object with properties of the fields'
-            names, or a vector or quaternion.
+        value: An object, a received message, a QML object whose properties have the fields' names,
+            or a vector or quaternion.
         schema: The message type.
         path: Field path of the message, for errors.
-        dialect: The module whose value it is. ``Ros2 1.0`` also takes texts for numbers, and the
-            other way round, where nothing is lost.
+        dialect: The module that the value is from. ``Ros2 1.0`` also converts texts to numbers and
+            numbers to texts where nothing is lost.
 
     Raises:
-        ConversionError: The value cannot be a message of this type.
+        ConversionError: The value is not a message of this type.
     """
     return _Conversion(dialect).fields(value, schema, path)
 
@@ -87,7 +87,7 @@ def elements_from_js(values: QJSValue, kind: str) -> list[Any]:
 
     Args:
         values: A JavaScript array of numbers and decimal texts.
-        kind: For errors.
+        kind: Element type, for errors.
 
     Raises:
         ConversionError: An element is no integer.
@@ -107,12 +107,12 @@ def _renamed_time(given: dict[str, Any], schema: Schema) -> dict[str, Any]:
 
 
 def scalar_from_python(value: Any, member: Member) -> Any:
-    """Return a number, text or bool of a view's editor for a single value, as ``Ros2 1.0`` does."""
+    """Convert a number, text or bool from a view's editor by the rules of ``Ros2 1.0``."""
     return _Conversion(Dialect.ROS2)._scalar(value, member, in_array=False)
 
 
 class _Conversion:
-    """The rules of one module."""
+    """Converts values by the rules of one module."""
 
     def __init__(self, dialect: Dialect) -> None:
         self._dialect = dialect
@@ -137,9 +137,9 @@ class _Conversion:
             raise _no_message(value, schema, path)
         found = properties_of(value)
         if not found and value.toString() != "[object Object]":
-            # A Map, a Set, a url: their content would silently be lost.
+            # The contents of a Map, a Set or a url would be lost without an error.
             raise _no_message(value, schema, path)
-        # A name that is not there is not read: that would be taken for a mistake in the interface.
+        # Check first: reading a missing name would be reported as a mistake in the interface.
         scalar = value.hasProperty("scalar") and value.property("scalar").isNumber()
         if scalar and "scalar" not in schema.by_name:
             held = value.toVariant()
@@ -149,7 +149,7 @@ class _Conversion:
         return self._read(found, names, value, schema, path)
 
     def _names(self, schema: Schema) -> dict[str, str]:
-        """Return the fields by what they may be called."""
+        """Return the fields by each of their accepted names."""
         names = {member.name: member.name for member in schema.members}
         names.update({ours: theirs for theirs, ours in self._dialect.names(schema).items()})
         return names
@@ -163,7 +163,7 @@ class _Conversion:
             if inner.isUndefined() or self._is_needless(name, schema):
                 continue
             member = schema.by_name.get(names.get(name, ""))
-            # An unknown field goes along: the codec refuses it and names those that exist.
+            # Pass unknown fields on: the codec refuses them and lists those that exist.
             here = f"{path}.{name}" if path else name
             if member is None:
                 fields[name] = shown(inner)
@@ -172,14 +172,14 @@ class _Conversion:
         return fields
 
     def _is_needless(self, name: str, schema: Schema) -> bool:
-        """Return whether it is the counter that only ROS 1's headers have."""
+        """Return whether this is the ``seq`` counter, which only ROS 1's headers have."""
         ros1 = self._dialect is Dialect.ROS1
         return ros1 and name == "seq" and schema.name == _HEADER and name not in schema.by_name
 
     def _field(self, value: QJSValue, member: Member, path: str) -> Any:
         if not member.is_array:
             return self._single(value, member, path)
-        # A long array that was received is a Proxy, which isArray() does not see through.
+        # A long received array is a Proxy, for which isArray() is false.
         if value.isArray() or value.property("#index").isNumber():
             return self._elements(value, member, path)
         if is_model(value):
@@ -194,11 +194,11 @@ class _Conversion:
         if constructor == "DataView":
             wanted = f"an array ({member.field.type}); pass the DataView's .buffer"
             raise ConversionError(path, Shown("a DataView"), wanted)
-        # Objects of JavaScript may be a web that Qt would follow for ever.
+        # JavaScript objects may have cycles, which Qt would follow forever.
         strange = value.isObject() and not value.isCallable() and constructor != "Object"
         held = value.toVariant() if strange else None
         if isinstance(held, list):
-            # A list of C++ or Python, which JavaScript does not call an array.
+            # A list from C++ or Python, which is not an array in JavaScript.
             return [
                 self._python(item, member, f"{path}[{index}]") for index, item in enumerate(held)
             ]
@@ -207,7 +207,7 @@ class _Conversion:
     def _elements(self, value: QJSValue, member: Member, path: str) -> Any:
         source = value.property("#source")
         if source.isQObject():
-            # A received array on its way back, untouched: no need to fetch it into JavaScript.
+            # An unchanged received array: no need to fetch it into JavaScript.
             arrays: Any = getattr(object_of(source), "arrays", [])
             index = value.property("#index").toInt()
             if 0 <= index < len(arrays) and arrays[index][0].struct is member.struct:
@@ -215,7 +215,7 @@ class _Conversion:
         if value.property("#index").isNumber():
             value = value.property("toArray").callWithInstance(value)
         length = _length(value, path)
-        # As above: elements that are objects are looked at one by one.
+        # As above: elements that are objects are converted one by one.
         if length > _BULK and member.struct is None and not value.property(0).isObject():
             items = value.toVariant()
             if None not in items:
@@ -230,14 +230,14 @@ class _Conversion:
 
     def _element(self, value: QJSValue, member: Member, path: str) -> Any:
         if value.isUndefined():
-            # What a growing length skipped.
+            # An element that was skipped when the array's length grew.
             return _default(member)
         return self._single(value, member, path)
 
     def _rows(self, model: Any, member: Member, path: str) -> list[Any]:
-        """Return the rows of an item model: its first role, or messages of its roles.
+        """Return the rows of an item model: values of its first role, or messages of all its roles.
 
-        A single role that is no field of the message holds the elements themselves.
+        A single role that is not a field of the message contains the elements themselves.
         """
         roles = roles_of(model)
         struct = member.struct
@@ -260,7 +260,7 @@ class _Conversion:
         names = self._names(schema)
         fields = {}
         for name, item in items.items():
-            # An item model answers None for roles that a row does not have.
+            # An item model returns None for roles that a row does not have.
             if item is None:
                 continue
             member = schema.by_name.get(names.get(name, ""))
@@ -278,7 +278,7 @@ class _Conversion:
         return fields
 
     def _python(self, value: Any, member: Member, path: str) -> Any:
-        """Return one element that Qt has made a Python value of."""
+        """Convert one element that Qt has already converted to a Python value."""
         if isinstance(value, QJSValue):
             return self._single(value, member, path)
         struct = member.struct
@@ -307,7 +307,7 @@ class _Conversion:
             return self._scalar(value.toString(), member, member.is_array)
         if value.isBool():
             return self._scalar(value.toBool(), member, member.is_array)
-        # A url has no properties; what has may be a web of objects that would take for ever.
+        # A url has no properties; objects that have some may have cycles.
         if value.isObject() and not value.isQObject() and not properties_of(value):
             held = value.toVariant()
             if member.number is None and isinstance(held, QtCore.QUrl):
@@ -315,7 +315,7 @@ class _Conversion:
         return shown(value)
 
     def _scalar(self, value: Any, member: Member, in_array: bool) -> Any:
-        """Return a number, text or bool for a field, translated if nothing gets lost."""
+        """Return a number, text or bool for a field, converted if nothing is lost."""
         number = member.number
         if number is None:
             if isinstance(value, QtCore.QUrl):
@@ -355,7 +355,7 @@ def _default(member: Member) -> Any:
 
 
 def typed_array(value: QJSValue) -> Any:
-    """Return a typed array's numbers as a numpy array; None when it is none."""
+    """Return a typed array as a numpy array; None for other values."""
     kind = _TYPED.get(value.property("constructor").property("name").toString())
     if kind is None or not value.isObject():
         return None
@@ -365,7 +365,7 @@ def typed_array(value: QJSValue) -> Any:
     data = bytes(held.data()) if isinstance(held, QtCore.QByteArray) else b""
     count, offset = value.property("length").toInt(), value.property("byteOffset").toInt()
     kind_of = np.dtype(kind)
-    # Anybody can write {constructor: {name: "Int8Array"}}.
+    # Any object may claim to be one: {constructor: {name: "Int8Array"}}.
     fits = count >= 0 and offset >= 0 and offset + count * kind_of.itemsize <= len(data)
     return np.frombuffer(data[offset:], kind_of, count) if fits else None
 
@@ -396,7 +396,7 @@ def _buffer(value: QJSValue, member: Member, path: str) -> Any:
 
 
 def _text(value: float) -> str:
-    """Return a number or bool as JavaScript writes it."""
+    """Return a number or bool as text in JavaScript's format."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if not math.isfinite(value):
@@ -422,40 +422,40 @@ def _as_number(value: Any, code: str) -> Any:
 
 
 _DEEPEST = 100
-#: Values in all that are read one by one: what shares its parts can have more than atoms there are.
+#: Maximum number of values read one by one: with shared parts, the count can grow exponentially.
 _MOST = 1 << 18
-#: How long reading a value may block the interface.
+#: Seconds that reading a value may block the interface.
 _READ_TIMEOUT_S = 5.0
 
 
 def plain_from_js(value: QJSValue) -> Any:
     """Return a value as None, bool, int, float, str, list, dict, bytes, QDateTime, Time, Duration.
 
-    Objects of QML give the properties that their own class declares, item models a list of their
+    QML objects become the properties that their own class declares, item models a list of their
     rows, as dicts by role.
 
     Raises:
-        ConversionError: It is a function, refers to itself, is nested too deeply, has more than
-            2^18 values, or takes more than 5 s to read; received arrays and typed arrays of
+        ConversionError: The value is a function, refers to itself, is nested too deeply, has more
+            than 2^18 values, or takes more than 5 s to read; received arrays and typed arrays of
             numbers count as one.
     """
     return _Reader().read(value, "", 0)
 
 
 def _number(number: float | str) -> float | str:
-    # Integers that JavaScript's numbers do not hold come as text.
+    # Integers beyond the range of JavaScript's numbers are passed as text.
     return integral(number) if not isinstance(number, str) and abs(number) < 2**53 else number
 
 
 class _Reader:
-    """Reads one value and all that is in it."""
+    """Converts one value recursively."""
 
     def __init__(self) -> None:
         self._left = _MOST
         self._deadline = time.monotonic() + _READ_TIMEOUT_S
 
     def read(self, value: QJSValue, path: str, depth: int) -> Any:
-        """Return a value; `path` is where it is."""
+        """Return a value converted to Python; `path` is its location, for errors."""
         self._count(path, depth)
         if value.isUndefined() or value.isNull():
             return None
@@ -542,7 +542,7 @@ class _Reader:
         return found
 
     def _python(self, value: Any, path: str, depth: int) -> Any:
-        """Return a value that Qt has made a Python value of."""
+        """Return a value that Qt has already converted to Python."""
         if isinstance(value, QJSValue):
             return self.read(value, path, depth)
         self._count(path, depth)

@@ -1,4 +1,4 @@
-"""Goals in QML: handles of goals that were sent, and of those that a server executes."""
+"""Handles of goals in QML: of sent goals, and of goals that a server executes."""
 # ruff: noqa: N802, N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ __all__ = [
     "tell_cancelling",
 ]
 
-#: Let go when JavaScript collects a handle: PySide 6.11 never frees the Python half.
+#: Released when JavaScript collects a handle: PySide 6.11 never frees the Python half.
 _HELD = ("_goal", "_callbacks", "_forget", "_value", "_feedback", "_result", "_shown")
 
 
@@ -54,14 +54,14 @@ def _ignore(_: object) -> None:
 
 
 class GoalCallbacks(NamedTuple):
-    """The callbacks of one goal, on the GUI thread.
+    """The callbacks of one goal, called on the GUI thread.
 
     Attributes:
-        response: Whether the server accepts it; once.
-        feedback: Each feedback.
-        transition: The handle, whenever its ``commState`` has changed.
-        result: The handle, once, when the goal has ended, one way or another.
-        handles_failure: Whether `result` tells of failures, which are logged otherwise.
+        response: Called once with whether the server accepts the goal.
+        feedback: Called with each feedback.
+        transition: Called with the handle after each change of its ``commState``.
+        result: Called once with the handle when the goal has ended, however it ended.
+        handles_failure: Whether `result` reports failures; otherwise they are logged.
     """
 
     response: Callable[[bool], object] = _ignore
@@ -72,24 +72,24 @@ class GoalCallbacks(NamedTuple):
 
 
 class GoalHandle(QtCore.QObject):
-    """A goal; JavaScript sees the same object everywhere, which stays until it has ended.
+    """A sent goal: the same object everywhere in JavaScript, kept until the goal has ended.
 
     Args:
         runtime: The engine's runtime.
         action: Name of the action, as in QML.
-        value: What is asked for.
-        callbacks: Called with its status, feedback and result.
-        dialect: Whose habits feedback and result follow.
-        patience: Milliseconds for a server to appear and to answer; 0 for ever.
-        forget: Called when it has ended.
+        value: The goal's fields.
+        callbacks: The callbacks for its status, feedback and result.
+        dialect: The module whose format feedback and result have.
+        patience: Milliseconds for a server to appear and to answer; 0 for no limit.
+        forget: Called when the goal has ended.
     """
 
-    #: With the new status. The status may stay the same while ``isActive`` changes.
+    #: The status, given as the argument, or ``isActive`` changed.
     statusChanged = Signal(int)
     goalIdChanged = Signal()
     feedbackChanged = Signal()
     resultChanged = Signal()
-    #: With the reason: it was to be cancelled, and for all that is known it goes on.
+    #: Cancelling failed, for this reason; as far as is known, the goal continues.
     cancelFailed = Signal(str)
 
     def __init__(
@@ -121,7 +121,7 @@ class GoalHandle(QtCore.QObject):
         state = self.__dict__
         self.destroyed.connect(lambda: let_go(state, _HELD))
 
-    # What QML sees.
+    # For QML.
 
     def _get_id(self) -> str:
         return self._goal.id_text if self._goal is not None else ""
@@ -156,7 +156,7 @@ class GoalHandle(QtCore.QObject):
 
     @Slot()
     def cancel(self) -> None:
-        """Ask the server to cancel it; a goal that was not sent yet is not sent at all."""
+        """Ask the server to cancel the goal; one that is still unsent is never sent."""
         caller = self._runtime.caller()
         if self._status is GoalStatus.LOST:
             reason = f"no further news of it will arrive: {self._reason}"
@@ -181,25 +181,25 @@ class GoalHandle(QtCore.QObject):
 
     @property
     def sent(self) -> bool:
-        """Whether it was handed over to a client of the node."""
+        """Whether the goal was passed to a client of the node."""
         return self._goal is not None
 
     @property
     def left(self) -> float | None:
-        """Seconds left for a server to answer, as errors show them; None for no limit."""
+        """Seconds left for a server to answer, as shown in errors; None for no limit."""
         if self._deadline is None:
             return None
         return round(max(0.0, self._deadline - time.monotonic()), 1)
 
     def start(self, client: ActionClient, executor: Executor) -> None:
-        """Send it, as soon as there is a server.
+        """Send the goal as soon as there is a server.
 
         Args:
-            client: A client that knows its type.
-            executor: The GUI thread's.
+            client: A client whose type is known.
+            executor: The executor of the GUI thread.
 
         Raises:
-            ConversionError: What is asked for does not fit.
+            ConversionError: The goal's fields do not match its type.
             Error: The client cannot send.
         """
         assert client.type is not None
@@ -220,9 +220,9 @@ class GoalHandle(QtCore.QObject):
         """End the goal and notify all listeners; only once.
 
         Args:
-            status: How.
-            result: The server's result; None when there is none.
-            reason: Why there is none.
+            status: The final status.
+            result: The server's result; None without one.
+            reason: Why there is no result.
         """
         if not is_alive(self) or self._over:
             return
@@ -230,7 +230,7 @@ class GoalHandle(QtCore.QObject):
         self._forget(self)
         self._answer(False)
         active, self._over, self._result = self._is_active(), True, result
-        # ROS 1 servers tell why.
+        # ROS 1 servers send the reason.
         self._reason = reason or getattr(self._goal, "text", "")
         if reason and not self._callbacks.handles_failure:
             text = named(self._action, Error(reason))
@@ -239,11 +239,11 @@ class GoalHandle(QtCore.QObject):
         self.resultChanged.emit()
         self._ended(js)
         self._callbacks.result(self)
-        # From here on it lives for as long as JavaScript holds it.
+        # From here on, only JavaScript keeps the handle alive.
         self.js, self._callbacks = QJSValue(), GoalCallbacks()
 
     def outcome(self) -> QJSValue:
-        """Return ``{goalId, code, result, reason}``; the result is empty when there is none."""
+        """Return ``{goalId, code, result, reason}``; without a result, `result` is empty."""
         runtime = self._runtime
         parts = {"goalId": self._get_id(), "code": int(status_code(self._status))}
         made = runtime.value({**parts, "reason": self._reason})
@@ -253,25 +253,25 @@ class GoalHandle(QtCore.QObject):
 
     @property
     def failure(self) -> str:
-        """Why there is no result; empty when there is one, or the goal has not ended."""
+        """Why there is no result; empty if there is one, or the goal has not ended."""
         return self._reason if self._result is None else ""
 
     def expire(self, reason: str) -> None:
-        """End the goal because its client is gone."""
+        """End the goal because its client no longer exists."""
         self.end(GoalStatus.LOST, None, reason)
 
-    # What others make of it.
+    # For subclasses.
 
     def _sent(self, goal: ClientGoal, executor: Executor) -> None:
-        """Take note that it was sent."""
+        """Handle that the goal was sent."""
 
     def _moved(self, status: GoalStatus) -> None:
-        """Take note of a new status."""
+        """Handle a new status."""
 
     def _ended(self, js: QJSValue) -> None:
-        """Take note that it has ended; `js` is the handle in JavaScript."""
+        """Handle the goal's end; `js` is the handle in JavaScript."""
 
-    # What happens to it.
+    # Events of the goal.
 
     @property
     def _label(self) -> str:
@@ -317,7 +317,7 @@ class GoalHandle(QtCore.QObject):
 
 
 def let_go(state: dict[str, object], names: Iterable[str]) -> None:
-    """Forget some attributes of an object that JavaScript has collected."""
+    """Delete some attributes of an object that JavaScript has collected."""
     for name in names:
         state.pop(name, None)
 
@@ -326,13 +326,13 @@ def tell_cancelling(answer: Promise[CancelAnswer], what: str, caller: Caller, re
     """Log that a request to cancel failed, or was refused.
 
     Args:
-        answer: The answer, which has come.
-        what: What was to be cancelled.
-        caller: Where in QML that was asked for.
-        refused: The level at which refusals are logged.
+        answer: The answer, already settled.
+        what: What should have been cancelled.
+        caller: The QML line of the request.
+        refused: The log level of refusals.
 
     Returns:
-        Why nothing is cancelled; empty when something is.
+        Why nothing is cancelled; empty if something is.
     """
     error = answer.exception(0)
     if error is not None:
@@ -346,7 +346,7 @@ def tell_cancelling(answer: Promise[CancelAnswer], what: str, caller: Caller, re
 
 
 _Comm, _Terminal = ActionCommStates.State, ActionTerminalStates.State
-#: A goal goes from one to a later one only.
+#: A goal only moves from a state to a later one.
 _ORDER = [
     _Comm.WAITING_FOR_GOAL_ACK,
     _Comm.PENDING,
@@ -360,7 +360,7 @@ _ORDER = [
 
 
 class RosGoalHandle(GoalHandle):
-    """A goal; the same object in every callback."""
+    """The handle of a sent goal in ``Ros 1.0``; the same object in every callback."""
 
     commStateChanged = Signal()
     terminalStateChanged = Signal()
@@ -368,7 +368,7 @@ class RosGoalHandle(GoalHandle):
 
     _comm = _Comm.WAITING_FOR_GOAL_ACK
     _expired = False
-    #: Whether the robot tells the states itself, as ROS 1 does.
+    #: Whether the robot reports the states itself, as in ROS 1.
     _native = False
 
     def _get_terminal(self) -> QJSValue:
@@ -394,15 +394,15 @@ class RosGoalHandle(GoalHandle):
 
     @Slot()
     def cancel(self) -> None:
-        """Ask the server to cancel it."""
+        """Ask the server to cancel the goal."""
         super().cancel()
-        # As with actionlib, at once; the robot tells what follows.
+        # Change the state immediately, like actionlib; the robot reports the next ones.
         if self.sent and not self._over:
             self._go(_Comm.WAITING_FOR_CANCEL_ACK)
 
     @Slot()
     def resend(self) -> None:
-        """Send it once more, for servers that may have missed it; only ROS 1 knows that."""
+        """Send the goal again, for servers that may have missed it; supported by ROS 1 only."""
         send: Any = getattr(self._goal, "resend", None)
         if self._expired:
             self._warn("resend", "it has expired: its client is gone")
@@ -415,7 +415,7 @@ class RosGoalHandle(GoalHandle):
                 self._warn("resend", str(error))
 
     def expire(self, reason: str) -> None:
-        """End the goal because its client is gone."""
+        """End the goal because its client no longer exists."""
         self._expired = True
         self.end(GoalStatus.LOST, None, reason)
         if is_alive(self):
@@ -433,7 +433,7 @@ class RosGoalHandle(GoalHandle):
             self._on_comm_state(goal.comm_state)  # type: ignore[attr-defined]
 
     def _on_comm_state(self, state: Any) -> None:
-        # The result comes after the state that says so, and is there once it is DONE.
+        # The result arrives after the terminal state, and is available once the state is DONE.
         if is_alive(self) and not self._over and state.name != "DONE":
             self._go(_Comm[state.name])
 
@@ -454,22 +454,22 @@ class RosGoalHandle(GoalHandle):
 
 #: Milliseconds after which a cancel request without effect is reported.
 _REMINDER = 5000
-#: Let go when JavaScript collects a handle: PySide 6.11 never frees the Python half.
+#: Released when JavaScript collects a handle: PySide 6.11 never frees the Python half.
 _SERVER_HELD = ("_goal", "_forget", "_type", "_asked")
 
 
 class ServerGoalHandle(QtCore.QObject):
-    """A goal that was accepted; JavaScript sees the same object everywhere.
+    """An accepted goal of a server; the same object everywhere in JavaScript.
 
     Args:
         runtime: The engine's runtime.
         goal: The goal.
         type: The action's type.
-        dialect: Whose habits its values follow.
-        forget: Called when it has ended.
+        dialect: The module whose format its values have.
+        forget: Called when the goal has ended.
     """
 
-    #: With the new status.
+    #: The status changed to the argument.
     statusChanged = Signal(int)
     cancelRequestedChanged = Signal()
 
@@ -487,7 +487,7 @@ class ServerGoalHandle(QtCore.QObject):
         self._asked: QJSValue | None = None
         self._abandoned = False
         self._caller = runtime.caller()
-        #: What the node waits for: the fields of the result, None when there is nothing to say.
+        #: The node waits for this: the fields of the result, or None for an empty result.
         self.ended: Future[Any] = Future()
         engine = runtime.engine
         #: Keeps JavaScript from collecting it before the goal has ended.
@@ -499,7 +499,7 @@ class ServerGoalHandle(QtCore.QObject):
         refresh = weak_callback(self.refresh)
         goal.cancel_request.on_done(lambda _: refresh(), runtime.session.executor)
 
-    # What QML sees.
+    # For QML.
 
     def _get_goal(self) -> QJSValue:
         if self._asked is None:
@@ -522,25 +522,25 @@ class ServerGoalHandle(QtCore.QObject):
 
     @Slot(QJSValue)
     def publishFeedback(self, feedback: QJSValue) -> None:
-        """Send feedback; a value that does not fit, or a goal that has ended, throws."""
+        """Send feedback; throws if the value is invalid or the goal has ended."""
         self._do("publishFeedback", self._goal.publish_feedback, self._type.feedback, feedback)
 
     @Slot()
     @Slot(QJSValue)
     def succeed(self, result: QJSValue | None = None) -> None:
-        """End it as done; throws when the result does not fit, or it has ended already."""
+        """End the goal as succeeded; throws if the result is invalid or the goal has ended."""
         self._do("succeed", self._goal.succeed, self._type.result, result)
 
     @Slot()
     @Slot(QJSValue)
     def abort(self, result: QJSValue | None = None) -> None:
-        """End it as failed; throws as :meth:`succeed`."""
+        """End the goal as aborted; throws like :meth:`succeed`."""
         self._do("abort", self._goal.abort, self._type.result, result)
 
     @Slot()
     @Slot(QJSValue)
     def canceled(self, result: QJSValue | None = None) -> None:
-        """End it as cancelled; throws as :meth:`succeed`, and without a cancel request."""
+        """End the goal as cancelled; throws like :meth:`succeed`, and without a cancel request."""
         self._do("canceled", self._goal.canceled, self._type.result, result)
 
     def _do(self, what: str, do: Callable[[Any], None], kind: Any, value: QJSValue | None) -> None:
@@ -553,7 +553,7 @@ class ServerGoalHandle(QtCore.QObject):
     # For its server.
 
     def take(self, answer: QJSValue) -> Any:
-        """Return the fields of the result from JavaScript; None for undefined.
+        """Return the result's fields from JavaScript; None for undefined.
 
         Raises:
             ConversionError: It does not fit.
@@ -580,17 +580,17 @@ class ServerGoalHandle(QtCore.QObject):
         self.refresh()
 
     def fail(self, error: BaseException) -> None:
-        """End it as failed."""
+        """End the goal as aborted."""
         if not self.ended.done() and not self._abandoned:
             self.ended.set_exception(error)
         self.refresh()
 
     def abandon(self) -> None:
-        """Take note that its server is about to close, which aborts it."""
+        """Handle that its server is about to close, which aborts the goal."""
         self._abandoned = True
 
     def refresh(self) -> None:
-        """Announce what has changed."""
+        """Emit the signals of everything that has changed."""
         if "_goal" not in self.__dict__:
             return
         status = self._goal.status

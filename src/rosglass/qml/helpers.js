@@ -1,8 +1,8 @@
-// What message values are made of on the JavaScript side; evaluated once per QML engine.
+// The JavaScript side of message values; evaluated once per QML engine.
 (function (makeTimes, makeArrays, host, qt5) {
     "use strict"
 
-    // Longer arrays take too long to be made whole.
+    // Converting longer arrays at once takes too long.
     const MOST_VALUES = 65536, MOST_MESSAGES = 1024
 
     function prototype(parent, members) {
@@ -12,13 +12,13 @@
         return made
     }
 
-    // How often a name was read that a type does not have. Interfaces read such names to find out
-    // whether they are there; only the first readings cost a look at what may be meant.
+    // Limits for reads of fields that a type does not have. Interfaces read such names to test for
+    // their existence; similar names are searched only for the first reads.
     const MOST_READ = 100, MOST_NAMES = 1000
     const absent = new Map()
 
     function readAbsent(value, name) {
-        // JavaScript asks any object for the latter two.
+        // JavaScript reads the latter two from any object.
         if (name[0] === "#" || name === "toJSON" || name === "then") return undefined
         const type = value["#messageType"] || value["#kind"]
         const key = type + "." + name, count = absent.get(key) || 0
@@ -29,14 +29,14 @@
         return undefined
     }
 
-    // What all messages and times inherit from: asked for what neither they nor objects have.
+    // The base of all messages and times: handles reads of names that neither they nor Object have.
     const base = Object.create(new Proxy(Object.prototype, {
         get: function (target, name, receiver) {
             if (name === "__proto__") return Object.getPrototypeOf(receiver)
             return typeof name !== "string" || name in target ? target[name] : readAbsent(receiver, name)
         }
     }))
-    // Qt's engine takes a Proxy for a function, and finds what functions have (`name`) before it asks.
+    // Qt's engine treats a Proxy as a function, and finds members of functions (`name`) first.
     for (const name of Object.getOwnPropertyNames(Function.prototype)) {
         if (name in Object.prototype) {
             Object.defineProperty(base, name, { value: Object.prototype[name], writable: true, configurable: true })
@@ -63,9 +63,9 @@
     const times = makeTimes(prototype, host, base)
     const arrays = makeArrays(prototype, host)
 
-    // A type's shape: its prototype, and which of its fields need more than JSON.parse gives.
-    // Each field is [name, kind of array element or "", shape of the compound or null]. Times have
-    // a prototype of their own; `id` is what `host` knows the type by.
+    // A type's shape: its prototype, and the fields for which JSON.parse is not enough. Each field
+    // is [name, type of array element or "", shape of the compound or null]. Times have their own
+    // prototype; `id` is the type's number in `host`.
     function shape(name, time, fields, constants, id) {
         const parent = time ? times.kinds[time] : base
         const members = Object.assign({}, constants)
@@ -73,7 +73,7 @@
         return { proto: prototype(parent, members), fields: fields, id: id }
     }
 
-    // A long array that is made whole when it is read: QML files on Qt 5 see 0 as a Proxy's length.
+    // A long array that is converted when it is read: in QML files on Qt 5, a Proxy's length is 0.
     function whenRead(value, name, source, index, length, kind, shape) {
         function keep(array) {
             Object.defineProperty(value, name, { value: array, writable: true, enumerable: true, configurable: true })

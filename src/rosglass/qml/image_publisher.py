@@ -1,4 +1,4 @@
-"""The element ``ImagePublisher``: what an item shows, as a topic of pictures."""
+"""The element ``ImagePublisher``: publishes an item's appearance as images."""
 # ruff: noqa: N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -33,28 +33,28 @@ if TYPE_CHECKING:
 
 __all__ = ["GRABBED", "ImagePublisher", "ItemGrab", "RosImagePublisher", "pixels_of"]
 
-#: Encodings that a grabbed picture can be turned into: Qt's format, and channels.
+#: Encodings that a grabbed picture can be converted to: Qt's format, and channels.
 GRABBED = {
     "rgb8": ("Format_RGB888", 3),
     "bgr8": ("Format_BGR888", 3),
     "rgba8": ("Format_RGBA8888", 4),
     "mono8": ("Format_RGB888", 1),
 }
-#: Shares of red, green and blue in grey (ITU-R BT.601), as OpenCV and ROS's drivers have them.
+#: Weights of red, green and blue in grey (ITU-R BT.601), as in OpenCV and ROS's drivers.
 _GREY = (0.299, 0.587, 0.114)
 
 
 class ItemGrab:
-    """One picture of an item, taken with the next frame of its renderer.
+    """A grab of one picture of an item, with the next frame of its renderer.
 
     Args:
         item: The item.
-        size: Width and height of the picture in pixels; None for the item's on the screen.
+        size: Width and height of the picture in pixels; None for the item's size on the screen.
         done: Called with the picture, on the GUI thread.
 
     Attributes:
-        problem: Why there will be no picture; empty when one can come.
-        size: Width and height that the picture shall have, pixels.
+        problem: Why there will be no picture; empty if one is possible.
+        size: Requested width and height of the picture, pixels.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class ItemGrab:
         if min(self.size) < 1:
             self.problem = f"the item is {item.width():g}x{item.height():g} pixels"
             return
-        # Qt 6 multiplies what it is asked for by the ratio, Qt 5 does not.
+        # Qt 6 multiplies the requested size by the ratio, Qt 5 does not.
         scale = ratio if QT6 else 1.0
         wanted = QtCore.QSize(*(max(1, -(-side // scale)) for side in self.size))
         result: Any = item.grabToImage(wanted)
@@ -89,7 +89,7 @@ class ItemGrab:
 
     @property
     def is_possible(self) -> bool:
-        """Whether the picture is still possible: the item exists, in the same window."""
+        """Whether the picture is still possible: the item exists and is in the same window."""
         return self._result is not None and is_alive(self._item) and is_alive(self.window)
 
     def cancel(self) -> None:
@@ -103,13 +103,13 @@ class ItemGrab:
 
 
 def pixels_of(image: QtGui.QImage, size: tuple[int, int], encoding: str) -> NDArray[Any]:
-    """Return the pixels of a grabbed picture; on any thread.
+    """Return the pixels of a grabbed picture; thread-safe.
 
-    Where an encoding has no transparency, what is transparent is black.
+    If the encoding has no transparency, transparent areas become black.
 
     Args:
-        image: What was grabbed.
-        size: Width and height wanted, pixels.
+        image: The grabbed picture.
+        size: Requested width and height, pixels.
         encoding: One of :data:`GRABBED`.
 
     Returns:
@@ -124,7 +124,7 @@ def pixels_of(image: QtGui.QImage, size: tuple[int, int], encoding: str) -> NDAr
         image = image.scaled(*size, modes, smooth)
     name, channels = GRABBED[encoding]
     if encoding != "rgba8" and image.hasAlphaChannel():
-        # Premultiplied colours without their alpha are the picture before black.
+        # Premultiplied colours without alpha are the picture on a black background.
         image = image.convertToFormat(formats.Format_ARGB32_Premultiplied)
         image.reinterpretAsFormat(formats.Format_RGB32)
     image = image.convertToFormat(getattr(formats, name))
@@ -142,7 +142,7 @@ _INFO = "sensor_msgs/msg/CameraInfo"
 _MAX_RATE, _MAX_SIDE = 120.0, 16384
 #: Seconds after which a window that is not drawn is reported.
 _DRAW_TIMEOUT_S = 2.0
-#: Pictures over which the frequency is taken.
+#: Number of pictures over which the frequency is measured.
 _MARKS = 30
 
 
@@ -172,7 +172,7 @@ def _object(value: QJSValue) -> QJSValue:
 
 
 class ImagePublisher(Element):
-    """Publishes an item as pictures. See its page in ``docs/elements``."""
+    """Publishes an item as images. See its page in ``docs/elements``."""
 
     source = Writable(QtCore.QObject, None, _item, then="_abandon")
     topic = Writable(str, "")
@@ -186,7 +186,7 @@ class ImagePublisher(Element):
     size = Writable(QtCore.QSize, QtCore.QSize(), _size, then="")
     cameraInfo = Writable(QJSValue, None, _object, then="_on_info_changed")
     enabled = Writable(bool, True)
-    #: Whether to publish without subscribers, too.
+    #: Whether to publish even without subscribers.
     always = Writable(bool, False, then="")
     publishing = ReadOnly(bool, False)
     frequency = ReadOnly(float, 0.0, tolerance=0.01)
@@ -253,10 +253,10 @@ class ImagePublisher(Element):
 
     @Slot(result=bool)
     def publish(self) -> bool:
-        """Publish a picture of the item as it is drawn next.
+        """Publish a picture of the item when it is next drawn.
 
         Returns:
-            Whether one will be published; not without subscribers, unless :attr:`always`.
+            Whether one will be published; without subscribers, only if :attr:`always` is set.
         """
         if self._endpoint is not None:
             if not self._is_wanted() or self._take():
@@ -284,7 +284,7 @@ class ImagePublisher(Element):
             self._take()
 
     def _take(self) -> bool:
-        """Take a picture, or another one after the one that is being taken; False if impossible."""
+        """Start a grab, or queue one after the current grab; return False if impossible."""
         node, source = self.node, self._source
         if node is None or not is_alive(source):
             self._set_problem("ImagePublisher: there is no source" if node is not None else "")
@@ -388,7 +388,7 @@ class ImagePublisher(Element):
         self._measure()
 
     def _measure(self) -> None:
-        """Announce the rate of published pictures, and whether one is overdue."""
+        """Report the rate of published pictures, and whether one is overdue."""
         now, sent = time.monotonic(), self._sent
         age = now - sent[-1] if sent else math.inf
         longest = max(1.0, 3 / self.rate if self.rate else 0.0)
@@ -400,7 +400,7 @@ class ImagePublisher(Element):
 
 
 class _Publishers:
-    """The publishers of pictures and, where wanted, of camera information.
+    """The publishers of pictures and, if wanted, of camera information.
 
     Args:
         node: The node.
@@ -418,7 +418,7 @@ class _Publishers:
         self.pictures = node.create_publisher(name, _IMAGE if raw else _COMPRESSED, 1)
         self.info: Publisher | None = None
         if info:
-            # Where image_transport's camera subscribers look for it.
+            # The topic on which image_transport's camera subscribers expect it.
             sibling = f"{base.rpartition('/')[0]}/camera_info"
             try:
                 self.info = node.create_publisher(sibling, _INFO, 1)
@@ -427,12 +427,12 @@ class _Publishers:
                 raise
 
     def has_subscriber(self) -> bool:
-        """Return whether a subscription matches; raises Error when the node is closed."""
+        """Return whether a subscription matches; raises Error if the node is closed."""
         publishers = (self.pictures, self.info)
         return any(one.subscription_count() for one in publishers if one is not None)
 
     def close(self) -> None:
-        """Close both."""
+        """Close both publishers."""
         self.pictures.close()
         if self.info is not None:
             self.info.close()
@@ -446,7 +446,7 @@ def _fields(
     kind: str,
     quality: int,
 ) -> dict[str, Any]:
-    """Return the fields of a picture's message besides its header; on any thread."""
+    """Return the fields of a picture's message except its header; thread-safe."""
     pixels = pixels_of(image, size, encoding)
     if transport == "compressed":
         from rosglass.images.compressed import compress  # noqa: PLC0415 - needs numpy

@@ -1,4 +1,4 @@
-"""Received pictures as video frames and images for displays, each step done once."""
+"""Converts received pictures to video frames and images for displays, each step only once."""
 
 from __future__ import annotations
 
@@ -55,17 +55,17 @@ if _MULTIMEDIA is not None and QT6:
         PixelFormat.NV12: _names.Format_NV12,
         PixelFormat.NV21: _names.Format_NV21,
     }
-#: What can be painted.
+#: Encodings that can be painted.
 IMAGE_FORMATS = frozenset(_IMAGE)
-#: What a video sink takes; empty without QtMultimedia. PySide2 cannot fill the planes of a frame,
-#: so there it goes by way of an image.
+#: Encodings for video sinks; empty without QtMultimedia. PySide2 cannot fill the planes of a
+#: frame, so it needs an image first.
 VIDEO_FORMATS = frozenset(_VIDEO if QT6 or _MULTIMEDIA is None else _IMAGE)
 
 
 def to_image(frame: Frame) -> QtGui.QImage:
     """Return a frame as an image that shares its memory."""
     plane = frame.planes[0]
-    # Rows of an image begin at multiples of 4 bytes.
+    # Rows of a QImage start at multiples of 4 bytes.
     if plane.strides[0] % 4 or not plane.flags.c_contiguous:
         padded = np.zeros((plane.shape[0], -(-plane.shape[1] // 4) * 4), np.uint8)
         padded[:, : plane.shape[1]] = plane
@@ -76,10 +76,9 @@ def to_image(frame: Frame) -> QtGui.QImage:
 
 
 class VideoFrame:
-    """A video frame in the making; usable from any thread.
+    """Builds a video frame; usable from any thread.
 
-    Pass :attr:`allocate` to :func:`rosglass.images.convert`, and what that returns to
-    :meth:`finish`.
+    Pass :attr:`allocate` to :func:`rosglass.images.convert`, and the result to :meth:`finish`.
 
     Raises:
         UnsupportedError: QtMultimedia is not installed.
@@ -92,11 +91,11 @@ class VideoFrame:
                 'pip install "rosglass[camera]", or show the picture in an ImageItem'
             )
         self._video: Any = None
-        #: Gives the memory of a new RGBX frame; None where Qt does not let it be filled.
+        #: Returns the memory of a new RGBX frame; None if Qt does not allow filling it.
         self.allocate = self._allocate if QT6 else None
 
     def finish(self, frame: Frame) -> Any:
-        """Return the ``QVideoFrame`` of `frame`, copying only what is not in it already."""
+        """Return `frame` as a ``QVideoFrame``, copying only planes that are not in it already."""
         if not QT6:
             kinds = (_ImageFormat.Format_RGB32, _ImageFormat.Format_ARGB32)
             image = to_image(frame).convertToFormat(kinds[frame.has_alpha])
@@ -116,7 +115,7 @@ class VideoFrame:
         return video
 
     def _allocate(self, width: int, height: int) -> NDArray[np.uint8]:
-        """Return the memory of a new RGBX frame, as rows x columns x 4."""
+        """Return the memory of a new RGBX frame, as an array of rows x columns x 4."""
         memory, stride = self._map(PixelFormat.RGBX, width, height)[0]
         pixels: NDArray[np.uint8] = np.ndarray(
             (height, width, 4), np.uint8, memory, 0, (stride, 4, 1)
@@ -124,7 +123,7 @@ class VideoFrame:
         return pixels
 
     def _map(self, format: PixelFormat, width: int, height: int) -> list[tuple[Any, int]]:
-        """Make the frame and return memory and stride of each of its planes."""
+        """Create the frame and return the memory and stride of each of its planes."""
         layout = _MULTIMEDIA.QVideoFrameFormat(QtCore.QSize(width, height), _VIDEO[format])
         video = _MULTIMEDIA.QVideoFrame(layout)
         if not video.map(_MULTIMEDIA.QVideoFrame.MapMode.WriteOnly):
@@ -141,24 +140,24 @@ class VideoFrame:
 
 
 _WHOLE = View()
-#: How much smaller than its place on the screen a picture may become.
+#: Factor by which a reduced picture may be smaller than its size on the screen.
 _UNSEEN = 1.05
-#: Settings of colours whose automatic range is remembered; a slider makes many.
+#: Maximum number of colour settings whose automatic range is kept; a slider creates many.
 _MOST_COLORS = 8
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """The view that a viewer shows; viewers with equal looks share their pictures.
+    """The settings of a viewer's view; viewers with equal looks share their pictures.
 
     Attributes:
-        video: Whether it takes video frames; otherwise it takes images.
-        view: Which part, and how it is turned.
-        colors: Colour map, nearest and farthest depth for pictures of depths; None for greys.
-        interval: Seconds between two pictures, 0 for all of them.
-        room: Width and height that the picture has on the screen, before it is turned; larger
-            ones are reduced to about that. None leaves them as they are.
-        painted: Whether it takes an image besides each video frame, which nothing else draws.
+        video: Whether the viewer needs video frames; otherwise images.
+        view: The visible part and its rotation.
+        colors: Colour map, nearest and farthest depth for depth images; None for grey.
+        interval: Seconds between two pictures; 0 for all pictures.
+        room: Width and height of the picture on the screen, pixels, before rotation; larger
+            pictures are reduced to about this size. None keeps their size.
+        painted: Whether each video frame also needs an image, because only images are drawn.
     """
 
     video: bool = True
@@ -170,11 +169,11 @@ class Look:
 
     @property
     def kinds(self) -> set[bool]:
-        """What is taken: true for video frames, false for images."""
+        """The formats that are needed: true for video frames, false for images."""
         return {self.video, self.video and not self.painted}
 
     def factor(self, image: RawImage) -> int:
-        """Return by which factor a picture can be made smaller without being seen to be."""
+        """Return the factor by which a picture can be reduced without a visible difference."""
         if self.room is None or self.view.region is not None or self.view.zoom > 1:
             return 1
         ratio = min(image.width / self.room[0], image.height / self.room[1])
@@ -183,16 +182,16 @@ class Look:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture as it is handed to viewers.
+    """A converted picture for viewers.
 
     Attributes:
-        frame: Its size, encoding and stamps; its planes may be the memory of `video`.
-        video: The ``QVideoFrame``; None when not wanted.
-        image: The ``QImage``; None when not wanted.
-        received: When it arrived.
-        late: Seconds that it was kept back on its way.
-        made: When it was ready, seconds of the clock that ages are measured by.
-        whole: What was received, when `frame` is smaller.
+        frame: Its size, encoding and stamps; its planes may share the memory of `video`.
+        video: The ``QVideoFrame``; None if not needed.
+        image: The ``QImage``; None if not needed.
+        received: Time of arrival.
+        late: Seconds that it was delayed in transit.
+        made: When it was ready, in seconds of the clock that measures ages.
+        whole: The received picture, if `frame` is smaller.
     """
 
     frame: Frame
@@ -205,41 +204,41 @@ class Picture:
 
 
 def whole_frame(picture: Picture, look: Look) -> Frame:
-    """Return a picture as a viewer sees it, with all the pixels that were received."""
+    """Return a picture as a viewer shows it, at the received resolution."""
     if picture.whole is None:
         return picture.frame
     return look.view.apply(convert(picture.whole, IMAGE_FORMATS, picture.received))
 
 
 class Renderer:
-    """Makes the pictures of one stream; used by its thread only.
+    """Converts the pictures of one stream; used by its thread only.
 
     Args:
-        clock: The clock that ages are measured by.
+        clock: The clock that measures ages.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
-        #: The colours of depths follow the pictures: each setting has its own.
+        #: The depth colours adapt to the pictures, separately for each setting.
         self._colors: dict[Any, DepthColors] = {}
 
     def render(
         self, image: RawImage, received: Time, late: float, looks: Iterable[Look]
     ) -> tuple[dict[Look, Picture], dict[Look, str]]:
-        """Make the pictures that are wanted.
+        """Convert a picture for each of the given looks.
 
         Args:
             image: The picture as received.
-            received: When it arrived.
-            late: Seconds that it was kept back on its way.
-            looks: What is wanted.
+            received: Time of arrival.
+            late: Seconds that it was delayed in transit.
+            looks: The wanted looks.
 
         Returns:
-            The pictures, and for looks that this one cannot be shown with, why.
+            The pictures, and the reasons for looks that this picture cannot be shown with.
 
         Raises:
-            DecodeError: The picture contradicts itself.
-            UnsupportedError: It cannot be shown at all.
+            DecodeError: The picture is inconsistent.
+            UnsupportedError: The picture cannot be shown at all.
         """
         groups: dict[Any, dict[View, list[Look]]] = {}
         for look in looks:
@@ -250,7 +249,7 @@ class Renderer:
         for (colors, factor), views in groups.items():
             small = reduce(image, factor)
             kinds = {kind for members in views.values() for look in members for kind in look.kinds}
-            # What is shown as it is can be converted where the display wants it.
+            # An unmodified picture can be converted directly into the display's memory.
             straight = VideoFrame() if kinds == {True} and [*views] == [_WHOLE] else None
             frame = self._convert(small, received, colors, kinds, straight)
             for view, members in views.items():

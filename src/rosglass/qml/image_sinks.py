@@ -1,4 +1,4 @@
-"""What shows pictures: a video sink (Qt 6), a video surface (Qt 5), or an :class:`ImageItem`."""
+"""Sinks that show pictures: video sinks (Qt 6), video surfaces (Qt 5), and :class:`ImageItem`."""
 # ruff: noqa: N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ __all__ = ["ImageItem", "Sink", "all_items", "is_painted", "window_of"]
 
 
 def window_of(item: QtQuick.QQuickItem) -> QtQuick.QQuickWindow | None:
-    """Return the window that an item is in, None when it is in none.
+    """Return the window that an item is in, or None.
 
-    PySide takes an item for the owner of what ``item.window()`` gives: with the item's wrapper that
-    of the window would be destroyed, other references or not.
+    PySide treats the item as the owner of the result of ``item.window()``: it would destroy the
+    window's wrapper together with the item's, despite other references.
     """
     for window in QtGui.QGuiApplication.allWindows():
         if isinstance(window, QtQuick.QQuickWindow):
@@ -34,7 +34,7 @@ def window_of(item: QtQuick.QQuickItem) -> QtQuick.QQuickWindow | None:
 
 
 def all_items() -> Iterator[QtQuick.QQuickItem]:
-    """Iterate over the items of all windows."""
+    """Yield the items of all windows."""
     for window in QtGui.QGuiApplication.allWindows():
         items = [window.contentItem()] if isinstance(window, QtQuick.QQuickWindow) else []
         while items:
@@ -44,14 +44,14 @@ def all_items() -> Iterator[QtQuick.QQuickItem]:
 
 
 def is_painted(window: QtQuick.QQuickWindow) -> bool:
-    """Return whether Qt's software renderer draws a window, which draws no video and no shaders."""
+    """Return whether Qt's software renderer, without video and shaders, draws a window."""
     kinds = QtQuick.QSGRendererInterface.GraphicsApi
     return window.rendererInterface().graphicsApi() in (kinds.Software, kinds.OpenVG)
 
 
-#: The QML file of what paints a VideoOutput's pictures.
+#: The QML file of the item that paints a VideoOutput's pictures.
 _PAINTED_VIDEO = Path(__file__).with_name("PaintedVideo.qml")
-#: Pixels to which the size of an item is rounded up: resizing it changes little.
+#: An item's size is rounded up to multiples of this, in pixels, so that resizing has few steps.
 _STEP = 8
 _NOT_DRAWN = "Qt's software renderer draws no VideoOutput, and its pictures cannot be painted"
 
@@ -59,15 +59,15 @@ _NOT_DRAWN = "Qt's software renderer draws no VideoOutput, and its pictures cann
 class Sink:
     """Shows the pictures of one viewer; used on the GUI thread.
 
-    A VideoOutput draws with the graphics card only. In a window that Qt's software renderer draws,
-    an :class:`ImageItem` inside it paints the pictures that its video sink gets.
+    A VideoOutput needs the graphics card. In a window that Qt's software renderer draws, an
+    :class:`ImageItem` inside it paints the pictures of its video sink.
 
     Args:
-        item: What QML gave.
-        source: The element whose pictures it shows, by which Qt 5's VideoOutput is found.
+        item: The value of ``videoSink`` or ``videoSurface`` in QML.
+        source: The element whose pictures it shows; used to find Qt 5's VideoOutput.
 
     Raises:
-        UnsupportedError: It shows no pictures.
+        UnsupportedError: The item cannot show pictures.
     """
 
     def __init__(self, item: QtCore.QObject, source: QtCore.QObject | None = None) -> None:
@@ -75,7 +75,7 @@ class Sink:
         self._multimedia = multimedia
         self.item: Any = item
         self._source = source
-        #: Whether it takes video frames; otherwise it takes images.
+        #: Whether the sink takes video frames; otherwise it takes images.
         self.takes_video = not isinstance(item, ImageItem)
         kind = "QVideoSink" if QT6 else "QAbstractVideoSurface"
         video = multimedia is not None and isinstance(item, getattr(multimedia, kind))
@@ -91,13 +91,13 @@ class Sink:
 
     @property
     def is_alive(self) -> bool:
-        """Whether it still exists."""
+        """Whether the item still exists."""
         return is_alive(self.item)
 
     def room(self) -> tuple[int, int] | None:
-        """Return the width and height in pixels that it has on the screen, rounded up generously.
+        """Return its width and height on the screen in pixels, rounded up; None if unknown.
 
-        None when that is unknown: it cannot be said where the pictures are shown.
+        The size is unknown if the item that shows the pictures cannot be found.
         """
         item = self.item if isinstance(self.item, ImageItem) else self.item.parent()
         window = window_of(item) if isinstance(item, QtQuick.QQuickItem) else None
@@ -114,16 +114,16 @@ class Sink:
         return (sides[1], sides[0]) if turned else (sides[0], sides[1])
 
     def is_painted(self) -> bool:
-        """Return whether a video sink's pictures have to be painted to be seen."""
+        """Return whether a video sink's pictures must be painted to be visible."""
         output = self._find_output() if self.takes_video else None
         window = window_of(output) if output is not None else None
         return window is not None and is_painted(window)
 
     def show(self, picture: Picture) -> bool:
-        """Show a picture; return false when it was made for another kind of sink.
+        """Show a picture; return false if it was made for another type of sink.
 
         Raises:
-            UnsupportedError: The surface takes no such pictures.
+            UnsupportedError: The surface does not accept such pictures.
         """
         painted = self.is_painted()
         made = picture.video if self.takes_video else picture.image
@@ -142,7 +142,7 @@ class Sink:
         return True
 
     def clear(self) -> None:
-        """Take the picture off the screen; what shows it keeps its implicit size."""
+        """Remove the picture from the screen; the item keeps its implicit size."""
         if is_alive(self._painter):
             self._painter.present(None)
         if not self.is_alive:
@@ -161,14 +161,14 @@ class Sink:
             output.setImplicitHeight(size[1])
 
     def _find_output(self) -> Any:
-        """Return the VideoOutput that a video sink belongs to; None as long as none is found."""
+        """Return the VideoOutput that a video sink belongs to; None until it is found."""
         if not is_alive(self._output):
             self._output = None
             if QT6:
                 owner = self.item.parent()
                 self._output = owner if isinstance(owner, QtQuick.QQuickItem) else None
             elif self._source is not None:
-                # Qt 5's surface does not say whose it is.
+                # Qt 5's surface has no reference to its owner.
                 self._output = next(
                     (
                         item
@@ -181,10 +181,10 @@ class Sink:
         return self._output
 
     def _find_painter(self) -> Any:
-        """Return what paints in a VideoOutput, made at the first picture.
+        """Return the item that paints in a VideoOutput; created for the first picture.
 
         Raises:
-            UnsupportedError: The VideoOutput belongs to no engine that has our types.
+            UnsupportedError: The VideoOutput's engine does not have our types.
         """
         if not is_alive(self._painter):
             context = QtQml.QQmlEngine.contextForObject(self._output)
@@ -192,7 +192,7 @@ class Sink:
             if engine is None:
                 raise UnsupportedError(f"{_NOT_DRAWN}: it is in no QML engine; use an ImageItem")
             url = QtCore.QUrl.fromLocalFile(str(_PAINTED_VIDEO))
-            # As long as its item: dropping it destroys that.
+            # Keep the component as long as its item: dropping it destroys the item.
             self._component = QtQml.QQmlComponent(engine, url)
             painter: Any = self._component.create()
             if painter is None:
@@ -218,9 +218,9 @@ class Sink:
 
 
 class ImageItem(QtQuick.QQuickPaintedItem):
-    """An item that paints the newest picture it was given.
+    """An item that paints the newest picture.
 
-    Stands in for a VideoOutput where that shows nothing: software rendering, offscreen, overlays,
+    Replaces a VideoOutput where that shows nothing: software rendering, offscreen, overlays,
     installations without QtMultimedia. It is its own ``videoSink``.
     """
 
@@ -230,7 +230,7 @@ class ImageItem(QtQuick.QQuickPaintedItem):
 
     @QtCore.QEnum
     class FillMode(IntEnum):
-        """How a picture of another shape fills the item; VideoOutput's names and numbers."""
+        """How a picture of another shape fills the item; names and numbers of VideoOutput."""
 
         Stretch = 0
         PreserveAspectFit = 1
@@ -241,12 +241,12 @@ class ImageItem(QtQuick.QQuickPaintedItem):
         self._image: QtGui.QImage | None = None
         self._fill = int(self.FillMode.PreserveAspectFit)
         self._source: QtCore.QObject | None = None
-        # PySide 6.11 never frees the Python half of what QML has made.
+        # PySide 6.11 never frees the Python half of an object created by QML.
         state = self.__dict__
         self.destroyed.connect(lambda: state.update(_image=None, _source=None))
 
     def present(self, image: QtGui.QImage | None) -> None:
-        """Show an image; None clears the item. On the GUI thread only."""
+        """Show an image, or clear the item with None; on the GUI thread only."""
         had = self._image is not None
         self._image = image
         if had != (image is not None):
@@ -263,7 +263,7 @@ class ImageItem(QtQuick.QQuickPaintedItem):
         painter.drawImage(target, image, source)
 
     def _place(self, image: QtGui.QImage) -> tuple[QtCore.QRectF, QtCore.QRectF]:
-        """Return the target rectangle, and the part of the picture that is drawn there."""
+        """Return the target rectangle and the part of the picture drawn in it."""
         width, height = self.width(), self.height()
         whole = QtCore.QRectF(0, 0, image.width(), image.height())
         target = QtCore.QRectF(0, 0, width, height)
@@ -290,7 +290,7 @@ class ImageItem(QtQuick.QQuickPaintedItem):
         if source is self._source:
             return
         before = self._source
-        # At the end of an interface, QML may take the source away before this.
+        # When an interface ends, QML may destroy the source before this item.
         if before is not None and is_alive(before) and before.property("videoSink") is self:
             before.setProperty("videoSink", None)
         self._source = source

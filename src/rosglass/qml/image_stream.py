@@ -1,4 +1,4 @@
-"""One camera stream for all the viewers of a session."""
+"""Camera streams, each shared by all its viewers in a session."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 __all__ = ["SharedStream", "Viewer"]
 
-#: Milliseconds that a stream without viewers stays subscribed: changing pages costs nothing.
+#: Milliseconds that a stream without viewers stays subscribed, so that changing pages is cheap.
 _LINGER = 1000
 _RATE_WINDOW, _LATENCY_WINDOW = 30, 10
-#: By how much pictures must be wanted more rarely than they can be had before they are fetched
+#: Factor by which the wanted interval must exceed the possible one before pictures are fetched
 #: one by one.
 _HYSTERESIS = 1.1
-#: What remains of the price of fetching after each picture that was not fetched.
+#: Decay of the estimated cost of fetching, per picture that was not fetched.
 _FORGETTING = 0.9
 
 
@@ -40,32 +40,32 @@ class Viewer(Protocol):
         """Show a picture."""
 
     def stream_changed(self) -> None:
-        """Look at the stream's problem, transport and so on again."""
+        """Read the stream's problem, transport and so on again."""
 
 
 class Channel:
-    """The viewers of a stream that want the same, of which each picture is made once.
+    """The viewers of a stream with the same look; each picture is converted once for all of them.
 
     Args:
-        look: What they want.
+        look: Their look.
     """
 
     def __init__(self, look: Look) -> None:
         self.look = look
         self.viewers: list[Viewer] = []
-        #: The newest picture shown, for viewers that come later.
+        #: The newest picture shown, for viewers that join later.
         self.last: Picture | None = None
-        #: Why pictures that can be shown cannot be shown like this; empty when they can.
+        #: Why the pictures cannot be shown with this look, though with others; empty if they can.
         self.problem = ""
         self._due = 0.0
         self._arrivals: deque[float] = deque(maxlen=_RATE_WINDOW)
 
     def is_due(self, now: float) -> bool:
-        """Return whether a picture is wanted."""
+        """Return whether the next picture is due."""
         return now >= self._due
 
     def take(self, now: float) -> None:
-        """Count a picture, so that the mean rate stays within the requested one."""
+        """Count a picture, so that the mean rate does not exceed the requested one."""
         interval = self.look.interval
         self._due = (self._due if now - self._due < interval else now) + interval
 
@@ -84,7 +84,7 @@ class Channel:
 
 @dataclass(slots=True)
 class _Pending:
-    """What the stream's thread has for the GUI thread."""
+    """Results of the stream's thread for the GUI thread."""
 
     pictures: dict[Channel, Picture]
     received: Time
@@ -94,16 +94,16 @@ class _Pending:
 class SharedStream(QtCore.QObject):
     """An :class:`ImageStream` and its viewers; lives on the GUI thread.
 
-    The newest picture wins: one that the GUI thread has not taken before the next one is ready is
-    dropped and counted. While all viewers want fewer pictures than the camera sends, they are
-    fetched one by one, at times that the session's load balancer gives.
+    The newest picture wins: a picture that the GUI thread has not taken before the next is ready is
+    dropped and counted. While all viewers want fewer pictures than the camera sends, pictures are
+    fetched one by one, at times scheduled by the session's load balancer.
     """
 
     def __init__(self, session: Session, node: Node, topic: str, preferred: str) -> None:
         super().__init__(session)
         self._session = session
         self._key = (node, topic, preferred)
-        #: Replaced, never changed: the stream's thread reads it.
+        #: Replaced instead of modified, because the stream's thread reads it.
         self._channels: tuple[Channel, ...] = ()
         self._renderer = Renderer(session.steady)
         self._lock = threading.Lock()
@@ -112,9 +112,9 @@ class SharedStream(QtCore.QObject):
         self._network: deque[float] = deque(maxlen=_LATENCY_WINDOW)
         self._processing: deque[float] = deque(maxlen=_LATENCY_WINDOW)
         self._total: deque[float] = deque(maxlen=_LATENCY_WINDOW)
-        #: Seconds between two pictures that satisfy all viewers; 0 when one wants all.
+        #: Seconds between two pictures that satisfy all viewers; 0 if one viewer wants all.
         self._interval = 0.0
-        #: Seconds between two pictures when none are left out, and those that fetching one takes.
+        #: Seconds between two pictures when all are received, and seconds that fetching one takes.
         self._period = self._price = 0.0
         self._asked: float | None = None
         self._last_stamp: Time | None = None
@@ -137,7 +137,7 @@ class SharedStream(QtCore.QObject):
     def join(
         cls, session: Session, node: Node, topic: str, preferred: str, look: Look, viewer: Viewer
     ) -> SharedStream:
-        """Return the stream of a camera with `viewer` among its viewers.
+        """Add `viewer` to the stream of a camera, created if needed; return the stream.
 
         Raises:
             InvalidNameError: The topic name breaks ROS's rules.
@@ -152,7 +152,7 @@ class SharedStream(QtCore.QObject):
         return made
 
     def change_look(self, viewer: Viewer, look: Look) -> None:
-        """Change the view of a viewer, from the next picture on."""
+        """Change a viewer's look from the next picture on."""
         self._take_out(viewer)
         channel = next((c for c in self._channels if c.look == look), None)
         if channel is None:
@@ -162,14 +162,14 @@ class SharedStream(QtCore.QObject):
         self._look_at_channels()
 
     def leave(self, viewer: Viewer) -> None:
-        """Remove a viewer; the stream ends some time after the last one."""
+        """Remove a viewer; the stream ends a while after the last one has left."""
         self._take_out(viewer)
         self._look_at_channels()
         if not self._channels:
             self._linger.start()
 
     def channel(self, viewer: Viewer) -> Channel | None:
-        """Return the channel that a viewer belongs to."""
+        """Return the channel of a viewer."""
         return next((c for c in self._channels if viewer in c.viewers), None)
 
     def close(self) -> None:
@@ -187,20 +187,20 @@ class SharedStream(QtCore.QObject):
 
     @property
     def dropped(self) -> int:
-        """Pictures that arrived but were overtaken before they could be shown."""
+        """Number of pictures that were replaced by newer ones before they could be shown."""
         return self.stream.statistics().dropped + self._overtaken
 
     @property
     def lost(self) -> int:
-        """Pictures that were sent but never arrived."""
+        """Number of pictures that were sent but never arrived."""
         return self.stream.statistics().lost
 
     @property
     def latencies(self) -> tuple[float, float, float]:
-        """Milliseconds from stamp to arrival, from arrival to display, and both; -1 unknown."""
+        """Milliseconds from stamp to arrival, from there to display, and in total; -1 unknown."""
         return _mean(self._network), _mean(self._processing), _mean(self._total)
 
-    # Who wants what.
+    # Viewers and their looks.
 
     def _take_out(self, viewer: Viewer) -> None:
         channel = self.channel(viewer)
@@ -214,43 +214,43 @@ class SharedStream(QtCore.QObject):
         interval = min(intervals, default=self._interval)
         if interval != self._interval:
             self._interval = interval
-            # A user may want pictures sooner than the next turn.
+            # The user may need pictures before the next turn.
             self._turn.stop()
             self._balancer.forget(self)
             self._fetch()
 
     def _wanted(self) -> bool:
-        """Return whether a received picture is wanted; in the middleware's thread."""
+        """Return whether a received picture is needed; in the middleware's thread."""
         if self._due():
             return True
         self._rest_if_possible()
         return False
 
     def _due(self) -> list[Channel]:
-        """Return the channels that want a picture now."""
+        """Return the channels that need a picture now."""
         now = time.monotonic()
-        # Turns need not fall on the moment when a picture is wanted.
+        # A turn may be somewhat earlier than the time at which a picture is due.
         early = self._interval / 2 if self._asked is not None else 0.0
         return [channel for channel in self._channels if channel.is_due(now + early)]
 
     # Turns.
 
     def _rest_if_possible(self) -> None:
-        """Receive nothing until the next turn, when pictures can be fetched one by one."""
-        if not self._interval:  # so it is, too, for a picture that comes while the stream is made
+        """Stop receiving until the next turn, if pictures can be fetched one by one."""
+        if not self._interval:  # also 0 for a picture that arrives during the stream's creation
             return
         stream = self.stream
         self._period = stream.period or self._period
         if not (self._period and self._balancer.enabled):
             return
-        # Between the key frames of a video, a picture that is fetched alone cannot be decoded.
+        # A single video frame that is not a key frame cannot be decoded.
         if stream.video or self._interval <= _HYSTERESIS * max(self._period, self._price):
             return
         stream.rest()
         self._session.executor.post(self._plan)
 
     def _plan(self) -> None:
-        """Wait for the next turn; on the GUI thread."""
+        """Schedule the next turn; on the GUI thread."""
         if not is_alive(self) or self._turn.isActive():
             return
         if not self._interval:
@@ -267,10 +267,10 @@ class SharedStream(QtCore.QObject):
     # Pictures.
 
     def _render(self, image: RawImage, sample: Sample) -> None:
-        """Make the pictures that are wanted; in the stream's thread."""
+        """Convert a received picture for the channels that need it; in the stream's thread."""
         now, channels = time.monotonic(), self._due()
         repeated = image.stamp is not None and image.stamp == self._last_stamp
-        # A publisher that repeats its last picture for a new subscriber has sent nothing new.
+        # A latched picture that is sent again to a new subscriber is not new.
         if not channels or (repeated and self._interval):
             return
         self._last_stamp = image.stamp

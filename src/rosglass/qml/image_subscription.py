@@ -1,4 +1,4 @@
-"""The element ``ImageTransportSubscription``: a camera's pictures in a video sink."""
+"""The element ``ImageTransportSubscription``: shows a camera in a video sink."""
 # ruff: noqa: N802, N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ __all__ = [
     "LookElement",
 ]
 
-#: How far the times of others are looked at, in numbers of their turns.
+#: Number of future turns of each other stream that are considered.
 _MOST_TURNS = 64
-#: By how many seconds a turn is put off at most: pictures that come later would count as old.
+#: Maximum delay of a turn in seconds: later pictures would count as old.
 _MOST_DELAY = 1.0
 
 
@@ -52,21 +52,21 @@ class LoadBalancer:
         return balancer
 
     def __init__(self) -> None:
-        #: Whether streams may receive single pictures; otherwise they receive all.
+        #: Whether streams may fetch single pictures; otherwise they receive all of them.
         self.enabled = True
-        #: When each stream's turn is, and how far apart its turns are, seconds.
+        #: Time of each stream's next turn, and the interval between its turns, both in seconds.
         self._turns: dict[object, tuple[float, float]] = {}
 
     def place(self, stream: object, interval: float, now: float) -> float:
-        """Return when a stream is to fetch its next picture.
+        """Return the time, in seconds, at which a stream should fetch its next picture.
 
-        A new one gets the middle of the largest gap before `now` plus `interval`. After that its
-        turns are `interval` apart, or somewhat more where it would meet another.
+        A new stream gets the middle of the largest gap before `now` plus `interval`. After that,
+        its turns are `interval` apart, or somewhat more to avoid the turn of another stream.
 
         Args:
-            stream: Who asks.
-            interval: Seconds that it wants between two pictures.
-            now: The time, seconds.
+            stream: The stream.
+            interval: Wanted seconds between two pictures.
+            now: The current time, seconds.
         """
         before = self._turns.pop(stream, None)
         if before is None:
@@ -83,11 +83,11 @@ class LoadBalancer:
         return due
 
     def forget(self, stream: object) -> None:
-        """Remove a stream from the schedule; safe for one without turns."""
+        """Remove a stream from the schedule; safe for unknown streams."""
         self._turns.pop(stream, None)
 
     def _taken(self, begin: float, end: float) -> list[float]:
-        """Return the turns of all streams within a time, in order."""
+        """Return the turns of all streams between two times, sorted."""
         taken = []
         for due, interval in self._turns.values():
             first = max(0, math.ceil((begin - due) / interval))
@@ -97,7 +97,7 @@ class LoadBalancer:
 
 
 def _widest(taken: list[float], begin: float, end: float) -> float:
-    """Return the middle of the largest gap in a time."""
+    """Return the middle of the largest gap between two times."""
     edges = [begin, *(time for time in taken if begin < time < end), end]
     gaps = [(after - before, before) for before, after in itertools.pairwise(edges)]
     width, start = max(gaps, key=lambda gap: gap[0])
@@ -146,7 +146,7 @@ class LookElement(TopicElement):
     mirrored = Writable(bool, False)
     flipped = Writable(bool, False)
     zoom = Writable(float, 1.0, _zoom)
-    #: Pixels from the top left corner; an empty rectangle is the whole picture.
+    #: In pixels from the top left corner; an empty rectangle means the whole picture.
     regionOfInterest = Writable(QtCore.QRectF, QtCore.QRectF(), _region)
     colorMap = Writable(str, "")
     #: Metres; -1 follows the camera.
@@ -157,17 +157,17 @@ class LookElement(TopicElement):
     fullResolution = Writable(bool, False)
 
     def _look(self, video: bool, room: tuple[int, int] | None, painted: bool) -> Look:
-        """Return the view that the properties describe.
+        """Return the look that the properties describe.
 
         Args:
-            video: Whether video frames are wanted; otherwise images.
-            room: Width and height on the screen, as far as known.
-            painted: Whether images are wanted besides video frames.
+            video: Whether video frames are needed; otherwise images.
+            room: Width and height on the screen, pixels; None if unknown.
+            painted: Whether images are needed in addition to video frames.
 
         Raises:
-            UnsupportedError: The colour map is unknown, or the depths are no range.
+            UnsupportedError: The colour map is unknown, or the depths are not a valid range.
         """
-        # They bring numpy, which an interface without a camera does not need.
+        # These import numpy, which interfaces without a camera do not need.
         from rosglass.images import DepthColors, View  # noqa: PLC0415
         from rosglass.qml.image_rendering import Look  # noqa: PLC0415
 
@@ -191,16 +191,16 @@ class LookElement(TopicElement):
 
     @property
     def _interval(self) -> float:
-        """Seconds between two pictures at least."""
+        """Minimum seconds between two pictures."""
         return 1 / self.throttleRate if self.throttleRate else 0.0
 
     @property
     def label(self) -> str:
-        """What error messages call this element."""
+        """The element's name in error messages."""
         return f"{type(self).__name__} {self._topic!r}"
 
 
-#: Importing it on the GUI thread would stop the screen for a tenth of a second: it brings numpy.
+#: Not imported on the GUI thread: it imports numpy, which would freeze the screen for 0.1 s.
 _NUMPY_MODULE = "rosglass.images"
 
 
@@ -209,7 +209,7 @@ class ImageTransportSubscription(LookElement):
 
     @QtCore.QEnum
     class PlaybackState(IntEnum):
-        """Whether pictures follow each other; the numbers of Qt's MediaPlayer."""
+        """Playback states, numbered as in Qt's MediaPlayer."""
 
         StoppedState = 0
         PlayingState = 1
@@ -218,9 +218,9 @@ class ImageTransportSubscription(LookElement):
     topicChanged = Signal()
     videoSinkChanged = Signal()
     playbackStateChanged = Signal()
-    #: A picture was saved in this file, an absolute path.
+    #: A picture was saved to this file (absolute path).
     snapshotSaved = Signal(str)
-    #: A picture was not saved, for this reason.
+    #: Saving a picture failed, for this reason.
     snapshotFailed = Signal(str)
 
     topic = Writable(str, read="_get_topic", write="_set_topic")
@@ -228,7 +228,7 @@ class ImageTransportSubscription(LookElement):
     enabled = Writable(bool, True, then="_on_enabled_changed")
     timeout = Writable(int, DEFAULT_TIMEOUT_MS, at_least(0), then="_update_stale", unit="ms")
     videoSink = Writable(QtCore.QObject, read="_get_sink", write="_set_sink")
-    #: What Qt 5's VideoOutput looks for.
+    #: Required by Qt 5's VideoOutput.
     videoSurface = Writable(
         QtCore.QObject, read="_get_sink", write="_set_sink", notify="videoSinkChanged"
     )
@@ -253,7 +253,7 @@ class ImageTransportSubscription(LookElement):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         super().__init__(parent, runtime)
-        # Loaded before QML hands over its sink: what Qt gave Python as a plain QObject stays one.
+        # Load before QML sets a sink: an object first wrapped as a plain QObject remains one.
         optional("QtMultimedia")
         self._paused = False
         self._sink: Sink | None = None
@@ -269,9 +269,9 @@ class ImageTransportSubscription(LookElement):
             return
         self._topic = topic
         if topic == self._resolved:
-            return  # the same topic, now whatever the node's namespace becomes
+            return  # the topic is the same, but no longer depends on the node's namespace
         self._resolved = ""
-        # What is paused would stay on the screen under another name.
+        # A paused picture would stay on the screen under the new topic's name.
         self._clear_shown()
         self.topicChanged.emit()
         self._schedule()
@@ -296,7 +296,7 @@ class ImageTransportSubscription(LookElement):
         if item is not None:
             item.destroyed.connect(self._schedule)
         self.videoSinkChanged.emit()
-        # Another kind of display needs other frames: join the stream again.
+        # Another type of sink needs other frames: join the stream again.
         self._close_endpoint()
         self._schedule()
 
@@ -310,18 +310,18 @@ class ImageTransportSubscription(LookElement):
 
     @Slot()
     def play(self) -> None:
-        """Receive pictures, after :meth:`pause` or :meth:`stop`."""
+        """Resume receiving after :meth:`pause` or :meth:`stop`."""
         self._set_paused(False)
         self.enabled = True
 
     @Slot()
     def pause(self) -> None:
-        """Stop receiving, and keep the last picture on the screen, marked as stale."""
+        """Stop receiving; keep the last picture on the screen, marked as stale."""
         self._set_paused(True)
 
     @Slot()
     def stop(self) -> None:
-        """Stop receiving, and clear the screen."""
+        """Stop receiving and clear the screen."""
         self._set_paused(False)
         self.enabled = False
 
@@ -334,13 +334,13 @@ class ImageTransportSubscription(LookElement):
 
     @Slot(str, result=QJSValue)
     def saveSnapshot(self, path: str) -> QJSValue:
-        """Write the picture that is shown into a file, away from the GUI thread.
+        """Save the current picture to a file, on a thread other than the GUI thread.
 
         Args:
-            path: The file, plain or as a ``file:`` URL; its ending tells its kind.
+            path: The file, as a path or ``file:`` URL; its extension determines the format.
 
         Returns:
-            A promise of its absolute path.
+            A promise of the file's absolute path.
         """
         runtime, picture = self._find_runtime(), self._picture
         if runtime is None:
@@ -365,7 +365,7 @@ class ImageTransportSubscription(LookElement):
             from rosglass.images import save  # noqa: PLC0415 - brings numpy
             from rosglass.qml.image_rendering import whole_frame  # noqa: PLC0415
 
-            # The picture, not only its frame, is held until then: the memory may be the video's.
+            # Keep the picture, not only its frame, until then: its video may own the memory.
             return save(whole_frame(picture, look), plain_path(path))
 
         runtime.session.background(work, done)
@@ -373,7 +373,7 @@ class ImageTransportSubscription(LookElement):
 
     @Slot(result=int)
     def getPublisherCount(self) -> int:
-        """Return how many publishers the transport in use has; 0 while not connected."""
+        """Return the number of publishers of the transport in use; 0 while not connected."""
         return self._count_publishers()
 
     # The stream.
@@ -446,7 +446,7 @@ class ImageTransportSubscription(LookElement):
             stream.change_look(self, look)
 
     def _best_look(self) -> Look:
-        """Return the view that the properties describe; the one before, if that is impossible."""
+        """Return the look that the properties describe; the previous one if they are invalid."""
         from rosglass.qml.image_rendering import Look  # noqa: PLC0415 - brings numpy
 
         assert self._sink is not None
@@ -466,7 +466,7 @@ class ImageTransportSubscription(LookElement):
         sink = self._sink
         if not is_alive(self) or sink is None or not sink.is_alive or self._paused:
             return
-        # What a silent link delayed would be cleared at once.
+        # A picture delayed by an interrupted link would be cleared immediately.
         if self.timeout and self._age(picture) > self._max_age_s:
             return
         try:
@@ -481,13 +481,13 @@ class ImageTransportSubscription(LookElement):
             self._update_stale()
 
     def stream_changed(self) -> None:
-        """Announce what changed; called by the stream on the GUI thread."""
+        """Emit the signals of changed properties; called by the stream on the GUI thread."""
         if is_alive(self):
             self._publishers = max(self._publishers, self._count_publishers())
             self._refresh()
 
     def _clear_shown(self) -> None:
-        """Take the picture off the screen."""
+        """Remove the picture from the screen."""
         self._picture, self._blank = None, True
         if self._sink is not None:
             self._sink.clear()
@@ -496,7 +496,7 @@ class ImageTransportSubscription(LookElement):
 
     @property
     def _max_age_s(self) -> float:
-        """Seconds after which a picture is old."""
+        """Seconds after which a picture counts as old."""
         return (self.timeout or DEFAULT_TIMEOUT_MS) / 1000 + self._interval
 
     def _age(self, picture: Picture) -> float:
@@ -508,7 +508,7 @@ class ImageTransportSubscription(LookElement):
 
     def _update_stale(self) -> None:
         super()._update_stale()
-        # A picture that stays is the more dangerous the more it looks like a live one.
+        # An old picture that looks live is dangerous.
         if self.timeout and not self._blank and not self._paused and self._is_old():
             self._clear_shown()
 
@@ -523,18 +523,18 @@ class ImageTransportSubscription(LookElement):
     @Slot()
     def _on_tick(self) -> None:
         super()._on_tick()
-        # Items are resized, moved to other windows and transformed without a signal of their sinks.
+        # Sinks have no signal for an item that is resized, transformed or moved to another window.
         if self._endpoint is not None and self._sink is not None and self._sink.is_alive:
             self._change_look(self._endpoint)
         self._refresh()
 
     def _refresh(self) -> None:
-        """Announce every read-only property that changed."""
+        """Emit the signal of every read-only property that changed."""
         shared = self._endpoint
         channel = shared.channel(self) if shared is not None else None
         framerate, latencies = 0.0, (-1.0, -1.0, -1.0)
         if shared is not None and channel is not None and not self.stale:
-            # The rate of a stream that is not live any more says nothing.
+            # The rate of a stream that is no longer live is meaningless.
             framerate, latencies = channel.frame_rate, shared.latencies
         report(
             self,
@@ -562,7 +562,7 @@ class ImageTransportSubscriber(ImageTransportSubscription):
 
 
 class ImageTransportManager(QtCore.QObject):
-    """Switches load balancing; one per engine, all of a session sharing the setting."""
+    """Switches load balancing; one per engine, with one setting per session."""
 
     loadBalancingEnabledChanged = Signal()
 
@@ -575,9 +575,9 @@ class ImageTransportManager(QtCore.QObject):
 
     @Slot(bool)
     def setLoadBalancingEnabled(self, enabled: bool) -> None:
-        """Set whether pictures of throttled cameras are fetched one by one, in turns.
+        """Set whether streams of throttled cameras take turns to fetch single pictures.
 
-        Otherwise cameras are received as fast as they send, and what is too much is not decoded.
+        Otherwise all pictures are received, and surplus ones are not decoded.
         """
         if enabled != self._balancer.enabled:
             self._balancer.enabled = enabled

@@ -1,4 +1,4 @@
-"""JavaScript values in Python: what they are, and how errors show them."""
+"""JavaScript values in Python: their types, conversions, and text for errors."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ __all__ = [
 
 #: No 64-bit integer has more digits.
 _WHOLE = re.compile(r"-?0*[0-9]{1,20}\Z")
-#: Elements of an array that an error shows in full.
+#: Maximum length of an array that errors show in full.
 _SHOWN = 100
 
 
@@ -58,35 +58,35 @@ def _iterate(value: QJSValue) -> Iterator[str]:
 
 
 def object_of(value: QJSValue) -> Any:
-    """Return the QObject that a value is; something else when it is none."""
-    # PySide2 takes the value for the owner of what toQObject() gives: other holders of the object
-    # in Python would find it gone with the value.
+    """Return a value's QObject; another Python value if it is not a QObject."""
+    # PySide2 treats the value as the owner of the result of toQObject(): the object's wrapper would
+    # be destroyed with the value, despite other references in Python.
     return value.toVariant()
 
 
 def is_model(value: QJSValue) -> bool:
-    """Return whether it is an item model: a ListModel, or one of C++ or Python."""
+    """Return whether a value is an item model: a ListModel, or one from C++ or Python."""
     return value.isQObject() and isinstance(object_of(value), QtCore.QAbstractItemModel)
 
 
 def roles_of(model: Any) -> dict[str, int]:
-    """Return an item model's roles by name, in the order of their numbers."""
+    """Return an item model's role numbers by name, sorted by number."""
     names = model.roleNames()
     return {bytes(names[number].data()).decode(): number for number in sorted(names)}
 
 
 def wide(text: str) -> int | str:
-    """Return the integer in a decimal text, otherwise the text."""
+    """Return a decimal text as an integer, other texts unchanged."""
     return int(text) if _WHOLE.match(text) else text
 
 
 def integral(value: Any) -> Any:
-    """Return a whole float as an integer, everything else as it is."""
+    """Return a whole float as an integer, other values unchanged."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def shown(value: QJSValue) -> Any:
-    """Return a Python value that shows in an error what was given."""
+    """Return a Python value whose repr shows a JavaScript value in an error."""
     if value.isNull() or value.isUndefined():
         return None
     if value.isNumber():
@@ -97,14 +97,14 @@ def shown(value: QJSValue) -> Any:
         return Shown("a function")
     if value.isArray():
         length = value.property("length").toNumber()
-        # ``a.length = 4e9`` is written in a moment, and its text never is; nor that of a web.
+        # Do not build the text of a huge array (``a.length = 4e9``) or of objects with cycles.
         if length > _SHOWN or any(value.property(at).isObject() for at in range(int(length))):
             return Shown(f"an array of {length:.0f} elements")
     return value.toString() if value.isString() else Shown(value.toString())
 
 
 class Shown:
-    """A value of no Python type, shown as JavaScript shows it."""
+    """A value without a Python type, with JavaScript's text as its repr."""
 
     def __init__(self, text: str) -> None:
         self._text = text
@@ -118,14 +118,14 @@ def null() -> QJSValue:
     return QJSValue(QJSValue.SpecialValue.NullValue)
 
 
-#: What says a number in text.
+#: A decimal number as text.
 DECIMAL = re.compile(r"[+-]?([0-9]{1,40}(\.[0-9]{0,40})?|\.[0-9]{1,40})([eE][+-]?[0-9]{1,3})?\Z")
 _SECONDS, _NANOSECONDS = ("sec", "secs"), ("nanosec", "nsec", "nsecs")
 _NS = 1_000_000_000
 
 
 def number_from_text(text: str) -> Fraction:
-    """Return the exact number in a decimal text; raises ConversionError."""
+    """Return the exact number of a decimal text; raises ConversionError."""
     from fractions import Fraction  # noqa: PLC0415 - takes milliseconds at start-up
 
     if not DECIMAL.match(text.strip()):
@@ -134,19 +134,19 @@ def number_from_text(text: str) -> Fraction:
 
 
 def time_from_js(value: QJSValue, name: str = "time") -> Time:
-    """Return a point in time from QML: a time of either module, a Date, or milliseconds.
+    """Return a QML value as a point in time: a time of either module, a Date, or milliseconds.
 
     Raises:
-        ConversionError: It is none of these; names `name`.
+        ConversionError: It is none of these; the message contains `name`.
     """
     return Time(_nanoseconds(value, name, "a time or a Date"))
 
 
 def duration_from_js(value: QJSValue, name: str = "duration") -> Duration:
-    """Return a duration from QML: milliseconds, or a duration of either module.
+    """Return a QML value as a duration: milliseconds, or a duration of either module.
 
     Raises:
-        ConversionError: It is none of these; names `name`.
+        ConversionError: It is none of these; the message contains `name`.
     """
     return Duration(_nanoseconds(value, name, "a duration or milliseconds"))
 
@@ -159,12 +159,12 @@ def _nanoseconds(value: QJSValue, name: str, wanted: str) -> int:
 
 
 def time_parts(value: QJSValue, path: str, wanted: str) -> tuple[Any, Any]:
-    """Return seconds and nanoseconds of any form of time; numbers are milliseconds.
+    """Return seconds and nanoseconds of a time in any form; numbers are milliseconds.
 
-    The parts are as they were given, unless they are not integers: the codec knows their ranges.
+    Integer parts are returned unchanged: the codec checks their ranges.
 
     Raises:
-        ConversionError: It is no time; says that `wanted` was.
+        ConversionError: It is not a time; the message says that `wanted` was expected.
     """
     if value.isDate():
         return from_milliseconds(value.property("getTime").callWithInstance(value).toNumber(), path)
@@ -184,7 +184,7 @@ def time_parts(value: QJSValue, path: str, wanted: str) -> tuple[Any, Any]:
 
 
 def known_parts(given: dict[str, Any], path: str, wanted: str) -> tuple[Any, Any]:
-    """Return seconds and nanoseconds of an object's properties; errors as in :func:`time_parts`."""
+    """Return seconds and nanoseconds of an object; raises like :func:`time_parts`."""
     if set(given) == {"nanoseconds"}:
         total = wide(given["nanoseconds"]) if isinstance(given["nanoseconds"], str) else None
         total = integral(given["nanoseconds"]) if total is None else total
@@ -202,7 +202,7 @@ def known_parts(given: dict[str, Any], path: str, wanted: str) -> tuple[Any, Any
 
 
 def from_milliseconds(milliseconds: float, path: str) -> tuple[int, int]:
-    """Return seconds and nanoseconds of milliseconds."""
+    """Convert milliseconds to seconds and nanoseconds."""
     if not math.isfinite(milliseconds) or abs(milliseconds) > 2**53:
         raise ConversionError(path, milliseconds, "milliseconds")
     whole = math.floor(milliseconds)
@@ -230,10 +230,10 @@ def _milliseconds(limit: Duration | None) -> float | str:
 
 
 def qos_from_js(value: QJSValue | None, default: QoS) -> QoS:
-    """Return the profile from QML: one made by ``Ros2.QoS()``, or a queue size.
+    """Return the QoS profile of a QML value: the result of ``Ros2.QoS()``, or a queue size.
 
     Raises:
-        ConversionError: It is neither, its depth is not a positive integer, or a limit is no
+        ConversionError: It is neither, its depth is not a positive integer, or a limit is not a
             number of milliseconds.
     """
     if value is None or value.isUndefined() or value.isNull():
@@ -263,10 +263,10 @@ def qos_from_js(value: QJSValue | None, default: QoS) -> QoS:
 
 
 def queue_from_js(value: QJSValue, default: QoS) -> QoS:
-    """Return the profile of a queue size, or one given; 0 means no limit, as in ROS 1.
+    """Return the profile of a queue size (0 for no limit, as in ROS 1), or a given profile.
 
     Raises:
-        ConversionError: As of :func:`qos_from_js`.
+        ConversionError: Like :func:`qos_from_js`.
     """
     if value.isNumber() and value.toNumber() == 0:
         return replace(default, history=History.KEEP_ALL)
@@ -274,14 +274,14 @@ def queue_from_js(value: QJSValue, default: QoS) -> QoS:
 
 
 def _limit(value: QJSValue, name: str) -> Duration | None:
-    """Return a profile's duration; None for no limit, which is 0 or infinity."""
+    """Return a duration of a profile; None for no limit (0 or infinity)."""
     given = value.property(f"{name}Ms")
     if given.isString() and given.toString() == _BEST:
         return BEST_AVAILABLE
     if given.isUndefined() or (given.isNumber() and given.toNumber() in (0, float("inf"))):
         return None
     milliseconds = given.toNumber() if given.isNumber() else -1.0
-    # 292 years, of which nanoseconds can tell.
+    # 292 years, the most that 64-bit nanoseconds can express.
     if not 1e-6 <= milliseconds < 9e12:
         wanted = "milliseconds above zero, or 0 for no limit"
         raise ConversionError(f"qos.{name}", shown(given), wanted)

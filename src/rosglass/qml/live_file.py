@@ -1,4 +1,4 @@
-"""A QML file in an engine of its own, which is made anew when it changes."""
+"""A QML file with its own engine, reloaded when the file changes."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ __all__ = [
 ]
 
 _LIBRARY = "libQt6Qml.so.6" if QT6 else "libQt5Qml.so.5"
-#: QQmlComponent::completeCreate(), as the Itanium C++ ABI has it.
+#: QQmlComponent::completeCreate(), mangled by the Itanium C++ ABI.
 _COMPLETE = "_ZN13QQmlComponent14completeCreateEv"
 
 
 @cache
 def _completion() -> Callable[[QtQml.QQmlComponent], object]:
-    """Return what completes what a component has begun, without Python's lock where it can."""
+    """Return a function for QQmlComponent::completeCreate(), without the GIL if possible."""
     try:
-        # The one that the binding has loaded already.
+        # The library that the binding has already loaded.
         complete: Any = ctypes.CDLL(_LIBRARY)[_COMPLETE]
     except (OSError, AttributeError):
         return QtQml.QQmlComponent.completeCreate
@@ -55,10 +55,10 @@ def _completion() -> Callable[[QtQml.QQmlComponent], object]:
 
 
 def create(component: QtQml.QQmlComponent, engine: QtQml.QQmlEngine) -> QtCore.QObject | None:
-    """Create the object of a component without the GIL; None with errors in the component.
+    """Create a component's object without the GIL; None if the component has errors.
 
-    QQmlComponent.create keeps Python's lock, while first bindings and ``Component.onCompleted``
-    run: one that never ends could not be ended.
+    QQmlComponent.create holds the GIL while the first bindings and ``Component.onCompleted`` run,
+    so that the watchdog could not end an endless one.
     """
     if component.isError():
         return None
@@ -74,9 +74,9 @@ def create(component: QtQml.QQmlComponent, engine: QtQml.QQmlEngine) -> QtCore.Q
 
 _log = logging.getLogger("rosglass.qml")
 _SUFFIXES = (".qml", ".js", ".mjs")
-#: Milliseconds without further changes after which an editor has finished saving.
+#: Milliseconds without further changes after which saving is considered complete.
 _DEBOUNCE = 80
-#: Files and folders that are looked at: a file in a home folder must not stop the interface.
+#: Maximum number of files and folders to scan: one in a home folder must not block the interface.
 _MOST = 2000
 
 
@@ -84,10 +84,10 @@ class Watcher(QtCore.QObject):
     """Watches every QML and JavaScript file under some folders.
 
     Args:
-        folders: The folders; hidden folders in them are left out.
+        folders: The folders; hidden subfolders are ignored.
     """
 
-    #: Files were written, came or went.
+    #: Files were changed, created or deleted.
     changed = Signal()
 
     def __init__(self, *folders: Path) -> None:
@@ -113,9 +113,9 @@ class Watcher(QtCore.QObject):
             self.changed.emit()
 
     def _scan(self) -> dict[str, tuple[int, int]]:
-        """Return time and size of every file, and watch those that are not watched.
+        """Return time and size of every file, and watch new files.
 
-        Editors save by renaming, after which the new file is not watched yet.
+        Editors save by renaming, and the renamed file is not yet watched.
         """
         stamps = {path: stamp for root in self._roots for path, stamp in self._files(root)}
         folders = {os.path.dirname(path) for path in stamps}  # noqa: PTH120
@@ -152,14 +152,14 @@ _MODULE = re.compile(r'module "([\w.]+)"(?: version ([\d.]+))?')
 _UNVERSIONED = re.compile(r"\s*import\s+[\w.]+\s*(?:as\b|;|//|$)")
 _OURS = {"Ros", "Ros2"}
 _TYPE = re.compile(r"^(\w+) is not a type$")
-#: Types that only one of our modules has -> the module, and what the other one calls it.
+#: Types that only one of our modules has -> the module, and the type's name in the other one.
 _ONLY_IN = {
     "Subscriber": ("Ros 1.0", "Subscription"),
     "ImageTransportSubscriber": ("Ros 1.0", "ImageTransportSubscription"),
     "Subscription": ("Ros2 1.0", "Subscriber"),
     "ImageTransportSubscription": ("Ros2 1.0", "ImageTransportSubscriber"),
 }
-#: Import -> types that only it has, of those that are used most.
+#: Import -> frequently used types that only this import provides.
 _IMPORTED_BY = {
     "QtQuick.Controls 2.15": {
         *("ApplicationWindow", "Button", "CheckBox", "ComboBox", "Dial", "Dialog", "Drawer"),
@@ -171,7 +171,7 @@ _IMPORTED_BY = {
     "QtQuick.Window 2.15": {"Window"},
     "RosRviz 1.0": {"AnchoredPopup", "MessageDialog"},
 }
-#: Module -> what brings it, on Qt 6 and on Qt 5.
+#: Module -> commands that install it, for Qt 6 and for Qt 5.
 _BROUGHT_BY = {
     "QtMultimedia": ('pip install "rosglass[camera]"', "apt install qml-module-qtmultimedia"),
     "QtQuick3D": ('pip install "rosglass[camera]"', ""),
@@ -180,7 +180,7 @@ _BROUGHT_BY = {
     "QtQuick.Layouts": ("", "apt install qml-module-qtquick-layouts"),
     "QtQuick.Window": ("", "apt install qml-module-qtquick-window2"),
 }
-#: Modules that Qt 6 has no longer -> what to use.
+#: Modules that Qt 6 has removed -> their replacements.
 _GONE = {
     "QtQuick.Controls.Styles": "QtQuick.Controls 2.15",
     "QtQuick.Extras": "QtQuick.Controls 2.15",
@@ -194,8 +194,8 @@ def error_list(errors: Sequence[QtQml.QQmlError], file: Path) -> str:
     """Return errors as ``file:line:column: message``, or ``file: message``, one per line.
 
     Args:
-        errors: What Qt says.
-        file: The file that was loaded, for errors that name none.
+        errors: The errors from Qt.
+        file: The loaded file, for errors that name no file.
     """
     lines = []
     for error in errors:
@@ -211,7 +211,7 @@ def error_list(errors: Sequence[QtQml.QQmlError], file: Path) -> str:
 
 
 def _unversioned(place: str) -> int:
-    """Return the line of the first import without a version, which Qt 5 does not report; or 0."""
+    """Return the line of the first import without a version, or 0; Qt 5 does not report it."""
     try:
         lines = Path(place).read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
@@ -220,7 +220,7 @@ def _unversioned(place: str) -> int:
 
 
 def _advice(text: str) -> str:
-    """Return what to do about an error; empty when its text says so."""
+    """Return advice for an error; empty if its text suffices."""
     if "requires a version" in text:
         return "Qt 5 needs one after the module's name: import QtQuick 2.15"
     kind = _TYPE.search(text)
@@ -249,9 +249,9 @@ def _advice(text: str) -> str:
     return f"to install it: {package}" if package else hint
 
 
-#: The QML file of an item that is no larger than its text, and can be closed.
+#: The QML file of a closable item that is only as large as its text.
 PANEL = Path(__file__).with_name("ErrorPanel.qml")
-#: Headings, by what is below.
+#: Headings of an ErrorView, for what is below it.
 ERRORS = "This interface has errors. It is shown once they are mended."
 ERRORS_BELOW = "The interface below is the last one without errors."
 NO_NODE = "This interface has no node: nothing is received or sent."
@@ -259,11 +259,11 @@ SCRIPT_ENDED = "The interface below goes on, but a part of what it should have d
 
 
 class ErrorView:
-    """Items that show errors, one in each window.
+    """Shows errors, in one item per window.
 
     Args:
         engine: The engine of the interface.
-        look: The QML file of such an item, with properties ``heading`` and ``text``.
+        look: The QML file of the item, with properties ``heading`` and ``text``.
     """
 
     def __init__(self, engine: QtQml.QQmlEngine, look: Path) -> None:
@@ -274,12 +274,12 @@ class ErrorView:
         self._contents: list[Any] = []
 
     def show(self, text: str, windows: Iterable[Any], heading: str) -> None:
-        """Show errors in place of earlier ones.
+        """Show errors, replacing earlier ones.
 
         Args:
             text: The errors.
             windows: Where to show them.
-            heading: What they mean for what is below.
+            heading: Their effect on the interface below.
         """
         self.hide()
         url = QtCore.QUrl.fromLocalFile(str(self._look))
@@ -288,14 +288,14 @@ class ErrorView:
             item: Any = component.create()
             item.setProperty("heading", heading)
             item.setProperty("text", text)
-            # PySide2 takes an item for deleted as soon as Python has no reference to its parent.
+            # PySide2 treats an item as deleted once Python has no reference to its parent.
             content = window.contentItem()
             item.setParentItem(content)
             self.items.append(item)
             self._contents.append(content)
 
     def hide(self) -> None:
-        """Show none."""
+        """Hide the errors."""
         for item in (*self.items, self._component):
             if is_alive(item):
                 item.deleteLater()
@@ -303,32 +303,32 @@ class ErrorView:
 
 
 class Made(NamedTuple):
-    """What a file was made into."""
+    """The objects created from a file."""
 
     root: QtCore.QObject
-    #: Must live as long as its root: dropping it destroys the root.
+    #: Must live as long as the root: dropping it destroys the root.
     component: QtQml.QQmlComponent
 
 
 class LiveFile(QtCore.QObject):
-    """A QML file, its engine, and the interface made from it last.
+    """A QML file, its engine, and the interface created from it last.
 
-    What shows it makes it with :meth:`create`, and hands what was made to :meth:`replace`, so that
-    a file with errors leaves what is shown as it is.
+    Callers pass the result of :meth:`create` to :meth:`replace`, so that the current interface
+    stays if the file has errors.
 
     Args:
         file: The file.
-        session: The node its QML talks through.
-        watch: Tell when a file in its folder, or in `import_paths`, changes.
+        session: The node that the QML uses.
+        watch: Emit :attr:`due` when a file in its folder or in `import_paths` changes.
         import_paths: Further folders with QML modules.
 
     Raises:
         QmlError: There is no such file or folder.
     """
 
-    #: It is to be made anew: it has changed, or :meth:`is_ready` said no before, and would not now.
+    #: Reload now: the file has changed, or :meth:`is_ready`, False before, is True now.
     due = Signal()
-    #: JavaScript of it was ended, because it blocked the interface: which, where, and what to do.
+    #: JavaScript that blocked the interface was ended: the text names it, with line and advice.
     script_ended = Signal(str)
 
     def __init__(
@@ -342,25 +342,25 @@ class LiveFile(QtCore.QObject):
         super().__init__()
         self.path, self._session = interface_file(file), session
         self._folders = [import_folder(path) for path in import_paths]
-        #: What was made last; None before anything was.
+        #: The objects created last; None before the first.
         self.made: Made | None = None
         self._deferred = False
         self._closed = False
         self.engine = QtQml.QQmlEngine()
         log_engine_warnings(self.engine)
-        # The last one is looked into first, and nothing hides our own modules.
+        # The engine searches the last path first: our own modules are added last.
         for path in [*_environment_paths(), *map(str, reversed(self._folders))]:
             self.engine.addImportPath(path)
         install(self.engine, session)
         Watchdog.of(session).watch(self.engine, self.script_ended.emit)
         session.call_ended.connect(self._go_on)
         self._watcher: Watcher | None = None
-        # Before anything is read, so that no change in between goes unnoticed.
+        # Before reading any file, so that no change is missed.
         self.watch = watch
 
     @property
     def watch(self) -> bool:
-        """Whether changes are noticed."""
+        """Whether the files are watched."""
         return self._watcher is not None
 
     @watch.setter
@@ -375,18 +375,18 @@ class LiveFile(QtCore.QObject):
             self._watcher.changed.connect(self.due)
 
     def is_ready(self) -> bool:
-        """Return whether it may be reloaded now; otherwise :attr:`due` is when.
+        """Return whether the file may be reloaded now; if not, :attr:`due` is emitted later.
 
-        Not while a call from QML waits, which would return into an interface that is gone.
+        Not while a call from QML waits: it would return into a destroyed interface.
         """
         self._deferred = bool(self._session.waiting_calls)
         return not self._deferred and not self._closed and is_alive(self.engine)
 
     def create(self) -> Made:
-        """Make the file as it is now, beside what was made of it before.
+        """Create the interface from the current file; the previous one stays.
 
         Raises:
-            QmlError: It has errors; the message lists them as ``file:line:column: text``.
+            QmlError: The file has errors; the message lists them as ``file:line:column: text``.
         """
         if not os.path.isfile(self.path):  # noqa: PTH113 - pathlib's may raise
             raise QmlError(f"{self.path}: there is no such file")
@@ -402,11 +402,11 @@ class LiveFile(QtCore.QObject):
         return Made(root, component)
 
     def replace(self, made: Made, show: Callable[[], None]) -> None:
-        """Replace the previous interface, which is destroyed, by the new one.
+        """Replace the previous interface by a new one and destroy the previous one.
 
         Args:
-            made: What was made.
-            show: Shows it; what it replaces still exists then.
+            made: The result of :meth:`create`.
+            show: Shows it; called before the previous interface is destroyed.
         """
         before, self.made = self.made, made
         self._session.holding += 1
@@ -418,7 +418,7 @@ class LiveFile(QtCore.QObject):
             self._session.holding -= 1
 
     def drop(self, made: Made) -> None:
-        """Destroy the interface; its clean-up leaves the node to its successor."""
+        """Destroy an interface; its clean-up must not shut down its successor's node."""
         root, component = made
         if not is_alive(root):
             self._dropped(component)
@@ -429,9 +429,9 @@ class LiveFile(QtCore.QObject):
             self._session.holding -= 1
             self._dropped(component)
 
-        # A signal of what QML has made, once looked at, has PySide2 keep its half of that for ever.
+        # After access to a signal of an object from QML, PySide2 would keep its half of it forever.
         end = QtCore.QObject(root)
-        # Component.onDestruction runs a little after this signal.
+        # Component.onDestruction runs shortly after this signal.
         end.destroyed.connect(lambda: QtCore.QTimer.singleShot(0, dropped))
         root.deleteLater()
 
@@ -439,7 +439,7 @@ class LiveFile(QtCore.QObject):
         """Close everything; safe to call twice.
 
         Args:
-            hold: Others need the node: what QML does at its end must not shut it down.
+            hold: Keep the node, which others need, even if QML shuts it down at its end.
         """
         if self._closed:
             return
@@ -455,7 +455,7 @@ class LiveFile(QtCore.QObject):
                 item.deleteLater()
 
     def _go_on(self) -> None:
-        # The call that has ended is still to return into QML.
+        # The call that has ended must still return into QML.
         if self._deferred:
             self._deferred = False
             QtCore.QTimer.singleShot(0, self._tell_due)
@@ -473,6 +473,6 @@ class LiveFile(QtCore.QObject):
 
 
 def _environment_paths() -> list[str]:
-    """Return what Qt 5 does not read itself: QML_IMPORT_PATH, the first path last."""
+    """Return the paths in QML_IMPORT_PATH, which Qt 5 does not read, the first path last."""
     paths = [] if QT6 else os.environ.get("QML_IMPORT_PATH", "").split(os.pathsep)
     return [path for path in reversed(paths) if path]

@@ -1,4 +1,4 @@
-"""Logging from QML through Python's logging, with file and line of the QML."""
+"""Logging from QML through Python's logging, with the QML file and line."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ __all__ = [
     "plain_path",
 ]
 
-#: The logger of all that concerns QML.
+#: The parent of all loggers for QML.
 ROOT = "rosglass.qml"
 
 
 class Caller(NamedTuple):
-    """Where in the QML files something happened.
+    """The location of an event in the QML files.
 
     Attributes:
         file: Local path, or URL.
@@ -55,29 +55,29 @@ class Caller(NamedTuple):
 
     @property
     def place(self) -> str:
-        """``file:line``, as editors understand it."""
+        """The location as ``file:line``, which editors understand."""
         return f"{self.file}:{self.line}"
 
 
 def plain_path(url: str) -> str:
-    """Return a file URL's path, and any other URL as it is."""
+    """Return a file URL's path; other URLs unchanged."""
     local = QtCore.QUrl(url)
     return local.toLocalFile() if local.isLocalFile() else url
 
 
 def logger_name(name: str) -> str:
-    """Return the Python logger of a QML logger; empty for the node's own."""
+    """Return the name of a QML logger's Python logger; an empty `name` means the node's own."""
     return f"{ROOT}.{name}" if name else ROOT
 
 
 def log_from_qml(name: str, level: int, message: str, caller: Caller) -> None:
-    """Log a message as coming from QML.
+    """Log a message from QML.
 
     Args:
         name: Name of the QML logger; empty for the node's own.
-        level: Python's level.
+        level: The level in Python's logging.
         message: The text.
-        caller: Where in QML it was logged.
+        caller: The QML line that logged it.
     """
     logger = logging.getLogger(logger_name(name))
     if not logger.isEnabledFor(level):
@@ -90,7 +90,7 @@ def log_from_qml(name: str, level: int, message: str, caller: Caller) -> None:
 
 
 class RateLimit:
-    """Lets one log line of each kind through every `seconds`."""
+    """Allows one log line of each kind every `seconds`."""
 
     def __init__(self, seconds: float = 5.0) -> None:
         self._seconds = seconds
@@ -114,7 +114,7 @@ class LocationFormatter(logging.Formatter):
         super().__init__("%(levelname)s %(name)s: %(message)s")
 
     def format(self, record: logging.LogRecord) -> str:
-        """Return the line for a record."""
+        """Return a record as a line of text."""
         if not record.name.startswith(ROOT) or record.pathname.endswith((".py", "<python>")):
             return super().format(record)
         name = record.name.removeprefix(ROOT).lstrip(".")
@@ -140,25 +140,25 @@ _HINTS = {
         " Set QML_XHR_ALLOW_FILE_WRITE to 1 to enable this feature."
     ),
 }
-#: How Qt words that the proxy is not there through which all is refused.
+#: Qt's error when the proxy that refuses all requests cannot be reached.
 _REFUSED = re.compile(r"\b[Pp]roxy\b")
 _handling = threading.local()
-#: Seconds until a warning that repeats is logged again, with how often it came.
+#: Seconds until a repeated warning is logged again, with its count.
 _REPEAT_S = 60.0
-#: Warnings and places that are remembered.
+#: Maximum number of remembered warnings and locations.
 _MOST = 1000
 
 
 class _Repeats:
-    """Repeated warnings of QML's engine: those of a binding are repeated with every message.
+    """Limits repeated warnings of QML's engine: a binding repeats its own with every message.
 
-    Each is logged the first, the tenth, the hundredth time and so on, and once a minute.
+    Each is logged on its 1st, 10th, 100th occurrence and so on, and once a minute.
     """
 
     def __init__(self) -> None:
-        #: By place and text: how often it came, and how often and when (monotonic) it was logged.
+        #: Location and text -> occurrences, and how often and when (monotonic) it was logged.
         self._seen: dict[tuple[Caller, str], tuple[int, int, float]] = {}
-        #: By place: what an error there comes from.
+        #: Location -> cause of errors there.
         self._causes: dict[tuple[str, int], str] = {}
 
     def forget(self) -> None:
@@ -174,7 +174,7 @@ class _Repeats:
         return self._causes.get((caller.file, caller.line), "")
 
     def counted(self, caller: Caller, text: str) -> str:
-        """Return what to log, empty for nothing."""
+        """Count a warning; return the text to log, empty for none."""
         now = time.monotonic()
         if len(self._seen) >= _MOST:
             self._seen.clear()
@@ -191,17 +191,17 @@ _repeats = _Repeats()
 
 
 def explain(caller: Caller, cause: str) -> None:
-    """Add a cause to errors that Qt reports of a place in QML from now on."""
+    """Add a cause to the errors that Qt reports for a QML line from now on."""
     _repeats.explain(caller, cause)
 
 
 def forget_repeats() -> None:
-    """Log warnings again that were logged before: the files may have changed."""
+    """Allow earlier warnings to be logged again, as the files may have changed."""
     _repeats.forget()
 
 
 def _handle(mode: Any, context: Any, message: str) -> None:
-    # A log handler that uses Qt may make Qt log in turn.
+    # A log handler that uses Qt may cause further messages from Qt.
     if getattr(_handling, "busy", False):
         return
     _handling.busy = True
@@ -214,7 +214,7 @@ def _handle(mode: Any, context: Any, message: str) -> None:
         if not file:
             logging.getLogger(f"rosglass.qt.{category}").log(level, "%s", text)
             return
-        # console.log() is what an author wants to see; Qt calls it a debug message.
+        # Authors expect to see console.log(), which Qt treats as a debug message.
         if category in {"qml", "js"} and level == logging.DEBUG:
             level = logging.INFO
         caller = Caller(plain_path(file), max(context.line, 0), context.function or "")
@@ -231,7 +231,7 @@ def _with_hint(text: str) -> str:
 
 
 def _log_warning(text: str, caller: Caller, prefix: str = "") -> None:
-    """Log what QML's engine warns of, where it has not been logged just now."""
+    """Log a warning of QML's engine, unless the same was logged recently."""
     cause = _repeats.cause(caller) if text.startswith("TypeError") else ""
     text = _repeats.counted(caller, f"{text}; {cause}" if cause else text)
     if text:
@@ -239,16 +239,16 @@ def _log_warning(text: str, caller: Caller, prefix: str = "") -> None:
 
 
 def install_message_handler() -> None:
-    """Send Qt's own messages, QML warnings and ``console.log()`` through Python's logging."""
+    """Redirect Qt's messages, QML warnings and ``console.log()`` to Python's logging."""
     QtCore.qInstallMessageHandler(_handle)
 
 
 def log_engine_warnings(engine: QtQml.QQmlEngine) -> None:
-    """Send an engine's warnings through Python's logging, each with its cause and counted.
+    """Redirect an engine's warnings to Python's logging, with cause and count.
 
-    Not where a handler of Qt's messages is installed, the program's own or ours, which gets them.
+    Not if a Qt message handler is installed, ours or the program's: that receives them.
     """
-    # Qt tells in no other way which one there is.
+    # Qt has no other way to get the current handler.
     handler = QtCore.qInstallMessageHandler(None)
     if handler is not None:
         QtCore.qInstallMessageHandler(handler)
@@ -260,17 +260,17 @@ def log_engine_warnings(engine: QtQml.QQmlEngine) -> None:
 def _on_warnings(warnings: Sequence[QtQml.QQmlError]) -> None:
     for warning in warnings:
         caller = Caller(plain_path(warning.url().toString()), max(warning.line(), 0), "")
-        # The program's own format may show no place.
+        # The program's own log format may not show the location.
         _log_warning(_with_hint(warning.description()), caller, f"{caller.place}: ")
 
 
 class QmlRosout(logging.Handler):
-    """Hands on to ``/rosout`` what QML logs, with its file and line, until it is closed.
+    """Forwards log records from QML, with file and line, to ``/rosout`` until it is closed.
 
-    Of what the elements say by themselves only warnings are handed on.
+    Records of the elements themselves are forwarded only from WARNING on.
 
     Args:
-        node: Whose log it is.
+        node: The node whose log is published.
     """
 
     def __init__(self, node: Node) -> None:
@@ -278,12 +278,12 @@ class QmlRosout(logging.Handler):
         self._node = node
         logger = logging.getLogger(ROOT)
         if logger.level == logging.NOTSET:
-            # ROS's own level; Python's would keep what interfaces log from the robot.
+            # ROS's default level; Python's would drop the info messages of interfaces.
             logger.setLevel(logging.INFO)
         logger.addHandler(self)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Hand on a record."""
+        """Forward a record."""
         if record.pathname.endswith(".py") and record.levelno < logging.WARNING:
             return
         try:
@@ -294,19 +294,19 @@ class QmlRosout(logging.Handler):
             return
         copied = copy.copy(record)
         copied.name = logger.name + record.name.removeprefix(ROOT)
-        # It is printed already; only publishing handlers get it.
+        # The record has already been printed; only publish it.
         for handler in logger.handlers:
             if isinstance(handler, RosoutHandler):
                 handler.emit(copied)
 
     def close(self) -> None:
-        """Hand on no more; safe to call twice."""
+        """Stop forwarding; safe to call twice."""
         logging.getLogger(ROOT).removeHandler(self)
         super().close()
 
 
 def _has_level(name: str) -> bool:
-    """Return whether a named QML logger was given a level of its own, which it has passed."""
+    """Return whether a named QML logger has its own level; its records have passed that level."""
     while name.startswith(f"{ROOT}."):
         if logging.getLogger(name).level != logging.NOTSET:
             return True

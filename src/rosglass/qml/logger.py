@@ -26,11 +26,11 @@ __all__ = [
 
 
 class LoggerLevel(QtCore.QObject):
-    """The levels of ``Ros2LoggerLevel``; their numbers are those of ROS 2 and of Python."""
+    """The levels of ``Ros2LoggerLevel``, numbered as in ROS 2 and Python."""
 
     @QtCore.QEnum
     class Level(IntEnum):
-        """How important a message is."""
+        """Severity of a message."""
 
         Unset = logging.NOTSET
         Debug = logging.DEBUG
@@ -41,7 +41,7 @@ class LoggerLevel(QtCore.QObject):
 
 
 class Logger(QtCore.QObject):
-    """What ``Ros2.getLogger(name)`` returns."""
+    """The logger that ``Ros2.getLogger(name)`` returns."""
 
     def __init__(self, runtime: Runtime, name: str, parent: QtCore.QObject) -> None:
         super().__init__(parent)
@@ -49,7 +49,7 @@ class Logger(QtCore.QObject):
 
     @Slot(QJSValue)
     def debug(self, message: QJSValue) -> None:
-        """Log a message for developers."""
+        """Log a debug message."""
         self._log(logging.DEBUG, message)
 
     @Slot(QJSValue)
@@ -69,12 +69,12 @@ class Logger(QtCore.QObject):
 
     @Slot(QJSValue)
     def fatal(self, message: QJSValue) -> None:
-        """Log an error after which the program is of no use."""
+        """Log a fatal error."""
         self._log(logging.CRITICAL, message)
 
     @Slot(int, result=bool)
     def setLoggerLevel(self, level: int) -> bool:
-        """Log only messages of this level and above; false for a number that is no level."""
+        """Log only messages of this level and above; return false for an invalid level."""
         if level not in set(LoggerLevel.Level):
             log_from_qml(
                 self._name,
@@ -90,7 +90,7 @@ class Logger(QtCore.QObject):
         log_from_qml(self._name, level, message.toString(), self._runtime.caller())
 
 
-#: The logger of interfaces, by the name that the reference gave it.
+#: The default logger of interfaces, named as in the reference plugin.
 DEFAULT_LOGGER = "ros.qml_ros_plugin"
 _LEVELS = (logging.DEBUG, logging.INFO, logging.WARNING, logging.ERROR, logging.CRITICAL)
 
@@ -100,7 +100,7 @@ class ConsoleLevels(QtCore.QObject):
 
     @QtCore.QEnum
     class Level(IntEnum):
-        """How important a message is; ``Count`` is their number."""
+        """Severity of a message; ``Count`` is the number of levels."""
 
         Debug = 0
         Info = 1
@@ -111,11 +111,11 @@ class ConsoleLevels(QtCore.QObject):
 
 
 class InitOptions(QtCore.QObject):
-    """The options of ``RosInitOptions``; can be combined with ``|``."""
+    """The options of ``RosInitOptions``, which can be combined with ``|``."""
 
     @QtCore.QEnum
     class Option(IntEnum):
-        """How the node is made."""
+        """How the node is created."""
 
         NoSigintHandler = 1
         AnonymousName = 2
@@ -123,7 +123,7 @@ class InitOptions(QtCore.QObject):
 
 
 class Console(QtCore.QObject):
-    """Names and levels of loggers."""
+    """Logger names and levels of ``Ros.console``."""
 
     def __init__(self, runtime: Runtime, parent: QtCore.QObject) -> None:
         super().__init__(parent)
@@ -133,7 +133,7 @@ class Console(QtCore.QObject):
 
     @Slot(str, int, result=bool)
     def setLoggerLevel(self, name: str, level: int) -> bool:
-        """Log only messages of this level and above; false for a number that is no level."""
+        """Log only messages of this level and above; return false for an invalid level."""
         if not 0 <= level < len(_LEVELS):
             log_from_qml(
                 "",
@@ -147,6 +147,6 @@ class Console(QtCore.QObject):
 
 
 def short_logger(name: str) -> str:
-    """Return a logger's name without the prefix that all of them have; empty for the default."""
+    """Return a logger's name without the common prefix; empty for the default logger."""
     rest = name.removeprefix(DEFAULT_LOGGER)
     return rest.removeprefix(".") if rest != name else name.removeprefix("ros.")

@@ -1,4 +1,4 @@
-"""``MessageItemModel``: a message as a tree that views show and edit."""
+"""``MessageItemModel``: a message as an item model that views show and edit."""
 # ruff: noqa: N802, N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 __all__ = ["MessageItemModel", "TreeItem", "check_leaf", "default_element", "plain_tree"]
 
 _numbers = itertools.count(1)
-#: What the plugins call some primitives.
+#: Names of some primitive types in the plugins.
 _NAMES = {"float32": "float", "float64": "double", "byte": "octet"}
 
 
 def plain_tree(message: Message) -> dict[str, Any]:
-    """Return a message as dicts, lists, numpy arrays and plain values."""
+    """Return a message as nested dicts, lists, numpy arrays and plain values."""
     return message.to_dict()
 
 
@@ -37,15 +37,15 @@ class TreeItem:
     """A message, an array, or a single value.
 
     Args:
-        parent: The item it is in; None for the message itself.
-        row: Its place there.
-        schema: For messages, their type.
-        member: The field it is, or is an element of; None for the message itself.
-        value: For the message itself, its fields; others are in their parent's.
+        parent: The enclosing item; None for the message itself.
+        row: Its row in the parent.
+        schema: The type, for messages.
+        member: The field that it is, or is an element of; None for the message itself.
+        value: The fields, for the message itself; other values are in the parent's.
 
     Attributes:
-        number: What tells it from all others, for as long as it exists.
-        children: The items inside that were looked at, by row.
+        number: Unique identifier for its lifetime.
+        children: The child items that have been accessed, by row.
         is_element: Whether it is an element of an array.
         is_array: Whether it is an array.
         is_leaf: Whether it is a single value.
@@ -69,12 +69,12 @@ class TreeItem:
 
     @property
     def is_fixed(self) -> bool:
-        """Whether it is an array of fixed length."""
+        """Whether this is an array of fixed length."""
         return self.member is not None and self.member.fixed_count is not None
 
     @property
     def bound(self) -> int | None:
-        """How many elements fit into it; None for no limit."""
+        """Maximum number of elements; None for no limit."""
         return self.member.size if self.member is not None else None
 
     @property
@@ -96,7 +96,7 @@ class TreeItem:
 
     @property
     def type_name(self) -> str:
-        """What it is: compound, array, or a primitive."""
+        """Its type: compound, array, or a primitive."""
         if self.is_array:
             return "array"
         if self.schema is not None or self.member is None:
@@ -106,7 +106,7 @@ class TreeItem:
 
     @property
     def value(self) -> Any:
-        """Its value, as :func:`plain_tree` has it."""
+        """Its value, in the form of :func:`plain_tree`."""
         if self.parent is None:
             return self._own
         found = self.parent.value[self.name]
@@ -125,7 +125,7 @@ class TreeItem:
 
     @property
     def count(self) -> int:
-        """How many fields or elements it has."""
+        """Number of fields or elements."""
         if self.is_array:
             return len(self.value)
         return len(self.schema.members) if self.schema is not None else 0
@@ -154,19 +154,19 @@ class TreeItem:
         parent.value[self.name] = value
 
     def insert(self, row: int, values: list[Any]) -> None:
-        """Put elements into an array."""
+        """Insert elements into an array."""
         self._own_list()[row:row] = values
         self._move(row, len(values))
 
     def remove(self, row: int, count: int) -> list[TreeItem]:
-        """Take elements out of an array; return the items that were looked at."""
+        """Remove elements of an array; return those items that had been accessed."""
         del self._own_list()[row : row + count]
         gone = [self.children.pop(at) for at in range(row, row + count) if at in self.children]
         self._move(row + count, -count)
         return gone
 
     def cut(self, count: int) -> list[TreeItem]:
-        """Forget the items from a row on; return those that were looked at."""
+        """Drop the items from row `count` on; return those that had been accessed."""
         return [self.children.pop(row) for row in list(self.children) if row >= count]
 
     def _move(self, row: int, by: int) -> None:
@@ -177,7 +177,7 @@ class TreeItem:
         self.children = moved
 
     def _own_list(self) -> list[Any]:
-        """Return the elements as a list: those of a received message cannot be changed."""
+        """Return the elements as a list that can be changed, unlike those of a received message."""
         values: Any = self.value
         if isinstance(values, list):
             return values
@@ -187,7 +187,7 @@ class TreeItem:
 
 
 def default_element(item: TreeItem) -> Any:
-    """Return a new element of an array."""
+    """Return a new element with default value for an array."""
     member = item.member
     assert member is not None
     if member.struct is not None:
@@ -196,7 +196,7 @@ def default_element(item: TreeItem) -> Any:
 
 
 def check_leaf(item: TreeItem, value: Any) -> Any:
-    """Return a value as a field holds it.
+    """Return a value converted to the type of its field.
 
     Raises:
         ConversionError: It does not fit.
@@ -219,7 +219,7 @@ def check_leaf(item: TreeItem, value: Any) -> Any:
     return first.item() if hasattr(first, "item") else first
 
 
-# Qt.ItemDataRole, written out: naming it makes PySide load every enumeration of Qt, at start-up.
+# Values of Qt.ItemDataRole: using its names would make PySide load all of Qt's enumerations.
 _DISPLAY, _EDIT, _USER = 0, 2, 0x0100
 _TYPE, _INDEX, _ELEMENT = _USER + 1, _USER + 2, _USER + 3
 _ROLES = {
@@ -230,15 +230,15 @@ _ROLES = {
     _ELEMENT: b"isArrayElement",
 }
 _NAME, _VALUE = 0, 1
-#: More rows inserted at once are a mistake that would freeze the screen.
+#: Inserting more rows at once is a mistake that would freeze the screen.
 _MOST_ROWS = 100_000
 
 
 class MessageItemModel(QtCore.QAbstractItemModel):
-    """The fields of a message as rows: column 0 their names, column 1 their values.
+    """The fields of a message as rows, with names in column 0 and values in column 1.
 
-    A message that is set keeps the rows that both have, so that views stay unfolded while messages
-    arrive.
+    Setting a new message keeps the rows that both messages have, so that views stay expanded while
+    messages arrive.
     """
 
     messageChanged = Signal()
@@ -364,7 +364,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
             first = self.index(0, _VALUE, index)
             self.dataChanged.emit(first, self.index(last, _VALUE, index))
 
-    # The tree, as views see it.
+    # The tree, for views.
 
     def _item(self, index: _Index | None) -> TreeItem | None:
         if index is None or not index.isValid():
@@ -396,7 +396,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         return self._index_of(item.parent)
 
     def rowCount(self, parent: _Index | None = None) -> int:
-        """Return how many fields or elements an item has."""
+        """Return the number of fields or elements of an item."""
         item = self._item(parent)
         if item is None or (parent is not None and parent.isValid() and parent.column() != _NAME):
             return 0
@@ -407,17 +407,17 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         return 2
 
     def roleNames(self) -> dict[int, QtCore.QByteArray]:
-        """Return the names that delegates use."""
+        """Return the names of the roles for delegates."""
         return {role: QtCore.QByteArray(name) for role, name in _ROLES.items()}
 
     def headerData(self, section: int, orientation: Any, role: int = _DISPLAY) -> Any:
-        """Return the columns' titles."""
+        """Return the column titles."""
         if orientation != QtCore.Qt.Orientation.Horizontal or role != _DISPLAY:
             return None
         return ("Name", "Value")[section] if section in {0, 1} else None
 
     def data(self, index: _Index, role: int = _DISPLAY) -> Any:
-        """Return what a cell shows."""
+        """Return the content of a cell."""
         item = self._item(index) if index.isValid() else None
         if item is None:
             return None
@@ -432,13 +432,13 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         if index.column() == _NAME:
             return item.name
         if not item.is_leaf:
-            # Qt's own delegates complain about undefined.
+            # Qt's own delegates warn about undefined.
             return "" if role == _DISPLAY else None
         value = item.value
         return exact(value) if type(value) is int else value
 
     def flags(self, index: _Index) -> Any:
-        """Return that leaves' values can be edited."""
+        """Return a cell's flags; only values of leaves can be edited."""
         item = self._item(index) if index.isValid() else None
         if item is None:
             return QtCore.Qt.ItemFlag.NoItemFlags
@@ -450,7 +450,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
     # Editing.
 
     def setData(self, index: _Index, value: Any, role: int = _EDIT) -> bool:
-        """Set a leaf; false, with the reason in the log, when the value does not fit."""
+        """Set a leaf; if the value does not fit, log why and return false."""
         item = self._item(index) if index.isValid() else None
         if item is None or not item.is_leaf or index.column() != _VALUE or role != _EDIT:
             return False
@@ -468,7 +468,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
     @Slot("QVariant", "QVariant", result=bool)
     @Slot("QVariant", "QVariant", "QVariant", result=bool)
     def insertRows(self, row: Any, count: Any, parent: Any = None) -> bool:
-        """Insert default elements into an array; false where the type does not allow it."""
+        """Insert default elements into an array; return false if the type does not allow it."""
         row, count = integral(row), integral(count)
         item = self._array(parent, "insertRows", row, count)
         if item is None or not 0 <= row <= item.count:
@@ -488,7 +488,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
     @Slot("QVariant", "QVariant", result=bool)
     @Slot("QVariant", "QVariant", "QVariant", result=bool)
     def removeRows(self, row: Any, count: Any, parent: Any = None) -> bool:
-        """Remove elements of an array; false where the type does not allow it."""
+        """Remove elements of an array; return false if the type does not allow it."""
         row, count = integral(row), integral(count)
         item = self._array(parent, "removeRows", row, count)
         if item is None or row < 0 or row + count > item.count:
@@ -501,7 +501,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         return True
 
     def _array(self, parent: Any, what: str, row: Any, count: Any) -> TreeItem | None:
-        """Return the array whose length may be changed; None, with a reason in the log."""
+        """Return the array if its length may be changed; otherwise log why and return None."""
         known = isinstance(parent, (QtCore.QModelIndex, QtCore.QPersistentModelIndex))
         item = self._item(parent) if known else self._root
         if type(row) is not int or type(count) is not int or count < 1 or item is None:
@@ -513,7 +513,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         return item
 
     def _renumbered(self, item: TreeItem, row: int) -> None:
-        """Notify views of changed element indices, which are the elements' names."""
+        """Notify views that element indices, which are the elements' names, have changed."""
         if row < item.count:
             index = self._index_of(item)
             first, last = self.index(row, _NAME, index), self.index(item.count - 1, _NAME, index)

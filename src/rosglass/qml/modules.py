@@ -1,4 +1,4 @@
-"""Finding QML files, and registering the QML modules with Qt and an engine."""
+"""Finds QML files, and registers the QML modules with Qt and engines."""
 # ruff: noqa: PTH112, PTH113, PTH208 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ _REMOTE = ("http://", "https://", "ftp://")
 
 
 def locate(place: str | os.PathLike[str]) -> Path:
-    """Return the path of a file or folder, which may be in a ROS package.
+    """Return the path of a file or folder, optionally in a ROS package.
 
     Args:
-        place: A path, or ``package://name/path``; packages are found by ``ROS_PACKAGE_PATH``,
+        place: A path, or ``package://name/path``; packages are searched in ``ROS_PACKAGE_PATH``,
             ``AMENT_PREFIX_PATH`` and ``CMAKE_PREFIX_PATH``.
 
     Raises:
-        QmlError: The environment knows no such package.
+        QmlError: The package is not in these paths.
     """
     text = os.fspath(place)
     if not text.startswith(_PACKAGE):
@@ -67,7 +67,7 @@ def interface_file(place: str | os.PathLike[str]) -> Path:
         place: See :func:`locate`.
 
     Raises:
-        QmlError: There is no such file, or it is none of QML.
+        QmlError: The file does not exist, or is not a QML file.
     """
     if os.fspath(place).lower().startswith(_REMOTE):
         raise QmlError(f"{os.fspath(place)}: interfaces are run from files of this machine only")
@@ -87,20 +87,20 @@ def interface_file(place: str | os.PathLike[str]) -> Path:
 
 
 def near(path: Path) -> str:
-    """Return a hint at a file that may be meant, empty where there is none."""
+    """Return a hint at a file with a similar name; empty if there is none."""
     with suppress(OSError, ValueError):
         return similar(path.name, (n for n in os.listdir(path.parent) if n.endswith(path.suffix)))
     return ""
 
 
 def import_folder(place: str | os.PathLike[str]) -> Path:
-    """Return the path of a folder that holds QML modules.
+    """Return the path of a folder with QML modules.
 
     Args:
         place: See :func:`locate`.
 
     Raises:
-        QmlError: There is no such folder.
+        QmlError: The folder does not exist.
     """
     path = locate(place)
     if not os.path.isdir(path):
@@ -108,8 +108,8 @@ def import_folder(place: str | os.PathLike[str]) -> Path:
     return path
 
 
-#: The directories to put on a QML import path: what all Qt versions share, and what is written
-#: differently for this one. The types also need :func:`register`.
+#: Directories for the QML import path: modules for all Qt versions, and those for this version
+#: only. The types also need :func:`register`.
 IMPORT_PATHS = tuple(
     Path(__file__).with_name(name) for name in ("imports", "imports6" if QT6 else "imports5")
 )
@@ -117,9 +117,9 @@ IMPORT_PATHS = tuple(
 
 @cache
 def register() -> None:
-    """Register the types with Qt, once per process."""
-    # Qt lets 5 ms pass before it draws what has changed, in the hope that more will: a third of
-    # what a picture needs from the robot to the screen.
+    """Register the types with Qt; only the first call has an effect."""
+    # Qt waits 5 ms before drawing, to collect further changes: a third of the time that a picture
+    # takes from the robot to the screen.
     os.environ.setdefault("QT_QPA_UPDATE_IDLE_TIME", "0")
     register_type: Any = QtQml.qmlRegisterType
     for uri, module in (("Ros", ros1), ("Ros2", ros2)):
@@ -133,15 +133,14 @@ def install(engine: QtQml.QQmlEngine, session: Session | None = None) -> Session
     """Make ``import Ros 1.0`` and ``import Ros2 1.0`` work in an engine.
 
     Args:
-        engine: The engine, before it loads anything that imports the module.
-        session: The node it talks through; None for the application's own, which all such engines
-            share.
+        engine: The engine; it must not yet have loaded a file that imports the modules.
+        session: The session to use; None for the application's own, which all such engines share.
 
     Returns:
         The session.
 
     Raises:
-        Error: The engine was given another session before.
+        Error: The engine already has a session.
     """
     register()
     for path in IMPORT_PATHS:

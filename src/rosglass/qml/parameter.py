@@ -1,4 +1,4 @@
-"""The element ``Parameter``: a setting of a node, to show and to change."""
+"""The element ``Parameter``: shows and changes a parameter of a node."""
 # ruff: noqa: N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -32,23 +32,23 @@ if TYPE_CHECKING:
 __all__ = ["Parameter", "ParameterLink", "Reading"]
 
 _log = logging.getLogger("rosglass.qml")
-#: Seconds that a node is given to answer.
+#: Seconds that a node has to answer.
 _ANSWER_TIMEOUT_S = 5.0
-#: Seconds between two readings. A change is lost if the node makes it before it knows that we
-#: listen, so the values are read again: often while nodes come and go, then now and then.
+#: Seconds between two readings. A change that the node makes before our subscription is matched
+#: is lost, so values are read again: often while nodes come and go, then less often.
 _QUICK_READ_S, _READ_S = 1.0, 5.0
-#: Seconds after a change of the graph in which values are read often.
+#: Seconds after a change of the graph during which values are read often.
 _UNSETTLED_S = 10.0
-#: Seconds until a node that is not found is called missing.
+#: Seconds until a node that is not found is reported as missing.
 _DISCOVERY_S = 3.0
 
 
 class Reading(NamedTuple):
-    """A node's answer about a parameter.
+    """A node's reply about a parameter.
 
     Attributes:
-        value: Its value; None without one.
-        descriptor: Its description; None if it is not declared.
+        value: Its value, or None.
+        descriptor: Its descriptor; None if it is not declared.
         problem: Why there is no value; empty if there is one.
     """
 
@@ -58,10 +58,10 @@ class Reading(NamedTuple):
 
 
 class ParameterLink:
-    """Reads the parameters of one node that elements show, on a thread of its own.
+    """Reads the parameters of one node for elements, on its own thread.
 
-    Values and descriptions come together, so that a range is known before its value; changes that
-    the node announces are passed on in between. Made by :meth:`join`, and ended when the last
+    Values and descriptors are read together, so that a range is set before its value; in between,
+    changes that the node announces are passed on. Created by :meth:`join`, closed when the last
     listener has left; on the GUI thread only.
     """
 
@@ -74,13 +74,13 @@ class ParameterLink:
         self._closed = False
         now = time.monotonic()
         self._missing_since, self._unsettled_until = now, now + _UNSETTLED_S
-        #: When to read; and whether a reading is on its way, and what changed since it was sent.
+        #: When to read next; whether a reading is pending, and what has changed since its request.
         self._read_at, self._reading = 0.0, False
         self._changed_since: dict[str, Any] = {}
         self._known: dict[str, Reading] = {}
         self._was_ready = False
         self._failure = ""
-        #: Why the node cannot be asked; empty when it can.
+        #: Why the node cannot be queried; empty if it can.
         self.problem = ""
         self._worker.post(self._open)
 
@@ -94,7 +94,7 @@ class ParameterLink:
         parameter: str,
         on_reading: Callable[[Reading], None],
     ) -> ParameterLink:
-        """Return the link to a node, which reads a parameter for a listener from now on.
+        """Return the link to a node, after adding a parameter and its listener.
 
         Args:
             session: The session.
@@ -102,7 +102,7 @@ class ParameterLink:
             name: Full name of the other node.
             listener: The key for :meth:`leave`.
             parameter: Name of the parameter.
-            on_reading: Called on the GUI thread with what the node says of it, changed or not.
+            on_reading: Called on the GUI thread with every reading, changed or not.
         """
         key = (cls, node, name)
         link = session.shared.get(key)
@@ -120,17 +120,17 @@ class ParameterLink:
             self.close()
 
     def close(self) -> None:
-        """End it; safe to call twice."""
+        """Close the link; safe to call twice."""
         if self._closed:
             return
         self._closed = True
         self._session.shared.pop((type(self), self._node, self._name), None)
-        # A question may be on its way, which the GUI thread must not wait for.
+        # The GUI thread must not wait for a pending request.
         self._session.background(self._shut)
 
     @property
     def ready(self) -> bool:
-        """Whether the node is there and serves its parameters."""
+        """Whether the node exists and serves its parameters."""
         client = self._client
         try:
             return client is not None and client.ready
@@ -138,12 +138,12 @@ class ParameterLink:
             return False
 
     def on_graph(self) -> None:
-        """Read often for a while: a node may have been restarted under its name."""
+        """Read often for a while: the node may have been restarted."""
         self._unsettled_until = time.monotonic() + _UNSETTLED_S
         self._read_at = min(self._read_at, time.monotonic() + _QUICK_READ_S)
 
     def on_tick(self) -> None:
-        """Read the parameters when it is time; find out why the node does not answer."""
+        """Read the parameters when due; find out why the node does not answer."""
         now, ready = time.monotonic(), self.ready
         if ready != self._was_ready:
             self._was_ready, self._missing_since = ready, now
@@ -162,7 +162,7 @@ class ParameterLink:
         self._read_at = 0.0
 
     def write(self, name: str, value: Any, done: Callable[[str | Error], None]) -> None:
-        """Set a parameter; `done` gets why the node refused, or an empty text."""
+        """Set a parameter; call `done` with an Error, the reason of a refusal, or an empty text."""
 
         def work(client: ParameterClient) -> str:
             wanted = client.describe([name], timeout=_ANSWER_TIMEOUT_S)[name].type
@@ -183,7 +183,7 @@ class ParameterLink:
             except ParameterError as error:
                 if len(names) == 1:
                     return {names[0]: Reading(None, None, str(error))}
-            # One impossible name must not take the others' values.
+            # One invalid name must not prevent reading the others.
             return {n: r for name in names for n, r in work(client, [name]).items()}
 
         def done(result: dict[str, Reading] | Error) -> None:
@@ -202,7 +202,7 @@ class ParameterLink:
         self._ask(work, done)
 
     def _readings(self, client: ParameterClient, names: Sequence[str]) -> dict[str, Reading]:
-        """Ask for values and descriptions; raises Error."""
+        """Request values and descriptors; raises Error."""
         values = client.get(names, timeout=_ANSWER_TIMEOUT_S)
         described = client.describe(names, timeout=_ANSWER_TIMEOUT_S)
         found = {name: Reading(values[name], described[name]) for name in names}
@@ -217,14 +217,14 @@ class ParameterLink:
         return found
 
     def _why_undeclared(self, name: str, declared: list[str]) -> str:
-        """Return the problem of a parameter that the node does not have."""
+        """Return the error text for a parameter that the node does not have."""
         hint = similar(name, declared)
         if not declared:
             hint = similar(self._name, (str(node) for node in self._node.nodes()))
         return f"{self._name} has no parameter {name!r}{hint}"
 
     def _why_missing(self) -> str:
-        """Return the problem of a node that does not serve parameters."""
+        """Return the error text for a node that does not serve parameters."""
         try:
             names = [str(node) for node in self._node.nodes()]
         except Error as error:
@@ -272,7 +272,7 @@ class ParameterLink:
             if name in event.changed and value is not None and reading and reading.descriptor:
                 known[name] = self._known[name] = reading._replace(value=value, problem="")
             elif any(name == shown for shown, _ in self._listeners.values()):
-                # Declared or forgotten: the description is another one, too.
+                # Declared or undeclared: the descriptor has changed, too.
                 self.read_soon()
         self._notify(known)
 
@@ -283,7 +283,7 @@ class ParameterLink:
 
 
 def _as(value: Any, wanted: ParameterType) -> Any:
-    """Return a number of JavaScript, which has only one kind, as the type of the parameter."""
+    """Convert a JavaScript number, which has no integer type, to the parameter's type."""
     if wanted is ParameterType.DOUBLE and type(value) is int:
         return float(value)
     if wanted is ParameterType.DOUBLE_ARRAY and isinstance(value, list):
@@ -294,7 +294,7 @@ def _as(value: Any, wanted: ParameterType) -> Any:
 class Parameter(Element):
     """One parameter of a node. See its page in ``docs/elements``."""
 
-    #: The node refused a value, for this reason.
+    #: The node rejected a value, for this reason.
     rejected = Signal(str, arguments=["reason"])
     valueChanged = Signal()
     descriptionChanged = Signal()
@@ -337,14 +337,14 @@ class Parameter(Element):
         super().__init__(parent, runtime)
         self._shown: Any = None
         self._descriptor: ParameterDescriptor | None = None
-        #: Requested changes without an answer.
+        #: Number of requested changes without a reply.
         self._writes = 0
-        #: Why the node gives no value.
+        #: Why the node returns no value.
         self._missing = ""
 
     @property
     def label(self) -> str:
-        """What error messages call this element."""
+        """The element's name in error messages."""
         return f"Parameter {self.name!r}"
 
     def _get_value(self) -> QJSValue:
@@ -377,11 +377,11 @@ class Parameter(Element):
                 if caller is not None:
                     log_from_qml("", logging.WARNING, text, caller)
                 self.rejected.emit(str(reason))
-                # Controls that show the requested value already return to the present one.
+                # Reset controls that already show the requested value.
                 self.valueChanged.emit()
             elif link is self._endpoint:
                 self._show(wanted)
-                # The node may have changed it to something else.
+                # The node may have set a different value.
                 link.read_soon()
 
         link.write(config[2], wanted, done)
@@ -396,7 +396,7 @@ class Parameter(Element):
             return QJSValue()
         return runtime.value(getattr(allowed, end))
 
-    # Following the node.
+    # Updates from the node.
 
     def _wanted(self) -> tuple[Node, str, str] | None:
         node = self.node
@@ -452,16 +452,16 @@ class Parameter(Element):
         self._set_problem(link.problem or self._missing)
         described = reading.descriptor != self._descriptor
         if described:
-            # The range comes before the value: a slider would clamp it to the old one.
+            # Set the range before the value: a slider would clamp the value to the old range.
             self._descriptor = reading.descriptor
             self.descriptionChanged.emit()
         self._show(reading.value, again=described)
-        # Handlers may have changed which parameter this is.
+        # Handlers may have changed the parameter's name.
         if is_alive(self) and link is self._endpoint:
             report(self, ready=reading.value is not None and link.ready)
 
     def _show(self, value: Any, again: bool = False) -> None:
-        """Show a value; announce it even if it is the same `again`."""
+        """Show a value; with `again`, emit the signal even if it has not changed."""
         same = value == self._shown and type(value) is type(self._shown)
         if is_alive(self) and (again or not same):
             self._shown = value
@@ -469,7 +469,7 @@ class Parameter(Element):
 
 
 def _to_js(value: Any) -> Any:
-    """Return a parameter's value as JavaScript can hold it."""
+    """Convert a parameter's value to a form that JavaScript supports."""
     if type(value) is int:
         return exact(value)
     if isinstance(value, dict):

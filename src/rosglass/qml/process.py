@@ -1,11 +1,11 @@
 """The process around interfaces: its display, its signals, and no network for QML.
 
-Qt Quick fetches pictures, fonts, QML files and modules from any address that it finds, those in
-rich text included. It does so in threads of its own, where Python must not be called: a thread that
-waits for the GIL is waited for by the GUI thread, which holds it. So Qt is given a proxy that
-refuses every request. Qt uses no proxy for addresses of this machine (``localhost``). For the same
-reason, Python cannot decide which files Qt may open. What its own switches close is closed:
-JavaScript's access to files, and requests of media players, which bypass proxies.
+Qt Quick fetches pictures, fonts, QML files and modules from any address in QML or rich text. It
+uses its own threads for this, which must not call Python: such a thread would wait for the GIL, and
+the GUI thread, which holds the GIL, for that thread. So Qt gets a proxy that refuses every request.
+Qt uses no proxy for addresses of this machine (``localhost``). For the same reason, Python cannot
+decide which files Qt may open. Qt's own switches disable JavaScript's access to files, and requests
+of media players, which bypass proxies.
 """
 
 from __future__ import annotations
@@ -39,19 +39,19 @@ _ADVICE = (
 
 
 def require_display() -> Callable[[], None]:
-    """Make sure that Qt can open a window.
+    """Check that Qt can open a window.
 
     Returns:
         A function to call once Qt is connected. Until then a connection stays open: a virtual
-        screen starts over when its last client leaves, and refuses others until then.
+        screen resets when its last client disconnects, and refuses clients during the reset.
 
     Raises:
-        UnsupportedError: There is no display, or a library is missing that Qt needs to use it; the
-            message says what to do.
+        UnsupportedError: There is no display, or a library that Qt needs for it is missing; the
+            message contains instructions.
     """
     wanted = os.environ.get("QT_QPA_PLATFORM", "").partition(":")[0].partition(";")[0]
     if not QT6 and wanted == "offscreen" and not os.environ.get("DISPLAY"):
-        # Qt 5 would look for OpenGL on a display that is not there, and crash.
+        # Without a display, Qt 5 would crash while looking for OpenGL.
         os.environ.setdefault("QT_QUICK_BACKEND", "software")
     if not sys.platform.startswith("linux") or wanted not in {"", "xcb", "wayland"}:
         return _nothing
@@ -90,10 +90,10 @@ def _wayland_answers() -> bool:
 
 
 class _X11Probe:
-    """A connection to the X server, authorised as Qt's will be.
+    """A connection to the X server with the same authorisation as Qt's.
 
     Attributes:
-        answers: Whether the server answered; true when it cannot be tried.
+        answers: Whether the server answered; true if this cannot be tested.
     """
 
     def __init__(self) -> None:
@@ -120,7 +120,7 @@ class _X11Probe:
 
 
 def _require_x11_plugin() -> None:
-    """Load Qt's X11 plugin; its own error names neither the library nor the package."""
+    """Load Qt's X11 plugin for a clear error: Qt's names neither the library nor the package."""
     if not QT6:
         return
     plugins = QtCore.QLibraryInfo.path(QtCore.QLibraryInfo.LibraryPath.PluginsPath)
@@ -138,9 +138,9 @@ def _require_x11_plugin() -> None:
         ) from None
 
 
-#: How long the program may take to end in good order.
+#: Seconds that the program may take to end cleanly.
 _QUIT_TIMEOUT_S = 4.0
-#: The signals that end a program, with Python's own handlers.
+#: The signals that end a program, and Python's default handlers.
 _DEFAULTS: dict[int, Any] = {
     signal.SIGINT: signal.default_int_handler,
     signal.SIGTERM: signal.SIG_DFL,
@@ -148,11 +148,11 @@ _DEFAULTS: dict[int, Any] = {
 
 
 def end_process_within(seconds: float, code: int) -> None:
-    """End the process after some time with an exit code, unless it has ended by then."""
+    """End the process with an exit code after `seconds`, unless it has already ended."""
 
     def end() -> None:
         try:
-            # Not time.sleep(), which fails where a clock is set under it (libfaketime).
+            # Not time.sleep(), which fails if the clock is changed (libfaketime).
             threading.Event().wait(seconds)
         finally:
             os._exit(code)
@@ -161,15 +161,15 @@ def end_process_within(seconds: float, code: int) -> None:
 
 
 class QuitOnSignal:
-    """Calls `quit` when a signal asks the process to end, and ends it if that does not help.
+    """Calls `quit` when a signal asks the process to end; ends the process if it then hangs.
 
-    Python runs its signal handlers only between two instructions of Python; an event loop in C++,
-    or QML that hangs, would delay that for ever. A thread notices at once.
+    Python runs signal handlers only between two Python instructions; a C++ event loop, or QML that
+    hangs, would delay them forever. A thread notices signals immediately.
 
     Args:
-        quit: Called in that thread with the signal's number.
-        patience: Seconds that the program has to end in good order.
-        keep_handlers: Leave signals alone that the program ignores or has a handler of its own for.
+        quit: Called in this thread with the signal's number.
+        patience: Seconds that the program has to end cleanly.
+        keep_handlers: Ignore signals that the program ignores or handles itself.
     """
 
     def __init__(
@@ -204,18 +204,18 @@ class QuitOnSignal:
     ) -> None:
         self._ended.set()
         for number, handler in self._before.items():
-            # One that was installed from C cannot be put back from Python.
+            # Python cannot restore a handler that was installed from C.
             signal.signal(number, _DEFAULTS[number] if handler is None else handler)
         signal.set_wakeup_fd(self._wakeup)
         os.close(self._writer)
-        # What `quit` refers to must not outlive this in a thread.
+        # The thread must not keep the objects that `quit` refers to alive.
         self._thread.join()
 
     def _watch(self) -> None:
         ending = {int(number) for number in self._signals}
         while received := os.read(self._reader, 1):
             if received[0] not in ending:
-                # As asyncio's, which learns of its signals by it.
+                # Forward to the previous descriptor, e.g. asyncio's, which needs it.
                 with suppress(OSError):
                     os.write(self._wakeup, received)
             else:
@@ -228,11 +228,11 @@ class QuitOnSignal:
 
 
 def _note(*_: object) -> None:
-    """Take a signal that :class:`QuitOnSignal` answers in its thread."""
+    """Ignore a signal here: :class:`QuitOnSignal` handles it in its thread."""
 
 
 def _is_programs_own(number: int) -> bool:
-    """Return whether a signal's handler is neither Python's own nor one of this package."""
+    """Return whether a signal's handler is neither Python's default nor this package's."""
     handler = signal.getsignal(number)
     if handler in (signal.SIG_DFL, _DEFAULTS[number]):
         return False
@@ -240,24 +240,24 @@ def _is_programs_own(number: int) -> bool:
 
 
 _log = logging.getLogger("rosglass.qml")
-#: What Qt's messages about refused requests are followed by.
+#: Appended to Qt's messages about refused requests.
 NETWORK_HINT = "; the network is closed to interfaces: start with --allow-network to open it"
-#: Environment variables that Qt reads, set unless they are set already.
+#: Environment variables for Qt, set unless they already are.
 _CLOSED = {
-    # Qt 5 lets an XMLHttpRequest read and write any file unless this forbids it, unlike Qt 6.
+    # Unlike Qt 6, Qt 5 lets an XMLHttpRequest read and write any file unless this forbids it.
     "QML_XHR_ALLOW_FILE_READ": "0",
     "QML_XHR_ALLOW_FILE_WRITE": "0",
-    # FFmpeg, which plays the films of Qt 6, names this list when it refuses an address.
+    # FFmpeg, which plays videos for Qt 6, prints this list when it refuses an address.
     "QT_FFMPEG_PROTOCOL_WHITELIST": "file,others with --allow-network",
 }
 
 
 @cache
 def close_network() -> None:
-    """Let nothing that Qt loads in this process reach a network, from now on.
+    """Block network access for everything that Qt loads in this process from now on.
 
-    JavaScript cannot read or write files, either. A proxy that the program has set itself is left
-    alone.
+    This also stops JavaScript from reading and writing files. A proxy that the program has set is
+    kept.
     """
     for name, value in _CLOSED.items():
         os.environ.setdefault(name, value)
@@ -276,8 +276,8 @@ def close_network() -> None:
 
 @cache
 def _refusing_port() -> tuple[socket.socket, int]:
-    """Return a port of this machine that refuses all, and its socket, which keeps it that way."""
+    """Return a local port that refuses all connections, and the socket that reserves it."""
     closed = socket.socket()
-    # It never listens, and nothing else can as long as it is bound.
+    # The socket never listens, and while it is bound, no other can listen on the port.
     closed.bind(("127.0.0.1", 0))
     return closed, closed.getsockname()[1]

@@ -1,4 +1,4 @@
-"""Declared QML properties: type, default, check and notify signal of each in one line.
+"""Declarations of QML properties: type, default, check and notify signal in one line.
 
 A class body says ``rate = Writable(float, 10.0, within(0, 1000, "per second"))`` or
 ``age = ReadOnly(float, -1.0)``. Each becomes a Qt property with the notify signal ``rateChanged``
@@ -32,7 +32,7 @@ _T = TypeVar("_T")
 
 
 class _Declaration(Generic[_T]):
-    """What a class body declares; replaced by a Qt property when the class is made."""
+    """A declaration in a class body; replaced by a Qt property when the class is created."""
 
     def __init__(self, kind: Any, notify: str) -> None:
         self._kind, self._notify = kind, notify
@@ -62,20 +62,20 @@ class _Declaration(Generic[_T]):
 
 
 class Writable(_Declaration[_T]):
-    """A property that QML sets.
+    """A property that QML can set.
 
-    A new value is stored in ``_NAME``, announced, and applied by the element's next update.
+    A new value is stored in ``_NAME``, the signal emitted, and the element's update scheduled.
 
     Args:
-        kind: Its Qt type.
+        kind: The Qt type.
         default: Its value until it is set.
-        accept: Returns the value to store. Raises ValueError with what is wrong with it ("is
-            negative"), or Error with the whole message; either is logged with the QML place.
+        accept: Returns the value to store. Raises ValueError with the fault ("is negative"), or
+            Error with the whole message; either is logged with the QML line.
         then: Method to call after a change; empty for none.
         notify: Name of the notify signal; empty for ``NAMEChanged``.
-        unit: Unit for error messages.
-        read: Getter, or the name of a method, in place of one that returns the stored value.
-        write: Name of a method that does all that itself.
+        unit: Unit in error messages.
+        read: Getter, or the name of a method; by default, the stored value is returned.
+        write: Name of a method that replaces all this.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class Writable(_Declaration[_T]):
 
         def write(item: Any, value: Any) -> None:
             if is_script and value is None:
-                value = QJSValue()  # null and undefined, in some versions
+                value = QJSValue()  # null and undefined, in some versions of PySide
             try:
                 new = value if accept is None else accept(value)
             except Error as error:
@@ -133,15 +133,15 @@ class Writable(_Declaration[_T]):
 
 
 class ReadOnly(_Declaration[_T]):
-    """A property that QML reads; Python changes it with :func:`report`.
+    """A property that QML can only read; Python changes it with :func:`report`.
 
     Args:
-        kind: Its Qt type.
-        default: Its value until one is reported.
-        read: Getter, or the name of a method, in place of one that returns the stored value; its
-            class emits the notify signal itself.
+        kind: The Qt type.
+        default: Its value until :func:`report` sets one.
+        read: Getter, or the name of a method, instead of the stored value; the class then emits
+            the notify signal itself.
         notify: Name of the notify signal; empty for ``NAMEChanged``.
-        tolerance: Relative change that is too small to be announced.
+        tolerance: Relative change up to which the signal is not emitted.
     """
 
     def __init__(
@@ -169,8 +169,8 @@ class ReadOnly(_Declaration[_T]):
 def report(item: QtCore.QObject, **values: object) -> bool:
     """Store new values of read-only properties, then emit the signals of those that changed.
 
-    Handlers see all new values at once. They may destroy the object, or change it: then its later
-    signals announce what is true by then.
+    Handlers see all new values. If a handler destroys the object, no more signals are emitted; if
+    it changes a value, the remaining handlers see the changed value.
 
     Returns:
         Whether the object is still alive.
@@ -191,7 +191,7 @@ def report(item: QtCore.QObject, **values: object) -> bool:
 
 
 def changed_enough(before: float, after: Any, tolerance: float = 0.01) -> bool:
-    """Return whether a rate changed by more than a part of itself, or from or to zero."""
+    """Return whether a rate changed by more than a fraction of itself, or from or to zero."""
     return bool(abs(after - before) > tolerance * abs(before) or (after == 0) != (before == 0))
 
 
@@ -199,7 +199,7 @@ def changed_enough(before: float, after: Any, tolerance: float = 0.01) -> bool:
 
 
 def at_least(least: int) -> Callable[[int], int]:
-    """Return a check for integers from `least` on."""
+    """Return a check for integers of at least `least`."""
 
     def check(value: int) -> int:
         if value < least:

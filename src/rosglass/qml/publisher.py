@@ -35,19 +35,19 @@ if TYPE_CHECKING:
 
 __all__ = ["Publisher", "RosPublisher"]
 
-#: Seconds that a message is held at most until its topic is advertised and the node connected.
+#: Maximum seconds that a message waits for its topic to be advertised and the node connected.
 _HOLD_TIMEOUT_S = 2.0
-#: Seconds after that in which messages are held until known subscribers are connected.
+#: Maximum seconds after that during which messages wait for known subscribers to connect.
 _MATCH_TIMEOUT_S = 1.0
-#: Messages that are held at most with keep-all history.
+#: Maximum number of messages held with keep-all history.
 _MAX_HELD = 1000
 
 
 class Publisher(Element):
     """Sends messages of one type on one topic; advertises as soon as there is a node.
 
-    What is published right after it was made is held until the topic is advertised, the node
-    connected to the robot and its subscribers to the topic, and goes out in order then.
+    Messages published right after its creation are held until the topic is advertised, the node
+    connected to the robot and the topic's subscribers are connected; then they are sent in order.
 
     Args:
         runtime: The engine's runtime.
@@ -73,11 +73,11 @@ class Publisher(Element):
         self._topic, self._type, self._qos = topic, type_name, qos
         self._resolved = ""
         self._schema: Schema | None = None
-        #: What waits, each until a time by :func:`time.monotonic`.
+        #: Held messages, each with its deadline by :func:`time.monotonic`.
         self._held: deque[tuple[Message, float]] = deque()
-        #: Keeps JavaScript from collecting this while something waits.
+        #: Keeps JavaScript from collecting this publisher while it holds messages.
         self._reference: QJSValue | None = None
-        #: Whether a held message was given up, and the node has not been connected since.
+        #: Whether a held message was dropped, and the node has not been connected since.
         self._unreachable = False
         #: When the node was connected and the topic advertised, monotonic.
         self._ready_at: float | None = None
@@ -86,12 +86,12 @@ class Publisher(Element):
 
     @property
     def label(self) -> str:
-        """What error messages call this element."""
+        """The element's name in error messages."""
         return self._topic
 
     @Slot(result=int)
     def getSubscriptionCount(self) -> int:
-        """Return how many subscriptions match; 0 before the topic is advertised."""
+        """Return the number of matching subscriptions; 0 before the topic is advertised."""
         sender = self._endpoint
         try:
             return sender.subscription_count() if sender is not None else 0
@@ -100,14 +100,14 @@ class Publisher(Element):
 
     @Slot(QJSValue, result=bool)
     def publish(self, message: QJSValue) -> bool:
-        """Send a message; fields that are left out get their defaults.
+        """Publish a message; omitted fields get their defaults.
 
         A value that does not fit throws a JavaScript Error that names the field; nothing is sent.
 
         Returns:
-            Whether it was handed to a connected node, or is held for a moment until that is there:
-            false while there is no node and none is connecting, while the topic cannot be
-            advertised, and while the connection is lost, or was not made in time.
+            Whether it was passed to a connected node, or is held until the node is connected. False
+            while there is no node and none is connecting, while the topic cannot be advertised, and
+            while the connection is lost or was not established in time.
         """
         sender, schema = self._endpoint, self._schema
         kind = self._early_type() if sender is None else sender.type
@@ -116,7 +116,7 @@ class Publisher(Element):
             reason = why or "it is not advertised yet"
             if self._session is not None and not self._session.is_initialized:
                 if self._session.closed:
-                    return False  # the program ends
+                    return False  # the program is ending
                 ended = bool(self._resolved)  # it was advertised
                 reason = "the node was shut down" if ended else f"{reason}; {NOT_INITIALIZED}"
             self._complain(f"nothing was published on {self._topic}: {reason}", logging.WARNING)
@@ -130,12 +130,12 @@ class Publisher(Element):
             if self._held:
                 self._send_held()
             if sender is None or self._held or not self._may_send(sender):
-                # As bytes: what JavaScript does with the object later is nothing to it.
+                # Copied by encoding, so that later changes of the JavaScript object have no effect.
                 self._hold(kind.decode(kind.encode(fields)))
                 return True
             self._send(sender, fields)
         except ConversionError as error:
-            # Logged by Qt, with the place, unless JavaScript catches it.
+            # Qt logs it with the QML line, unless JavaScript catches it.
             if self._runtime is not None:
                 text = f"nothing was published on {self._resolved or self._topic}: {error}"
                 self._runtime.throw(self.DIALECT.spelled(text))
@@ -153,16 +153,16 @@ class Publisher(Element):
     def _send(self, sender: Sender, message: dict[str, object] | Message) -> None:
         waits = self.node is not None and self.node.wire != "ros1"  # ROS 1 queues without limit
         if waits and self._qos.history is History.KEEP_ALL and self._session is not None:
-            # A publisher that must not lose anything waits for a network that is stuck: not here.
+            # On the worker: with keep-all history, publishing blocks while the network is stuck.
             data = sender.type.encode(message)
             self._session.background(lambda: sender.publish_serialized(data), self._on_sent_late)
         else:
             sender.publish(message)
 
     def _early_type(self) -> MessageType | None:
-        """Return the type of a topic that is about to be advertised; None when it will not be.
+        """Return the type of a topic that will be advertised soon; None if it will not be.
 
-        A type that only the robot knows is not known before the topic is advertised.
+        A type that must be requested from the robot is unknown until the topic is advertised.
         """
         session = self._session or (self._runtime.session if self._runtime is not None else None)
         if session is None or self._problem or session.state not in ("connecting", "connected"):
@@ -187,17 +187,17 @@ class Publisher(Element):
         return self._session is not None and self._session.state == "connected"
 
     def _may_send(self, sender: Sender) -> bool:
-        """Return whether a message is sent now instead of held."""
+        """Return whether a message is sent now instead of being held."""
         return self._unreachable or self._is_settled(sender)
 
     def _is_settled(self, sender: Sender) -> bool:
-        """Return whether the known subscribers receive what is sent now."""
+        """Return whether the known subscribers will receive a message sent now."""
         if self._is_connected():
             self._unreachable = False
             if self._ready_at is None:
                 self._ready_at = time.monotonic()
         if not self._settled:
-            latched = self._qos.durability is Durability.TRANSIENT_LOCAL  # it is kept for them
+            latched = self._qos.durability is Durability.TRANSIENT_LOCAL  # late ones get it, too
             late = self._ready_at is not None and (
                 time.monotonic() - self._ready_at > _MATCH_TIMEOUT_S or self._is_matched(sender)
             )
@@ -205,7 +205,7 @@ class Publisher(Element):
         return self._settled
 
     def _is_matched(self, sender: Sender) -> bool:
-        """Return whether a subscriber is connected, and all that the graph shows."""
+        """Return whether there are subscribers, and all of those in the graph are connected."""
         if self.node is None:
             return False
         try:
@@ -222,14 +222,14 @@ class Publisher(Element):
                 text = f"{self._topic}: messages are dropped, the oldest first: more than "
                 text += f"{most} were published before it was advertised"
                 self._complain(text, logging.WARNING)
-        # JavaScript may let go of it, as in createPublisher(...).publish({}).
+        # JavaScript may drop its only reference, as in createPublisher(...).publish({}).
         engine = self._runtime.engine if self._runtime is not None else None
         if self._reference is None and engine is not None:
             self._reference = engine.newQObject(self)
         self._held.append((message, time.monotonic() + _HOLD_TIMEOUT_S))
 
     def _send_held(self) -> None:
-        """Send held messages once subscribers receive them; drop those that are too old."""
+        """Send held messages once subscribers can receive them; drop those that are too old."""
         sender, held = self._endpoint, self._held
         if sender is not None and self._is_settled(sender):
             while held:
@@ -250,13 +250,13 @@ class Publisher(Element):
             self._reference = None
 
     def _on_sent_late(self, result: Error | None) -> None:
-        """Log that a message that waited for the network was not sent."""
+        """Log that a message could not be sent after waiting for the network."""
         if result is not None and is_alive(self):
             text = f"nothing was published on {self._resolved or self._topic}: {result}"
             self._log(self.DIALECT.spelled(text), logging.ERROR)
 
     def _complain(self, text: str, level: int) -> None:
-        """Log with the QML place, but not for every message of a stream."""
+        """Log with the QML line, at a limited rate."""
         if self._runtime is None:
             return
         text, caller = self.DIALECT.spelled(text), self._runtime.caller()
@@ -293,11 +293,11 @@ class Publisher(Element):
 
     @Slot()
     def _log_no_subscriber(self) -> None:
-        """Log that the topic has no subscription, with a similar name: it may be misspelt."""
+        """Log that the topic has no subscription, with a similar name in case it is misspelt."""
         node, sender = self.node, self._endpoint
         if node is None or sender is None or not self._is_connected():
             return
-        # A node that has just been closed answers nothing.
+        # The node may just have been closed.
         with suppress(Error):
             if sender.subscription_count() or node.subscriptions(self._resolved):
                 return
@@ -311,7 +311,7 @@ class Publisher(Element):
         if self._held:
             self._send_held()
         if self._endpoint is not None:
-            self._is_settled(self._endpoint)  # for what is published next
+            self._is_settled(self._endpoint)  # updates the state for the next message
             self._set_problem(self._endpoint.problem)
 
 
@@ -322,8 +322,8 @@ class RosPublisher(Publisher):
         runtime: The engine's runtime.
         type_name: Message type, as in QML.
         topic: Topic name, as in QML.
-        queue_size: Messages that wait for a slow subscriber; 0 for no limit.
-        latch: Whether new subscribers get the last message at once.
+        queue_size: Maximum number of messages queued for a slow subscriber; 0 for no limit.
+        latch: Whether new subscribers immediately get the last message.
     """
 
     DIALECT = Dialect.ROS1
@@ -348,7 +348,7 @@ class RosPublisher(Publisher):
 
     @Slot(result=int)
     def getNumSubscribers(self) -> int:
-        """Return how many subscribers are connected; 0 before the topic is advertised."""
+        """Return the number of connected subscribers; 0 before the topic is advertised."""
         return self.getSubscriptionCount()
 
     def _on_created(self, endpoint: Sender) -> None:

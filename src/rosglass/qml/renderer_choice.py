@@ -1,8 +1,8 @@
-"""Which of Qt Quick's renderers draws: OpenGL, or Qt's own, without a graphics card.
+"""Choice of Qt Quick's renderer: OpenGL, or Qt's software renderer.
 
-Qt takes one for the whole process when the first window, or picture, of Qt Quick is made: only the
-files tell by then what will be in it. Where the screen's OpenGL is computed by the processor
-itself, Qt's own renderer is several times as fast.
+Qt chooses one for the whole process when the first window or picture of Qt Quick is created. By
+then, only the files show what needs OpenGL. Where OpenGL runs on the CPU, Qt's software renderer is
+several times as fast.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ __all__ = [
     "taken_renderer",
 ]
 
-#: Qt's classes, and what they are in QML: those of Qt 5.15's "Qt Quick Software Adaptation", those
-#: that draw by OpenGL themselves, and layers, which leave holes in what is below them.
+#: Qt classes that need OpenGL -> their names in QML: those of Qt 5.15's "Qt Quick Software
+#: Adaptation", those that call OpenGL themselves, and layers, which cut holes in items below.
 _CLASSES = {
     "QQuickShaderEffect": "ShaderEffect",
     "QQuickShaderEffectSource": "layer|ShaderEffectSource",
@@ -44,8 +44,8 @@ _CLASSES = {
     "QQuickWebEngineView": "WebEngineView",
     "QQuickFramebufferObject": "QQuickFramebufferObject",
 }
-#: Cameras of robots are painted where video is not drawn; nothing else that a VideoOutput shows is.
-#: ImagePublisher takes pictures of items, which have no transparency with the software renderer.
+#: QML that needs OpenGL. The software renderer draws robots' cameras, but nothing else that a
+#: VideoOutput shows; with it, ImagePublisher's pictures of items have no transparency.
 _WRITTEN = re.compile(
     r"\b(ShaderEffect|ShaderEffectSource|MultiEffect|RectangularShadow|View3D|WebEngineView|layer"
     r"|MediaPlayer|Video|Camera|CaptureSession|ImagePublisher)\s*\{"
@@ -63,11 +63,11 @@ _LISTED = re.compile(r"^[ \t]*(?:singleton\s+)?([A-Z]\w*)\s+[\d.]+\s+(\S+\.qml)\
 
 
 def need_in_items(root: Any, file: Path) -> str:
-    """Return the first item that only OpenGL draws, as ``place: what``; empty for none.
+    """Return the first item that only OpenGL can draw, as ``place: what``; empty for none.
 
     Args:
-        root: What to look through.
-        file: The interface that it is of.
+        root: The root object to search.
+        file: The interface that it belongs to.
     """
     items = [root]
     while items:
@@ -80,7 +80,7 @@ def need_in_items(root: Any, file: Path) -> str:
 
 
 def need_in_file(file: Path, import_paths: Sequence[str]) -> str:
-    """Return what only OpenGL draws of a file and those that it uses.
+    """Return the first use of something that only OpenGL draws, in a file and those it uses.
 
     Args:
         file: The file.
@@ -98,7 +98,7 @@ def need_in_file(file: Path, import_paths: Sequence[str]) -> str:
 
 
 def _files(file: Path, import_paths: Sequence[Path]) -> Iterator[tuple[Path, str]]:
-    """Iterate over a file and those that it uses, of its folders and of modules, with texts."""
+    """Yield a file and the files it uses, from its folders and from modules, with their texts."""
     waiting, seen = [file], {file}
     folders: dict[Path, _Folder] = {}
     while waiting:
@@ -117,7 +117,7 @@ def _files(file: Path, import_paths: Sequence[Path]) -> Iterator[tuple[Path, str
 
 
 def _places(module: str, version: str, import_paths: Sequence[Path]) -> list[Path]:
-    """Return where a module may be, as Qt 5 looks for it."""
+    """Return the folders in which Qt 5 looks for a module."""
     place = module.replace(".", "/")
     major = version.partition(".")[0]
     names = [place, f"{place}.{version}", f"{place}.{major}"] if version else [place]
@@ -125,7 +125,7 @@ def _places(module: str, version: str, import_paths: Sequence[Path]) -> list[Pat
 
 
 class _Folder:
-    """A folder with QML files: of an interface, or a module's."""
+    """A folder with QML files, of an interface or a module."""
 
     _names: AbstractSet[str] = frozenset()
 
@@ -136,7 +136,7 @@ class _Folder:
         self._listed = dict(_LISTED.findall(_read(path / "qmldir")))
 
     def used(self, text: str) -> set[Path]:
-        """Return its files for the types and files that are named in a text."""
+        """Return the folder's files for the types and files named in a text."""
         found = set()
         for kind, source in _USED.findall(text):
             name = source or self._listed.get(kind, f"{kind}.qml")
@@ -148,12 +148,12 @@ class _Folder:
 
 
 def _plain(path: Path) -> Path:
-    """Return the one name of a place, as addresses have it: folders may import each other."""
+    """Return the canonical path of a file or folder: folders may import each other."""
     return Path(os.path.normpath(path))
 
 
 def _read(path: Path) -> str:
-    """Return a file's text without its comments, each line where it is."""
+    """Return a file's text without comments, with unchanged line numbers."""
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -162,11 +162,11 @@ def _read(path: Path) -> str:
 
 
 def _place(item: Any, written: str, file: Path) -> str:
-    """Return where an item is written in the interface, with the line if it is found."""
+    """Return where the interface declares an item, with the line if it is found."""
     while item is not None:
         context = QtQml.QQmlEngine.contextForObject(item)
         path = Path("" if context is None else context.baseUrl().toLocalFile())
-        # What JavaScript makes of a text claims to be of a file `inline`.
+        # For objects that JavaScript creates from a text, Qt reports a file `inline`.
         if path.is_relative_to(file.parent) and path.is_file():
             text = _read(path)
             found = re.search(rf"\b({written})\b", text)
@@ -179,16 +179,16 @@ def _line(text: str, index: int) -> int:
     return text.count("\n", 0, index) + 1
 
 
-#: What a user can ask for.
+#: The options for users.
 RENDERERS = ("auto", "opengl", "software")
-#: What Mesa's OpenGL without a graphics card calls itself.
+#: Names of Mesa's OpenGL renderers that run on the CPU.
 _COMPUTED = ("llvmpipe", "softpipe", "swrast", "software rasterizer")
-#: What Qt looks at when it makes its first window.
+#: Environment variables that Qt reads when it creates its first window.
 _VARIABLES = ("QT_QUICK_BACKEND", "QMLSCENE_DEVICE")
-#: What users of Qt 6 ask for Vulkan or a certain OpenGL with.
+#: Environment variables by which users of Qt 6 select Vulkan or a version of OpenGL.
 _RHI_VARIABLES = ("QSG_RHI_BACKEND", "QSG_RHI")
 _SOFTWARE = ("software", "softwarecontext")
-#: OpenGL's name of the string that says what draws.
+#: GL_RENDERER, for glGetString().
 _GL_RENDERER = 0x1F01
 
 _NAMES = {"opengl": "OpenGL", "software": "Qt's software renderer"}
@@ -196,9 +196,9 @@ _BEFORE = "something of Qt Quick that was made before has chosen it"
 
 
 class RendererChoice:
-    """The one choice of a process, made with its first interface in QML."""
+    """The process's choice of a renderer, made for its first QML interface."""
 
-    #: What is drawn, and where errors send users, for the log.
+    #: What is drawn, and what error messages refer users to.
     _subject = "interfaces"
     _application = "rosglass.qml.Application"
     _log = logging.getLogger("rosglass.qml")
@@ -206,9 +206,9 @@ class RendererChoice:
     def __init__(self) -> None:
         self._wanted = "auto"
         self._expected: list[Path] = []
-        #: "opengl" or "software"; empty before it is made.
+        #: "opengl" or "software"; empty before the choice.
         self.renderer = ""
-        #: Why that one.
+        #: Reason for the choice.
         self.reason = ""
 
     def prefer(self, renderer: str) -> None:
@@ -218,7 +218,7 @@ class RendererChoice:
             renderer: One of :data:`RENDERERS`.
 
         Raises:
-            Error: There is no such renderer, or Qt has chosen another one already.
+            Error: The renderer is unknown, or Qt has already chosen another one.
         """
         if renderer not in RENDERERS:
             raise Error(f"renderer {renderer!r}: expected one of {', '.join(RENDERERS)}")
@@ -241,20 +241,20 @@ class RendererChoice:
             )
 
     def expect(self, file: str | os.PathLike[str]) -> None:
-        """Add a file that will be shown later; its needs count as well."""
+        """Add a file that will be shown later, whose needs are also considered."""
         if self.renderer:
             return
         with suppress(QmlError):
             self._expected.append(interface_file(file))
 
     def choose(self, import_paths: Sequence[str]) -> str:
-        """Return the renderer; the first call chooses for all.
+        """Return the renderer; the first call makes the choice.
 
         Args:
-            import_paths: Folders with QML modules that the expected files use.
+            import_paths: Folders with QML modules for the expected files.
 
         Raises:
-            UnsupportedError: OpenGL was asked for, and Qt cannot use it here.
+            UnsupportedError: OpenGL was requested, but Qt cannot use it here.
         """
         if not self.renderer:
             self.renderer, self.reason = self._choose(import_paths)
@@ -263,15 +263,15 @@ class RendererChoice:
             if self.renderer == "opengl":
                 self._try_opengl()
             if self.renderer == "software":
-                # A thread that draws would need Python for pictures, and the GUI thread waits for
-                # it with Python's lock: neither would go on.
+                # No render thread: it would need the GIL to paint pictures, while the GUI thread
+                # holds the GIL and waits for it, a deadlock.
                 os.environ["QSG_RENDER_LOOP"] = "basic"
             name = _NAMES[self.renderer]
             self._log.info("%s are drawn by %s: %s", self._subject, name, self.reason)
         return self.renderer
 
     def tell_missing(self, need: str) -> str:
-        """Return the warning for an interface that needs OpenGL where there is none."""
+        """Return the warning for an interface that needs OpenGL, with the software renderer."""
         return (
             f"{need} is not drawn, or wrongly: Qt's software renderer draws all {self._subject} "
             f"here ({self.reason}); start with --renderer opengl, or Application(renderer='opengl')"
@@ -298,9 +298,9 @@ class RendererChoice:
         return "software", f"no graphics card, OpenGL would be computed by {device}"
 
     def _graphics_device(self) -> str:
-        """Return what draws the screen, e.g. ``llvmpipe (LLVM 15.0.6, 256 bits)``; "" for nothing.
+        """Return the OpenGL renderer, e.g. ``llvmpipe (LLVM 15.0.6, 256 bits)``; "" for none.
 
-        Where Qt does not draw by OpenGL anyway, on Windows and macOS, what it does draw by.
+        On Windows and macOS, where Qt does not use OpenGL, a general description.
         """
         if not sys.platform.startswith(("linux", "freebsd")):
             return "what Qt chooses here"
@@ -314,15 +314,15 @@ class RendererChoice:
         return device
 
     def _try_opengl(self) -> None:
-        """Use the software renderer where OpenGL is unavailable, or raise UnsupportedError."""
+        """Use the software renderer if OpenGL is unavailable, or raise UnsupportedError."""
 
 
-#: That of the process, for windows of its own.
+#: The choice of this process, for its own windows.
 choice = RendererChoice()
 
 
 def taken_renderer() -> str:
-    """Return which renderer Qt has taken for the process; empty as long as it has taken none."""
+    """Return the renderer that Qt has chosen for the process; empty before it chooses."""
     if not any(window.inherits("QQuickWindow") for window in QtGui.QGuiApplication.allWindows()):
         return ""
     backend = QtQuick.QQuickWindow.sceneGraphBackend()
@@ -330,7 +330,7 @@ def taken_renderer() -> str:
 
 
 def ask_for_software() -> bool:
-    """Return whether the process has the software renderer, taken now if it is not too late."""
+    """Select the software renderer unless it is too late; return whether it is in use."""
     window = QtQuick.QQuickWindow
     if window.sceneGraphBackend() not in _SOFTWARE:
         window.setSceneGraphBackend("software")

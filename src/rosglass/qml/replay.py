@@ -1,4 +1,4 @@
-"""The element ``Replay``: a recording in place of the robot, or played to the robot."""
+"""The element ``Replay``: a recording instead of the robot, or played to the robot."""
 # ruff: noqa: N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ __all__ = ["Replay", "RobotPlace"]
 
 
 class RobotPlace:
-    """The address of a session, taken by recordings in turn; on the GUI thread only."""
+    """Replaces the address of a session by recordings; on the GUI thread only."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        #: Who wants which recording; the last one is shown.
+        #: Elements -> the recordings that they want; the last one is shown.
         self._wanted: dict[Any, str] = {}
-        #: Address before the first recording, and the one that was put in its place.
+        #: Address before the first recording, and the address that replaced it.
         self._before, self._ours = "", ""
 
     @classmethod
     def of(cls, session: Session) -> RobotPlace:
-        """Return the one of a session."""
+        """Return the instance of a session."""
         place: RobotPlace = session.shared.setdefault(cls, cls(session))
         return place
 
     def take(self, user: Any, file: str) -> str:
-        """Show a recording; returns why it is not shown, empty when it is."""
+        """Show a recording; return why it is not shown, or an empty text."""
         if not self._session.owns_node:
             return "the program brought its own node, which stays"
         if self._wanted.get(user) != file:
@@ -50,12 +50,12 @@ class RobotPlace:
         return "" if shown == file else f"another Replay shows {shown} now"
 
     def leave(self, user: Any) -> None:
-        """Stop showing it; show the one before again."""
+        """Stop showing a user's recording; show the previous one again."""
         if self._wanted.pop(user, None) is not None:
             self._settle()
 
     def leave_soon(self, user: Any) -> None:
-        """Do so unless the program ends."""
+        """Call :meth:`leave` later, unless the program ends."""
 
         def leave() -> None:
             if is_alive(self._session):
@@ -64,7 +64,7 @@ class RobotPlace:
         QtCore.QTimer.singleShot(0, leave)
 
     def _settle(self) -> str:
-        """Connect the session to the last recording; return that one."""
+        """Connect the session to the last recording and return it."""
         session = self._session
         if not self._wanted:
             if session.url == self._ours:
@@ -86,10 +86,10 @@ _MAX_TOPICS = 10_000
 
 
 def _topic_names(value: QJSValue) -> tuple[str, ...]:
-    """Return the names in an array of QML; raises ValueError for anything else."""
+    """Return the names in a QML array; raises ValueError for other values."""
     if value.isUndefined() or value.isNull():
         return ()
-    # A Python list is not what JavaScript calls an array.
+    # A Python list is not an array in JavaScript.
     if not (value.isObject() and value.property("length").toNumber() <= _MAX_TOPICS):
         raise ValueError("must be an array of names")
     return tuple(strings(value))
@@ -98,7 +98,7 @@ def _topic_names(value: QJSValue) -> tuple[str, ...]:
 class Replay(Element):
     """Controls the recording that an interface shows. See its page in ``docs/elements``."""
 
-    #: The end was reached.
+    #: The recording has reached its end.
     finished = Signal()
     rateChanged = Signal()
     loopChanged = Signal()
@@ -122,7 +122,7 @@ class Replay(Element):
         write="_set_position",
     )
     duration = ReadOnly(float, read=lambda self: self._state[2])
-    # Qt 5 ends the program when it makes a list of texts of certain objects.
+    # Not a string list: Qt 5 aborts the program when it converts certain objects to one.
     topics = Writable(QJSValue, (), _topic_names, read="_get_topics")
     toRobot = Writable(bool, False)
     ready = ReadOnly(bool, False)
@@ -134,7 +134,7 @@ class Replay(Element):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         super().__init__(parent, runtime)
-        # What QML has not set is as the recording's address says.
+        # Values that QML has not set are those of the recording's address.
         self._wanted_rate: float | None = None
         self._wanted_loop: bool | None = None
         self._wanted_playing: bool | None = None
@@ -187,24 +187,24 @@ class Replay(Element):
 
     @Slot()
     def play(self) -> None:
-        """Let time pass; from the beginning when the end was reached."""
+        """Start playing, from the beginning if the end was reached."""
         self._set_playing(True)
 
     @Slot()
     def pause(self) -> None:
-        """Let time stand still."""
+        """Pause playing."""
         self._set_playing(False)
 
     @Slot(float)
     def seek(self, seconds: float) -> None:
-        """Continue at another position, in seconds from the beginning; an impossible one throws."""
+        """Jump to a position in seconds from the beginning; an invalid one throws."""
         problem = self._seek(seconds)
         runtime = self._find_runtime()
         if problem and runtime is not None:
             runtime.throw(f"Replay.seek: {problem}")
 
     def _seek(self, seconds: float) -> str:
-        """Return why it cannot be done, empty when it can."""
+        """Jump to a position; return why this is impossible, or an empty text."""
         if self._playback is None:
             self._wanted_position = seconds
             return ""
@@ -221,7 +221,7 @@ class Replay(Element):
             (playback.play if playing else playback.pause)()
         self._refresh()
 
-    # Finding what to control.
+    # Finding the playback.
 
     def _wanted(self) -> tuple[Node, str, tuple[str, ...]] | None:
         refused, node = self._set_robot_place(), self.node
@@ -249,19 +249,19 @@ class Replay(Element):
         if self.toRobot:
             super()._create_endpoint(wanted)
         else:
-            self._on_created(wanted[0].playback)  # which belongs to the recording's node
+            self._on_created(wanted[0].playback)  # belongs to the recording's node
 
     def _factory(self, node: Node, file: str, topics: tuple[str, ...]) -> Callable[[], Playback]:
         def create() -> Playback:
             from rosglass.bags import Playback, open_bag  # noqa: PLC0415 - few ever need it
 
-            # Nothing is sent to a robot before QML says so.
+            # Send nothing to a robot before QML calls play().
             return Playback(node, open_bag(file), topics=topics, paused=True)
 
         return create
 
     def _set_robot_place(self) -> str:
-        """Put the recording in the robot's place, or take it out; return why it is not shown."""
+        """Replace the robot by the recording, or restore it; return why this failed."""
         session, user = self._session, self._user
         assert session is not None
         place = RobotPlace.of(session)
@@ -298,7 +298,7 @@ class Replay(Element):
         playback, session = self._playback, self._session
         lost = session is not None and session.state != "connected"
         if lost and self.toRobot and playback is not None and playback.is_playing:
-            # A robot that is back must not continue with commands from a recording.
+            # A reconnected robot must not continue with commands from a recording.
             self._refuse("Replay: paused, as the connection with the robot was lost")
             self.pause()
 
@@ -307,7 +307,7 @@ class Replay(Element):
         self._refresh()
 
     def _refresh(self) -> None:
-        """Announce what changed since the last call."""
+        """Emit the signals of properties that changed since the last call."""
         playback = self._playback
         before, now = self._state, (False, 0.0, 0.0)
         if playback is not None:

@@ -1,4 +1,4 @@
-"""The module ``Ros 1.0``: its singletons, and the types that it registers."""
+"""The module ``Ros 1.0``: its singletons and registered types."""
 # ruff: noqa: N802 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ __all__ = ["NATIVE", "TYPES", "Package", "Ros", "Time", "WallTime"]
 
 
 class WallTime(QtCore.QObject):
-    """What QML calls ``WallTime``: the time of the operator's machine."""
+    """The singleton ``WallTime``: the time of the operator's machine."""
 
     @property
     def _runtime(self) -> Runtime:
@@ -54,13 +54,13 @@ class WallTime(QtCore.QObject):
 
     @Slot(result=QJSValue)
     def now(self) -> QJSValue:
-        """Return the system's time."""
+        """Return the system time."""
         return self._runtime.time(Moment.now(), Dialect.ROS1)
 
     @Slot(QJSValue, result=QJSValue)
     @Slot(QJSValue, QJSValue, result=QJSValue)
     def create(self, first: QJSValue, second: QJSValue | None = None) -> QJSValue:
-        """Return a time of seconds, or of whole seconds and nanoseconds."""
+        """Create a time from seconds, or from whole seconds and nanoseconds."""
         runtime = self._runtime
         made = runtime.create_time(Dialect.ROS1, "time", first, second or QJSValue())
         if made.isError():
@@ -71,18 +71,18 @@ class WallTime(QtCore.QObject):
 
 
 class Time(WallTime):
-    """What QML calls ``Time``: the time of the robot, which may be simulated."""
+    """The singleton ``Time``: the time of the robot, which may be simulated."""
 
     def _now(self) -> Moment:
         session = self._runtime.session
         if session.node is not None:
             return session.node.now()
-        # Requested, but still connecting: whether time is simulated is not known yet.
+        # While the node is connecting, it is unknown whether time is simulated.
         return Moment.now() if session.is_initialized else Moment()
 
     @Slot(result=QJSValue)
     def now(self) -> QJSValue:
-        """Return the time of the node's clock; zero before init, and before a simulation's."""
+        """Return the node's time; zero before init, and before the first simulated time."""
         return self._runtime.time(self._now(), Dialect.ROS1)
 
     @Slot(result=bool)
@@ -96,23 +96,23 @@ class Time(WallTime):
 
     @Slot(result=bool)
     def isSystemTime(self) -> bool:
-        """Return whether the time is that of the operator's machine."""
+        """Return whether the time is the system time of the operator's machine."""
         return not self.isSimTime()
 
     @Slot(result=bool)
     def isValid(self) -> bool:
-        """Return whether there is a time: false before init, and before a simulation's first."""
+        """Return whether time is valid: false before init, and before the first simulated time."""
         return self._now() != Moment()
 
 
 _T = TypeVar("_T")
 
-#: How long the program ``rospack`` may take.
+#: Seconds that the program ``rospack`` may take.
 _ROSPACK_TIMEOUT_S = 10
 
 
 class Package(QtCore.QObject):
-    """The packages that the environment names: ``ROS_PACKAGE_PATH`` and sourced workspaces.
+    """The packages in ``ROS_PACKAGE_PATH`` and in sourced workspaces.
 
     Args:
         runtime: The engine's runtime.
@@ -126,7 +126,7 @@ class Package(QtCore.QObject):
         self._searched: tuple[str | None, ...] = ()
 
     def _look(self, search: Callable[[Folders], _T], otherwise: _T, *, again: bool = False) -> _T:
-        """Return the packages in the folders, searched once per state of the environment."""
+        """Search the package folders; re-read them if `again` or if the environment changed."""
         from rosglass.interfaces.provider import (  # noqa: PLC0415 - few need it
             workspace,
             workspace_variables,
@@ -148,7 +148,7 @@ class Package(QtCore.QObject):
 
     @Slot(str, result=str)
     def getPath(self, package: str) -> str:
-        """Return a package's folder; empty when there is no such package."""
+        """Return a package's folder; empty if the package does not exist."""
         return self._look(lambda folders: folders.package(package), "")
 
     @Slot(result="QStringList")
@@ -159,15 +159,16 @@ class Package(QtCore.QObject):
     @Slot(str, str, result=QJSValue)
     @Slot(str, str, bool, result=QJSValue)
     def getPlugins(self, name: str, attribute: str, force_recrawl: bool = False) -> QJSValue:
-        """Return what packages export for a package.
+        """Return the values that packages export for a package.
 
         Args:
-            name: Name of the element within ``<export>``, usually the package that is extended.
+            name: Name of the element in ``<export>``, usually the package that is extended.
             attribute: The attribute whose values are returned.
-            force_recrawl: Whether to look at the folders again.
+            force_recrawl: Whether to read the folders again.
 
         Returns:
-            An object from names of packages to lists of values; ``${prefix}`` is their folder.
+            An object of package names to lists of values, in which ``${prefix}`` is the package's
+            folder.
         """
 
         def search(folders: Folders) -> dict[str, list[str]]:
@@ -182,7 +183,7 @@ class Package(QtCore.QObject):
 
     @Slot(str, result=str)
     def command(self, command: str) -> str:
-        """Return what the program ``rospack`` prints; empty, with a line in the log, without it."""
+        """Return the output of the program ``rospack``; empty, with a log message, without it."""
         caller, session = self._runtime.caller(), self._runtime.session
         printed: list[str | Error] = [""]
 
@@ -194,7 +195,7 @@ class Package(QtCore.QObject):
                     printed[0] = error
                 session.executor.post(end)
 
-            # Not on the session's worker: subscribing would have to wait for it.
+            # Not on the session's worker, where it would delay subscribing.
             threading.Thread(target=work, name="rospack", daemon=True).start()
 
         if not wait_for(session, begin):
@@ -244,7 +245,7 @@ _OPTIONS = sum(InitOptions.Option)
 
 
 class Ros(ValueFunctions):
-    """What QML calls ``Ros``; one per engine, all of a session sharing its node."""
+    """The singleton ``Ros``, one per engine; all of a session share its node."""
 
     DIALECT = Dialect.ROS1
     NAME = "Ros"
@@ -268,7 +269,7 @@ class Ros(ValueFunctions):
     def init(
         self, first: QJSValue, second: QJSValue | None = None, third: QJSValue | None = None
     ) -> None:
-        """Ask for a node; arguments are optional command line, name, optional RosInitOptions."""
+        """Request a node; arguments are optional command line, name, optional RosInitOptions."""
         args: Sequence[str] = ()
         if is_list(first):
             args, first, second = strings(first), second or QJSValue(), third
@@ -299,7 +300,7 @@ class Ros(ValueFunctions):
 
     @Slot(int)
     def setThreads(self, count: int) -> None:
-        """Do nothing: messages are received beside the interface whatever their number."""
+        """Do nothing: messages are always received on other threads than the interface's."""
         if count < 0:
             self._runtime.throw(f"Ros.setThreads: {count} is negative")
 
@@ -309,11 +310,10 @@ class Ros(ValueFunctions):
     @Slot(QJSValue, QJSValue, QJSValue, QJSValue, result=QtCore.QObject)
     @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QtCore.QObject)
     def advertise(self, *given: QJSValue) -> QtCore.QObject | None:
-        """Return a publisher, which exists as long as JavaScript refers to it.
+        """Return a publisher, which exists while JavaScript refers to it.
 
         Arguments are optional namespace, message type, topic, queue size (0 for no limit), and
-        optionally whether
-        new subscribers get the last message.
+        optionally whether new subscribers get the last message.
         """
         try:
             texts, rest = _split(given, "Ros.advertise([ns,] type, topic, queueSize, latch)")
@@ -353,10 +353,10 @@ class Ros(ValueFunctions):
     def waitForMessageAsync(
         self, topic: str, first: QJSValue | None = None, second: QJSValue | None = None
     ) -> QJSValue:
-        """Call a function with the next message of a topic, undefined when none arrived in time.
+        """Call a function with the next message of a topic; with undefined after a timeout.
 
-        Arguments are topic, optional milliseconds (0: for ever) and function. Without a function,
-        a promise of the message is returned.
+        Arguments are topic, optional milliseconds (0 for no timeout) and function. Without a
+        function, a promise of the message is returned.
         """
         return next_message(Subscriber(None, self._runtime), self._runtime, topic, first, second)
 
@@ -366,7 +366,7 @@ class Ros(ValueFunctions):
     def advertiseService(
         self, type_name: str, name: str, handler: QJSValue
     ) -> QtCore.QObject | None:
-        """Offer a service for as long as JavaScript refers to the server returned.
+        """Offer a service while JavaScript refers to the returned server.
 
         Args:
             type_name: Service type, ``pkg/Type``.
@@ -382,7 +382,7 @@ class Ros(ValueFunctions):
     @Slot(QJSValue, QJSValue, result=QtCore.QObject)
     @Slot(QJSValue, QJSValue, QJSValue, result=QtCore.QObject)
     def createActionClient(self, *given: QJSValue) -> QtCore.QObject | None:
-        """Return an action client, which exists as long as JavaScript refers to it or a goal runs.
+        """Return an action client, which exists while JavaScript refers to it or a goal is active.
 
         Arguments are optional namespace, action type (``pkg/DoAction``) and name.
         """
@@ -404,21 +404,21 @@ class Ros(ValueFunctions):
     def advertiseAction(
         self, type_name: str, name: str, execute: QJSValue
     ) -> QtCore.QObject | None:
-        """Offer an action for as long as JavaScript refers to the server returned.
+        """Offer an action while JavaScript refers to the returned server.
 
         Args:
             type_name: Action type, ``pkg/DoAction``.
             name: Action name.
-            execute: Called with the goal and its handle; returns the result, or a promise of it, or
-                nothing, and ends the goal by its handle. Or an object of ``execute``, ``accept``
-                and ``cancel``.
+            execute: Called with the goal and its handle; returns the result or a promise of it, or
+                returns nothing and ends the goal by its handle. Or an object with ``execute``,
+                ``accept`` and ``cancel``.
         """
         return self._offer(
             "advertiseAction", RosActionServer, name, type_name, lambda: server_functions(execute)
         )
 
     def _check_topic(self, topic: str) -> None:
-        """Raise InvalidNameError unless this is a name in ROS 1."""
+        """Raise InvalidNameError unless `topic` is a valid name in ROS 1."""
         from rosglass.ros1.names import expand  # noqa: PLC0415 - not needed at start-up
 
         expand(topic, "node", "/")
@@ -436,7 +436,7 @@ class Ros(ValueFunctions):
 
     @Slot(str, result=str)
     def queryTopicType(self, topic: str) -> str:
-        """Return a topic's type; empty when it is unknown."""
+        """Return a topic's type; empty if it is unknown."""
         types = self._types("queryTopicType", topic, self._topics())
         return types[0] if types else ""
 
@@ -450,7 +450,7 @@ class Ros(ValueFunctions):
     def logInternal(
         self, level: int, function: str, file: str, line: int, message: QJSValue, name: str = ""
     ) -> None:
-        """Log a message from a given place; `level` is one of RosConsoleLevels."""
+        """Log a message with a given location; `level` is one of RosConsoleLevels."""
         levels = (logging.DEBUG, logging.INFO, logging.WARNING, logging.ERROR, logging.CRITICAL)
         if not 0 <= level < len(levels):
             self._runtime.throw(f"Ros.logInternal: {level} is not one of RosConsoleLevels")
@@ -473,7 +473,7 @@ class Ros(ValueFunctions):
 
 
 def _split(given: Sequence[QJSValue], usage: str) -> tuple[tuple[str, str, str], list[QJSValue]]:
-    """Return namespace (or an empty text), type and topic, and the arguments that follow."""
+    """Return the namespace (empty if omitted), type and topic, and the remaining arguments."""
     texts = [value.toString() for value in given if value.isString()]
     count = len(texts)
     if count not in {2, 3} or not all(value.isString() for value in given[:count]):
@@ -484,7 +484,7 @@ def _split(given: Sequence[QJSValue], usage: str) -> tuple[tuple[str, str, str],
     return (namespace, type_name, topic), list(given[count:])
 
 
-#: Bases of the module's singletons (``imports/Ros/*.qml``), by their name in ``Ros.Native``.
+#: Names in ``Ros.Native`` -> base classes of the module's singletons (``imports/Ros/*.qml``).
 NATIVE = {
     "TfTransformListenerNative": RosTfTransformListener,
     "RosNative": Ros,
@@ -493,7 +493,7 @@ NATIVE = {
     "WallTimeNative": WallTime,
     "ImageTransportManagerNative": ImageTransportManager,
 }
-#: What QML can write, by name.
+#: Names in QML -> types.
 TYPES = {
     "SynchronizedSubscription": RosSynchronizedSubscription,
     "Replay": Replay,

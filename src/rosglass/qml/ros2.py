@@ -1,4 +1,4 @@
-"""The module ``Ros2 1.0``: its singletons, and the types that it registers."""
+"""The module ``Ros2 1.0``: its singletons and registered types."""
 # ruff: noqa: N802, N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -47,25 +47,25 @@ __all__ = ["NATIVE", "TYPES", "AmentIndex", "Ros2"]
 
 _T = TypeVar("_T")
 _log = logging.getLogger("rosglass.qml")
-#: Where an install space lists its packages; ament's resource index, section "File System Index".
+#: Package list of an install space; see ament's resource index, section "File System Index".
 _LIST = "share/ament_index/resource_index/packages"
 
 
 class AmentIndex(QtCore.QObject):
-    """The packages in the install spaces that ``AMENT_PREFIX_PATH`` names, the first one winning.
+    """The packages in the install spaces of ``AMENT_PREFIX_PATH``, of which the first has priority.
 
-    Without ROS 2 there are none. Install spaces that cannot be read are named in the log.
+    Empty without ROS 2. Install spaces that cannot be read are logged.
     """
 
     @Slot(str, result=str)
     def getPackageShareDirectory(self, package: str) -> str:
-        """Return a package's folder of shared files; empty when there is no such package."""
+        """Return a package's share folder; empty if the package does not exist."""
         prefix = self.getPackagePrefix(package)
         return os.path.join(prefix, "share", package) if prefix else ""  # noqa: PTH118
 
     @Slot(str, result=str)
     def getPackagePrefix(self, package: str) -> str:
-        """Return the install space that a package is in; empty when there is none."""
+        """Return the install space of a package; empty if the package does not exist."""
         if not package or "/" in package or package.startswith("."):
             return ""
         return _look(lambda: _prefix(package), "")
@@ -112,7 +112,7 @@ def _prefixes() -> list[str]:
 
 
 class Ros2(ValueFunctions):
-    """What QML calls ``Ros2``; one per engine, all of a session sharing its node."""
+    """The singleton ``Ros2``, one per engine; all of a session share its node."""
 
     aboutToShutdown = Signal()
 
@@ -132,7 +132,7 @@ class Ros2(ValueFunctions):
     def init(
         self, name: str, first: QJSValue | None = None, second: QJSValue | None = None
     ) -> None:
-        """Ask for a node; arguments are name, optional command line, optional init options."""
+        """Request a node; arguments are name, optional command line, optional init options."""
         args, options = (first, second) if is_list(first) else (None, first)
         try:
             namespace, domain = _read_options(options)
@@ -148,40 +148,40 @@ class Ros2(ValueFunctions):
 
     @Slot(result=QJSValue)
     def now(self) -> QJSValue:
-        """Return the time of the node's clock; the system's before there is a node."""
+        """Return the time of the node's clock; the system time before there is a node."""
         node = self._session.node
         return self._runtime.time(node.now() if node is not None else Time.now())
 
     @Slot(result=QJSValue)
     def createInitOptions(self) -> QJSValue:
-        """Return empty init options: setNamespace(), setDomainId()."""
+        """Return empty init options, with methods setNamespace() and setDomainId()."""
         return self._runtime.options()
 
     # Profiles.
 
     @Slot(result=QJSValue)
     def QoS(self) -> QJSValue:
-        """Return best effort, volatile, only the newest message."""
+        """Return a profile: best effort, volatile, only the newest message."""
         return self._runtime.qos(DEFAULT_QOS)
 
     @Slot(result=QJSValue)
     def SensorDataQoS(self) -> QJSValue:
-        """Return best effort, the newest 5."""
+        """Return a profile: best effort, the newest 5."""
         return self._runtime.qos(QoS.sensor_data())
 
     @Slot(result=QJSValue)
     def SystemDefaultsQoS(self) -> QJSValue:
-        """Return reliable, volatile, the newest 10."""
+        """Return a profile: reliable, volatile, the newest 10."""
         return self._runtime.qos(QoS())
 
     @Slot(result=QJSValue)
     def ServicesQoS(self) -> QJSValue:
-        """Return reliable, volatile, the newest 10."""
+        """Return a profile: reliable, volatile, the newest 10."""
         return self._runtime.qos(QoS.services())
 
     @Slot(result=QJSValue)
     def ClockQoS(self) -> QJSValue:
-        """Return best effort, only the newest message."""
+        """Return a profile: best effort, only the newest message."""
         return self._runtime.qos(QoS.clock())
 
     @Slot(result=QJSValue)
@@ -196,12 +196,12 @@ class Ros2(ValueFunctions):
     def createPublisher(
         self, topic: str, type_name: str, qos: QJSValue | None = None
     ) -> QtCore.QObject | None:
-        """Return a publisher, which exists as long as JavaScript refers to it.
+        """Return a publisher, which exists while JavaScript refers to it.
 
         Args:
             topic: Topic name.
             type_name: Message type, ``pkg/msg/Type`` or ``pkg/Type``.
-            qos: Profile, or the depth of a reliable one; 10 when left out.
+            qos: Profile, or the depth of a reliable one; 10 by default.
         """
         try:
             self._check_topic(topic)
@@ -221,11 +221,11 @@ class Ros2(ValueFunctions):
     def createSubscription(
         self, topic: str, first: QJSValue | None = None, second: QJSValue | None = None
     ) -> QtCore.QObject | None:
-        """Return a subscription, which exists as long as JavaScript refers to it.
+        """Return a subscription, which exists while JavaScript refers to it.
 
         Args:
             topic: Topic name.
-            first: Message type; or, when the type is left out, profile or queue size.
+            first: Message type; if the type is omitted, profile or queue size.
             second: Profile or queue size after a type.
         """
         type_name, qos = "", first
@@ -247,10 +247,10 @@ class Ros2(ValueFunctions):
     def waitForMessageAsync(
         self, topic: str, first: QJSValue | None = None, second: QJSValue | None = None
     ) -> QJSValue:
-        """Call a function with the next message of a topic, undefined when none arrived in time.
+        """Call a function with the next message of a topic; with undefined after a timeout.
 
-        Arguments are topic, optional milliseconds (0: for ever) and function. Without a function,
-        a promise of the message is returned.
+        Arguments are topic, optional milliseconds (0 for no timeout) and function. Without a
+        function, a promise of the message is returned.
         """
         return next_message(Subscription(None, self._runtime), self._runtime, topic, first, second)
 
@@ -261,12 +261,12 @@ class Ros2(ValueFunctions):
     def createServiceClient(
         self, name: str, type_name: str, qos: QJSValue | None = None
     ) -> QtCore.QObject | None:
-        """Return a service client, which exists as long as JavaScript refers to it.
+        """Return a service client, which exists while JavaScript refers to it.
 
         Args:
             name: Service name.
-            type_name: Service type, ``pkg/srv/Type`` or ``pkg/Type``; empty takes the server's.
-            qos: Profile of requests and replies; the usual one when left out.
+            type_name: Service type, ``pkg/srv/Type`` or ``pkg/Type``; empty uses the server's.
+            qos: Profile of requests and replies; the default for services if omitted.
         """
         try:
             self._check_topic(name)
@@ -283,7 +283,7 @@ class Ros2(ValueFunctions):
     def createServiceServer(
         self, name: str, type_name: str, handler: QJSValue
     ) -> QtCore.QObject | None:
-        """Offer a service for as long as JavaScript refers to the server returned.
+        """Offer a service while JavaScript refers to the returned server.
 
         Args:
             name: Service name.
@@ -298,11 +298,11 @@ class Ros2(ValueFunctions):
 
     @Slot(str, str, result=QtCore.QObject)
     def createActionClient(self, name: str, type_name: str) -> QtCore.QObject | None:
-        """Return an action client, which exists as long as JavaScript refers to it or a goal runs.
+        """Return an action client, which exists while JavaScript refers to it or a goal is active.
 
         Args:
             name: Action name.
-            type_name: Action type, ``pkg/action/Type`` or ``pkg/Type``; empty takes the server's.
+            type_name: Action type, ``pkg/action/Type`` or ``pkg/Type``; empty uses the server's.
         """
         try:
             self._check_topic(name)
@@ -319,14 +319,14 @@ class Ros2(ValueFunctions):
     def createActionServer(
         self, name: str, type_name: str, execute: QJSValue
     ) -> QtCore.QObject | None:
-        """Offer an action for as long as JavaScript refers to the server returned.
+        """Offer an action while JavaScript refers to the returned server.
 
         Args:
             name: Action name.
             type_name: Action type, ``pkg/action/Type`` or ``pkg/Type``.
-            execute: Called with the goal and its handle; returns the result, or a promise of it, or
-                nothing, and ends the goal by its handle. Or an object of ``execute``, ``accept``
-                and ``cancel``.
+            execute: Called with the goal and its handle; returns the result or a promise of it, or
+                returns nothing and ends the goal by its handle. Or an object with ``execute``,
+                ``accept`` and ``cancel``.
         """
         return self._offer(
             "createActionServer", ActionServer, name, type_name, lambda: server_functions(execute)
@@ -351,12 +351,12 @@ class Ros2(ValueFunctions):
 
     @Slot(str, result="QStringList")
     def queryTopicTypes(self, topic: str) -> list[str]:
-        """Return the types announced for a topic; another name of getTopicTypes."""
+        """Return the types announced for a topic; alias of getTopicTypes."""
         types: list[str] = self.getTopicTypes(topic)
         return types
 
     def _check_topic(self, topic: str) -> None:
-        """Raise InvalidNameError unless this is a name in ROS 2."""
+        """Raise InvalidNameError unless `topic` is a valid name in ROS 2."""
         from rosglass.comm.names import expand  # noqa: PLC0415 - not needed at start-up
 
         session = self._session
@@ -367,7 +367,7 @@ class Ros2(ValueFunctions):
     @Slot(result=QtCore.QObject)
     @Slot(str, result=QtCore.QObject)
     def getLogger(self, name: str = "") -> QtCore.QObject:
-        """Return a logger; the node's own without a name."""
+        """Return a logger; the node's own if `name` is empty."""
         if name not in self._loggers:
             self._loggers[name] = Logger(self._runtime, name, self)
         return self._loggers[name]
@@ -386,7 +386,7 @@ def _read_options(options: QJSValue | None) -> tuple[str, int]:
     return namespace, int(domain)
 
 
-#: Bases of the module's singletons (``imports/Ros2/*.qml``), by their name in ``Ros2.Native``.
+#: Names in ``Ros2.Native`` -> base classes of the module's singletons (``imports/Ros2/*.qml``).
 NATIVE = {
     "TfTransformListenerNative": TfTransformListener,
     "AmentIndexNative": AmentIndex,
@@ -394,7 +394,7 @@ NATIVE = {
     "Ros2Native": Ros2,
     "ImageTransportManagerNative": ImageTransportManager,
 }
-#: What QML can write, by name.
+#: Names in QML -> types.
 TYPES = {
     "SynchronizedSubscription": SynchronizedSubscription,
     "Replay": Replay,

@@ -1,4 +1,4 @@
-"""Showing a QML file in its windows, and showing it anew when it changes."""
+"""Shows a QML file in its windows, and reloads it when it changes."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ if TYPE_CHECKING:
 
 __all__ = ["Kiosk", "Runner", "needs_widgets"]
 
-#: Milliseconds without a movement after which the pointer disappears.
+#: Milliseconds without movement after which the pointer is hidden.
 _STILL = 3000
 
 
 class Kiosk(QtCore.QObject):
-    """Keeps windows open, and hides the pointer while it is not moved.
+    """Keeps windows open, and hides an idle pointer.
 
     Closing a window, as Alt-F4 does, is ignored. ``Qt.quit()``, Ctrl-C and SIGTERM end the program.
 
     Args:
-        app: The application; windows that open later are kept open once they have the focus.
+        app: The application; windows that open later are kept open once they get the focus.
     """
 
     def __init__(self, app: QtGui.QGuiApplication) -> None:
@@ -64,9 +64,9 @@ class Kiosk(QtCore.QObject):
         app.focusWindowChanged.connect(self.keep)
 
     def keep(self, window: QtGui.QWindow | None) -> None:
-        """Keep a window open; it may be given again."""
+        """Keep a window open; safe to call again."""
         if window is not None:
-            # Installing a filter again moves it to the front.
+            # Installing the filter again only moves it to the front.
             window.installEventFilter(self)
 
     def close(self) -> None:
@@ -78,7 +78,7 @@ class Kiosk(QtCore.QObject):
         self._show()
 
     def eventFilter(self, watched: QtCore.QObject, event: Any) -> bool:  # noqa: ARG002, N802
-        """Take what would close a window; Qt calls this before every event of a window."""
+        """Discard events that would close a window; Qt calls this before each event of a window."""
         kind = event.type()
         if kind == self._kinds.Close:
             event.ignore()
@@ -107,7 +107,7 @@ _WIDGET_MODULES = re.compile(r"^\s*import\s+(QtCharts|Qt\.labs\.platform)\b", re
 
 
 def needs_widgets(file: Path) -> bool:
-    """Return whether an interface imports a module that crashes without a QApplication."""
+    """Return whether an interface imports a module that needs a QApplication to avoid a crash."""
     return any(_WIDGET_MODULES.search(_text(path)) for path in {file, *file.parent.glob("*.qml")})
 
 
@@ -126,18 +126,18 @@ def _text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8", errors="replace")
     except OSError:
-        # Qt says it better, if it is needed at all.
+        # Qt's own message is better, if the line is needed at all.
         return ""
 
 
 class Runner(QtCore.QObject):
-    """Holds the engine, the windows and the interface in them.
+    """Owns the engine, the interface and its windows.
 
     Args:
         file: The QML file.
-        session: The node its QML talks through.
-        watch: Show it anew whenever a file in its folder, or in `import_paths`, changes.
-        fullscreen: Fill the screen; an interface of several windows, all screens it uses.
+        session: The node that the QML uses.
+        watch: Reload whenever a file in its folder or in `import_paths` changes.
+        fullscreen: Fill the screen; with several windows, all screens that they use.
         kiosk: Fill the screen, and prevent closing it by accident.
         import_paths: Further folders with QML modules.
 
@@ -165,17 +165,17 @@ class Runner(QtCore.QObject):
         session.killed.connect(self._on_killed)
         session.forgotten.connect(self._on_forgotten)
         session.initialized.connect(self._on_initialized)
-        #: The window the interface is in, or the first of those it opens; None while it has none.
+        #: The window around the interface, or the first of its own windows; None before.
         self.window: QtQuick.QQuickWindow | None = None
-        #: The window whose first frame has not been seen yet.
+        #: The window whose first frame is still pending.
         self._awaited: QtQuick.QQuickWindow | None = None
-        #: What the program is to end with, once something has asked for its end.
+        #: The exit code, once something has requested the end of the program.
         self.exit_code: int | None = None
-        #: Whether `window` is ours, around an interface that is no window itself.
+        #: Whether we created `window`, for an interface that is not a window itself.
         self._own = False
         self._errors = ErrorView(self.engine, _ERRORS)
         self._notice = ErrorView(self.engine, PANEL)
-        #: Whether the interface asked for no node, and its author is shown the line to add.
+        #: Whether the interface did not call init(), so that the line to add is shown.
         self._without_node = False
         self._live.script_ended.connect(self._tell_script_ended)
         self._kiosk: Kiosk | None = None
@@ -184,7 +184,7 @@ class Runner(QtCore.QObject):
             self._kiosk = Kiosk(app)
 
     def load(self) -> None:
-        """Show the file; one with errors that is watched is shown once they are mended.
+        """Show the file; if it has errors and is watched, show it as soon as they are fixed.
 
         Raises:
             QmlError: The file has errors; the message lists them.
@@ -205,12 +205,12 @@ class Runner(QtCore.QObject):
         self._live.due.connect(self.reload)
 
     def reload(self) -> bool:
-        """Reload the file; with errors, keep the present interface and show them over it.
+        """Reload the file; if it has errors, keep the current interface and show them over it.
 
-        Put off while a call from QML waits, which would return into an interface that is gone.
+        Deferred while a call from QML waits: it would return into a destroyed interface.
 
         Returns:
-            Whether it is shown.
+            Whether the file is shown.
         """
         if not self._live.is_ready():
             return False
@@ -231,7 +231,7 @@ class Runner(QtCore.QObject):
                 if window is not self.window and is_alive(window):
                     self._let_go(window)
 
-        # Cleaning up, the old interface may shut Ros2 down, which the new one already uses.
+        # While cleaning up, the old interface may shut down the node that the new one uses.
         self._live.replace(made, show)
         if self._without_node:
             self._on_forgotten()
@@ -239,7 +239,7 @@ class Runner(QtCore.QObject):
         return True
 
     def windows(self) -> list[QtQuick.QQuickWindow]:
-        """Return the windows of the interface, those it hides included."""
+        """Return the windows of the interface, including hidden ones."""
         app: Any = QtCore.QCoreApplication.instance()
         found = [self.window] if self.window is not None and is_alive(self.window) else []
         mine = runtime_of(self.engine)
@@ -250,17 +250,17 @@ class Runner(QtCore.QObject):
         return found
 
     def grab(self) -> QtGui.QImage:
-        """Return what the window shows; a null image when there is none."""
+        """Return an image of the window; a null image if there is no window."""
         window = self.window
         return QtGui.QImage() if window is None else window.grabWindow()
 
     def exit(self, code: int) -> None:
-        """End the program, also when called before the event loop runs."""
+        """End the program; may be called before the event loop runs."""
         self.exit_code = code
         QtCore.QTimer.singleShot(0, lambda: QtCore.QCoreApplication.exit(code))
 
     def close(self) -> None:
-        """Take the interface down; safe to call twice."""
+        """Close the interface; safe to call twice."""
         if self._kiosk is not None:
             self._kiosk.close()
             self._kiosk = None
@@ -323,7 +323,7 @@ class Runner(QtCore.QObject):
                 window.show()
 
     def _show_empty(self, text: str) -> None:
-        """Show errors where there is no interface yet."""
+        """Show errors while there is no interface."""
         window = self.window = QtQuick.QQuickWindow()
         self._own = True
         window.resize(*_DEFAULT_SIZE)
@@ -332,7 +332,7 @@ class Runner(QtCore.QObject):
         self._show_errors(text)
 
     def _fit(self, item: QtQuick.QQuickItem, window: QtQuick.QQuickWindow, first: bool) -> None:
-        """Put an item into a window, and size it with the window."""
+        """Put an item into a window, and keep it as large as the window."""
         if first:
             width = item.width() or item.implicitWidth() or _DEFAULT_SIZE[0]
             height = item.height() or item.implicitHeight() or _DEFAULT_SIZE[1]
@@ -355,7 +355,7 @@ class Runner(QtCore.QObject):
             window.removeEventFilter(self._kiosk)
         window.setVisible(False)
         if runtime_of(window) is None:
-            # Around an item; QML destroys its own with their root.
+            # Only our own window: QML destroys its windows with their root.
             window.deleteLater()
 
     def _show_errors(self, text: str) -> None:
@@ -367,11 +367,11 @@ class Runner(QtCore.QObject):
         self._notice.show(text, self.windows(), SCRIPT_ENDED)
 
     def _tell_not_drawn(self, items: Sequence[QtQuick.QQuickItem]) -> None:
-        """Warn of items that only OpenGL draws, which a reloaded file may have added."""
+        """Warn of items that only OpenGL can draw, which a reload may have added."""
         if choice.renderer != "software":
             return
         needs = [need for item in items if (need := need_in_items(item, self.file))]
-        # Films, and pictures of items, are no items that could be found.
+        # Videos and grabs of items are not items, so search the file, too.
         for need in needs or [need_in_file(self.file, self.engine.importPathList())]:
             if need:
                 _log.warning("%s", choice.tell_missing(need))
@@ -394,7 +394,7 @@ class Runner(QtCore.QObject):
 
     @Slot()
     def _on_killed(self) -> None:
-        # It may have called Qt.quit() at the signal of the shutdown.
+        # The interface may have called Qt.quit() when the node was shut down.
         if self.exit_code is None:
             _log.error("the interface ends with its node: %s", self.session.detail)
             self.exit(1)
@@ -406,7 +406,7 @@ class Runner(QtCore.QObject):
 def _keep_places(
     windows: Sequence[QtQuick.QQuickWindow], before: Sequence[QtQuick.QQuickWindow]
 ) -> None:
-    """Put windows where those of the same title were; a single one in any case."""
+    """Move windows to the positions of those with the same title; a single one in any case."""
     places = {window.title(): window.geometry() for window in reversed(before)}
     for window in windows:
         if window in before:

@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 __all__ = ["UNPREPARED", "Host", "LongArrays", "Runtime", "own_runtime", "runtime_of"]
 
 _NS = 1_000_000_000
-#: Nanoseconds of as many seconds as a double counts exactly.
+#: Largest number of whole seconds that a double holds exactly, in nanoseconds.
 _LONGEST = 2**53 * _NS
 
 
 class LongArrays(QtCore.QObject):
-    """The long arrays of one message; exists as long as JavaScript refers to one of them."""
+    """The long arrays of one message; exists while JavaScript refers to one of them."""
 
     def __init__(self, runtime: Runtime, arrays: list[LongArray], dialect: Dialect) -> None:
         super().__init__()
@@ -66,7 +66,7 @@ class LongArrays(QtCore.QObject):
 
     @Slot(int, result="QVariant")
     def buffer(self, index: int) -> QtCore.QByteArray | None:
-        """Return a numeric array's bytes in this machine's byte order, otherwise None."""
+        """Return a numeric array's bytes in native byte order; None for other arrays."""
         if not 0 <= index < len(self.arrays):
             return None
         member, values = self.arrays[index]
@@ -80,26 +80,26 @@ class Host(QtCore.QObject):
     """Serves the scripts of one engine.
 
     Args:
-        runtime: The engine's; also its parent, so that JavaScript does not collect it.
+        runtime: The engine's runtime; also the parent, so that JavaScript does not collect it.
     """
 
     def __init__(self, runtime: Runtime) -> None:
         super().__init__(runtime)
         self._runtime = runtime
         self._types: list[tuple[Schema, Dialect]] = []
-        #: Places and names of which was said that no such field is there.
+        #: Locations and names of missing fields that have been logged.
         self.named: set[tuple[str, int, str]] = set()
 
     @Slot(str, str, "QStringList")
     def missing(self, type: str, name: str, known: list[str]) -> None:
-        """Say that QML reads a field that a message does not have, once for each place.
+        """Log that QML reads a field that a message does not have, once per location.
 
-        A name that is like none of the message's may be read to find out whether it is there, so
-        that is no warning; an error that follows from it is explained.
+        A name unlike any field may be read to test for its existence, so this is not a warning.
+        Errors that result from it are explained.
         """
         caller = self._runtime.caller()
         if not caller.line:
-            return  # Python reads it
+            return  # read by Python
         hint = similar(name, known)
         text = f"{type} has no field {name!r:.80}{hint or '; it has ' + ', '.join(known[:20])}"
         explain(caller, text)
@@ -110,7 +110,7 @@ class Host(QtCore.QObject):
             log_from_qml("", level, f"{text}{end} It is undefined here.", caller)
 
     def know(self, schema: Schema, dialect: Dialect) -> int:
-        """Return the number that stands for a type in scripts."""
+        """Register a type; return its number for scripts."""
         self._types.append((schema, dialect))
         return len(self._types) - 1
 
@@ -124,7 +124,7 @@ class Host(QtCore.QObject):
 
     @Slot(float, float, float, result=QJSValue)
     def multiply(self, sec: float, nanosec: float, factor: float) -> QJSValue:
-        """Return a duration times a number, rounded to the nanosecond, as two parts."""
+        """Return a duration times a number, rounded to nanoseconds, as seconds and nanoseconds."""
         from fractions import Fraction  # noqa: PLC0415 - takes milliseconds at start-up
 
         total = round(Fraction(factor) * (int(sec) * _NS + int(nanosec)))
@@ -136,7 +136,7 @@ class Host(QtCore.QObject):
 
         Args:
             text: The number.
-            digits: What it counts, as a power of ten: 0 for seconds, 9 for nanoseconds.
+            digits: Its unit, as a power of ten: 0 for seconds, 9 for nanoseconds.
         """
         try:
             found = number_from_text(text) * _NS / 10**digits
@@ -149,7 +149,7 @@ class Host(QtCore.QObject):
 
     @Slot(str, QJSValue, result="QVariant")
     def pack(self, kind: str, values: QJSValue) -> QtCore.QByteArray | None:
-        """Return 64-bit integers, given as numbers or decimal text, as bytes."""
+        """Pack 64-bit integers, given as numbers or decimal text, into bytes."""
         import numpy as np  # noqa: PLC0415 - few programs ask for them
 
         try:
@@ -164,14 +164,14 @@ class Host(QtCore.QObject):
 _log = logging.getLogger("rosglass.qml")
 _FOLDER = Path(__file__).parent
 _NAME = "rosglass.runtime"
-#: Where JavaScript is ours: no place that a message should name.
+#: Our own scripts, which are never reported as the location of a message.
 _OWN_SCRIPTS = tuple(str(_FOLDER / name) for name in ("times.js", "arrays.js", "helpers.js"))
-#: What to say to an object in an engine that has no runtime.
+#: Error for an object in an engine without a runtime.
 UNPREPARED = "call rosglass.qml.install(engine) before the QML engine loads anything"
-#: Bytes of long arrays handed to JavaScript after which it is asked to collect its garbage: it
-#: does not see how much memory its small objects hold on our side.
+#: Bytes of long arrays passed to JavaScript after which its garbage collector is called: it does
+#: not see how much memory its small objects hold in Python.
 _GARBAGE = 64 << 20
-#: Functions that helpers.js gives.
+#: Names of the functions that helpers.js returns.
 _HELPERS = (
     "build",
     "buildWithNan",
@@ -195,11 +195,11 @@ _PROMISE = """(function () {
 
 
 class Runtime(QtCore.QObject):
-    """Everything that belongs to one engine; a child of the engine, found by :func:`runtime_of`.
+    """State of one engine; a child of the engine, found by :func:`runtime_of`.
 
     Args:
         engine: The engine.
-        session: The session that its QML talks to.
+        session: The session that its QML uses.
     """
 
     def __init__(self, engine: QtQml.QQmlEngine, session: Session) -> None:
@@ -215,7 +215,7 @@ class Runtime(QtCore.QObject):
 
     @cached_property
     def _helper(self) -> dict[str, QJSValue]:
-        """Functions of our scripts; read for the first value, which is after the first frame."""
+        """Functions of our scripts; loaded for the first value, after the first frame."""
         parts = [self._script(name) for name in ("times.js", "arrays.js")]
         host = self._engine.newQObject(self._host)
         made = self._script("helpers.js").call([*parts, host, QJSValue(not QT6)])
@@ -231,10 +231,10 @@ class Runtime(QtCore.QObject):
         return JsCalls(self._engine)
 
     def call(self, function: QJSValue, arguments: Sequence[QJSValue]) -> QJSValue:
-        """Return what a function of QML returns, or the error that it throws.
+        """Call a QML function; return its result, or the error that it throws.
 
         Raises:
-            Error: The engine is gone.
+            Error: The engine no longer exists.
         """
         if self.engine is None:
             raise Error("the QML engine of this function is gone")
@@ -242,17 +242,17 @@ class Runtime(QtCore.QObject):
 
     @property
     def engine(self) -> QtQml.QQmlEngine | None:
-        """The engine; None when it is gone."""
+        """The engine; None if it no longer exists."""
         return self._engine if is_alive(self._engine) else None
 
     def throw(self, message: str) -> None:
-        """Throw a JavaScript Error out of the slot that is running."""
+        """Throw a JavaScript Error from the running slot."""
         engine = self.engine
         if engine is not None:
             engine.throwError(message)
 
     def caller(self) -> Caller:
-        """Return where in QML the slot that is running was called from."""
+        """Return the QML line that called the running slot."""
         engine = self.engine
         stack = "" if engine is None else _evaluate(engine, "new Error().stack").toString()
         for frame in stack.splitlines()[1:]:
@@ -264,13 +264,13 @@ class Runtime(QtCore.QObject):
         return Caller("<python>", 0, "")
 
     def forget_warnings(self) -> None:
-        """Repeat warnings about missing fields: the files may have changed."""
+        """Allow warnings about missing fields to be repeated, as the files may have changed."""
         self._host.named.clear()
         if "_helper" in self.__dict__:
             self._call("forgetAbsent", [])
 
     def keep(self, item: QtCore.QObject) -> QtCore.QObject:
-        """Give an object to JavaScript, which owns it until it is collected."""
+        """Transfer the ownership of an object to JavaScript's garbage collector."""
         QtQml.QQmlEngine.setObjectOwnership(
             item, QtQml.QQmlEngine.ObjectOwnership.JavaScriptOwnership
         )
@@ -280,14 +280,14 @@ class Runtime(QtCore.QObject):
         return item
 
     def value(self, value: Any) -> QJSValue:
-        """Return a plain value (None, bool, number, text, list, dict) for JavaScript."""
+        """Convert a plain value (None, bool, number, text, list, dict) for JavaScript."""
         engine = self.engine
         if engine is None or value is None:
             return QJSValue()
         if isinstance(value, str):
             return QJSValue(value)
         if isinstance(value, (bool, int, float)):
-            # QJSValue's own overloads cut numbers to 32 bits, and PySide2's to integers.
+            # QJSValue's constructors truncate numbers to 32 bits, and PySide2's to integers.
             plain = value if isinstance(value, bool) else float(value)
             script: Any = engine.toScriptValue(plain)
             scalar: QJSValue = script
@@ -303,7 +303,7 @@ class Runtime(QtCore.QObject):
         return made
 
     def message(self, message: Message, dialect: Dialect = Dialect.ROS2) -> QJSValue:
-        """Return a message as a JavaScript value, with the habits of a module.
+        """Return a message as a JavaScript value, in the style of a module.
 
         Raises:
             DecodeError: The received bytes are malformed.
@@ -327,11 +327,11 @@ class Runtime(QtCore.QObject):
         return made.property("promise"), made.property("resolve"), made.property("reject")
 
     def time(self, time: Time, dialect: Dialect = Dialect.ROS2) -> QJSValue:
-        """Return a time as the module's messages carry it: with seconds(), or toSec()."""
+        """Return a time in the style of the module's messages: with seconds() or toSec()."""
         return self._make_time(dialect, "time", time.sec, time.nanosec)
 
     def duration(self, duration: Duration, dialect: Dialect = Dialect.ROS2) -> QJSValue:
-        """Return a duration as the module's messages carry it: in ``Ros 1.0`` milliseconds."""
+        """Return a duration in the style of the module's messages: milliseconds in ``Ros 1.0``."""
         return self._make_time(dialect, "duration", *divmod(duration.nanoseconds, 10**9))
 
     def _make_time(self, dialect: Dialect, kind: str, sec: int, nanosec: int) -> QJSValue:
@@ -340,17 +340,17 @@ class Runtime(QtCore.QObject):
     def create_time(
         self, dialect: Dialect, kind: str, first: QJSValue, second: QJSValue
     ) -> QJSValue:
-        """Return what ``Ros2.time()`` and its like make of their arguments.
+        """Create a time or duration for ``Ros2.time()`` and similar functions.
 
         Returns:
-            The value; a JavaScript error when the arguments are none of what is accepted.
+            The value; a JavaScript error if the arguments are invalid.
         """
         arguments = [self.value(dialect.ros), self.value(kind), first, second]
         result: QJSValue = self._helper["createTime"].call(arguments)
         return result
 
     def clock(self, number: int) -> QJSValue:
-        """Return the kind of clock that times of JavaScript have, by rcl's number."""
+        """Return the JavaScript object of a clock type, by rcl's number."""
         return self._call("clock", [self.value(number)])
 
     def options(self) -> QJSValue:
@@ -411,22 +411,22 @@ class Runtime(QtCore.QObject):
 def runtime_of(item: QtCore.QObject) -> Runtime | None:
     """Return the runtime of an object's engine; None for an engine without one.
 
-    An engine, given itself, that has none yet gets the application's own session.
+    If `item` is itself an engine without a runtime, it gets one with the application's own session.
     """
     if isinstance(item, QtQml.QQmlEngine):
         child = item.findChild(Runtime, _NAME)
         return child if isinstance(child, Runtime) else Runtime(item, Session.default())
     context = QtQml.QQmlEngine.contextForObject(item)
-    # PySide2 takes the context for the owner of an engine that it gives, and ends it likewise.
+    # Not from the context's engine: PySide2 would treat the context as its owner and destroy it.
     found = context.contextProperty(_NAME) if context is not None else None
     return found if isinstance(found, Runtime) else None
 
 
 def own_runtime(item: QtCore.QObject) -> Runtime:
-    """Return the runtime of the engine that made an object.
+    """Return the runtime of the engine that created an object.
 
     Raises:
-        Error: The engine has none.
+        Error: The engine has no runtime.
     """
     runtime = runtime_of(item)
     if runtime is None:

@@ -1,4 +1,4 @@
-"""Service clients made by ``Ros2.createServiceClient``, and behind ``Service`` of ``Ros 1.0``."""
+"""Service clients: ``Ros2.createServiceClient`` and ``Service`` of ``Ros 1.0``."""
 # ruff: noqa: N802, N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -30,35 +30,35 @@ if TYPE_CHECKING:
     from rosglass.messages import Message
     from rosglass.qml.runtime import Runtime
 
-    #: Called with the response, or why there is none; on the GUI thread.
+    #: Called on the GUI thread with the response or the error.
     Done: TypeAlias = Callable[[Message | Error], None]
 
 __all__ = ["Service", "ServiceClient"]
 
-#: Seconds in which a client that lost its server says itself what became of the requests.
+#: Seconds after the loss of a server during which the client itself reports failed requests.
 _GRACE_S = 4.0
 
 
 @dataclass(eq=False)
 class _Request:
-    """A request on its way."""
+    """A request without a reply."""
 
     value: QJSValue
     done: Done
     call: Call | None = None
-    #: When it was made, monotonic.
+    #: Time of creation, monotonic.
     made: float = field(default_factory=time.monotonic)
 
 
 class ServiceClient(ClientElement):
-    """Calls a service; requests made before there is a server wait for it.
+    """Calls a service; requests wait until there is a server.
 
     Args:
         runtime: The engine's runtime.
         name: Service name, as in QML.
-        type_name: Service type; empty takes the one that the server announces.
-        dialect: Whose habits responses follow.
-        qos: Profile of requests and replies; None for the usual one.
+        type_name: Service type; empty uses the server's.
+        dialect: The module whose format responses have.
+        qos: Profile of requests and replies; None for the default one.
     """
 
     ready = ReadOnly(bool, False, notify="serviceReadyChanged")
@@ -80,17 +80,17 @@ class ServiceClient(ClientElement):
         super().__init__(runtime, name, type_name, dialect)
         self._qos = qos
         self._requests: list[_Request] = []
-        #: When its server was lost, monotonic.
+        #: Time at which the server was lost, monotonic.
         self._lost = 0.0
 
     @property
     def label(self) -> str:
-        """What error messages call this element."""
+        """The element's name in error messages."""
         return f"service {self._name}"
 
     @Slot(result=bool)
     def isServiceReady(self) -> bool:
-        """Return whether a server is there."""
+        """Return whether a server is available."""
         return self.ready
 
     # Calling.
@@ -98,7 +98,7 @@ class ServiceClient(ClientElement):
     @Slot(QJSValue)
     @Slot(QJSValue, QJSValue)
     def sendRequestAsync(self, request: QJSValue, callback: QJSValue | None = None) -> None:
-        """Call the service; `callback` is called with the response, or false.
+        """Call the service; `callback` is called with the response, or with false on failure.
 
         A value that does not fit throws a JavaScript Error that names the field; nothing is sent.
         """
@@ -138,18 +138,18 @@ class ServiceClient(ClientElement):
 
     @Slot()
     def cancelRequests(self) -> None:
-        """Give up every request without a response; servers are not notified."""
+        """Drop every request without a response; servers are not notified."""
         self._fail_all(Error(f"the request to {self._name} was given up"))
 
     def send(self, value: QJSValue, done: Done) -> bool:
         """Send a request as soon as there is a server.
 
         Args:
-            value: The request; one that does not fit throws into JavaScript.
+            value: The request; an invalid one throws into JavaScript.
             done: Called with the response or the error, on the GUI thread.
 
         Returns:
-            Whether it is on its way; `done` is not called otherwise.
+            Whether the request was accepted; otherwise `done` is not called.
         """
         request = _Request(value, done)
         self._requests.append(request)
@@ -163,7 +163,7 @@ class ServiceClient(ClientElement):
         return True
 
     def _submit(self, request: _Request, *, running: bool = False) -> None:
-        """Send a request; `running` says whether the QML function that made it still runs."""
+        """Send a request; `running`: the QML function that made it is still running."""
         client, session = self._endpoint, self._session
         assert client is not None
         assert client.type is not None
@@ -189,7 +189,7 @@ class ServiceClient(ClientElement):
             self._end(request, error if isinstance(error, Error) else Error(str(error)))
 
     def _give_up(self, request: _Request) -> None:
-        """End a request for which no server has appeared."""
+        """Fail a request for which no server has appeared."""
         if not is_alive(self) or request not in self._requests or self.ready:
             return
         reason = self._problem or "is it running, and is its name right?"
@@ -245,8 +245,8 @@ class ServiceClient(ClientElement):
 
     @Slot()
     def _on_tick(self) -> None:
-        # A server that seemed to be there when the request was made may have been dead; the one
-        # that takes its place must not receive outdated requests.
+        # The server that seemed to exist at the time of a request may have been dead; its successor
+        # must not receive outdated requests.
         timeout_s, now = self.connectionTimeout / 1000, time.monotonic()
         if not self.connectionTimeout or self.ready or now - self._lost < _GRACE_S:
             return
@@ -255,7 +255,7 @@ class ServiceClient(ClientElement):
                 self._give_up(request)
 
 
-#: How long a call waits for a server; discovering an existing one takes up to this long.
+#: Milliseconds that a call waits for a server; discovery of an existing one may take this long.
 _CONNECTION_TIMEOUT_MS = 5000
 
 
@@ -272,8 +272,8 @@ class Service(QtCore.QObject):
         """Call a service and return the response; the interface keeps running.
 
         Returns:
-            The response; true when its type has no fields; false when the call failed, which is
-            logged with the reason.
+            The response; true if its type has no fields; false if the call failed, with the reason
+            in the log.
         """
         runtime = self._runtime()
         answer: list[Message | Error] = []
@@ -293,7 +293,7 @@ class Service(QtCore.QObject):
         caller = runtime.caller()
         if wait_for(runtime.session, begin):
             if refused and not answer:
-                # It throws what does not fit.
+                # An invalid request has thrown an error.
                 return QJSValue()
             why = "" if runtime.session.is_initialized else f": {NOT_INITIALIZED}"
             result = answer[0] if answer else Error(f"{service} was not called to the end{why}")
@@ -324,7 +324,7 @@ class Service(QtCore.QObject):
         return own_runtime(self)
 
     def _client(self, runtime: Runtime, service: str, type_name: str) -> ServiceClient:
-        # Made once: finding a server may take longer than calling it.
+        # Clients are kept: discovery may take longer than the call.
         key = (service, full_type(type_name, "srv"))
         client = self._clients.get(key)
         if client is None or not is_alive(client):

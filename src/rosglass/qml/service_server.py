@@ -44,7 +44,7 @@ class ServiceServer(Element):
     ) -> None:
         super().__init__(parent, runtime)
         self._answers: Answers | None = None
-        #: Requests received before the server was created here.
+        #: Requests that arrived before the worker thread had returned the server.
         self._early: list[Callable[[], None]] = []
 
     def configure(self, name: str, type_name: str, handler: QJSValue) -> None:
@@ -53,7 +53,7 @@ class ServiceServer(Element):
 
     @property
     def label(self) -> str:
-        """What error messages call this element."""
+        """The element's name in error messages."""
         return f"service {self.name}"
 
     def _wanted(self) -> tuple[Node, str, str] | None:
@@ -88,7 +88,7 @@ class ServiceServer(Element):
             raise ServiceError(_GONE)
         if self._endpoint is not None:
             return self._answer(request, self._endpoint, self._answers)
-        # A client waited for the service, and called before the worker thread had returned it.
+        # A waiting client called before the worker thread had returned the server.
         return self._answers.later(self._early, lambda: self._on_request(request))
 
     def _answer(self, request: Message, server: Server, answers: Answers) -> Any:
@@ -109,10 +109,10 @@ class ServiceServer(Element):
 
 
 def server_function(given: QJSValue) -> QJSValue:
-    """Return the function that ``createServiceServer`` was given.
+    """Return the function passed to ``createServiceServer``.
 
     Raises:
-        Error: It is none.
+        Error: It is not a function.
     """
     if not given.isCallable():
         raise Error("the handler is not a function")

@@ -1,4 +1,4 @@
-"""The node of a user interface: created, replaced and closed off the GUI thread."""
+"""The node of a user interface; created, replaced and closed outside the GUI thread."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ _log = logging.getLogger("rosglass.qml")
 
 
 class _Waker(QtCore.QObject):
-    """Lives on the GUI thread, which its signal wakes.
+    """Wakes the GUI thread, on which it lives, by a signal.
 
-    An event of our own would do the same, but the posting thread touches it once
-    more when it may have been delivered, and deleted, already: PySide2 crashes.
+    A custom event would do the same, but PySide2 crashes: the posting thread accesses it again
+    after it may have been delivered and deleted.
     """
 
     _asked = Signal()
@@ -47,12 +47,12 @@ class _Waker(QtCore.QObject):
     def __init__(self, job: Callable[[], None]) -> None:
         super().__init__()
         self._job, self._home = job, threading.get_ident()
-        # Queued between threads without saying so; naming the kind makes PySide load all of Qt's
-        # enumerations, which takes longer than anything else here.
+        # The default is a queued connection between threads. Naming the type would make PySide load
+        # all of Qt's enumerations, which takes longer than anything else here.
         self._asked.connect(self.run)
 
     def wake(self) -> None:
-        """Run the job soon; from any thread."""
+        """Run the job soon; thread-safe."""
         if threading.get_ident() == self._home:
             QtCore.QTimer.singleShot(0, self.run)
         else:
@@ -65,22 +65,22 @@ class _Waker(QtCore.QObject):
 
 
 class GuiExecutor(Executor):
-    """Runs jobs on the thread that made it, which must run a Qt event loop.
+    """Runs jobs on the thread that created it, which must run a Qt event loop.
 
-    Many jobs posted at once cost one event. Jobs posted while jobs run wait for the next event, so
+    Jobs posted together share one event. Jobs posted while jobs run wait for the next event, so
     that a busy topic cannot keep the user interface from drawing.
     """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._jobs: deque[Callable[[], None]] = deque()
-        #: Those whose turn it is.
+        #: The jobs of the current event.
         self._turn: deque[Callable[[], None]] = deque()
         self._waker = _Waker(self._run)
         self._closed = False
 
     def post(self, job: Callable[[], None]) -> None:
-        """Run `job` soon; forgotten when the executor is closed."""
+        """Run `job` soon; dropped if the executor is closed."""
         with self._lock:
             if self._closed:
                 return
@@ -90,14 +90,14 @@ class GuiExecutor(Executor):
             self._waker.wake()
 
     def close(self) -> None:
-        """Drop the waiting jobs and accept no more; safe to call twice."""
+        """Drop waiting jobs and accept no more; safe to call twice."""
         with self._lock:
             self._closed = True
             self._jobs.clear()
             self._turn.clear()
 
     def resume(self) -> None:
-        """Go on with the other jobs although one is running: it waits in an event loop."""
+        """Run the other jobs while the current one waits in an event loop."""
         self._waker.wake()
 
     def _run(self) -> None:
@@ -105,7 +105,7 @@ class GuiExecutor(Executor):
             self._turn.extend(self._jobs)
             self._jobs.clear()
         for _ in range(len(self._turn)):
-            # A job that waits may have let others take their turn.
+            # While a job waited, others may have been run.
             if self._turn:
                 _guarded(self._turn.popleft())
 
@@ -114,15 +114,15 @@ def _guarded(job: Callable[[], None]) -> None:
     try:
         job()
     except Exception:
-        # Nothing may be raised through Qt's event loop.
+        # Exceptions must not reach Qt's event loop.
         _log.exception("a callback failed")
 
 
 class ScriptLimit:
-    """An attribute in seconds, 0 for no limit; other values raise Error.
+    """A descriptor for a limit in seconds, 0 for no limit; invalid values raise Error.
 
     Args:
-        seconds: As long as nothing is set.
+        seconds: The default.
     """
 
     def __init__(self, seconds: float) -> None:
@@ -154,20 +154,20 @@ class ScriptLimit:
 
 
 _T = TypeVar("_T")
-#: Milliseconds between two looks at ages and rates.
+#: Milliseconds between two updates of ages and rates.
 TICK = 100
-#: Milliseconds until connecting is tried again when this machine could not open a session.
+#: Milliseconds until connecting is retried if this machine could not open a session.
 _RETRY = 1000
-#: Milliseconds that elements wait for a node before a missing init() is reported.
+#: Milliseconds that elements wait for a node before a missing init() is logged.
 _FORGOTTEN = 3000
-#: The problem before init(), and what to do.
+#: Error text before init(), with advice.
 NOT_INITIALIZED = (
     'no node was asked for: call Ros2.init("name"), or Ros.init("name") with Ros 1.0, '
     "e.g. in Component.onCompleted"
 )
-#: Longest delay of connecting; an interface without a window has no first frame.
+#: Maximum delay of connecting; an interface without a window has no first frame.
 _MAX_DEFER_MS = 1000
-#: How long the end of the program waits for the node to close, and for all threads.
+#: Seconds that the program's end waits for the node and all threads to finish.
 _CLOSE_TIMEOUT_S = 1.2
 
 
@@ -178,7 +178,7 @@ def _connect(url: str | None, name: str, namespace: str, arguments: Sequence[str
 
 
 def _parse(arguments: Sequence[str], url: str) -> Arguments | None:
-    """Return the ROS arguments of a ROS 2 node; the ROS 1 client reads its own."""
+    """Parse the ROS arguments of a ROS 2 node; the ROS 1 client parses its own."""
     if not arguments or url.startswith("ros1:"):
         return None
     from rosglass.ros2.ros_arguments import Arguments  # noqa: PLC0415 - few programs have arguments
@@ -187,43 +187,43 @@ def _parse(arguments: Sequence[str], url: str) -> Arguments | None:
 
 
 class Session(QtCore.QObject):
-    """One node, shared by every QML engine that is given this session.
+    """One node, shared by all QML engines that use this session.
 
-    Lives on the GUI thread. Connecting, creating and closing run on a worker thread, so that no
-    robot that does not answer can freeze the screen.
+    Lives on the GUI thread. Connecting, creating and closing run on a worker thread, so that a
+    robot that does not respond cannot freeze the screen.
 
     Args:
-        url: Address of the robot; empty asks the environment when connecting.
-        name: Node name that overrides the one that QML asks for; empty for none.
-        connect: Makes a node of URL, name and namespace; for tests and embedding.
+        url: Address of the robot; if empty, the environment is read when connecting.
+        name: Node name that overrides the one from QML; empty for none.
+        connect: Creates a node from URL, name and namespace; for tests and embedding.
         arguments: Arguments of the node, ``--ros-args`` included; see :func:`rosglass.connect`.
 
     Raises:
         RosArgumentError: One of `arguments` is not valid.
     """
 
-    #: The node was asked for; :attr:`is_initialized` is true already.
+    #: The node was requested; :attr:`is_initialized` is already true.
     initialized = Signal()
-    #: The node is about to be closed, or others have closed it.
+    #: The node is about to be closed, or was closed by others.
     about_to_shutdown = Signal()
     #: Another node asked this one to end, as ``rosnode kill`` does.
     killed = Signal()
-    #: :attr:`node` exists now, or exists no longer.
+    #: :attr:`node` was created or removed.
     node_changed = Signal()
     #: :attr:`state` or :attr:`detail` changed.
     connection_changed = Signal()
     url_changed = Signal()
-    #: Nodes or endpoints appeared or went.
+    #: Nodes or endpoints appeared or disappeared.
     graph_changed = Signal()
-    #: Ten times per second while anybody holds :meth:`use_ticks`.
+    #: Emitted ten times per second while there are users, see :meth:`use_ticks`.
     tick = Signal()
-    #: Elements have waited for some seconds for a node that nothing has asked for.
+    #: Elements have waited some seconds for a node, but init() was not called.
     forgotten = Signal()
-    #: A call from QML that waited has ended, and returns to QML.
+    #: A waiting call from QML has ended and is about to return to QML.
     call_ended = Signal()
 
-    #: Seconds that JavaScript may compute at a time before it is ended; 0 for no limit. What is no
-    #: such number raises Error.
+    #: Seconds that JavaScript may compute without a break before it is ended; 0 for no limit.
+    #: Invalid values raise Error.
     longest_script = ScriptLimit(5.0)
 
     _default: ClassVar[Session | None] = None
@@ -238,23 +238,23 @@ class Session(QtCore.QObject):
         super().__init__()
         self._arguments = tuple(arguments)
         self._asked: tuple[str, ...] = ()
-        _parse(arguments, url)  # raises what is wrong with them
+        _parse(arguments, url)  # raises an error if they are invalid
         self.executor = GuiExecutor()
-        #: The node; None before it is there and after it is closed.
+        #: The node; None before it is created and after it is closed.
         self.node: Node | None = None
         self.name, self.namespace = "", ""
         self.streams: dict[Any, Any] = {}
-        #: What elements share, other than pictures, by what it is.
+        #: Objects that elements share, except camera streams, by key.
         self.shared: dict[Any, Any] = {}
-        #: While any, QML's wish to shut down is ignored: its successor, or others, need the node.
+        #: While not 0, shutdown() from QML is ignored: its successor, or others, need the node.
         self.holding = 0
-        #: Calls from QML that wait in an event loop of their own.
+        #: Number of calls from QML that wait in their own event loop.
         self.waiting_calls = 0
         self._url, self._forced_name, self._connect = url, name, connect
         self._owns_node = True
         self._status = Status(ConnectionState.CLOSED)
         self._failed = False
-        #: Full names that several nodes bear, and how many do.
+        #: Full names shared by several nodes -> number of these nodes.
         self.duplicate_nodes: dict[str, int] = {}
         self._steady: tuple[Callable[[], float], float] = (time.monotonic, 0.0)
         self._generation = 0
@@ -264,7 +264,7 @@ class Session(QtCore.QObject):
         self._rosout: QmlRosout | None = None
         self._logger_level: int | None = None
         self._worker = Dispatcher("rosglass-qml")
-        #: What to call on the GUI thread with the results of background jobs.
+        #: Callbacks on the GUI thread for the results of background jobs.
         self._done: dict[object, Callable[[Any], None]] = {}
         self._loaded: set[str] = set()
         self._ticking = 0
@@ -272,7 +272,7 @@ class Session(QtCore.QObject):
         self._ticker.setInterval(TICK)
         self._ticker.timeout.connect(self.tick)
         self._reminder: QtCore.QTimer | None = None
-        # Before the elements, which ask for them.
+        # Connected before the elements, which use the result.
         self.graph_changed.connect(self._find_duplicates)
         self._handlers: dict[str, dict[int, tuple[QtCore.QObject, Callable[[], None]]]] = {}
         for signal in ("node_changed", "connection_changed", "graph_changed", "tick"):
@@ -284,19 +284,19 @@ class Session(QtCore.QObject):
 
     @classmethod
     def default(cls) -> Session:
-        """Return the application's own session, shared by all engines that were given no other."""
+        """Return the application's own session, shared by all engines without another one."""
         if cls._default is None:
             cls._default = cls()
         return cls._default
 
     @property
     def closed(self) -> bool:
-        """Whether it was closed, as at the end of the program."""
+        """Whether the session was closed, as at the end of the program."""
         return self._closed
 
     @property
     def is_initialized(self) -> bool:
-        """Whether init() was called, without a shutdown since."""
+        """Whether init() was called and no shutdown has followed."""
         return bool(self.name)
 
     @property
@@ -304,14 +304,14 @@ class Session(QtCore.QObject):
         """``uninitialized``, ``connecting``, ``connected``, ``lost`` or ``failed``."""
         if not self.is_initialized:
             return "uninitialized"
-        # A node that others have ended, as by one of its name in ROS 1, does not come back.
+        # A node shut down by others, e.g. by one of the same name in ROS 1, does not restart.
         if self._failed or self._status.state is ConnectionState.CLOSED:
             return "failed"
         return str(self._status.state.value)
 
     @property
     def detail(self) -> str:
-        """One line about the connection: what was tried, what happens next."""
+        """One line about the connection: what was tried and what happens next."""
         return self._status.detail if self.is_initialized else ""
 
     @property
@@ -331,13 +331,13 @@ class Session(QtCore.QObject):
 
     @property
     def owns_node(self) -> bool:
-        """Whether it connects by itself, by :attr:`url`; not with a node that was adopted."""
+        """Whether it creates the node by :attr:`url`; false for an adopted node."""
         return self._owns_node
 
     def steady(self) -> float:
-        """Return the seconds that ages are measured by, in any thread; see :meth:`Node.steady`.
+        """Return the time in seconds for measuring ages; thread-safe; see :meth:`Node.steady`.
 
-        They never run back, whatever node comes next.
+        It never runs backwards, even if the node is replaced.
         """
         clock, ahead = self._steady
         return clock() + ahead
@@ -352,23 +352,22 @@ class Session(QtCore.QObject):
         domain: int = -1,
         arguments: Sequence[str] = (),
     ) -> bool:
-        """Ask for a node.
+        """Request a node.
 
         Args:
-            name: Its base name.
-            namespace: Its absolute namespace.
-            domain: ROS domain, -1 for what the URL or the environment says. Where neither names a
-                middleware, it means DDS, as ROS_DOMAIN_ID does.
-            arguments: Arguments of the node, besides those of the session.
+            name: Base name.
+            namespace: Absolute namespace.
+            domain: ROS domain; -1 for the URL's or the environment's. If neither names a
+                middleware, a domain selects DDS, as ROS_DOMAIN_ID does.
+            arguments: Arguments of the node, in addition to those of the session.
 
         Returns:
-            False when there is a node already, which stays as it is.
+            False if there already is a node, which stays unchanged.
 
         Raises:
             InvalidNameError: The name or namespace breaks ROS's rules.
             RosArgumentError: One of `arguments` is not valid.
-            UnsupportedError: A domain is chosen, and the environment names a middleware that is
-                not known.
+            UnsupportedError: A domain is given, and the environment names an unknown middleware.
         """
         from rosglass.comm.names import validate_namespace, validate_node_name  # noqa: PLC0415
 
@@ -394,25 +393,25 @@ class Session(QtCore.QObject):
         return True
 
     def defer_connecting(self) -> None:
-        """Delay connecting until :meth:`go_on`, a second at most.
+        """Delay connecting until :meth:`go_on`, by at most a second.
 
-        Connecting keeps Python busy, which the first frame of an interface needs, too.
+        Connecting keeps Python busy, which the interface's first frame needs, too.
         """
         if not self.is_initialized:
             self._deferred = True
             QtCore.QTimer.singleShot(_MAX_DEFER_MS, self.go_on)
 
     def go_on(self) -> None:
-        """Connect now if that was deferred; safe to call at any time."""
+        """Connect now if connecting was deferred; safe to call at any time."""
         deferred, self._deferred = self._deferred, False
         if deferred and self.is_initialized and self._owns_node:
             self._start()
 
     def adopt(self, node: Node) -> None:
-        """Use a node that Python made, and leave it open at the end.
+        """Use a node created in Python, and leave it open at the end.
 
         Raises:
-            InvalidNameError: The session has a node already.
+            InvalidNameError: The session already has a node.
         """
         if self.is_initialized:
             raise InvalidNameError(f"this session already has the node {self.name!r}")
@@ -422,7 +421,7 @@ class Session(QtCore.QObject):
         self.initialized.emit()
 
     def shutdown(self) -> None:
-        """Close the node; everything made from it stops, and starts again after the next init."""
+        """Close the node; everything that uses it stops until the next init."""
         if not self.is_initialized or self.holding:
             return
         if self._status.state is not ConnectionState.CLOSED:
@@ -433,7 +432,7 @@ class Session(QtCore.QObject):
         self._set_status(Status(ConnectionState.CLOSED))
 
     def close(self) -> None:
-        """Shut down and wait, little more than a second, for the threads; safe to call twice."""
+        """Shut down and wait for the threads, little more than a second; safe to call twice."""
         if self._closed:
             return
         self._closed = True
@@ -457,15 +456,15 @@ class Session(QtCore.QObject):
     def background(
         self, work: Callable[[], _T], done: Callable[[_T | Error], None] | None = None
     ) -> None:
-        """Run a job that may wait on the worker thread, jobs in the order of the calls.
+        """Run a job that may block on the worker thread; jobs run in the order of the calls.
 
         Args:
-            work: What to do.
-            done: Called on the GUI thread with the result, or with the error it raised.
+            work: The job.
+            done: Called on the GUI thread with the result or the raised error.
         """
         key = object()
         if done is not None:
-            # Kept here: the worker thread must not hold, and drop last, what holds QML's objects.
+            # Kept here: the worker thread must not drop the last reference to QML's objects.
             self._done[key] = done
 
         def run() -> None:
@@ -483,11 +482,11 @@ class Session(QtCore.QObject):
         self._worker.post(run)
 
     def is_loaded(self, module: str, then: Callable[[], object]) -> bool:
-        """Return whether a module is there without delay; if not, import it on the worker thread.
+        """Return whether a module is imported; if not, import it on the worker thread.
 
         Args:
-            module: Its full name; one that needs no Qt.
-            then: Called on the GUI thread when it is there.
+            module: Full name of a module that does not need Qt.
+            then: Called on the GUI thread after the import.
         """
         if module in self._loaded:
             return True
@@ -500,17 +499,17 @@ class Session(QtCore.QObject):
         return False
 
     def attach(self, item: QtCore.QObject, **handlers: Callable[[], None]) -> Callable[[], None]:
-        """Connect handlers to signals for the life of an object.
+        """Connect handlers to signals for the lifetime of an object.
 
-        Plain calls, because a signal connected to a method of an object that QML destroys, or
-        extends, keeps being delivered to what is left of it, or is not delivered at all.
+        The handlers are called directly: a signal connected to a method of an object that QML
+        destroys or extends may still be delivered after its destruction, or not at all.
 
         Args:
             item: The object.
-            handlers: What to call, by name of the signal.
+            handlers: Handlers by name of the signal.
 
         Returns:
-            A function that ends it, to be called when the object is destroyed.
+            A function that disconnects them, to be called when the object is destroyed.
         """
         key = id(item)
         for name, handler in handlers.items():
@@ -523,7 +522,7 @@ class Session(QtCore.QObject):
         return detach
 
     def use_ticks(self, wanted: bool) -> None:
-        """Start or stop taking part in :attr:`tick`; an idle program has none."""
+        """Count a user of :attr:`tick` in or out; without users there are no ticks."""
         self._ticking += 1 if wanted else -1
         if wanted and self._reminder is None and not self.is_initialized:
             self._reminder = QtCore.QTimer(self)
@@ -536,7 +535,7 @@ class Session(QtCore.QObject):
             self._ticker.stop()
 
     def _remind(self) -> None:
-        """Report once that elements wait for a node without a call of init()."""
+        """Log once that elements wait for a node but init() was not called."""
         if self._ticking > 0 and not self._closed and not self.is_initialized:
             _log.warning("nothing is received or sent: %s", NOT_INITIALIZED)
             self.forgotten.emit()
@@ -600,7 +599,7 @@ class Session(QtCore.QObject):
         self._apply_logger_level()
         self._set_status(node.status())
         self.node_changed.emit()
-        # The changes before the callback was registered are not reported again.
+        # Changes before the callback was registered are not reported again.
         self.graph_changed.emit()
 
     def _drop_node(self) -> None:
@@ -609,7 +608,7 @@ class Session(QtCore.QObject):
             handle.close()
         self._handles = []
         if self._rosout is not None:
-            # QML's elements, which PySide keeps, hold this, and it the whole node.
+            # QML's elements, which PySide keeps, hold this handler, which holds the whole node.
             self._rosout.close()
             self._rosout = None
         node, self.node = self.node, None
@@ -621,10 +620,10 @@ class Session(QtCore.QObject):
                 self.background(node.close)
 
     def mixing(self, topic: str) -> str:
-        """Return the problem of a topic that nodes of one name publish; empty otherwise.
+        """Return the problem of a topic published by nodes of the same name; empty for none.
 
         Args:
-            topic: Absolute; nothing is said of an empty one.
+            topic: Absolute name; an empty one has no problem.
         """
         if self.node is None or not self.duplicate_nodes or not topic:
             return ""
@@ -632,7 +631,7 @@ class Session(QtCore.QObject):
             senders = [one.node.full for one in self.node.publishers(topic)]
             for name, count in self.duplicate_nodes.items():
                 if senders.count(name) > 1:
-                    # Which of the nodes has which publisher is not known.
+                    # It is unknown which of the nodes has which publisher.
                     what = f"{senders.count(name)} publishers of nodes called {name}, a name of"
                     return f"{topic}: {what} {count} nodes, are mixed"
         return ""
@@ -660,7 +659,7 @@ class Session(QtCore.QObject):
         self._set_status(status)
         if ended:
             self.about_to_shutdown.emit()
-        # A handler may have asked for another node.
+        # A handler may have requested another node.
         if ended and status.killed and self._status is status:
             self.killed.emit()
 
@@ -669,7 +668,7 @@ class Session(QtCore.QObject):
 
         Args:
             name: Name of the QML logger; empty for the node's own.
-            level: Python's level.
+            level: The level in Python's logging.
         """
         logging.getLogger(logger_name(name)).setLevel(level)
         if not name:
@@ -694,7 +693,7 @@ class Session(QtCore.QObject):
 
 def _call_all(handlers: dict[int, tuple[QtCore.QObject, Callable[[], None]]]) -> None:
     for item, handler in list(handlers.values()):
-        # Any of them may have destroyed others.
+        # A handler may have destroyed other objects.
         if is_alive(item):
             try:
                 handler()
@@ -703,7 +702,7 @@ def _call_all(handlers: dict[int, tuple[QtCore.QObject, Callable[[], None]]]) ->
 
 
 def _with_domain(url: str, domain: int) -> str:
-    """Return `url` with another ``domain`` option; an empty one becomes the default URL."""
+    """Return `url` with a ``domain`` option; an empty `url` becomes the default URL."""
     if not url:
         from rosglass.connection import default_url  # noqa: PLC0415 - not before someone connects
 

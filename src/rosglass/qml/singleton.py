@@ -1,4 +1,4 @@
-"""The bases of ``Ros`` and ``Ros2``: node, log, graph, and functions for values."""
+"""The base classes of ``Ros`` and ``Ros2``: node, log, graph, and functions for values."""
 # ruff: noqa: N802, N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -40,23 +40,23 @@ _SHORT = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)\Z")
 
 
 class RosSingleton(QtCore.QObject):
-    """Base of ``Ros`` and ``Ros2``; one per engine, all of a session sharing its node."""
+    """Base of ``Ros`` and ``Ros2``, one per engine; all of a session share its node."""
 
-    #: Whose habits its values follow.
+    #: The module whose format its values have.
     DIALECT: ClassVar[Dialect] = Dialect.ROS2
-    #: What QML calls it.
+    #: Its name in QML.
     NAME: ClassVar[str] = "Ros2"
 
     initialized = Signal()
     connectionChanged = Signal()
     urlChanged = Signal()
-    #: Nodes, topics, services or actions appeared or went.
+    #: Nodes, topics, services or actions appeared or disappeared.
     graphChanged = Signal()
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
         self._bound: Runtime | None = None
-        # QML may only listen; without this, nothing would ever ask for the runtime.
+        # If QML only connects to signals, nothing else looks the runtime up.
         QtCore.QTimer.singleShot(0, self._bind)
 
     @Slot()
@@ -75,7 +75,7 @@ class RosSingleton(QtCore.QObject):
         return self._bound
 
     def _listen(self, session: Session) -> None:
-        """Pass the session's signals on."""
+        """Forward the session's signals."""
         session.initialized.connect(self.initialized)
         session.connection_changed.connect(self.connectionChanged)
         session.url_changed.connect(self.urlChanged)
@@ -86,7 +86,7 @@ class RosSingleton(QtCore.QObject):
         return self._runtime.session
 
     def _node(self, what: str) -> Node | None:
-        """Return the node; None, with a line in the log for developers, when there is none."""
+        """Return the node; without one, log a debug message and return None."""
         node = self._session.node
         if node is None:
             self._log(logging.DEBUG, f"{self.NAME}.{what}: there is no node yet")
@@ -96,12 +96,12 @@ class RosSingleton(QtCore.QObject):
 
     @Slot(result=bool)
     def isInitialized(self) -> bool:
-        """Return whether init() was called, without a shutdown since."""
+        """Return whether init() was called and no shutdown has followed."""
         return self._session.is_initialized
 
     @Slot(result=bool)
     def ok(self) -> bool:
-        """Return whether there is a node, or one is being made; false after a failure."""
+        """Return whether there is a node, or one is being created; false after a failure."""
         return self._session.state not in {"uninitialized", "failed"}
 
     @Slot(result=str)
@@ -116,7 +116,7 @@ class RosSingleton(QtCore.QObject):
 
     @Slot(str, result=str)
     def getEnvironmentVariable(self, name: str) -> str:
-        """Return a variable of the environment; empty when it is not set."""
+        """Return an environment variable; empty if it is not set."""
         return os.environ.get(name, "")
 
     def _set_url(self, url: str) -> None:
@@ -137,7 +137,7 @@ class RosSingleton(QtCore.QObject):
     @Slot(QJSValue)
     @Slot(QJSValue, str)
     def debug(self, message: QJSValue, name: str = "") -> None:
-        """Log a message for developers."""
+        """Log a debug message."""
         self._log(logging.DEBUG, message.toString(), name)
 
     @Slot(QJSValue)
@@ -161,12 +161,12 @@ class RosSingleton(QtCore.QObject):
     @Slot(QJSValue)
     @Slot(QJSValue, str)
     def fatal(self, message: QJSValue, name: str = "") -> None:
-        """Log an error after which the program is of no use."""
+        """Log a fatal error."""
         self._log(logging.CRITICAL, message.toString(), name)
 
     @abstractmethod
     def _check_topic(self, topic: str) -> None:
-        """Raise InvalidNameError unless this can be the name of a topic, service or action."""
+        """Raise InvalidNameError unless `topic` is a valid name of a topic, service or action."""
 
     def _offer(
         self,
@@ -176,14 +176,14 @@ class RosSingleton(QtCore.QObject):
         type_name: str,
         given: Callable[[], object],
     ) -> QtCore.QObject | None:
-        """Return a server that exists as long as JavaScript refers to it; errors are thrown.
+        """Return a server that exists while JavaScript refers to it; errors are thrown.
 
         Args:
-            function: What QML calls.
-            kind: The server's class.
+            function: The function's name in QML.
+            kind: Class of the server.
             name: Name of the service or action.
-            type_name: Its type.
-            given: Returns the functions that answer.
+            type_name: Type of the service or action.
+            given: Returns the functions that handle requests or goals.
         """
         try:
             self._check_topic(name)
@@ -200,11 +200,11 @@ class RosSingleton(QtCore.QObject):
 
 
 def check_type(type_name: str, name: str) -> None:
-    """Raise InvalidNameError unless this can be a type's name; empty texts are the caller's.
+    """Raise InvalidNameError unless `type_name` may be a type; callers handle empty ones.
 
     Args:
-        type_name: What was given as the type.
-        name: What was given beside it, as the name of a topic, service or action.
+        type_name: The argument for the type.
+        name: The argument for the name of the topic, service or action.
     """
     from rosglass.interfaces.names import split_name  # noqa: PLC0415 - not needed at start-up
 
@@ -237,22 +237,22 @@ def full_type(name: str, kind: str = "msg") -> str:
     return f"{match[1]}/{kind}/{match[2]}" if match else name
 
 
-#: What an action is made of has names with this in them.
+#: Part of the names of an action's topics and services.
 _HIDDEN = "/_action/"
 
 
 class GraphSingleton(RosSingleton):
-    """The present graph, announced by ``graphChanged``; empty while there is no node."""
+    """The current graph, with ``graphChanged``; empty while there is no node."""
 
     @Slot(result="QStringList")
     @Slot(str, result="QStringList")
     def queryTopics(self, datatype: str = "") -> list[str]:
-        """Return the topics, those of one type if given."""
+        """Return the topics, or only those of one type."""
         return _of_type(self._topics(), full_type(datatype))
 
     @Slot(result=QJSValue)
     def getTopicNamesAndTypes(self) -> QJSValue:
-        """Return an object from topic names to lists of types."""
+        """Return an object of topic names to lists of types."""
         return self._spelled(self._topics())
 
     @Slot(str, result="QStringList")
@@ -263,12 +263,12 @@ class GraphSingleton(RosSingleton):
     @Slot(result="QStringList")
     @Slot(str, result="QStringList")
     def queryServices(self, datatype: str = "") -> list[str]:
-        """Return the services but those that actions are made of; of one type if given."""
+        """Return the services, or only those of one type, without those of actions."""
         return _of_type(self._services(), full_type(datatype, "srv"))
 
     @Slot(result=QJSValue)
     def getServiceNamesAndTypes(self) -> QJSValue:
-        """Return an object from service names to lists of types."""
+        """Return an object of service names to lists of types."""
         return self._spelled(self._services())
 
     @Slot(str, result="QStringList")
@@ -279,12 +279,12 @@ class GraphSingleton(RosSingleton):
     @Slot(result="QStringList")
     @Slot(str, result="QStringList")
     def queryActions(self, datatype: str = "") -> list[str]:
-        """Return the actions, those of one type if given."""
+        """Return the actions, or only those of one type."""
         return _of_type(self._actions(), full_type(datatype, "action"))
 
     @Slot(result=QJSValue)
     def getActionNamesAndTypes(self) -> QJSValue:
-        """Return an object from action names to lists of types."""
+        """Return an object of action names to lists of types."""
         return self._spelled(self._actions())
 
     @Slot(str, result="QStringList")
@@ -318,7 +318,7 @@ class GraphSingleton(RosSingleton):
 
     @Slot(str, result=QJSValue)
     def getNodeInfo(self, name: str) -> QJSValue:
-        """Return what a node publishes, subscribes, serves and calls.
+        """Return the publishers, subscriptions, services and service clients of a node.
 
         Args:
             name: The node's full name.
@@ -385,7 +385,7 @@ class GraphSingleton(RosSingleton):
         )
 
     def _spell(self, type: str) -> str:
-        """Return a type's name as this module spells it."""
+        """Return a type's name in this module's spelling."""
         return self.DIALECT.type_name(type) if "/" in type else type
 
 
@@ -398,21 +398,21 @@ def _of_type(known: dict[str, list[str]], wanted: str) -> list[str]:
 
 
 class ValueFunctions(GraphSingleton):
-    """Empty messages, constants, times and files, in the form of the singleton's module."""
+    """Functions for empty messages, constants, times and files, in the module's style."""
 
     @Slot(str, result=QJSValue)
     def createEmptyMessage(self, type_name: str) -> QJSValue:
-        """Return a message with every field at its default; undefined for unknown types."""
+        """Return a message with default values; undefined for an unknown type."""
         return self._empty("createEmptyMessage", type_name, "message")
 
     @Slot(str, result=QJSValue)
     def createEmptyServiceRequest(self, type_name: str) -> QJSValue:
-        """Return a service's request with every field at its default; undefined if unknown."""
+        """Return a service's request with default values; undefined for an unknown type."""
         return self._empty("createEmptyServiceRequest", type_name, "service")
 
     @Slot(str, result=QJSValue)
     def createEmptyActionGoal(self, type_name: str) -> QJSValue:
-        """Return an action's goal with every field at its default; undefined if unknown."""
+        """Return an action's goal with default values; undefined for an unknown type."""
         return self._empty("createEmptyActionGoal", type_name, "action")
 
     def _empty(self, function: str, type_name: str, wanted: str) -> QJSValue:
@@ -432,8 +432,8 @@ class ValueFunctions(GraphSingleton):
     def constants(self, type_name: str) -> QJSValue:
         """Return the constants of a message type by name.
 
-        Those of services and actions come as ``request``, ``response``, ``goal``, ``result`` and
-        ``feedback``; an unknown type throws.
+        For services and actions, they are grouped as ``request``, ``response``, ``goal``,
+        ``result`` and ``feedback``; an unknown type throws.
         """
         from rosglass.qml.to_js import constants_of  # noqa: PLC0415 - brings in the messages
 
@@ -443,7 +443,7 @@ class ValueFunctions(GraphSingleton):
     def documentation(self, type_name: str) -> QJSValue:
         """Return the documentation of a type, its fields and its constants.
 
-        Services and actions as in :meth:`constants`; an unknown type throws.
+        Services and actions are grouped as in :meth:`constants`; an unknown type throws.
         """
         return self._parts("documentation", type_name, self._document)
 
@@ -486,10 +486,10 @@ class ValueFunctions(GraphSingleton):
         return self._runtime.value({name: show(part) for name, part in parts.items()})
 
     def _load(self, name: str, action: bool = False) -> MessageType | ServiceType | ActionType:
-        """Return a type, of the module's ROS if it is known there, otherwise of the other."""
+        """Return a type from the module's ROS version if it exists there, otherwise the other."""
         from rosglass.messages import load  # noqa: PLC0415 - brings in the definitions
 
-        # ROS 1 calls actions by their message, pkg/DoAction.
+        # ROS 1 names actions after their message, pkg/DoAction.
         names = [name.removesuffix("Action"), name] if action else [name]
         tries = [(ros, one) for ros in (self.DIALECT.ros, 3 - self.DIALECT.ros) for one in names]
         for ros, one in tries:
@@ -502,13 +502,13 @@ class ValueFunctions(GraphSingleton):
     @Slot(QJSValue, result=QJSValue)
     @Slot(QJSValue, QJSValue, result=QJSValue)
     def time(self, first: QJSValue, second: QJSValue | None = None) -> QJSValue:
-        """Return a time of seconds, of seconds and nanoseconds, of decimal text, of a Date."""
+        """Create a time from seconds, seconds and nanoseconds, decimal text, or a Date."""
         return self._create_time("time", first, second)
 
     @Slot(QJSValue, result=QJSValue)
     @Slot(QJSValue, QJSValue, result=QJSValue)
     def duration(self, first: QJSValue, second: QJSValue | None = None) -> QJSValue:
-        """Return a duration of seconds, of seconds and nanoseconds, of decimal text."""
+        """Create a duration from seconds, seconds and nanoseconds, or decimal text."""
         return self._create_time("duration", first, second)
 
     def _create_time(self, kind: str, first: QJSValue, second: QJSValue | None) -> QJSValue:

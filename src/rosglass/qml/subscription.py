@@ -30,25 +30,26 @@ if TYPE_CHECKING:
 __all__ = ["DEFAULT_QOS", "Subscriber", "Subscription", "next_message", "wait_for_message"]
 
 _log = logging.getLogger("rosglass.qml")
-#: A topic that comes so much faster than it is shown is received some messages at a time.
+#: Topics faster than the throttle rate by these factors are received in batches; the second
+#: factor applies while batching, the first otherwise.
 _MUCH_FASTER, _HARDLY_FASTER = 3.0, 1.5
-#: What ``Ros2.QoS()`` gives: matches every publisher, keeps only the newest message.
+#: The profile of ``Ros2.QoS()``: matches every publisher, keeps only the newest message.
 DEFAULT_QOS = QoS(depth=1, reliability=Reliability.BEST_EFFORT)
 
 
 class _Feed(Executor):
-    """A subscription whose samples wait until the GUI thread shows them.
+    """A subscription that queues its samples for the GUI thread.
 
-    The inbox posts one delivery job here, and no other one before that job has run: a fast topic
-    costs one event per delivery, not per message.
+    The inbox posts one delivery job at a time, so that a fast topic costs one event per delivery,
+    not per message.
 
     Args:
         node: The node.
         topic: Absolute topic name.
-        type_name: Message type; empty takes the one that is published.
+        type_name: Message type; empty uses the published one.
         qos: Requested profile.
-        executor: The GUI thread.
-        on_arrival: Called there with this object when samples wait.
+        executor: The executor of the GUI thread.
+        on_arrival: Called on the GUI thread with this object when samples have arrived.
     """
 
     def __init__(
@@ -76,7 +77,7 @@ class _Feed(Executor):
         self._samples.append(sample)
 
     def take(self) -> list[Sample]:
-        """Return the samples that wait."""
+        """Take the queued samples."""
         job, self._job = self._job, None
         if job is not None:
             job()
@@ -99,7 +100,7 @@ class Subscription(TopicElement):
     messageType = Writable(str, read="_get_type", write="_set_type")
     qos = Writable(QJSValue, read="_get_qos", write="_set_qos")
     queueSize = Writable(int, read="_get_queue_size", write="_set_queue_size")
-    #: Messages per second that are shown at most; 0 delivers all.
+    #: Maximum messages per second that are shown; 0 for all.
     throttleRate = Writable(int, 20, at_least(0), then="_restart_timer")
     enabled = Writable(bool, True)
     timeout = Writable(int, None, at_least(0), then="_update_stale", unit="ms", read="_get_timeout")
@@ -124,7 +125,7 @@ class Subscription(TopicElement):
         self._profile = DEFAULT_QOS
         self._wanted_queue_size: int | None = None
         self._sample: Sample | None = None
-        #: Whether it came with the present subscription, and so from the present robot.
+        #: Whether the sample is from the current subscription, and so from the current robot.
         self._current = False
         self._value: QJSValue | None = None
         self._shown_at = self._late = 0.0
@@ -133,7 +134,7 @@ class Subscription(TopicElement):
 
     @property
     def label(self) -> str:
-        """What error messages call this element."""
+        """The element's name in error messages."""
         return f"Subscription {self._topic!r}"
 
     def configure(self, topic: str, type_name: str, qos: QoS) -> None:
@@ -141,7 +142,7 @@ class Subscription(TopicElement):
         self._topic, self._wanted_type, self._profile = topic, type_name, qos
 
     def source(self) -> tuple[str, str, QoS]:
-        """Return what it receives: topic (empty while unknown), type (empty for any), profile."""
+        """Return topic (empty while unknown), type (empty for any) and QoS profile."""
         return self._resolve(self._topic), self._wanted_type, self._profile
 
     # Properties that QML sets.
@@ -154,7 +155,7 @@ class Subscription(TopicElement):
             return
         self._topic = topic
         if topic == self._resolved:
-            return  # the same topic, now whatever the node's namespace becomes
+            return  # the topic is the same, but no longer depends on the node's namespace
         self._resolved = ""
         self._clear_shown()
         self.topicChanged.emit()
@@ -182,7 +183,7 @@ class Subscription(TopicElement):
             self._refuse(f"{self.label}: {error}")
 
     def _set_profile(self, qos: QoS) -> None:
-        # A queue size that was set wins, whichever of the two QML happens to set last.
+        # An explicit queue size has priority, whichever of the two QML sets last.
         size, before_size, before = self._wanted_queue_size, self._get_queue_size(), self._profile
         if size is not None:
             history = History.KEEP_LAST if size else History.KEEP_ALL
@@ -230,7 +231,7 @@ class Subscription(TopicElement):
 
     @Slot(result=int)
     def getPublisherCount(self) -> int:
-        """Return how many publishers the topic has; 0 while not connected."""
+        """Return the number of publishers of the topic; 0 while not connected."""
         return self._count_publishers()
 
     # Subscribing.
@@ -266,7 +267,7 @@ class Subscription(TopicElement):
         report(self, subscribed=False)
 
     def _clear_shown(self) -> None:
-        """Clear the message: it belongs to another topic or type."""
+        """Clear the message, which belongs to another topic or type."""
         had = self._sample is not None
         self._sample, self._value, self._age = None, None, -1.0
         if had:
@@ -295,7 +296,7 @@ class Subscription(TopicElement):
         samples = feed.take()
         for sample in samples if self.throttleRate == 0 else samples[-1:]:
             self._show(sample)
-            # A handler may have changed the topic, or destroyed this very object.
+            # A handler may have changed the topic or destroyed this object.
             if not is_alive(self) or feed is not self._endpoint:
                 return
 
@@ -306,7 +307,7 @@ class Subscription(TopicElement):
             self._set_problem(f"{self._resolved}: a malformed message was refused: {error}")
             return
         except TypeNotFoundError:
-            return  # only bytes; the subscription's own problem says why
+            return  # unreadable without its type; the subscription reports the problem
         name = self.DIALECT.type_name(sample.type.definition.name)
         new_type = name != self._found_type and not self._wanted_type
         self._found_type = name
@@ -315,7 +316,7 @@ class Subscription(TopicElement):
         self._late = self._lateness(sample)
         self._age = 0.0
         self._outdated = False
-        # Every getter returns what belongs to the new message before the first signal is sent.
+        # Update all properties before emitting the first signal.
         was_stale, self._stale = self._stale, self._is_old()
         if new_type:
             self.messageTypeChanged.emit()
@@ -330,12 +331,12 @@ class Subscription(TopicElement):
             self.newMessage.emit(self._get_message())
 
     def _lateness(self, sample: Sample) -> float:
-        """Return by how many seconds a message was delayed more than others."""
+        """Return the excess delay of a message over others, in seconds."""
         feed = self._endpoint
         return 0.0 if feed is None else feed.subscription.lateness(sample).seconds
 
     def _has_listeners(self) -> bool:
-        """Return whether newMessage is connected; if not, its value need not be built."""
+        """Return whether newMessage is connected, so that its value is needed."""
         meta = self.metaObject()
         return self.isSignalConnected(meta.method(meta.indexOfSignal("newMessage(QJSValue)")))
 
@@ -356,18 +357,18 @@ class Subscription(TopicElement):
         if self._sample is None:
             return True
         timeout = self._get_timeout()
-        # A link that was silent may deliver late what is new only here.
+        # After an interruption, a link may deliver old messages that are new only here.
         return timeout > 0 and self._steady() - self._shown_at + self._late > timeout / 1000
 
     def _recheck_outdated(self) -> None:
-        # The publisher that latched the message is there: it would have sent a newer one.
+        # The publisher that latched the message still exists and would have sent a newer one.
         latched = self._profile.durability is Durability.TRANSIENT_LOCAL
         connected = self._session is not None and self._session.state == "connected"
         if latched and connected and self._current and self._has_publisher():
             self._outdated = False
 
     def _has_publisher(self) -> bool:
-        """Return whether the publisher of the message is still there, not a successor."""
+        """Return whether the publisher of the message itself, not a successor, still exists."""
         node, sample = self.node, self._sample
         if node is None or sample is None:
             return False
@@ -387,7 +388,7 @@ class Subscription(TopicElement):
         self._refresh()
 
     def _refresh(self) -> None:
-        """Announce the subscription's present statistics and problem."""
+        """Report the subscription's current statistics and problem."""
         feed = self._endpoint
         if feed is None:
             report(self, frequency=0.0, bandwidth=0.0)
@@ -405,7 +406,7 @@ class Subscription(TopicElement):
             subscribed=subscription.type is not None or self._current,
             frequency=statistics.frequency,
             bandwidth=statistics.bandwidth,
-            # A throttled topic drops messages on purpose; only unthrottled ones can be lost.
+            # Throttling drops messages on purpose, so only count losses without it.
             dropped=statistics.dropped if throttle == 0 else 0,
         )
 
@@ -436,11 +437,11 @@ class Subscriber(Subscription):
 
     @Slot(result=int)
     def getNumPublishers(self) -> int:
-        """Return how many publishers the topic has; 0 while not connected."""
+        """Return the number of publishers of the topic; 0 while not connected."""
         return self._count_publishers()
 
 
-#: Milliseconds that Qt's timers can wait, 24 days.
+#: Maximum milliseconds of a Qt timer, 24 days.
 _LONGEST = 2**31 - 1
 
 
@@ -454,14 +455,14 @@ def next_message(
     """Implement ``waitForMessageAsync``.
 
     Args:
-        subscription: A new one, made for this.
+        subscription: A new subscription for this purpose.
         runtime: The engine's runtime.
         topic: Topic name.
         first: Milliseconds, or the function.
         second: The function after milliseconds.
 
     Returns:
-        A promise of the message; undefined when there is a function.
+        A promise of the message; undefined if there is a function.
     """
     timed = first is not None and first.isNumber()
     callback = second if timed else first
@@ -500,14 +501,14 @@ def wait_for_message(
     milliseconds: float,
     done: Callable[[QJSValue | None], None],
 ) -> None:
-    """Call a function with the next message of a topic, a latched one included.
+    """Call a function with the next message of a topic, which may be a latched one.
 
     Args:
-        runtime: The engine's runtime, which keeps the subscription.
-        subscription: A new one, made for this.
+        runtime: The engine's runtime, which owns the subscription.
+        subscription: A new subscription for this purpose.
         topic: Topic name.
-        milliseconds: How long to wait, 0 or infinity for ever.
-        done: Called with the message; None if there was none.
+        milliseconds: Time to wait; 0 or infinity for no limit.
+        done: Called with the message, or with None after a timeout.
     """
     subscription.setParent(runtime)
     subscription.configure(topic, "", QoS.best_available())

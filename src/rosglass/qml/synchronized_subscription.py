@@ -1,4 +1,4 @@
-"""The element ``SynchronizedSubscription``: messages of several topics that belong together."""
+"""The element ``SynchronizedSubscription``: matching messages of several topics."""
 # ruff: noqa: N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ if TYPE_CHECKING:
 __all__ = ["RosSynchronizedSubscription", "SynchronizedSubscription"]
 
 _MAX_SLOP_MS = 3_600_000
-#: Sets over which the frequency is taken.
+#: Number of sets over which the frequency is measured.
 _MARKS = 30
 
 
 class _Matcher:
-    """Receives topics and matches them, on a thread of its own.
+    """Receives topics and matches their messages, on its own thread.
 
     Args:
-        node: Who subscribes.
-        wanted: Topic, type (may be empty) and profile of each.
-        queue_size: Messages of a topic that wait at most.
-        slop: Nanoseconds that a set may span.
-        headerless: Whether messages without header count by the time of their arrival.
-        arrived: Called on the GUI thread with this object when there are sets.
-        executor: The GUI thread.
+        node: The subscribing node.
+        wanted: Topic, type (may be empty) and QoS profile of each topic.
+        queue_size: Maximum number of waiting messages per topic.
+        slop: Maximum difference between the stamps of a set, nanoseconds.
+        headerless: Whether the arrival time replaces the stamp of messages without a header.
+        arrived: Called on the GUI thread with this object when sets are available.
+        executor: The executor of the GUI thread.
 
     Raises:
         Error: One of the topics cannot be subscribed to.
@@ -81,12 +81,12 @@ class _Matcher:
 
     @property
     def dropped(self) -> int:
-        """Messages that fit into no set, and those of sets that were not taken in time."""
+        """Number of messages that matched no set, or whose set was not taken in time."""
         return self._match.dropped + self._lost
 
     @property
     def problem(self) -> str:
-        """What is wrong with one of the topics; empty when nothing is."""
+        """The problem of one of the topics; empty if there is none."""
         for index, subscription in enumerate(self.subscriptions):
             problem = subscription.problem or self._bad.get(index, "")
             if problem:
@@ -94,18 +94,18 @@ class _Matcher:
         return ""
 
     def take(self) -> list[list[Sample]]:
-        """Return the sets that wait."""
+        """Take the waiting sets."""
         with self._lock:
             sets, self._sets = list(self._sets), deque()
         return sets
 
     def lateness(self, samples: list[Sample]) -> float:
-        """Return by how many seconds a set was kept back on its way."""
+        """Return the delay of a set in transit, in seconds."""
         pairs = zip(self.subscriptions, samples, strict=True)
         return max(subscription.lateness(sample).seconds for subscription, sample in pairs)
 
     def close(self) -> None:
-        """Receive no more."""
+        """Stop receiving."""
         for subscription in self.subscriptions:
             subscription.close()
         self._worker.close()
@@ -165,7 +165,7 @@ class SynchronizedSubscription(Element):
     topics = Writable(QJSValue)
     subscriptions = Writable(QJSValue)
     queueSize = Writable(int, 10, within(1, 10_000))
-    #: Milliseconds that the stamps of a set may span.
+    #: Maximum difference between the stamps of a set, milliseconds.
     slop = Writable(float, 100.0, within(0, _MAX_SLOP_MS), unit="ms")
     allowHeaderless = Writable(bool, False)
     enabled = Writable(bool, True)
@@ -185,9 +185,9 @@ class SynchronizedSubscription(Element):
         super().__init__(parent, runtime)
         self._samples: list[Sample] | None = None
         self._value: QJSValue | None = None
-        #: When the set was shown, and the seconds that it was delayed before.
+        #: When the set was shown, and the seconds by which it was delayed before.
         self._shown_at = self._late = 0.0
-        #: Whether the connection was lost since.
+        #: Whether the connection has been lost since then.
         self._outdated = False
         self._times: deque[float] = deque(maxlen=_MARKS)
 
@@ -199,10 +199,10 @@ class SynchronizedSubscription(Element):
     # Subscribing.
 
     def _sources(self, node: Node) -> tuple[tuple[str, str, QoS], ...]:
-        """Return topic, type and profile of each; nothing while one of them has no topic yet.
+        """Return topic, type and QoS profile of each source; empty while one has no topic.
 
         Raises:
-            Error: They are not what they must be.
+            Error: A source is invalid.
         """
         given = [*_items(self.topics, "topics"), *_items(self.subscriptions, "subscriptions")]
         found = []

@@ -1,4 +1,4 @@
-"""``TfBuffer``: the transforms below one namespace; ``TfTransformListener``: those of the robot."""
+"""``TfBuffer`` (transforms in a namespace) and ``TfTransformListener`` (those of the robot)."""
 # ruff: noqa: N802, N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def _checked_namespace(namespace: str) -> str:
 
 
 class TfLink:
-    """The transforms of one namespace, received while elements use them; on the GUI thread only.
+    """Receives the transforms of one namespace while elements use them; on the GUI thread only.
 
     Attributes:
         buffer: The transforms.
@@ -73,19 +73,19 @@ class TfLink:
         def work() -> None:
             from rosglass.tf import TransformListener  # noqa: PLC0415 - loaded with the buffer
 
-            # Here and not on the GUI thread: who shuts it may be next on this one.
+            # Not on the GUI thread: the next job on this thread may be the one that closes it.
             self._listener = TransformListener(node, self.buffer, namespace)
 
         session.background(work, self._opened)
 
     @property
     def problem(self) -> str:
-        """Why they are not received, or mixed with another robot's; empty when all is well."""
+        """Why transforms are not received, or mixed with another robot's; empty for no problem."""
         return self._failure or self._session.mixing(self._topic)
 
     @classmethod
     def join(cls, session: Session, node: Node, namespace: str, user: Any) -> TfLink:
-        """Return the link of a namespace, kept open by `user`."""
+        """Return the link of a namespace; it stays open for `user`."""
         key = (cls, node, namespace)
         link = session.shared.get(key)
         if link is None:
@@ -107,7 +107,7 @@ class TfLink:
             self._failure = str(result)
             _log.warning("transforms are not received: %s", result)
         elif self._listener is not None:
-            # Not the static ones: nodes of one name may well send each its own.
+            # Not the static ones: nodes of the same name may publish different ones.
             self._topic = self._listener.subscriptions[0].topic
 
     def _shut(self) -> None:
@@ -117,22 +117,22 @@ class TfLink:
 
 
 class _Watches(NamedTuple):
-    """A link to transforms, and the callbacks registered with its buffer."""
+    """A link, and the callbacks registered with its buffer."""
 
     link: TfLink
     watches: list[Handle]
 
 
 class _Queries(Element):
-    """Looks up transforms in a buffer that receives from the session's node."""
+    """Looks up transforms in a buffer filled by the session's node."""
 
     _endpoint: _Watches | None
 
     @property
     def buffer(self) -> TransformBuffer | None:
-        """The transforms; None while there is no node."""
+        """The buffer; None while there is no node."""
         if self._endpoint is None:
-            # A caller need not wait for the event loop after mentioning it.
+            # Available immediately after the first use in QML, without waiting for the event loop.
             self._run_update()
         return self._endpoint.link.buffer if self._endpoint is not None else None
 
@@ -144,7 +144,7 @@ class _Queries(Element):
     @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
     @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
     def canTransform(self, *given: QJSValue) -> QJSValue:
-        """Return true when a transform can be looked up, otherwise why not, as a text.
+        """Return true if a transform can be looked up, otherwise the reason as text.
 
         Arguments are those of :meth:`lookUpTransform`.
         """
@@ -160,15 +160,14 @@ class _Queries(Element):
     @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
     @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QJSValue)
     def lookUpTransform(self, *given: QJSValue) -> QJSValue:
-        """Return where a frame is, seen from another.
+        """Look up the transform from a source frame to a target frame.
 
-        Arguments are target and source frame, and optionally the time (newest when left out) and
-        milliseconds to wait; or target frame, its time, source frame, its time, a frame that does
-        not move in between, and optionally milliseconds to wait. The interface lives on while it
-        waits.
+        Arguments are target frame, source frame, and optionally the time (by default the newest)
+        and milliseconds to wait; or target frame, target time, source frame, source time, a fixed
+        frame, and optionally milliseconds to wait. The interface keeps running during the wait.
 
         Returns:
-            A ``geometry_msgs/TransformStamped`` with ``valid``; when that is false, also with
+            A ``geometry_msgs/TransformStamped`` with ``valid``; if that is false, also with
             ``exception`` and ``message``.
         """
         runtime = self._find_runtime()
@@ -180,7 +179,7 @@ class _Queries(Element):
         return shown_transform(runtime, result, "", "", self)
 
     def _look_up(self, what: str, given: Sequence[QJSValue]) -> Transform | _Missing | str:
-        """Return the transform, or what is missing; an empty text after a thrown error."""
+        """Return the transform, or why it is missing; an empty text if an error was thrown."""
         runtime = self._find_runtime()
         if runtime is None:
             return ""
@@ -213,7 +212,7 @@ class _Queries(Element):
 
     @Slot(str, result=str)
     def getFrameAuthority(self, frame: str) -> str:
-        """Return the node that publishes a frame; empty when there is no such frame."""
+        """Return the node that publishes a frame; empty if the frame does not exist."""
         info = self._frame(frame)
         return (
             "" if info is None else info.authority or ("unknown_publisher" if info.parent else "")
@@ -221,7 +220,7 @@ class _Queries(Element):
 
     @Slot(str, result=QJSValue)
     def getFrame(self, frame: str) -> QJSValue:
-        """Return the description of a frame; undefined when there is no such frame."""
+        """Return the description of a frame; undefined if the frame does not exist."""
         buffer, info, runtime = self.buffer, self._frame(frame), self._find_runtime()
         if buffer is None or info is None or runtime is None:
             return QJSValue()
@@ -238,7 +237,7 @@ class _Queries(Element):
 
     @Slot(str, result=float)
     def getTransformAge(self, frame: str) -> float:
-        """Return the seconds since a frame's newest transform, by its stamp; -1 when unknown."""
+        """Return the age of a frame's newest transform by its stamp, in seconds; -1 if unknown."""
         info, node = self._frame(frame), self.node
         if info is None or node is None or info.static:
             return -1.0
@@ -247,7 +246,7 @@ class _Queries(Element):
 
     @Slot(str, str, result="QStringList")
     def getChain(self, target: str, source: str) -> list[str]:
-        """Return the frames from source to target, both included; empty when nothing joins them."""
+        """Return the frames from source to target, inclusive; empty if they are not connected."""
         buffer = self.buffer
         try:
             return [] if buffer is None else buffer.tree().chain(target, source)
@@ -260,7 +259,7 @@ class _Queries(Element):
 
 
 class _Missing:
-    """A transform that cannot be had, and why: tf2's exception and its text."""
+    """A transform that is not available, with tf2's exception and its text."""
 
     def __init__(self, frames: Transform, exception: str, why: str) -> None:
         self.frames, self.exception, self.why = frames, exception, why
@@ -270,7 +269,7 @@ class _Query:
     """The arguments of a lookup.
 
     Raises:
-        ConversionError: They are not what they should be.
+        ConversionError: The arguments are invalid.
     """
 
     def __init__(self, given: Sequence[QJSValue]) -> None:
@@ -293,7 +292,7 @@ class _Query:
             raise ConversionError("timeout", milliseconds, "milliseconds from 0 on")
         #: Seconds to wait.
         self.timeout = milliseconds / 1000
-        #: The frames that are asked for.
+        #: The requested frames.
         self.frames = Transform(frame_id=self.target, child_frame_id=self.source)
 
     def look_up(self, buffer: TransformBuffer) -> Transform:
@@ -305,7 +304,7 @@ class _Query:
         return buffer.lookup_transform(self.target, self.source, self.time)
 
     def promise(self, buffer: TransformBuffer) -> Promise[Transform]:
-        """Return the promise of the transform within the time."""
+        """Return a promise of the transform within the timeout."""
         if self.full:
             return buffer.lookup_transform_full_async(
                 self.target,
@@ -321,7 +320,7 @@ class _Query:
 
 
 def _time(value: QJSValue) -> Time:
-    """Return a time; zero, which means the newest, for an invalid Date, undefined and null."""
+    """Convert a time; an invalid Date, undefined and null become zero, i.e. the newest."""
     if value.isUndefined() or value.isNull():
         return Time()
     if value.isDate() and value.property("getTime").callWithInstance(value).toString() == "NaN":
@@ -332,14 +331,14 @@ def _time(value: QJSValue) -> Time:
 def shown_transform(
     runtime: Runtime, transform: Transform, exception: str, why: str, element: Element
 ) -> QJSValue:
-    """Return a transform as QML gets it.
+    """Convert a transform for QML.
 
     Args:
         runtime: The engine's runtime.
-        transform: The transform; of one that is not valid, only its frames count.
+        transform: The transform; if it is not valid, only its frames are used.
         exception: Name of tf2's exception; empty for a valid transform.
-        why: Its text.
-        element: Whose habits are followed.
+        why: Text of the exception.
+        element: The element whose module determines the format.
     """
     from rosglass.messages import load  # noqa: PLC0415 - brings in the definitions
 
@@ -372,18 +371,18 @@ def _described(buffer: TransformBuffer, info: FrameInfo) -> dict[str, Any]:
 
 
 class _Listening(_Queries):
-    """Receives transforms for as long as it exists."""
+    """Receives transforms as long as it exists."""
 
-    #: Transforms were received; several that arrive together are announced once.
+    #: Transforms were received; emitted once for several that arrive together.
     transformChanged = Signal()
-    #: Frames appeared, disappeared, or have another parent.
+    #: Frames appeared, disappeared or changed their parent.
     framesChanged = Signal()
-    #: The buffer is another one, or there is none any more.
+    #: The buffer was replaced or removed.
     bufferChanged = Signal()
 
     @Slot()
     def clear(self) -> None:
-        """Forget every transform but the static ones."""
+        """Remove all transforms except static ones."""
         buffer = self.buffer
         if buffer is not None:
             buffer.clear()
@@ -437,11 +436,11 @@ class TfTransformListener(_Listening):
 
     @Slot()
     def initialize(self) -> None:
-        """Listen; being mentioned is enough for that."""
+        """Start listening; any use of the singleton in QML does this, too."""
 
 
 class TfBuffer(_Listening):
-    """Transforms below one namespace, apart from all others. See its page in ``docs/elements``."""
+    """The transforms of one namespace only. See its page in ``docs/elements``."""
 
     ns = Writable(str, "", _checked_namespace)
 

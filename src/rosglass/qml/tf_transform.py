@@ -1,4 +1,4 @@
-"""The elements ``TfTransform`` and ``TfBroadcaster``: following a transform, and sending one."""
+"""The elements ``TfTransform``, which follows a transform, and ``TfBroadcaster``."""
 # ruff: noqa: N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = ["RosTfBroadcaster", "RosTfTransform", "TfBroadcaster", "TfTransform"]
 
-#: Seconds after which the reason why there is no transform is looked up again.
+#: Seconds after which the reason for a missing transform is looked up again.
 _LOOK_UP_S = 1.0
 
 
@@ -51,14 +51,14 @@ class TfTransform(Element):
     rotationChanged = Signal()
     bufferChanged = Signal()
 
-    #: The frame that is looked up, and the one it is seen from.
+    #: The frame that is looked up, and the frame in which its pose is given.
     sourceFrame = Writable(str, "")
     targetFrame = Writable(str, "")
     enabled = Writable(bool, True)
     active = Writable(
         bool, read=lambda self: self.enabled, write="_set_enabled", notify="enabledChanged"
     )
-    #: Updates per second at most; 0 stops them, and in ``Ros 1.0`` means no limit.
+    #: Maximum updates per second; 0 stops updates, and in ``Ros 1.0`` means no limit.
     rate = Writable(float, 62.5, _finite)  # one per 16 ms
     timeout = Writable(int, DEFAULT_TIMEOUT_MS, at_least(0), then="_update_stale", unit="ms")
     buffer = Writable(QtCore.QObject, read=lambda self: self._own_buffer, write="_set_buffer")
@@ -81,7 +81,7 @@ class TfTransform(Element):
         super().__init__(parent, runtime)
         self._own_buffer: TfBuffer | None = None
         self._link: TfLink | None = None
-        #: What is wrong with the names of the frames; empty when they are good.
+        #: Error text for invalid frame names; empty if they are valid.
         self._bad_frames = ""
         self._transform: Transform | None = None
         self._exception, self._why = "Uninitialized", "nothing was looked up yet"
@@ -89,7 +89,7 @@ class TfTransform(Element):
         self._updated = 0.0
         #: When the transform last changed; None before.
         self._arrived: float | None = None
-        #: When the connection was lost; what arrives later is live, as without a ROS 1 master.
+        #: When the connection was lost; later transforms are live, e.g. without a ROS 1 master.
         self._lost: float | None = None
         self._timer = single_shot(self, self._refresh)
         self._look_again = lambda *_: self._schedule() if is_alive(self) else None
@@ -105,7 +105,7 @@ class TfTransform(Element):
             return
         self._own_buffer = buffer
         if buffer is not None:
-            # Signals do not reach methods of objects that QML extends; they do reach functions.
+            # Signals do not reach methods of objects that QML extends, but they reach functions.
             buffer.bufferChanged.connect(self._look_again)
             buffer.destroyed.connect(self._look_again)
         self.bufferChanged.emit()
@@ -136,7 +136,7 @@ class TfTransform(Element):
         return bool(self.enabled and self.sourceFrame and self.targetFrame)
 
     def _find_buffer(self) -> TransformBuffer | None:
-        """Return the buffer to look in: the one that was set, or that of the node."""
+        """Return the buffer to use: the one that was set, or the node's."""
         node, session = self.node, self._session
         if node is None or session is None or self._own_buffer is not None:
             self._leave_link()
@@ -182,7 +182,7 @@ class TfTransform(Element):
     def _update(self) -> None:
         super()._update()
         if self._config is not None:
-            # What the buffer has already may be of a robot that is gone: it has to move first.
+            # Transforms in the buffer may be from a previous robot: wait for a new one.
             self._look_up(moved=False)
         elif self.enabled and self._find_buffer() is None:
             self._show(None, "Uninitialized", "there is no node yet")
@@ -200,7 +200,7 @@ class TfTransform(Element):
 
     @property
     def _interval(self) -> float:
-        """Seconds between two updates at least."""
+        """Minimum seconds between two updates."""
         return 1 / self.rate if self.rate > 0 else 0.0
 
     @Slot()
@@ -208,7 +208,7 @@ class TfTransform(Element):
         self._look_up(moved=True)
 
     def _look_up(self, *, moved: bool) -> None:
-        """Look the transform up; `moved` says whether one of its links was just received."""
+        """Look up the transform; `moved`: one of its links has just been received."""
         if self._config is None:
             return
         buffer, target, source = self._config
@@ -218,7 +218,7 @@ class TfTransform(Element):
         except TransformException as error:
             self._show(None, type(error).__name__, str(error))
             return
-        # Of a chain whose other links stand still, the newest that is known stays the same.
+        # In a chain, the newest common time only changes with the link that is furthest behind.
         if moved and (self._transform is None or found.stamp != self._transform.stamp):
             self._arrived = self._steady()
         self._show(found, "", "")
@@ -229,7 +229,7 @@ class TfTransform(Element):
             self._update_stale()
             return
         self._transform, self._exception, self._why = found, exception, why
-        # Every getter returns what belongs to the new transform before the first signal is sent.
+        # Update all properties before emitting the first signal.
         self._shown, self._valid = None, found is not None
         self.messageChanged.emit()
         if before is None or found is None or before.translation != found.translation:
@@ -244,7 +244,7 @@ class TfTransform(Element):
     # Judging.
 
     def _update_stale(self) -> None:
-        """Announce the age, and whether the transform is stale."""
+        """Report the age, and whether the transform is stale."""
         moving = self._transform is not None and self._transform.stamp.nanoseconds > 0
         arrived = self._arrived
         age = self._steady() - arrived if moving and arrived is not None else -1.0
@@ -264,7 +264,7 @@ class TfTransform(Element):
     def _on_tick(self) -> None:
         missing = self._config is not None and self._transform is None
         if missing and not self._timer.isActive() and time.monotonic() - self._updated > _LOOK_UP_S:
-            # The reason may be another one by now: only frames that are watched announce changes.
+            # The reason may have changed: only watched frames emit signals.
             self._refresh()
         own = self._own_buffer
         source = self._link if own is None or not is_alive(own) else own
@@ -280,9 +280,9 @@ class RosTfTransform(TfTransform):
 
 
 class TfBroadcaster(Element):
-    """Publishes a transform, again and again or once for all. See its page in ``docs/elements``."""
+    """Publishes a transform, periodically or as a static one. See its page in ``docs/elements``."""
 
-    #: The frame that is given, and the one it is given in.
+    #: The parent frame, and the frame whose pose is sent.
     frameId = Writable(str, "")
     childFrameId = Writable(str, "")
     translation = Writable(
@@ -326,12 +326,12 @@ class TfBroadcaster(Element):
     @Slot(result=bool)
     @Slot(QJSValue, result=bool)
     def send(self, transforms: QJSValue | None = None) -> bool:
-        """Send the current transform now, or others: a TransformStamped, or a list of them.
+        """Send the current transform now, or a given TransformStamped or list of them.
 
-        A value that does not fit throws a JavaScript Error.
+        An invalid value throws a JavaScript Error.
 
         Returns:
-            Whether it was handed to a node.
+            Whether it was passed to a node.
         """
         if transforms is None or transforms.isUndefined():
             return self._send([self._current()])
@@ -423,7 +423,7 @@ class TfBroadcaster(Element):
 
 
 def _numbers(value: QJSValue, type_name: str, what: str, names: str) -> tuple[float, ...]:
-    """Return the numbers of a vector from QML; raises Error."""
+    """Return the components of a vector from QML; raises Error."""
     from rosglass.messages import load  # noqa: PLC0415 - brings in the definitions
     from rosglass.messages.schema import schema_of  # noqa: PLC0415 - the same
 

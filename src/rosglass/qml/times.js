@@ -1,9 +1,9 @@
-// Times and durations of both modules, exact in nanoseconds. `host` does what doubles cannot; they
-// inherit from `base`.
+// Times and durations of both modules, exact to nanoseconds. `host` does arithmetic beyond doubles;
+// the objects inherit from `base`.
 (function (prototype, host, base) {
     "use strict"
 
-    // Numbers that answer as methods and as properties: `t.seconds()` and `t.seconds * 2`.
+    // Numbers that work as methods and as properties: `t.seconds()` and `t.seconds * 2`.
     const number = prototype(Function.prototype, {
         valueOf: function () { return this() },
         toString: function (radix) { return this().toString(radix) },
@@ -18,8 +18,8 @@
         return Object.setPrototypeOf(function () { return value }, number)
     }
 
-    // A kind of clock: one object for each, the same whether `t.clockType` is called or not, so that
-    // === with Ros2ClockTypes holds for both.
+    // Clock types: one object each, returned by both `t.clockType` and `t.clockType()`, so that
+    // both are === to a member of Ros2ClockTypes.
     function clock(value) {
         const made = function () { return made }
         return Object.setPrototypeOf(made, prototype(Function.prototype, {
@@ -30,13 +30,13 @@
     }
     const clocks = [clock(0), clock(1), clock(2), clock(3)]
 
-    // What is within an object that is shown may have no end.
+    // Do not expand nested objects in errors: they may have cycles.
     function flat(key, inner) {
         return key !== "" && inner !== null && typeof inner === "object" ? "..." : inner
     }
 
     function fail(value, wanted) {
-        // A time's own toString() would come back here.
+        // A time's own toString() would call this function again.
         const plain = value !== null && typeof value === "object" && !(value instanceof Date)
         const shown = Array.isArray(value) ? "an array" : plain ? JSON.stringify(value, flat) : String(value)
         throw new TypeError("expected " + wanted + ", got " + shown.slice(0, 200))
@@ -60,12 +60,12 @@
         return (value && value["#kind"]) || ""
     }
 
-    // The parts of whatever says a time or a duration; numbers are milliseconds.
+    // Seconds and nanoseconds of a time or duration in any form; numbers are milliseconds.
     function parts(value, wanted) {
         if (typeof value === "number") return fromUnits(value, 1000, wanted)
         if (value instanceof Date) return fromUnits(value.getTime(), 1000, wanted)
         if (value === null || typeof value !== "object") fail(value, wanted)
-        // Names that are not there are not read: that would be taken for a mistake in the interface.
+        // Check first: reading a missing name would be reported as a mistake in the interface.
         const sec = "sec" in value ? value.sec : "secs" in value ? value.secs : undefined
         if (sec === undefined) {
             const total = "nanoseconds" in value ? value.nanoseconds : undefined
@@ -163,7 +163,7 @@
         toSec: function () { return seconds(this) },
         toNSec: function () { return nanoseconds(this) }
     }
-    // Older versions of R1 gave times as Date, and its examples ask them so: `stamp.getHours()`.
+    // Older versions of R1 returned times as Date, as its examples expect: `stamp.getHours()`.
     for (const name of ["getDate", "getDay", "getFullYear", "getHours", "getMilliseconds", "getMinutes",
                         "getMonth", "getSeconds", "getTime", "getYear"])
         ros1[name] = function () { return toDate.call(this)[name]() }
@@ -204,8 +204,8 @@
 
     function maker(dialect) { return dialect === 1 ? make1 : make2 }
 
-    // What Ros2.time(), Ros2.duration() and Time.create() make: of seconds, of seconds and
-    // nanoseconds, of decimal text, of anything that says a time.
+    // Ros2.time(), Ros2.duration() and Time.create(): from seconds, seconds and nanoseconds,
+    // decimal text, or a time in any form.
     function create(dialect, kind, first, second) {
         const wanted = kind === "time" ? TIME : DURATION
         let p

@@ -1,7 +1,6 @@
-"""Conversion of messages for QML: short parts become JSON, long arrays stay in Python.
+"""Conversion of messages for QML: short values become JSON, long arrays stay in Python.
 
-Only what is short is written out. Arrays longer than :data:`INLINE` stay in Python, where the
-JavaScript side fetches what it is asked for.
+Arrays longer than :data:`INLINE` stay in Python; JavaScript fetches their elements on access.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ __all__ = [
     "to_json",
 ]
 
-#: Arrays of more numbers, texts or messages than this are fetched when they are asked for.
+#: Longer arrays of numbers, texts or messages are fetched on access.
 INLINE = {"number": 64, "text": 32, "message": 16}
 _EXACT = 1 << 53
 _HEADER = "std_msgs/msg/Header"
@@ -43,14 +42,14 @@ LongArray = tuple["Member", Any]
 
 
 def exact(value: int) -> int | str:
-    """Return an integer as JavaScript can hold it: as decimal text from 2^53 on."""
+    """Return an integer for JavaScript, as decimal text from 2^53 on."""
     return value if -_EXACT < value < _EXACT else str(value)
 
 
 def reader(
     schema: Schema, dialect: Dialect = Dialect.ROS2
 ) -> Callable[[Message, list[LongArray]], dict[str, Any]]:
-    """Return a function that reads a message's short parts and collects its long arrays."""
+    """Return a function that reads a message's short values and collects its long arrays."""
     made: Callable[[Message, list[LongArray]], dict[str, Any]] = schema.cached(
         ("qml reader", dialect), lambda: _make_reader(schema, dialect)
     )
@@ -83,7 +82,7 @@ def _make_reader(
 
 
 def _names(schema: Schema, dialect: Dialect) -> list[str]:
-    """Return what the module calls the fields."""
+    """Return the names of the fields in the module."""
     if schema.is_time:
         return list(dialect.time_fields)
     renamed = dialect.names(schema)
@@ -91,23 +90,23 @@ def _names(schema: Schema, dialect: Dialect) -> list[str]:
 
 
 def is_duration(schema: Schema) -> bool:
-    """Return whether a type is a span of time."""
+    """Return whether a type is a duration."""
     return schema.is_time and schema.name.endswith("uration")
 
 
 def milliseconds(duration: Message) -> float:
-    """Return a duration as ``Ros 1.0`` shows it."""
+    """Return a duration in milliseconds, its form in ``Ros 1.0``."""
     (first, second) = (getattr(duration, member.attr) for member in duration._schema__.members)
     return float(first * 1000 + second / 1_000_000)
 
 
 def _is_number(member: Member, dialect: Dialect) -> bool:
-    """Return whether a field is a duration that is shown as a number."""
+    """Return whether a field is a duration that becomes a number."""
     return dialect is Dialect.ROS1 and member.struct is not None and is_duration(member.struct)
 
 
 def _fix(member: Member, dialect: Dialect) -> Callable[[Any, list[LongArray]], Any] | None:
-    """Return what has to be done to a member's value, None when it can stay as it is."""
+    """Return a conversion for a member's values; None if they need none."""
     if member.is_array:
         return _array_fix(member, dialect)
     if _is_number(member, dialect):
@@ -150,9 +149,9 @@ class Shape(NamedTuple):
 
     Attributes:
         name: The type's name.
-        time: Which times' methods its values have (see ``times.js``); empty for none.
+        time: Which time or duration methods its values have (see ``times.js``); empty for none.
         constants: Its constants.
-        fields: Fields that are more than a single value: name, kind of array element (empty for a
+        fields: Arrays and nested messages: field name, type of the array's elements (empty for a
             nested message), schema of the nested message.
     """
 
@@ -166,7 +165,7 @@ def describe(schema: Schema, dialect: Dialect = Dialect.ROS2) -> Shape:
     """Return the description of a type for JavaScript."""
     constants = constants_of(schema.definition)
     if dialect is Dialect.ROS1 and schema.name == _HEADER and "seq" not in schema.by_name:
-        # Interfaces of ROS 1 may show it; ROS 2 does not count.
+        # ROS 1 interfaces may show it; ROS 2 headers have no counter.
         constants["seq"] = 0
     time = ""
     if schema.is_time:
@@ -183,7 +182,7 @@ def describe(schema: Schema, dialect: Dialect = Dialect.ROS2) -> Shape:
 
 
 def constants_of(definition: Definition) -> dict[str, Any]:
-    """Return a message's constants as JavaScript can hold them."""
+    """Return a message's constants for JavaScript."""
     return {
         constant.name: exact(constant.value) if type(constant.value) is int else constant.value
         for constant in definition.constants
@@ -191,7 +190,7 @@ def constants_of(definition: Definition) -> dict[str, Any]:
 
 
 def to_json(value: Any) -> tuple[str, bool]:
-    """Return JSON, and whether it has NaN or infinities, as ``{"#": name}``."""
+    """Return JSON, and whether it contains NaN or infinities, written as ``{"#": name}``."""
     try:
         return json.dumps(value, allow_nan=False), False
     except ValueError:

@@ -1,4 +1,4 @@
-"""Waiting in a call from QML: for an answer while the screen is drawn, for files with a limit."""
+"""Waiting in calls from QML: for replies while the interface runs, for files with a timeout."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
 __all__ = ["FILE_TIMEOUT_S", "FOLDER_TIMEOUT_S", "MOST_WAITING", "wait_for", "within"]
 
-#: Calls that wait within each other at most. Each needs a part of the stack, and once that is used
-#: up, nothing works any more, a stop button neither.
+#: Maximum number of nested waiting calls. Each needs stack space, and without any left nothing
+#: works, not even a stop button.
 MOST_WAITING = 16
 
 
 class _Keeper(QtCore.QObject):
     """Delays the deletion of objects while a call waits.
 
-    Qt ends the program when an object is destroyed whose signal handler is still running, which
-    happens when a page is closed during the call.
+    Qt aborts the program if an object is destroyed while its signal handler runs, which happens if
+    a page is closed during the call.
     """
 
     def __init__(self) -> None:
@@ -40,24 +40,25 @@ class _Keeper(QtCore.QObject):
         return False
 
     def release(self) -> None:
-        """Delete the objects after all."""
+        """Delete the delayed objects."""
         for item in self._kept:
             if is_alive(item):
                 item.deleteLater()
 
 
 def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> bool:
-    """Return once an operation has ended; the interface keeps running until then.
+    """Wait for an operation; the interface keeps running.
 
-    Events are handled as ever: pictures are drawn, a stop button works. Ends early when the
-    program does.
+    Events are handled as usual: pictures are drawn, a stop button works. Returns early if the
+    program ends.
 
     Args:
         session: The session.
-        begin: Starts it; given the function to call, on the GUI thread, when it has ended.
+        begin: Starts the operation; its argument is the function to call, on the GUI thread, when
+            the operation has ended.
 
     Returns:
-        False when it was started and not waited for, as :data:`MOST_WAITING` calls wait already.
+        False if it was started without waiting, because :data:`MOST_WAITING` calls already wait.
     """
     app = QtCore.QCoreApplication.instance()
     assert app is not None
@@ -69,7 +70,7 @@ def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> b
         ended = True
         loop.quit()
 
-    # Nothing is drawn before this call returns.
+    # The first frame cannot be drawn before this call returns.
     session.go_on()
     begin(end)
     if ended:
@@ -79,7 +80,7 @@ def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> b
     app.installEventFilter(keeper)
     session.waiting_calls += 1
     try:
-        # Jobs behind the one that is running now would wait for it.
+        # Otherwise the jobs after the current one would wait for it.
         session.executor.resume()
         execute = loop.exec if hasattr(loop, "exec") else loop.exec_
         execute()
@@ -93,21 +94,21 @@ def wait_for(session: Session, begin: Callable[[Callable[[], None]], None]) -> b
 
 _T = TypeVar("_T")
 
-#: How long a file, and a folder that is searched, may block the interface.
+#: Seconds that reading a file or searching a folder may block the interface.
 FILE_TIMEOUT_S, FOLDER_TIMEOUT_S = 2.0, 5.0
 
 
 def within(seconds: float, what: str, work: Callable[[], _T]) -> _T:
-    """Return what `work` returns; it runs on a thread, since calls to a dead server never end.
+    """Run `work` on a thread with a timeout: calls to a dead file server never return.
 
     Args:
-        seconds: How long it may take.
+        seconds: The timeout.
         what: The file or folder, for the error.
-        work: Touches files, and nothing else.
+        work: Accesses files and nothing else.
 
     Raises:
-        Error: It took longer; it may come to its end later.
-        Exception: What `work` raises.
+        Error: It took longer; it may still finish later.
+        Exception: An exception from `work`.
     """
     found: list[_T] = []
     failed: list[Exception] = []

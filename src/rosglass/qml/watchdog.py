@@ -1,4 +1,4 @@
-"""The watchdog of the GUI thread: reports a frozen screen, and ends JavaScript that blocks it."""
+"""Watchdog of the GUI thread: reports a frozen screen and ends JavaScript that blocks it."""
 
 from __future__ import annotations
 
@@ -27,32 +27,32 @@ if TYPE_CHECKING:
 __all__ = ["JsStack", "Watchdog"]
 
 #: Bytes from the start of QJSEngine to its pointer to QV4::ExecutionEngine, whose first member is
-#: the pointer to the innermost QV4::CppStackFrame: Qt's own JIT relies on that.
+#: the pointer to the innermost QV4::CppStackFrame: Qt's own JIT relies on this layout.
 _ENGINE = 2 * ctypes.sizeof(ctypes.c_void_p)
-#: Bytes from the start of a frame to its caller, its QV4::Function, and its place in the code.
+#: Bytes from the start of a frame to its caller, its QV4::Function, and its position in the code.
 _CALLER, _FUNCTION, _POSITION = (0, 8, 20) if QT6 else (16, 24, 52)
-#: Bytes from the start of a QV4::Function to its QV4::CompiledData::Function; inside of that.
+#: Bytes from the start of a QV4::Function to its QV4::CompiledData::Function; and within that.
 _COMPILED = 8
 _NAME, _TABLES, _COUNTS, _LOCATION = 8, 24, 28, 40
-#: Bytes of an entry of the table of lines.
+#: Bytes of an entry in the line table.
 _ENTRY = 12 if QT6 else 8
 _MAGIC = b"qv4cdata"
-#: Bytes from the start of a compiled file within which its functions are looked for.
+#: Bytes from the start of a compiled file within which its functions are searched.
 _LONGEST = 1 << 24
 _PAGE = 4096
-#: Stack frames that are reported.
+#: Maximum number of reported stack frames.
 _MOST = 12
-#: Bytes from the number of a compiled file's strings to that of the string with its name.
+#: Bytes from a compiled file's string count to the index of the string with its name.
 _FILE = 124
 _PROBE, _PROBE_FILE, _PROBE_LINE = "rosglassProbe", "/rosglass/probe", 3
 _SCRIPT = f"(function {_PROBE}(probe) {{\n\n probe.look() }})"
 
 
 class _Layout(NamedTuple):
-    """Where in a compiled file something is; differs between versions of Qt.
+    """Offsets in a compiled file, which differ between versions of Qt.
 
     Attributes:
-        strings: Bytes from its start to the number of its strings, which is before their place.
+        strings: Bytes from its start to its string count, which precedes the strings' offset.
         text: Bytes from the start of a string to its characters.
     """
 
@@ -61,7 +61,7 @@ class _Layout(NamedTuple):
 
 
 class _Memory:
-    """This process's memory, of which nothing that is read can do harm."""
+    """Reads this process's memory; invalid addresses raise an error instead of crashing."""
 
     def __init__(self) -> None:
         try:
@@ -70,7 +70,7 @@ class _Memory:
             self._file = -1
 
     def read(self, address: int, size: int) -> bytes:
-        """Return bytes; raises OSError when they are not there."""
+        """Return bytes; raises OSError if the address is invalid."""
         if self._file < 0 or not 0 < address < 1 << 62:
             raise OSError(f"no such address: {address:#x}")
         found = os.pread(self._file, size, address)
@@ -79,18 +79,18 @@ class _Memory:
         return found
 
     def number(self, address: int, size: int = 4) -> int:
-        """Return an unsigned number."""
+        """Return an unsigned integer."""
         return int.from_bytes(self.read(address, size), "little")
 
     def close(self) -> None:
-        """Give the file back."""
+        """Close the file."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
 
 
 class _Probe(QtCore.QObject):
-    """Looks at the stack of a function that is known."""
+    """Inspects the stack while a known function runs."""
 
     def __init__(self, stack: JsStack, parent: QtCore.QObject) -> None:
         super().__init__(parent)
@@ -100,25 +100,25 @@ class _Probe(QtCore.QObject):
 
     @Slot()
     def look(self) -> None:
-        """Look; JavaScript calls this."""
+        """Inspect the stack; JavaScript calls this."""
         self.frame = self._stack.frame
         with suppress(OSError, struct.error):
             self.layout = self._stack.find_layout()
 
 
 class JsStack:
-    """The stack of JavaScript in an engine.
+    """The JavaScript stack of an engine.
 
-    Qt tells nothing of it while JavaScript runs, so it is read from Qt's memory. That is private to
-    Qt: it is tried with a function that is known, and what does not hold is not used.
+    Qt has no interface for it while JavaScript runs, so it is read from Qt's memory. The layout is
+    private to Qt: it is checked with a known function, and parts that do not match are not used.
 
     Args:
-        engine: The engine, which must live as long as this is asked; in the GUI thread.
+        engine: The engine, which must outlive this object; in the GUI thread.
     """
 
     def __init__(self, engine: QtQml.QQmlEngine) -> None:
         engine_v4 = ctypes.c_void_p.from_address(address(engine) + _ENGINE).value or 0
-        #: Where Qt keeps :attr:`frame`, for those in a hurry.
+        #: Qt's pointer to :attr:`frame`, for fast access.
         self.pointer = ctypes.c_void_p.from_address(engine_v4)
         self._memory = _Memory()
         self._layout: _Layout | None = None
@@ -126,21 +126,21 @@ class JsStack:
         probe = _Probe(self, engine)
         script: Any = engine.evaluate(_SCRIPT, _PROBE_FILE)
         script.call([engine.newQObject(probe)])
-        #: Whether it is known when JavaScript runs.
+        #: Whether running JavaScript can be detected.
         self.is_known = probe.frame not in {0, before} and self.frame == before
         self._layout = probe.layout if self.is_known else None
         probe.deleteLater()
 
     @property
     def frame(self) -> int:
-        """The identity of the innermost function that runs; 0 while none does."""
+        """Address of the innermost running function's frame; 0 if none runs."""
         return self.pointer.value or 0
 
     def handler(self, waiting: int) -> tuple[int, int]:
-        """Return the frame of the function that was called first, and the function; 0 for none.
+        """Return the frame of the outermost running function, and the function; 0 for none.
 
         Args:
-            waiting: A frame that is not part of it any more, but waits for its end; 0 for none.
+            waiting: A frame that only waits for the end of these functions; 0 for none.
         """
         outermost = function = 0
         with suppress(OSError):
@@ -152,15 +152,15 @@ class JsStack:
 
     @staticmethod
     def function_of(frame: int) -> ctypes.c_void_p:
-        """Return where Qt keeps the function of a frame, for those in a hurry."""
+        """Return Qt's pointer to the function of a frame, for fast access."""
         return ctypes.c_void_p.from_address(frame + _FUNCTION)
 
     def callers(self) -> list[Caller]:
-        """Return where it is, the innermost function first; empty when that cannot be known.
+        """Return the call stack, innermost function first; empty if it cannot be read.
 
-        Of a deep stack, the innermost functions and the outermost one.
+        For a deep stack, only the innermost functions and the outermost one.
 
-        To be called from another thread while JavaScript runs: what is read while it changes is
+        Called from another thread while JavaScript runs: parts that change while being read are
         left out.
         """
         if self._layout is None:
@@ -174,13 +174,13 @@ class JsStack:
         return found
 
     def close(self) -> None:
-        """Look no more; safe to call twice."""
+        """Stop reading; safe to call twice."""
         self.pointer = ctypes.c_void_p()
         self._layout = None
         self._memory.close()
 
     def find_layout(self) -> _Layout | None:
-        """Return the layout of compiled files, given that the function that is known runs."""
+        """Return the layout of compiled files, determined while the known function runs."""
         memory = self._memory
         compiled = memory.number(memory.number(self.frame + _FUNCTION, 8) + _COMPILED, 8)
         unit, name = self._unit(compiled), memory.number(compiled + _NAME)
@@ -198,7 +198,7 @@ class JsStack:
         while frame:
             yield frame
             before, frame = frame, self._memory.number(frame + _CALLER, 8)
-            # The stack grows downwards, so it is a caller's, or has changed since.
+            # The stack grows downwards: such a frame is a caller's, or has changed in between.
             if frame <= before:
                 return
 
@@ -220,11 +220,11 @@ class JsStack:
         return Caller(plain_path(file), line, name)
 
     def _unit(self, compiled: int) -> int:
-        """Return where the compiled file begins that a function is in."""
-        # What is before the file may not be there, but a page is there as a whole.
+        """Return the start of the compiled file that contains a function."""
+        # Memory before the file may be unmapped, but pages are mapped as a whole.
         page, end = compiled & -_PAGE, compiled
         while compiled - page < _LONGEST:
-            # The magic word may lie across two pages.
+            # The magic word may span two pages.
             at = self._memory.read(page, end - page).rfind(_MAGIC)
             if at >= 0:
                 return page + at
@@ -244,29 +244,30 @@ class JsStack:
 
 
 _log = logging.getLogger("rosglass.qml")
-#: Milliseconds between two signs of life of the GUI thread.
+#: Milliseconds between two heartbeats of the GUI thread.
 _BEAT = 250
-#: Seconds between two looks at them; and between two looks at what it does while there are none.
+#: Seconds between two checks of the heartbeat; and of the GUI thread while it has no heartbeat.
 _LOOK, _CLOSE_LOOK = 0.5, 0.1
-#: Seconds for which JavaScript stays interrupted, one after the other: until it has ended, for it
-#: continues where it is when the interruption ends; and not longer, for it would end the next
-#: handler, too. At first no other thread runs Python, which could keep this one from noticing.
+#: Seconds of successive interruptions. One must last until JavaScript has ended, which would
+#: otherwise continue, but not longer, or it would also end the next handler. First attempts let no
+#: other thread run Python, which could keep this thread from noticing the end.
 _HOLDS = (0.0005,) * 6
-#: The same while others may: JavaScript that calls Python cannot end before.
+#: The same while other threads may run Python: otherwise, JavaScript that calls Python cannot end.
 _SHARED_HOLDS = (0.001, 0.001, 0.004, 0.004, 0.016, 0.032)
-#: Seconds after which a thread lets others run Python, in either case.
+#: Python's switch interval in seconds, in either case.
 _NEVER, _AT_ONCE = 1.0, 1e-5
-#: How often that is tried, and the seconds before: a thread that has slept is not kept waiting.
+#: Number of attempts, and seconds of sleep before each: the system runs a thread promptly after it
+#: has slept.
 _TRIES, _REST = 60, 0.002
-#: Seconds within which it is seen whether the GUI thread computes right now.
+#: Seconds to measure whether the GUI thread is computing.
 _GLANCE = 50e-6
-#: Seconds between two looks above which the whole process stood still.
+#: Seconds between two checks above which the whole process was stopped.
 _GAP = 1.0
-#: The part of its time that a thread computes at least, when it does not wait for something.
+#: Minimum share of processor time of a thread that is not waiting.
 _BUSY = 0.05
-#: On an overloaded machine, JavaScript may take up to this many times as long.
+#: On an overloaded machine, JavaScript may take up to this many times the limit.
 _LOAD_FACTOR = 4
-#: Seconds within which the next function of JavaScript does not begin.
+#: Seconds within which the next JavaScript function cannot start.
 _LATE = 30e-6
 _OURS = str(Path(__file__).parents[1])
 _LIBRARIES = (sysconfig.get_paths()["stdlib"], *{sysconfig.get_paths()[p] for p in ("purelib",)})
@@ -275,14 +276,14 @@ _AND_OTHERS = "; the machine is busy, so what came right after it may have ended
 
 
 class _Watched(NamedTuple):
-    """An engine.
+    """A watched engine.
 
     Attributes:
         engine: The engine.
-        stack: Its stack.
-        tell: Called on the GUI thread with what was done to the engine.
-        waiting: What was the innermost function when the event loop was last seen to run; others
-            than 0 wait for something in an event loop of their own.
+        stack: Its JavaScript stack.
+        tell: Called on the GUI thread with a description of what was done to the engine.
+        waiting: Frame of the innermost function when the event loop was last seen to run; if not
+            0, this function waits in its own event loop.
     """
 
     engine: QtQml.QQmlEngine
@@ -292,32 +293,32 @@ class _Watched(NamedTuple):
 
     @property
     def is_running(self) -> bool:
-        """Whether JavaScript runs, or something in C++ or Python that it has called."""
+        """Whether JavaScript runs, or C++ or Python code that it has called."""
         return self.stack.is_known and self.stack.frame != self.waiting[0]
 
     def hold(self, wanted: tuple[int, int], seconds: float) -> float:
-        """Interrupt JavaScript until its function has ended, or until some seconds have passed.
+        """Interrupt JavaScript until its function has ended, or until a timeout.
 
         Args:
             wanted: The :attr:`handler` to end.
-            seconds: How long.
+            seconds: The timeout.
 
         Returns:
-            For how many seconds at most the interruption outlasted the function: it may have ended
-            the next one, too.
+            Maximum seconds by which the interruption outlasted the function: it may also have ended
+            the next one.
         """
         outermost, handler = wanted
         if self.handler != wanted:
             return 0.0
         frame, waiting = self.stack.pointer, self.waiting[0] or None
-        # The next one may have begun already when it is looked whether any runs.
+        # Compare the function, too: the next one may already have started.
         function = self.stack.function_of(outermost)
         tell, clock = self.engine.setInterrupted, time.perf_counter
         seen = now = clock()
         until = now + seconds
         tell(True)
         try:
-            # Each part of a microsecond that this takes counts.
+            # Every fraction of a microsecond counts here.
             while frame.value != waiting and function.value == handler and now < until:
                 seen, now = now, clock()
         finally:
@@ -326,17 +327,17 @@ class _Watched(NamedTuple):
 
     @property
     def handler(self) -> tuple[int, int]:
-        """The frame and the function that was called first; 0 while none runs."""
+        """Frame and function of the outermost running function; 0 if none runs."""
         return self.stack.handler(self.waiting[0])
 
 
 class _Use(NamedTuple):
-    """What a thread did until now.
+    """Processor use of a thread.
 
     Attributes:
-        computed: Seconds that it computed.
-        ready: Seconds that it would have computed, if other programs had not.
-        runs: Whether it is at it now.
+        computed: Seconds of processor time.
+        ready: Seconds that it waited for a processor used by other programs.
+        runs: Whether it is currently running or ready to run.
     """
 
     computed: float
@@ -345,20 +346,20 @@ class _Use(NamedTuple):
 
 
 class Watchdog(QtCore.QObject):
-    """Watches the GUI thread for a session, as long as it is given engines.
+    """Watches the GUI thread of a session while there are engines to watch.
 
-    Lives on the GUI thread, which gives signs of life by a timer. A thread of its own looks for
-    them. While there are none it adds up for how long the GUI thread has computed in JavaScript,
-    and ends that when it is longer than :attr:`Session.longest_script`; native code and Python are
-    only reported.
+    Lives on the GUI thread, where a timer is the heartbeat. A separate thread checks it. While it
+    is missing, this thread adds up the processor time that the GUI thread spends in JavaScript, and
+    ends the JavaScript after :attr:`Session.longest_script`. Native code and Python are only
+    reported.
 
-    JavaScript that runs while a function of Qt keeps Python's lock cannot be ended, for no thread
-    of Python runs then: QObject.setProperty, QQmlComponent.create (for which there is
-    ``creation.py``), QJSValue.call (for which there is :class:`JsCalls`). The event loop, signals
-    and QMetaObject.invokeMethod give it back.
+    JavaScript cannot be ended while a function of Qt that called it holds the GIL, because then no
+    other Python thread runs: QObject.setProperty, QQmlComponent.create (instead, use ``create`` of
+    ``live_file.py``), QJSValue.call (instead, use :class:`JsCalls`). The event loop, signals and
+    QMetaObject.invokeMethod release the GIL.
 
     Args:
-        session: Whose interfaces it watches.
+        session: The session whose interfaces are watched.
     """
 
     def __init__(self, session: Session) -> None:
@@ -370,12 +371,12 @@ class Watchdog(QtCore.QObject):
         self._use = _watch_thread(self._number, self._clock)
         affinity = getattr(os, "sched_getaffinity", None)
         self._alone = affinity is not None and len(affinity(0)) == 1
-        #: When the event loop was last seen to run, and in which frame of Python; whether it is
-        #: known to run at all.
+        #: When the event loop was last seen to run, and in which Python frame; whether it is known
+        #: to run at all.
         self._beaten = time.monotonic()
         self._loop: tuple[int, object] | None = None
         self._lives = False
-        #: When the thread last looked, and seconds in which it could not.
+        #: Time of the thread's last check, and seconds in which it could not check.
         self._looked, self._blind = self._beaten, 0.0
         self._report = ""
         self._end = threading.Event()
@@ -390,17 +391,17 @@ class Watchdog(QtCore.QObject):
 
     @classmethod
     def of(cls, session: Session) -> Watchdog:
-        """Return the watchdog of a session, made if need be."""
+        """Return the watchdog of a session, created if needed."""
         found = session.shared.get(cls)
         if not isinstance(found, Watchdog):
             found = session.shared[cls] = Watchdog(session)
         return found
 
     def watch(self, engine: QtQml.QQmlEngine, tell: Callable[[str], None]) -> None:
-        """Watch an engine, too.
+        """Start watching an engine.
 
         Args:
-            engine: The engine; :meth:`forget` it before it goes.
+            engine: The engine; call :meth:`forget` before it is destroyed.
             tell: Called on the GUI thread with what was done to the engine, or why nothing was.
         """
         stack = JsStack(engine)
@@ -416,7 +417,7 @@ class Watchdog(QtCore.QObject):
             self._thread.start()
 
     def forget(self, engine: QtQml.QQmlEngine) -> None:
-        """Watch an engine no longer; safe to call twice."""
+        """Stop watching an engine; safe to call twice."""
         watched = self._watched.pop(id(engine), None)
         if watched is not None:
             watched.stack.close()
@@ -461,10 +462,10 @@ class Watchdog(QtCore.QObject):
 
     @Slot()
     def _on_quit(self) -> None:
-        # It is unknown whether the event loop will run once more.
+        # It is unknown whether the event loop will run again.
         self._lives = False
 
-    # The thread that watches.
+    # The watching thread.
 
     def _run(self, end: threading.Event) -> None:
         while not end.wait(_LOOK):
@@ -477,7 +478,7 @@ class Watchdog(QtCore.QObject):
                     return
 
     def _look(self) -> float:
-        """Say that the thread looks; returns the seconds since, 0 when it could not look."""
+        """Record a check; return the seconds since the last one, 0 if the thread could not run."""
         now = time.monotonic()
         passed, self._looked = now - self._looked, now
         if passed <= _GAP:
@@ -497,11 +498,11 @@ class Watchdog(QtCore.QObject):
             if not limit:
                 return
             if not passed:
-                # What it did is unknown.
+                # Its activity in this time is unknown.
                 continue
             still += passed
             running = [watched for watched in tuple(self._watched.values()) if watched.is_running]
-            # The stack grows downwards: what is called last is lowest.
+            # The stack grows downwards: the innermost frame has the lowest address.
             innermost = min(running, key=lambda watched: watched.stack.frame, default=None)
             if innermost is not None and (used.runs or computed > _BUSY * passed):
                 last, handler = handler, innermost.handler
@@ -514,7 +515,7 @@ class Watchdog(QtCore.QObject):
                 self._tell_still(still, innermost)
 
     def _end_script(self, watched: _Watched, seconds: float) -> bool:
-        """Have JavaScript end that runs now; returns whether it did."""
+        """End the running JavaScript; return whether it ended."""
         callers, handler = watched.stack.callers(), watched.handler
         ended, late, alone, shared = False, 0.0, list(_HOLDS), list(_SHARED_HOLDS)
         for _ in range(_TRIES):
@@ -522,12 +523,12 @@ class Watchdog(QtCore.QObject):
             ended = watched.handler != handler
             if ended:
                 break
-            # Interrupted while it waits for this thread's processor, it would not be seen to end.
+            # While it waits for this thread's processor, its end would not be noticed.
             if not self._computes() and self._use().runs:
                 continue
             if not shared:
                 break
-            # Asked again: what calls Python all the time computes only now and then.
+            # Measure again: JavaScript that keeps calling Python computes only at times.
             interval = _NEVER if alone and self._computes() else _AT_ONCE
             before = sys.getswitchinterval()
             sys.setswitchinterval(interval)
@@ -542,7 +543,7 @@ class Watchdog(QtCore.QObject):
         return ended
 
     def _computes(self) -> bool:
-        """Return whether the GUI thread computes right now, beside this one."""
+        """Return whether the GUI thread is computing now, in parallel with this thread."""
         if self._alone:
             return True
         began, before = time.perf_counter(), self._clock()
@@ -565,7 +566,7 @@ class Watchdog(QtCore.QObject):
         self._show(watched, text)
 
     def _tell_still(self, seconds: float, watched: _Watched | None) -> None:
-        """Report a blocked GUI thread that does not run JavaScript; it can only be waited for."""
+        """Report a blocked GUI thread that is not in JavaScript and cannot be interrupted."""
         frame = sys._current_frames().get(self._main)
         callers = watched.stack.callers() if watched is not None else []
         called = f", called at {_place(callers[0])}" if callers else ""
@@ -590,12 +591,12 @@ def _place(caller: Caller) -> str:
 
 
 def _identity(frame: FrameType) -> tuple[int, object]:
-    """Return the identity of a frame, without keeping its objects."""
+    """Return an identifier of a frame that does not keep its objects alive."""
     return id(frame), frame.f_code
 
 
 def _python_place(frame: FrameType) -> str:
-    """Return where Python is, in the program's own files if it is called from there."""
+    """Return the current Python line, in the program's own files if they are on the stack."""
     found: FrameType | None = frame
     while found is not None and found.f_code.co_filename.startswith((_OURS, *_LIBRARIES, "<")):
         found = found.f_back
@@ -604,21 +605,21 @@ def _python_place(frame: FrameType) -> str:
 
 
 def _thread_clock(ident: int) -> Callable[[], float]:
-    """Return a function for the seconds of processor time of a thread."""
+    """Return a function that returns a thread's processor time in seconds."""
     of_thread: Any = getattr(time, "pthread_getcpuclockid", None)
     if of_thread is None:
-        # On Windows, other threads than this one hardly ever compute while nothing is drawn.
+        # For Windows: other threads hardly compute while nothing is drawn.
         return time.process_time
     clock = of_thread(ident)
     return lambda: time.clock_gettime(clock)
 
 
 def _watch_thread(number: int, clock: Callable[[], float]) -> Callable[[], _Use]:
-    """Return a function for the present activity of a thread.
+    """Return a function that returns a thread's processor use.
 
     Args:
-        number: Of the thread, the system's.
-        clock: Tells for how many seconds it has computed.
+        number: The system's thread id.
+        clock: Returns the thread's processor time in seconds.
     """
     # Linux, Documentation/scheduler/sched-stats.rst and proc_pid_stat(5).
     times, state = (Path(f"/proc/self/task/{number}/{name}") for name in ("schedstat", "stat"))

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Io"]
 
-#: Larger files are no settings, and would freeze the screen.
+#: Maximum file size in bytes: larger files are not settings, and would freeze the screen.
 _LARGEST = 64 << 20
-#: Anchors and aliases make small files large (``&a [*b, *b]``).
+#: Limits, because anchors and aliases make small files large (``&a [*b, *b]``).
 _MOST_VALUES, _DEEPEST = 200_000, 100
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
 _DATE = re.compile(
@@ -45,8 +45,8 @@ class Io(QtCore.QObject):
     """Reads and writes YAML files.
 
     Args:
-        runtime: The engine's.
-        dialect: The module; says how times are written.
+        runtime: The engine's runtime.
+        dialect: The module, which determines the format of times.
         parent: The singleton.
     """
 
@@ -56,10 +56,10 @@ class Io(QtCore.QObject):
 
     @Slot("QVariant", result=QJSValue)
     def readYaml(self, path: Any) -> QJSValue:
-        """Return a file's value; false, with the reason in the log, when it cannot be read.
+        """Return the contents of a file; if it cannot be read, log why and return false.
 
         Args:
-            path: Path or ``file://`` URL; relative ones start at the working directory.
+            path: Path or ``file://`` URL; relative to the working directory.
         """
         try:
             file = _local(path)
@@ -70,10 +70,10 @@ class Io(QtCore.QObject):
 
     @Slot("QVariant", QJSValue, result=bool)
     def writeYaml(self, path: Any, value: QJSValue) -> bool:
-        """Write a value to a file, all of it or nothing.
+        """Write a value to a file atomically.
 
         Returns:
-            False, with the reason in the log, when the value or the file cannot be written.
+            False, with the reason in the log, if the value or the file cannot be written.
         """
         try:
             file = _local(path)
@@ -92,7 +92,7 @@ class Io(QtCore.QObject):
 
 
 def _local(path: Any) -> Path:
-    """Return the file that a path or URL means."""
+    """Return the path of a file given as a path or URL."""
     if isinstance(path, QJSValue):
         path = path.toString()
     text = path.toString() if isinstance(path, QtCore.QUrl) else path
@@ -116,7 +116,7 @@ def _read(file: Path) -> str:
 
 
 def _replace(file: Path, text: str) -> None:
-    """Write a file atomically: readers never see half of it."""
+    """Write a file atomically: readers never see a partial file."""
     if file.is_dir():
         raise IsADirectoryError(f"{file} is a folder")
     data = text.encode("utf-8")
@@ -136,16 +136,16 @@ def _replace(file: Path, text: str) -> None:
 
 
 class _Moment(NamedTuple):
-    """A date, as it is written."""
+    """A date as written in the file."""
 
     text: str
 
 
 @cache
 def _yaml() -> tuple[Any, Any]:
-    """Return a loader and a dumper with our idea of what a plain scalar is.
+    """Return a loader and a dumper with our own rules for plain scalars.
 
-    PyYAML's own takes ``12:30`` for 750 and knows no ``1e3``; rules otherwise as YAML 1.1.
+    PyYAML reads ``12:30`` as 750 and ``1e3`` as text; otherwise, YAML 1.1 applies.
     """
     import yaml  # noqa: PLC0415 - few interfaces have files
 
@@ -168,7 +168,7 @@ def _yaml() -> tuple[Any, Any]:
         yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 - PyYAML's
 
         def construct_mapping(self, node: Any, deep: bool = False) -> Any:
-            # PyYAML lets the last of two equal keys win.
+            # PyYAML silently uses the last of several equal keys.
             keys = [key.value for key, _ in node.value if key.tag != "tag:yaml.org,2002:merge"]
             seen: set[str] = set()
             for key in keys:
@@ -219,7 +219,7 @@ class _Reader:
         self._count = 0
 
     def value(self, found: Any, depth: int) -> QJSValue:
-        """Return the JavaScript value."""
+        """Convert a value to JavaScript."""
         self._count += 1
         if depth > _DEEPEST or self._count > _MOST_VALUES:
             raise UnsupportedError(
@@ -248,7 +248,7 @@ class _Reader:
         return self._runtime.value(exact(found) if type(found) is int else found)
 
     def _time(self, found: dict[Any, Any]) -> QJSValue | None:
-        """Return the time that a map of this module's makes is; None for all others."""
+        """Return a map in this module's time format as a time; None for other maps."""
         first, second = self._dialect.time_fields
         kind = "time"
         keys = set(found)
@@ -268,7 +268,7 @@ class _Reader:
 
 
 def _key(key: Any) -> str:
-    """Return a map's key as JavaScript writes it."""
+    """Return a map's key as text in JavaScript's format."""
     if isinstance(key, bool):
         return "true" if key else "false"
     return "null" if key is None else key.text if isinstance(key, _Moment) else str(key)

@@ -1,8 +1,8 @@
-"""The choice of the Qt binding; everything above imports Qt from here.
+"""Choice of the Qt binding; all other modules import Qt from here.
 
-PySide6 (Qt 6) is the default. PySide2 (Qt 5) is taken when a Qt 5 binding is already in the
-process, as inside RViz, or when the environment variable ``ROSGLASS_QT`` says ``pyside2``. Two Qt
-builds in one process overwrite each other's symbols, so a second one is refused.
+PySide6 (Qt 6) is the default. PySide2 (Qt 5) is used if a Qt 5 binding is already loaded, as inside
+RViz, or if the environment variable ``ROSGLASS_QT`` is ``pyside2``. Two Qt builds in one process
+overwrite each other's symbols, so a second one is refused.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ __all__ = [
     "send_deferred_deletes",
 ]
 
-#: Binding -> major version of its Qt. PyQt is never chosen, but tells which Qt is loaded.
+#: Binding -> major version of its Qt. PyQt is never chosen, but shows which Qt is loaded.
 _QT_OF = {"PySide6": 6, "PyQt6": 6, "PySide2": 5, "PyQt5": 5}
 _INSTALL_QT5 = (
     "Qt 5 comes with the system's own Python; on Debian and Ubuntu: sudo apt install "
@@ -47,11 +47,11 @@ def choose_binding(loaded: frozenset[str], wanted: str = "") -> str:
     """Return the binding to use.
 
     Args:
-        loaded: Bindings whose QtCore is already imported in this process.
+        loaded: Bindings whose QtCore has been imported in this process.
         wanted: The value of ``ROSGLASS_QT``: ``pyside6``, ``pyside2`` or empty.
 
     Raises:
-        UnsupportedError: `wanted` is unknown, or needs another Qt than the one already loaded.
+        UnsupportedError: `wanted` is unknown, or needs a different Qt than the loaded one.
     """
     known = {"pyside6": "PySide6", "pyside2": "PySide2"}
     if wanted and wanted.lower() not in known:
@@ -70,10 +70,10 @@ def choose_binding(loaded: frozenset[str], wanted: str = "") -> str:
 
 
 def _refuse_broken_binding(binding: str, version: tuple[int, ...]) -> None:
-    """Refuse a binding that is known to bring the interpreter down.
+    """Refuse a binding that is known to crash the interpreter.
 
-    PySide6 6.12 gives back a reference to None on each call that returns nothing when run on
-    Python 3.11 or older; after some thousand calls the interpreter aborts.
+    On Python 3.11 or older, PySide6 6.12 releases a reference to None too often in each call that
+    returns nothing; after some thousand calls the interpreter aborts.
     """
     if binding == "PySide6" and version[:2] == (6, 12) and sys.version_info < (3, 12):
         raise UnsupportedError(
@@ -92,10 +92,10 @@ QT6 = _QT_OF[BINDING] == 6
 
 
 def _load(module: str = "") -> Any:
-    """Import a module that every installation of the binding must have.
+    """Import a module that every installation of the binding needs.
 
     Raises:
-        UnsupportedError: PySide2 lacks it; which package brings PySide6 is for the caller to say.
+        UnsupportedError: It is missing in PySide2; for PySide6, the caller names the package.
     """
     try:
         return import_module(f"{BINDING}.{module}" if module else BINDING)
@@ -120,7 +120,7 @@ QJSValue = QtQml.QJSValue
 
 
 def optional(module: str) -> Any:
-    """Return a Qt module that not every installation has, e.g. ``QtMultimedia``, or None."""
+    """Return an optional Qt module, e.g. ``QtMultimedia``; None if it is not installed."""
     try:
         return import_module(f"{BINDING}.{module}")
     except ImportError:
@@ -138,10 +138,10 @@ def address(item: QtCore.QObject) -> int:
 
 
 def run_event_loop(loop: QtCore.QCoreApplication | QtCore.QEventLoop) -> int:
-    """Run an event loop until it exits; returns the exit code."""
+    """Run an event loop until it exits; return the exit code."""
     return int(loop.exec() if QT6 else loop.exec_())
 
 
 def send_deferred_deletes() -> None:
-    """Carry out every ``deleteLater()`` now; they otherwise wait for the event loop."""
+    """Process all pending ``deleteLater()`` calls now instead of in the event loop."""
     QtCore.QCoreApplication.sendPostedEvents(None, int(QtCore.QEvent.Type.DeferredDelete))
