@@ -80,7 +80,7 @@ class GoalHandle(QtCore.QObject):
         value: The goal's fields.
         callbacks: The callbacks for its status, feedback and result.
         dialect: The module whose format feedback and result have.
-        patience: Milliseconds for a server to appear and to answer; 0 for no limit.
+        timeout_ms: Milliseconds for a server to appear and to answer; 0 for no limit.
         forget: Called when the goal has ended.
     """
 
@@ -99,13 +99,13 @@ class GoalHandle(QtCore.QObject):
         value: QJSValue,
         callbacks: GoalCallbacks,
         dialect: Dialect,
-        patience: int,
+        timeout_ms: int,
         forget: Callable[[GoalHandle], None],
     ) -> None:
         super().__init__()
         self._runtime, self._action, self._value = runtime, action, value
         self._callbacks, self._dialect, self._forget = callbacks, dialect, forget
-        self._deadline = time.monotonic() + patience / 1000 if patience else None
+        self._deadline = time.monotonic() + timeout_ms / 1000 if timeout_ms else None
         self._caller = runtime.caller()
         self._goal: ClientGoal | None = None
         self._status = GoalStatus.PENDING

@@ -168,7 +168,7 @@ class QuitOnSignal:
 
     Args:
         quit: Called in this thread with the signal's number.
-        patience: Seconds that the program has to end cleanly.
+        timeout_s: Seconds that the program has to end cleanly.
         keep_handlers: Ignore signals that the program ignores or handles itself.
     """
 
