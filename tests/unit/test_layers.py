@@ -36,8 +36,9 @@ RANK = {
     "qt": 6,
     "qml": 9,
     "rviz": 10,
-    "cli": 12,
-    "demo": 11,
+    "scene": 11,
+    "cli": 13,
+    "demo": 12,
 }
 QT = {"PySide6", "PySide2", "PyQt5", "PyQt6", "shiboken6", "shiboken2"}
 MODULES = sorted(ROOT.rglob("*.py"))
