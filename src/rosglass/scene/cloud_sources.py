@@ -61,15 +61,20 @@ def cloud_from_columns(columns: Mapping[str, Any], warnings: Sequence[str] = ())
     if len(shapes) > 1 or any(len(shape) != 1 for shape in shapes):
         raise ArgumentError("columns", sorted(shapes), "arrays of one length")
     count = len(next(iter(arrays.values()))) if arrays else 0
-    values = np.empty((count, len(arrays)), np.float32)
-    fields = []
-    for index, (name, array) in enumerate(arrays.items()):
-        values.view(np.uint32)[:, index] = array.view(np.uint32)
-        datatype = UINT32 if array.dtype == np.uint32 else FLOAT32
-        fields.append(CloudField(name, 4 * index, datatype))
-    is_bigendian = sys.byteorder == "big"
-    step = 4 * len(arrays)
-    layout = CloudLayout(count, 1, step, step * count, tuple(fields), is_bigendian)
+    values = np.empty((count, len(arrays)), np.uint32)
+    for index, array in enumerate(arrays.values()):
+        values[:, index] = array.view(np.uint32)
+    return _cloud({name: array.dtype for name, array in arrays.items()}, values, warnings)
+
+
+def _cloud(types: Mapping[str, Any], values: Array, warnings: Sequence[str] = ()) -> Cloud:
+    """Create a cloud from points x fields of 4 bytes."""
+    fields = tuple(
+        CloudField(name, 4 * index, UINT32 if dtype == np.uint32 else FLOAT32)
+        for index, (name, dtype) in enumerate(types.items())
+    )
+    step, is_bigendian = 4 * len(fields), sys.byteorder == "big"
+    layout = CloudLayout(len(values), 1, step, step * len(values), fields, is_bigendian)
     return Cloud(layout, values.reshape(-1).view(np.uint8), warnings)
 
 
@@ -224,13 +229,18 @@ def cloud_from_depth_image(depth: Any, camera_info: Any, color: Any = None) -> C
     z = z if is_metric else z * np.float32(0.001)
     u = ((np.arange(image.width) - cx) / fx).astype(np.float32)
     v = ((np.arange(image.height) - cy) / fy).astype(np.float32)
+    # One column after the other: new memory is what costs most here.
+    values = np.empty((len(known), 4), np.float32)
     with np.errstate(over="ignore", invalid="ignore"):
-        found = {"x": u * z, "y": v[:, None] * z, "z": z}
+        values[:, 0] = (u * z).reshape(-1).take(known)
+        values[:, 1] = (v[:, None] * z).reshape(-1).take(known)
+    values[:, 2] = z.reshape(-1).take(known)
+    colors = values.view(np.uint32)[:, 3]
+    colors[:] = 0xFFFFFF
     if color is not None:
-        found["rgb"] = _packed_colors(_raw_image(color), image)
-    columns = {name: array.reshape(-1).take(known) for name, array in found.items()}
-    columns.setdefault("rgb", np.full(len(known), 0xFFFFFF, np.uint32))
-    return cloud_from_columns(columns)
+        colors[:] = _packed_colors(_raw_image(color), image).reshape(-1).take(known)
+    types = {"x": np.float32, "y": np.float32, "z": np.float32, "rgb": np.uint32}
+    return _cloud(types, values)
 
 
 def _raw_image(message: Any) -> RawImage:
