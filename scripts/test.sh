@@ -60,5 +60,8 @@ if [[ "$(version .venv)" != "$(version .venv-system)" ]]; then
   say "unit tests, and what holds on every wire ($(.venv/bin/python -V))"
   run .venv 6 -m "not exhaustive" "${units[@]}" "$@"
 fi
+say "tests of the 3D view ($(.venv/bin/python -V), PySide6)"
+# Apart from tests/gui: it needs an X server, the others are drawn offscreen.
+run .venv 3 "${once_more[@]}" tests/scene "$@"
 say "tests of interfaces in Qt 6, and with other programs ($(.venv/bin/python -V), PySide6)"
 run .venv 6 "${once_more[@]}" -m "not exhaustive" tests/gui tests/interop "$@"

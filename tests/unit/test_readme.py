@@ -68,7 +68,7 @@ def test_every_name_of_rosglass_in_the_documentation_is_there_after_importing_it
 
 
 def test_every_file_that_the_architecture_names_exists() -> None:
-    page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8").partition("\n## 7. ")[0]
+    page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8").partition("\n## 8. ")[0]
     named = set(re.findall(r"`([\w/]+\.(?:py|js|qml))`", page))
     files = {f"/{file.relative_to(ROOT).as_posix()}" for file in ROOT.glob("[bst]*/**/*.*")}
     assert [name for name in sorted(named) if not any(f.endswith(f"/{name}") for f in files)] == []

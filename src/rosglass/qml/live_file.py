@@ -7,12 +7,14 @@ import logging
 import os
 import re
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.errors import QmlError
 from rosglass.qml.log import forget_repeats, log_engine_warnings, plain_path
 from rosglass.qml.modules import import_folder, install, interface_file
+from rosglass.qml.renderer_choice import imports_module
 from rosglass.qml.runtime import runtime_of
 from rosglass.qml.watchdog import Watchdog
 from rosglass.qt import QT6, QtCore, QtQml, Signal, address, is_alive
@@ -234,6 +236,8 @@ def _advice(text: str) -> str:
     if found is None:
         return ""
     module, version = found[1], found[2]
+    if module == "RosScene" and not QT6:
+        return "it needs Qt 6 (PySide6): run the interface with rosglass from PyPI, outside of RViz"
     if module in _OURS:
         return f"its version is 1.0: import {module} 1.0"
     for ours in _OURS:
@@ -395,6 +399,9 @@ class LiveFile(QtCore.QObject):
         runtime = runtime_of(self.engine)
         if runtime is not None:
             runtime.forget_warnings()
+        if QT6 and imports_module("RosScene", self.path, self.engine.importPathList()):
+            # A package above this one, which makes the types of this module.
+            import_module("rosglass.scene.modules").register()
         component = QtQml.QQmlComponent(self.engine, QtCore.QUrl.fromLocalFile(str(self.path)))
         root = create(component, self.engine)
         if root is None:

@@ -29,6 +29,7 @@ __all__ = [
     "RendererChoice",
     "ask_for_software",
     "choice",
+    "imports_module",
     "need_in_file",
     "need_in_items",
     "taken_renderer",
@@ -52,7 +53,7 @@ _WRITTEN = re.compile(
     r"|\b(layer\.enabled)\b"
     r"|^[ \t]*import\s+(QtGraphicalEffects|Qt5Compat\.GraphicalEffects|QtQuick\.Effects"
     r"|QtQuick\.Particles|QtQuick3D|QtQuick\.Scene3D|Qt3D|QtWebEngine|QtWebView|QtLocation"
-    r"|QtGraphs|QtDataVisualization)\b",
+    r"|QtGraphs|QtDataVisualization|RosScene)\b",
     re.MULTILINE,
 )
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
@@ -95,6 +96,18 @@ def need_in_file(file: Path, import_paths: Sequence[str]) -> str:
             kind = found.lastindex or 0
             return f"{path}:{_line(text, found.start(kind))}: {found[kind]}"
     return ""
+
+
+def imports_module(name: str, file: Path, import_paths: Sequence[str]) -> bool:
+    """Return whether a file, or one that it uses, imports a QML module.
+
+    Args:
+        name: The module.
+        file: The file.
+        import_paths: Folders with QML modules.
+    """
+    files = _files(file, [Path(folder) for folder in import_paths])
+    return any(name == found for _, text in files for found, _ in _MODULE.findall(text))
 
 
 def _files(file: Path, import_paths: Sequence[Path]) -> Iterator[tuple[Path, str]]:

@@ -1,0 +1,595 @@
+"""Base classes of displays: settings, status, the topic, and the place in the fixed frame.
+
+A display is a QML object inside a ``SceneView``, or is added with ``view.displays``. It fills its
+:attr:`Display.root` with drawables (:mod:`rosglass.scene.drawing`). One that shows messages derives
+from :class:`TopicDisplay` and implements :meth:`TopicDisplay.show`.
+"""
+# ruff: noqa: N815 - the names of properties and signals are QML's
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from rosglass.comm.qos import Durability, QoS, Reliability
+from rosglass.errors import Error, TransformException
+from rosglass.interfaces.names import ros1_name
+from rosglass.qml.callbacks import weak_callback
+from rosglass.qml.element import TopicElement
+from rosglass.qml.properties import ReadOnly, Writable, report
+from rosglass.qt import Signal, Slot, is_alive
+from rosglass.scene.drawing import Group, instance_matrix
+from rosglass.scene.settings import Configurable, Setting
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rosglass.comm.handle import Executor
+    from rosglass.comm.inbox import Sample
+    from rosglass.comm.node import Node
+    from rosglass.messages import Message
+    from rosglass.qml.runtime import Runtime
+    from rosglass.qt import QtCore
+    from rosglass.scene.scene import Scene
+
+__all__ = [
+    "FIXED_FRAME",
+    "OUTDATED_ALPHA",
+    "Display",
+    "Status",
+    "TopicDisplay",
+    "frame_and_stamp",
+    "matrix_of",
+]
+
+_log = logging.getLogger("rosglass.scene")
+
+#: RViz's word for the fixed frame in settings that name a frame.
+FIXED_FRAME = "<Fixed Frame>"
+_LEVELS = ("ok", "warn", "error")
+#: QoS policies by RViz's words; "Best Available", which matches every publisher, is ours.
+_RELIABILITY = {
+    "Best Available": Reliability.BEST_AVAILABLE,
+    "Best Effort": Reliability.BEST_EFFORT,
+    "Reliable": Reliability.RELIABLE,
+    "System Default": Reliability.SYSTEM_DEFAULT,
+}
+_DURABILITY = {
+    "Best Available": Durability.BEST_AVAILABLE,
+    "Volatile": Durability.VOLATILE,
+    "Transient Local": Durability.TRANSIENT_LOCAL,
+    "System Default": Durability.SYSTEM_DEFAULT,
+}
+#: Messages that wait for the GUI thread or their transforms, of displays that show each.
+_MOST_WAITING = 1000
+#: Opacity of data whose publisher or connection is gone.
+OUTDATED_ALPHA = 0.35
+
+
+class Status(NamedTuple):
+    """One line of a display's status.
+
+    Attributes:
+        level: ``ok``, ``warn`` or ``error``.
+        text: In words.
+    """
+
+    level: str
+    text: str
+
+
+def matrix_of(pose: Any) -> NDArray[np.float64]:
+    """Return the matrix of a ``geometry_msgs/Pose``.
+
+    Raises:
+        Error: It has numbers that are not finite, or a quaternion that is none.
+    """
+    at, turn = pose.position, pose.orientation
+    position, rotation = (at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w)
+    if not np.isfinite([*position, *rotation]).all():
+        raise Error(f"pose: position {position} or orientation {rotation} is not finite")
+    length = sum(number * number for number in rotation)
+    if length and abs(length - 1.0) > 0.1:
+        raise Error(f"pose: the quaternion {rotation} is not normalised")
+    return instance_matrix(position, rotation)
+
+
+def frame_and_stamp(message: Message) -> tuple[str, int]:
+    """Return the frame and the time in nanoseconds of a message's header; without one "", 0."""
+    if "header" not in message:
+        return "", 0
+    header = message.header
+    stamp = header.stamp
+    old = "secs" in stamp
+    seconds, rest = (stamp.secs, stamp.nsecs) if old else (stamp.sec, stamp.nanosec)
+    return header.frame_id.lstrip("/"), seconds * 1_000_000_000 + rest
+
+
+class Display(Configurable, TopicElement):
+    """Something that a scene shows.
+
+    Attributes:
+        TYPE: Its name in RViz, e.g. ``Grid``.
+        root: What it draws, in the fixed frame.
+    """
+
+    TYPE: ClassVar[str] = ""
+    SETTINGS: ClassVar[dict[str, Setting]] = {}
+
+    nameChanged = Signal()
+    statusChanged = Signal()
+
+    #: Its name in the Displays panel; that of its type until it is set.
+    name = Writable(str, read=lambda self: self._name or self.TYPE, write="_set_name")
+    enabled = Writable(bool, True, then="_on_enabled")
+    #: ``ok``, ``warn`` or ``error``: the worst of its lines.
+    statusLevel = ReadOnly(str, "ok", notify="statusChanged")
+    #: All lines, each with its name.
+    statusText = ReadOnly(str, "", notify="statusChanged")
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self.root = Group()
+        self.scene: Scene | None = None
+        self.status_lines: dict[str, Status] = {}
+        self._name = ""
+        #: What a ``.rviz`` file had for it.
+        self.saved: dict[str, Any] = {}
+        super().__init__(parent, runtime)
+
+    @property
+    def label(self) -> str:
+        """The display in error messages."""
+        return f"display {self._name or self.TYPE!r}"
+
+    def _owner_name(self) -> str:
+        return self.label
+
+    def _set_name(self, name: str) -> None:
+        if name != self._name:
+            self._name = name
+            self.nameChanged.emit()
+
+    @Slot()
+    def _run_update(self) -> None:
+        if is_alive(self) and self.scene is None:
+            # Declared in QML inside a view; objects that Python makes are added by it.
+            view = self.parent()
+            while view is not None and not hasattr(view, "adopt_display"):
+                view = view.parent()
+            if view is not None:
+                view.adopt_display(self)
+        if self.scene is not None:
+            super()._run_update()
+
+    def join(self, scene: Scene) -> None:
+        """Start to be shown in a scene; called by the scene."""
+        self.scene = scene
+        self.root.visible = self.enabled
+        scene.root.add(self.root)
+        self._schedule()
+        self._restyle()
+
+    def leave(self) -> None:
+        """Stop being shown; called by the scene, also for a display that QML has destroyed."""
+        self.root.remove()
+        self.root.clear()
+        self.scene = None
+
+    def _on_enabled(self) -> None:
+        self.root.visible = self.enabled
+        if not self.enabled:
+            self.clear_status()
+        self._restyle()
+        self._schedule()
+
+    # -- for subclasses --------------------------------------------------------------------------
+
+    def _restyle(self) -> None:
+        """Apply changed settings to what is drawn."""
+
+    def on_transforms(self) -> None:
+        """Follow frames that have moved; at most 30 times per second, while enabled."""
+
+    def on_fixed_frame(self) -> None:
+        """Place everything anew: another frame is the fixed one."""
+        self.on_transforms()
+
+    def reset(self) -> None:
+        """Drop all data that was received, e.g. as time has jumped back."""
+
+    def _is_old(self) -> bool:
+        return False
+
+    # -- status ----------------------------------------------------------------------------------
+
+    def set_status(self, name: str, level: str, text: str) -> None:
+        """Set a line of the status.
+
+        Args:
+            name: What it is about, e.g. ``Topic``.
+            level: ``ok``, ``warn`` or ``error``.
+            text: In words: what is wrong, and what to do.
+        """
+        assert level in _LEVELS
+        new = Status(level, text)
+        if self.status_lines.get(name) != new:
+            self.status_lines[name] = new
+            self._report_status()
+
+    def delete_status(self, name: str) -> None:
+        """Remove a line of the status, if there is one."""
+        if self.status_lines.pop(name, None) is not None:
+            self._report_status()
+
+    def clear_status(self) -> None:
+        """Remove all lines."""
+        if self.status_lines:
+            self.status_lines.clear()
+            self._report_status()
+
+    def _report_status(self) -> None:
+        if not is_alive(self):
+            return
+        lines = self.status_lines.items()
+        worst = max((_LEVELS.index(one.level) for _, one in lines), default=0)
+        text = "\n".join(f"{name}: {one.text}" for name, one in lines)
+        report(self, statusLevel=_LEVELS[worst], statusText=text)
+
+    # -- frames ----------------------------------------------------------------------------------
+
+    def place_of(
+        self, frame: str, stamp: int = 0, status: str = "Transform"
+    ) -> NDArray[np.float64] | None:
+        """Return the pose of a frame in the fixed frame; None, with a status, where it is unknown.
+
+        Args:
+            frame: The frame; empty or ``<Fixed Frame>`` for the fixed frame itself.
+            stamp: Nanoseconds; 0 for the newest.
+            status: Name of the line of the status.
+        """
+        if self.scene is None:
+            return None
+        if frame in ("", FIXED_FRAME):
+            self.delete_status(status)
+            return np.eye(4)
+        try:
+            found = self.scene.look_up(frame, stamp)
+        except TransformException as error:
+            self.set_status(status, "error", f"no transform from [{frame}]: {error}")
+            return None
+        self.set_status(status, "ok", "Transform OK")
+        return found
+
+
+class _Item(NamedTuple):
+    """A message on its way to the screen.
+
+    Attributes:
+        data: What :meth:`TopicDisplay.preparer` has made of it.
+        frame: Its frame.
+        stamp: Its time in nanoseconds; 0 for the newest.
+    """
+
+    data: Any
+    frame: str
+    stamp: int
+
+
+class _Intake:
+    """Decodes messages in the node's thread, and hands them to the GUI thread.
+
+    Args:
+        prepare: Turns a message into what is shown; knows nothing of the display itself.
+        types: Names of the types that it takes.
+        executor: Of the GUI thread.
+        on_ready: Called there when there is something to take.
+        depth: How many wait there at most; older ones are dropped and counted.
+        eager: Whether all fields are decoded at once.
+    """
+
+    def __init__(
+        self,
+        prepare: Callable[[Message], Any],
+        types: tuple[str, ...],
+        executor: Executor,
+        on_ready: Callable[[], None],
+        depth: int,
+        eager: bool = False,
+    ) -> None:
+        self.prepare, self._types, self._eager = prepare, types, eager
+        self._executor, self._on_ready = executor, on_ready
+        self._lock = threading.Lock()
+        self._items: deque[_Item] = deque(maxlen=depth)
+        self._error = ""
+        self.received = self.dropped = 0
+
+    def receive(self, sample: Sample) -> None:
+        """Take a sample, in the node's thread."""
+        item, error = None, ""
+        try:
+            name = sample.type.name
+            if self._types and ros1_name(name) not in self._types:
+                raise Error(f"the topic's type is {name}, not {' or '.join(self._types)}")
+            if self._eager:
+                message = sample.type.decode_all(sample.data, wire=sample.wire)
+            else:
+                message = sample.message()
+            item = _Item(self.prepare(message), *frame_and_stamp(message))
+        except Error as reason:
+            error = str(reason)
+        except Exception as reason:  # what peers send never ends the thread
+            _log.exception("a %s", sample.type.name)
+            error = f"this message could not be shown: {reason!r}"
+        with self._lock:
+            first = not self._items and not self._error
+            self.received += 1
+            self._error = error
+            if item is not None:
+                if getattr(item.data, "replaces_all", False):
+                    self._items.clear()
+                self.dropped += len(self._items) == self._items.maxlen
+                self._items.append(item)
+        if first or error:
+            self._executor.post(self._on_ready)
+
+    def take(self) -> tuple[list[_Item], str]:
+        """Take what has arrived, and why the last message could not be used."""
+        with self._lock:
+            items, error = list(self._items), self._error
+            self._items.clear()
+            self._error = ""
+        return items, error
+
+
+class TopicDisplay(Display):
+    """A display of the messages of one topic.
+
+    Attributes:
+        MESSAGES: Names of the types that it shows, without ``msg/``.
+        KEEPS_ALL: Whether each message counts, as for markers; otherwise the newest does.
+        EAGER: Whether all fields of a message are decoded at once, which is faster if all are used.
+    """
+
+    MESSAGES: ClassVar[tuple[str, ...]] = ()
+    KEEPS_ALL: ClassVar[bool] = False
+    EAGER: ClassVar[bool] = False
+
+    topic = Setting("Topic", "topic", "", "Topic to subscribe to.", then="_on_topic")
+    depth = Setting(
+        "Topic/Depth", "int", 5, "Messages kept until their transform is known.", min=1, max=1000,
+        then="_schedule",
+    )  # fmt: skip
+    reliability = Setting(
+        "Topic/Reliability Policy", "enum", "Best Available", "What publishers have to offer.",
+        choices=list(_RELIABILITY), then="_schedule",
+    )  # fmt: skip
+    durability = Setting(
+        "Topic/Durability Policy", "enum", "Best Available", "Whether earlier messages are wanted.",
+        choices=list(_DURABILITY), then="_schedule",
+    )  # fmt: skip
+
+    #: How many messages were received.
+    received = ReadOnly(int, 0)
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self._intake: _Intake | None = None
+        self._waiting: deque[_Item] = deque()
+        self._last: _Item | None = None
+        self._arrived = 0.0
+        super().__init__(parent, runtime)
+
+    # -- the subscription ------------------------------------------------------------------------
+
+    def _on_topic(self) -> None:
+        self._topic = self.topic
+        self._resolved = ""
+        self.clear_status()
+        self.reset()
+        self._schedule()
+
+    def profile(self) -> QoS:
+        """Return what is requested of publishers."""
+        return QoS(
+            depth=_MOST_WAITING if self.KEEPS_ALL else self.depth,
+            reliability=_RELIABILITY[self.reliability],
+            durability=_DURABILITY[self.durability],
+        )
+
+    def _wanted(self) -> tuple[Any, ...] | None:
+        node = self.node
+        if node is None or not self.enabled or not self._topic or self.scene is None:
+            return None
+        self._resolved = self._resolve(self._topic)
+        if not self._resolved:
+            return None
+        return node, (self._resolved, *self.further_topics(self._resolved)), self.profile()
+
+    def further_topics(self, topic: str) -> tuple[str, ...]:  # noqa: ARG002 - for subclasses
+        """Return topics that are received beside `topic`, e.g. of updates."""
+        return ()
+
+    def _factory(self, *wanted: Any) -> Callable[[], Any]:
+        node, topics, qos = wanted
+        intake = self._intake = _Intake(
+            self.preparer(),
+            self.MESSAGES,
+            self._executor,
+            weak_callback(self._on_items),
+            _MOST_WAITING if self.KEEPS_ALL else max(self.depth, 1),
+            self.EAGER,
+        )
+        return lambda: _Subscriptions(node, topics, qos, intake)
+
+    def _on_created(self, endpoint: Any) -> None:  # noqa: ARG002 - the base class's signature
+        self.set_status("Topic", "warn", "No messages received")
+        self._expect_publishers()
+
+    def _on_closed(self, endpoint: Any) -> None:  # noqa: ARG002 - the base class's signature
+        self._intake = None
+        self._waiting.clear()
+
+    def _on_create_failed(self, error: Error) -> None:
+        self.set_status("Topic", "error", str(error))
+        super()._on_create_failed(error)
+
+    def _recheck_outdated(self) -> None:
+        if self._count_publishers():
+            self._outdated = False
+            self._show_age()
+
+    def _update_stale(self) -> None:
+        super()._update_stale()
+        self._show_age()
+
+    def _is_old(self) -> bool:
+        return self._last is None
+
+    def _show_age(self) -> None:
+        """Fade data whose publisher or connection is gone, and say so."""
+        gone = self._outdated and self._last is not None and self.enabled
+        self.root.alpha = OUTDATED_ALPHA if gone else 1.0
+        if gone:
+            when = time.strftime("%H:%M:%S", time.localtime(self._arrived))
+            self.set_status("Data", "warn", f"its publisher is gone; the last message is of {when}")
+        else:
+            self.delete_status("Data")
+
+    # -- messages --------------------------------------------------------------------------------
+
+    def preparer(self) -> Callable[[Message], Any]:
+        """Return a function that decodes a message, for the node's thread.
+
+        It must not refer to the display, only to values of its settings.
+        """
+        return lambda message: message
+
+    def _renew_preparer(self) -> None:
+        """Let further messages be decoded by changed settings."""
+        if self._intake is not None:
+            self._intake.prepare = self.preparer()
+
+    def _on_items(self) -> None:
+        intake = self._intake
+        if not is_alive(self) or intake is None or self.scene is None:
+            return
+        items, error = intake.take()
+        if error:
+            self.set_status("Message", "error", error)
+        elif items:
+            self.delete_status("Message")
+        if not items:
+            return
+        self._arrived = time.time()
+        report(self, received=intake.received)
+        self.set_status("Topic", "ok", f"{intake.received} messages received")
+        self._outdated = False
+        if self.KEEPS_ALL:
+            self._waiting.extend(items)
+            while len(self._waiting) > _MOST_WAITING:
+                self._waiting.popleft()
+        else:
+            self._waiting.extend(items[-self.depth :])
+            while len(self._waiting) > self.depth:
+                self._waiting.popleft()
+        self._show_waiting()
+
+    def _show_waiting(self) -> None:
+        """Show what waits for its transform, as far as it is known now."""
+        if not self.KEEPS_ALL:
+            # The newest that can be placed; older ones are of no use then.
+            for at in range(len(self._waiting) - 1, -1, -1):
+                pose = self.place_of(self._waiting[at].frame, self._waiting[at].stamp)
+                if pose is not None:
+                    item = self._waiting[at]
+                    for _ in range(at + 1):
+                        self._waiting.popleft()
+                    self._show(item, pose)
+                    return
+            return
+        for _ in range(len(self._waiting)):
+            item = self._waiting.popleft()
+            pose = self.place_of(item.frame, item.stamp)
+            if pose is None:
+                self._waiting.append(item)
+            else:
+                self._show(item, pose)
+
+    def _show(self, item: _Item, pose: NDArray[np.float64]) -> None:
+        self._last = item
+        try:
+            self.show(item.data, pose, item.frame, item.stamp)
+        except Error as error:
+            self.set_status("Message", "error", str(error))
+        except Exception as error:
+            _log.exception("%s", self.label)
+            self.set_status("Message", "error", f"this message could not be shown: {error!r}")
+        self._show_age()
+
+    def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:
+        """Show a message.
+
+        Args:
+            data: What :meth:`preparer` has made of it.
+            pose: Of its frame in the fixed frame, at its time.
+            frame: Its frame.
+            stamp: Its time in nanoseconds; 0 for the newest.
+
+        Raises:
+            Error: It cannot be shown; the text becomes the status.
+        """
+        raise NotImplementedError
+
+    def on_transforms(self) -> None:
+        """Show what has waited for transforms."""
+        if self._waiting:
+            self._show_waiting()
+
+    def on_fixed_frame(self) -> None:
+        """Show the last message in the new fixed frame."""
+        if self._last is not None:
+            pose = self.place_of(self._last.frame, self._last.stamp)
+            if pose is None:
+                # At its time it is not known any more: rather the newest than a wrong place.
+                pose = self.place_of(self._last.frame, 0)
+            self.root.visible = self.enabled and pose is not None
+            if pose is not None:
+                self._show(self._last, pose)
+        self._show_waiting()
+
+    def reset(self) -> None:
+        """Drop all messages."""
+        self._waiting.clear()
+        self._last = None
+        self.root.clear()
+
+
+class _Subscriptions:
+    """The subscriptions of a display, all of which feed the same intake."""
+
+    def __init__(self, node: Node, topics: tuple[str, ...], qos: QoS, intake: _Intake) -> None:
+        self._open: list[Any] = []
+        try:
+            for topic in topics:
+                subscription = node.create_subscription(
+                    topic, None, qos=qos, raw_callback=intake.receive
+                )
+                self._open.append(subscription)
+        except Error:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Close them; safe to call twice."""
+        while self._open:
+            self._open.pop().close()

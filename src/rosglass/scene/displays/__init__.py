@@ -1,0 +1,1 @@
+"""The displays of RViz, one module for each family."""

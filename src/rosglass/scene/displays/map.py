@@ -1,0 +1,261 @@
+"""The displays Map (occupancy grids, costmaps and their updates) and GridCells."""
+# ruff: noqa: N815 - the names of properties are QML's
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from rosglass.errors import Error
+from rosglass.qml.properties import ReadOnly, report
+from rosglass.scene.display import TopicDisplay, matrix_of
+from rosglass.scene.drawing import MapImage, Points
+from rosglass.scene.settings import Setting, rgb_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rosglass.qml.runtime import Runtime
+    from rosglass.qt import QtCore
+
+__all__ = ["GridCellsDisplay", "MapDisplay", "palette"]
+
+_MAX_SIDE = 16384
+_MAX_CELLS = 2_000_000
+#: RViz's colour of cells that are unknown (-1).
+_UNKNOWN = (0x70, 0x89, 0x86, 255)
+
+
+def palette(scheme: str) -> NDArray[np.uint8]:
+    """Return RViz's colours of the 256 values of a cell, (256, 4) RGBA.
+
+    Values are those of ``nav_msgs/OccupancyGrid``: 0 free to 100 occupied, -1 (255) unknown; what
+    is not allowed is green (101 to 127) and red to yellow (-128 to -2).
+
+    Args:
+        scheme: ``map``, ``costmap`` or ``raw``.
+    """
+    value = np.arange(256)
+    out = np.full((256, 4), 255, np.uint8)
+    if scheme == "raw":
+        out[:, :3] = value[:, np.newaxis]
+        return out
+    share = value[:101] * 255 // 100
+    if scheme == "map":
+        out[:101, :3] = (255 - share)[:, np.newaxis]
+    else:
+        out[:101, 0], out[:101, 1], out[:101, 2] = share, 0, 255 - share
+        out[0] = 0
+        out[99], out[100] = (0, 255, 255, 255), (255, 0, 255, 255)
+    out[101:128] = (0, 255, 0, 255)
+    out[128:255, 0], out[128:255, 2] = 255, 0
+    out[128:255, 1] = 255 * (value[128:255] - 128) // (254 - 128)
+    out[255] = _UNKNOWN
+    return out
+
+
+class _Grid(NamedTuple):
+    """A whole map.
+
+    Attributes:
+        cells: (rows, columns) bytes.
+        resolution: Metres of a cell.
+        origin: Pose of its lower left corner in its frame.
+        replaces_all: Earlier maps and updates do not count any more.
+    """
+
+    cells: NDArray[np.uint8]
+    resolution: float
+    origin: NDArray[np.float64]
+    replaces_all: bool = True
+
+
+class _Update(NamedTuple):
+    """A part of a map.
+
+    Attributes:
+        x, y: Column and row where it begins.
+        cells: (rows, columns) bytes.
+    """
+
+    x: int
+    y: int
+    cells: NDArray[np.uint8]
+
+
+def _cells_of(message: Any, width: int, height: int) -> NDArray[np.uint8]:
+    if not (0 < width <= _MAX_SIDE and 0 < height <= _MAX_SIDE):
+        raise Error(f"width {width}, height {height}: expected 1 to {_MAX_SIDE} cells")
+    data = np.asarray(message.data)
+    if len(data) != width * height:
+        raise Error(f"data: {len(data)} cells, where {width} x {height} are {width * height}")
+    return data.view(np.uint8).reshape(height, width)
+
+
+def _read_map(message: Any) -> _Grid | _Update:
+    if "info" not in message:
+        cells = _cells_of(message, message.width, message.height)
+        return _Update(message.x, message.y, cells.copy())
+    info = message.info
+    resolution = float(info.resolution)
+    if not (np.isfinite(resolution) and resolution > 0):
+        raise Error(f"info.resolution: expected metres above 0, got {resolution}")
+    cells = _cells_of(message, info.width, info.height)
+    return _Grid(cells.copy(), resolution, matrix_of(info.origin))
+
+
+class MapDisplay(TopicDisplay):
+    """A map or costmap, with updates. See its page in ``docs/scene.md``."""
+
+    TYPE = "Map"
+    MESSAGES = ("nav_msgs/OccupancyGrid", "map_msgs/OccupancyGridUpdate")
+    KEEPS_ALL = True
+
+    alpha = Setting("Alpha", "float", 0.7, "Opacity.", min=0.0, max=1.0)
+    colorScheme = Setting(
+        "Color Scheme", "enum", "map", "How values are coloured.", choices=["map", "costmap", "raw"]
+    )
+    drawBehind = Setting("Draw Behind", "bool", False, "Whether it is drawn below all else.")
+    useTimestamp = Setting(
+        "Use Timestamp", "bool", False, "Whether it is placed at its own time, not the newest.",
+        then="_place_again",
+    )  # fmt: skip
+    updateTopic = Setting(
+        "Update Topic", "topic", "", "Of updates; the topic with _updates by default.",
+        then="_schedule",
+    )  # fmt: skip
+
+    #: Metres of a cell; 0 before the first map.
+    resolution = ReadOnly(float, 0.0)
+    #: Cells in x and y.
+    columns = ReadOnly(int, 0)
+    rows = ReadOnly(int, 0)
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self._image = MapImage()
+        self._image.owner = self
+        #: What is received, as updates are written into it.
+        self._cells: NDArray[np.uint8] | None = None
+        self._corner: NDArray[np.float64] = np.eye(4)
+        self._where = ("", 0)
+        super().__init__(parent, runtime)
+
+    def further_topics(self, topic: str) -> tuple[str, ...]:
+        """Return the topic of updates."""
+        return (self._resolve(self.updateTopic or f"{topic}_updates"),)
+
+    def preparer(self) -> Callable[[Any], Any]:
+        """Return the function that checks and copies cells."""
+        return _read_map
+
+    def _show_waiting(self) -> None:
+        while self._waiting:
+            item = self._waiting.popleft()
+            if isinstance(item.data, _Grid):
+                self._last = item
+                self._where = (item.frame, item.stamp)
+                self._cells, self._corner = item.data.cells, item.data.origin
+                self.root.add(self._image)
+                self._image.set_cells(self._cells, item.data.resolution)
+                rows, columns = self._cells.shape
+                report(self, resolution=item.data.resolution, rows=rows, columns=columns)
+                self.delete_status("Update")
+            else:
+                self._apply(item.data)
+        self._place_again()
+
+    def _apply(self, update: _Update) -> None:
+        if self._cells is None:
+            self.set_status("Update", "warn", "an update came before the map; it is not used")
+            return
+        rows, columns = update.cells.shape
+        x, y = update.x, update.y
+        if x < 0 or y < 0 or x + columns > self._cells.shape[1] or y + rows > self._cells.shape[0]:
+            whole = f"{self._cells.shape[1]} x {self._cells.shape[0]}"
+            text = f"x {x}, y {y}, {columns} x {rows} cells: beyond the map of {whole} cells"
+            self.set_status("Update", "error", text)
+            return
+        self.delete_status("Update")
+        changed = self._cells.copy()
+        changed[y : y + rows, x : x + columns] = update.cells
+        self._cells = changed
+        self._image.set_cells(changed, self.resolution)
+
+    def _place_again(self) -> None:
+        if self._cells is None:
+            return
+        frame, stamp = self._where
+        pose = self.place_of(frame, stamp if self.useTimestamp else 0)
+        self._image.visible = pose is not None
+        if pose is not None:
+            self._image.pose = pose @ self._corner
+
+    def on_transforms(self) -> None:
+        """Follow the map's frame."""
+        self._place_again()
+
+    def on_fixed_frame(self) -> None:
+        """Place the map in the new fixed frame."""
+        self._place_again()
+
+    def _restyle(self) -> None:
+        self._image.set_palette(palette(self.colorScheme))
+        self._image.set_look(alpha=self.alpha, below=self.drawBehind)
+
+    def reset(self) -> None:
+        """Drop the map."""
+        super().reset()
+        self._cells = None
+        report(self, resolution=0.0, rows=0, columns=0)
+
+
+class GridCellsDisplay(TopicDisplay):
+    """The cells of a ``nav_msgs/GridCells``. See its page in ``docs/scene.md``."""
+
+    TYPE = "GridCells"
+    MESSAGES = ("nav_msgs/GridCells",)
+    EAGER = True
+
+    color = Setting("Color", "color", "#19ff00", "Of the cells.")
+    alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self._cells = Points()
+        self._cells.owner = self
+        self._size = 0.0
+        super().__init__(parent, runtime)
+
+    def preparer(self) -> Callable[[Any], Any]:
+        """Return the function that reads cells."""
+        return _read_cells
+
+    def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:  # noqa: ARG002
+        """Show cells as squares."""
+        points, self._size = data
+        self._cells.set_points(points)
+        self._cells.pose = pose
+        self.root.add(self._cells)
+        self._restyle()
+
+    def _restyle(self) -> None:
+        colouring = self._cells.colouring._replace(mode="flat", first=rgb_of(self.color))
+        self._cells.set_look(
+            style="flat squares", size=self._size, colouring=colouring, alpha=self.alpha
+        )
+
+
+def _read_cells(message: Any) -> tuple[NDArray[np.float32], float]:
+    width, height = float(message.cell_width), float(message.cell_height)
+    if not (np.isfinite([width, height]).all() and width > 0 and height > 0):
+        raise Error(f"cell_width {width}, cell_height {height}: expected metres above 0")
+    if len(message.cells) > _MAX_CELLS:
+        raise Error(f"cells: {len(message.cells)} are more than the {_MAX_CELLS} that are drawn")
+    points = np.array([(p.x, p.y, p.z) for p in message.cells], np.float32).reshape(-1, 3)
+    return points, min(width, height)

@@ -1,0 +1,131 @@
+"""Axes and arrows made of cylinders and cones, many at once; what several displays draw."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rosglass.scene.drawing import CONE, CYLINDER, Group, Mesh
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["ArrowShapes", "AxesShapes", "poses_matrices", "stack_poses"]
+
+#: Turns z, along which cylinders and cones stand, to x, y and z.
+_ALONG = np.zeros((3, 4, 4))
+_ALONG[0] = [[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
+_ALONG[1] = [[0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]
+_ALONG[2] = np.eye(4)
+_COLOURS = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1]], np.float32)
+
+
+def stack_poses(poses: Any) -> NDArray[np.float64]:
+    """Return matrices as one array of shape (n, 4, 4), which may be empty."""
+    return np.asarray(poses, np.float64).reshape(-1, 4, 4)
+
+
+def poses_matrices(positions: Any, rotations: Any) -> NDArray[np.float64]:
+    """Return matrices (n, 4, 4) of positions (n, 3) and quaternions x, y, z, w (n, 4).
+
+    A quaternion of length 0 is no rotation, others are normalised, as RViz does it.
+    """
+    at = np.asarray(positions, np.float64).reshape(-1, 3)
+    q = np.asarray(rotations, np.float64).reshape(-1, 4)
+    length = (q**2).sum(axis=1)
+    q = np.where(length[:, np.newaxis] > 0, q, (0.0, 0.0, 0.0, 1.0))
+    x, y, z, w = (q / np.sqrt(np.where(length > 0, length, 1.0))[:, np.newaxis]).T
+    out = np.zeros((len(at), 4, 4))
+    out[:, 0, 0], out[:, 0, 1] = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w)
+    out[:, 0, 2], out[:, 1, 0] = 2 * (x * z + y * w), 2 * (x * y + z * w)
+    out[:, 1, 1], out[:, 1, 2] = 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
+    out[:, 2, 0], out[:, 2, 1] = 2 * (x * z - y * w), 2 * (y * z + x * w)
+    out[:, 2, 2], out[:, :3, 3], out[:, 3, 3] = 1 - 2 * (x * x + y * y), at, 1
+    return out
+
+
+def _along(
+    length: ArrayLike, diameter: ArrayLike, start: ArrayLike, count: int
+) -> NDArray[np.float64]:
+    """Return matrices that scale a shape of height 1 along z, and move it to a start."""
+    out = np.zeros((count, 4, 4))
+    out[:, 0, 0] = out[:, 1, 1] = diameter
+    out[:, 2, 2] = length
+    out[:, 2, 3] = start
+    out[:, 3, 3] = 1
+    return out
+
+
+class AxesShapes(Group):
+    """Red, green and blue cylinders along x, y and z of any number of poses.
+
+    Args:
+        owner: What a pick of them finds.
+    """
+
+    def __init__(self, owner: Any = None) -> None:
+        super().__init__()
+        self._mesh = Mesh(CYLINDER)
+        self._mesh.owner = owner
+        self._mesh.set_instances([])
+        self.add(self._mesh)
+
+    def set_axes(
+        self, poses: Any, length: ArrayLike, radius: ArrayLike, alpha: float = 1.0
+    ) -> None:
+        """Draw axes.
+
+        Args:
+            poses: (n, 4, 4).
+            length: Metres, for each or all.
+            radius: Metres, for each or all.
+            alpha: Opacity.
+        """
+        at = stack_poses(poses)
+        length = np.broadcast_to(np.asarray(length, np.float64), len(at))
+        local = _along(length, np.asarray(radius) * 2.0, length / 2, len(at))
+        matrices = at[:, np.newaxis] @ (_ALONG @ local[:, np.newaxis])
+        colours = np.tile(_COLOURS * [1, 1, 1, alpha], (len(at), 1))
+        self._mesh.set_instances(matrices.reshape(-1, 4, 4), colours if len(at) else (1, 1, 1, 1))
+
+
+class ArrowShapes(Group):
+    """Arrows along x of any number of poses: a shaft from their origin, then a head.
+
+    Args:
+        owner: What a pick of them finds.
+    """
+
+    def __init__(self, owner: Any = None) -> None:
+        super().__init__()
+        self._shafts, self._heads = Mesh(CYLINDER), Mesh(CONE)
+        for mesh in (self._shafts, self._heads):
+            mesh.owner = owner
+            mesh.set_instances([])
+            self.add(mesh)
+
+    def set_arrows(
+        self,
+        poses: Any,
+        shaft: tuple[ArrayLike, ArrayLike],
+        head: tuple[ArrayLike, ArrayLike],
+        colours: ArrayLike,
+        head_colours: ArrayLike | None = None,
+    ) -> None:
+        """Draw arrows.
+
+        Args:
+            poses: (n, 4, 4).
+            shaft: Length and diameter in metres, for each or all.
+            head: Length and diameter in metres, for each or all.
+            colours: RGBA from 0 to 1, for each or all.
+            head_colours: Those of the heads, if they are others.
+        """
+        at = stack_poses(poses) @ _ALONG[0]
+        count = len(at)
+        length = np.broadcast_to(np.asarray(shaft[0], np.float64), count)
+        middle = _along(length, shaft[1], length / 2, count)
+        tip = _along(head[0], head[1], length, count)
+        self._shafts.set_instances(at @ middle, colours)
+        self._heads.set_instances(at @ tip, colours if head_colours is None else head_colours)

@@ -1,0 +1,240 @@
+"""The display TF: the robot's frames, their names and parents."""
+# ruff: noqa: N815 - the names of properties are QML's
+
+from __future__ import annotations
+
+import re
+import time
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+
+from rosglass.errors import TransformException
+from rosglass.qml.properties import ReadOnly, report
+from rosglass.qt import Signal, Slot
+from rosglass.scene.display import Display
+from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, stack_poses
+from rosglass.scene.drawing import Labels
+from rosglass.scene.settings import Setting
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rosglass.qml.runtime import Runtime
+    from rosglass.qt import QtCore
+    from rosglass.tf import FrameInfo
+
+__all__ = ["TFDisplay"]
+
+_MAX_FRAMES = 2000
+#: Sizes in RViz at a marker scale of 1, metres.
+_AXIS_M, _AXIS_RADIUS_M, _NAME_M = 0.2, 0.02, 0.1
+_SHAFT_M, _HEAD_M, _HEAD_WIDTH_M = 0.01, 0.08, 0.08
+_SHAFT_COLOUR, _HEAD_COLOUR = (0.8, 0.8, 0.3, 1.0), (1.0, 0.1, 0.6, 1.0)
+#: The share of its timeout after which a frame begins to fade.
+_FADE_AFTER = 1 / 3
+
+
+class _Frame(NamedTuple):
+    """A frame that is shown.
+
+    Attributes:
+        name: Its name.
+        pose: In the fixed frame.
+        share: Its opacity: less than 1 once it is not updated any more.
+        parent: Its parent's name.
+    """
+
+    name: str
+    pose: NDArray[np.float64]
+    share: float
+    parent: str
+
+
+class TFDisplay(Display):
+    """The frames of the robot. See its page in ``docs/scene.md``."""
+
+    TYPE = "TF"
+
+    showNames = Setting("Show Names", "bool", True, "Whether names are shown.")
+    showAxes = Setting("Show Axes", "bool", True, "Whether axes are shown.")
+    showArrows = Setting("Show Arrows", "bool", True, "Whether arrows point at parents.")
+    markerScale = Setting(
+        "Marker Scale", "float", 1.0, "Of names, axes and arrows.", min=0.0, max=1e6
+    )
+    markerAlpha = Setting("Marker Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
+    updateInterval = Setting(
+        "Update Interval", "float", 0.0, "Seconds; 0 for each change.", min=0.0
+    )
+    frameTimeout = Setting(
+        "Frame Timeout", "float", 15.0, "Seconds until a frame without updates is hidden.", min=1.0
+    )  # fmt: skip
+    whitelist = Setting("Filter (whitelist)", "string", "", "Regular expression of frames to show.")
+    blacklist = Setting("Filter (blacklist)", "string", "", "Regular expression of frames to hide.")
+    allEnabled = Setting("Frames/All Enabled", "bool", True, "Whether frames are shown at first.")
+
+    framesChanged = Signal()
+    #: Names of the frames that are shown.
+    frames: ReadOnly[list[str]] = ReadOnly(cast("type[list[str]]", "QStringList"), [])
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self._axes, self._arrows = AxesShapes(self), ArrowShapes(self)
+        self._names = Labels()
+        #: Whether frames are shown, of those that were switched.
+        self._switched: dict[str, bool] = {}
+        self._next = 0.0
+        #: Whether a frame fades.
+        self._silent = False
+        super().__init__(parent, runtime)
+        self.root.add(self._axes, self._arrows, self._names)
+
+    def leave(self) -> None:
+        """Stop being shown."""
+        super().leave()
+        self.root.add(self._axes, self._arrows, self._names)
+
+    @Slot(str, bool)
+    def setFrameEnabled(self, frame: str, enabled: bool) -> None:  # noqa: N802 - QML's name
+        """Show or hide one frame."""
+        self._switched[frame] = enabled
+        self._draw()
+
+    def is_frame_enabled(self, frame: str) -> bool:
+        """Return whether a frame is shown, as far as it is known."""
+        return self._switched.get(frame, bool(self.allEnabled))
+
+    def load_settings(self, saved: Any) -> list[str]:
+        """Take the settings of a file, and which frames it shows."""
+        frames = saved.get("Frames")
+        if isinstance(frames, dict):
+            for name, state in frames.items():
+                value = state.get("Value") if isinstance(state, dict) else state
+                if isinstance(value, bool) and name != "All Enabled":
+                    self._switched[str(name)] = value
+        return super().load_settings(saved)
+
+    def save_settings(self, older: Any = None) -> dict[str, Any]:
+        """Return the settings for a file, with the frames that are shown."""
+        kept = super().save_settings(older)
+        frames = dict(kept.get("Frames") or {})
+        for name in [*self.frames, *self._switched]:
+            frames[name] = {"Value": self.is_frame_enabled(name)}
+        kept["Frames"] = frames
+        return kept
+
+    def _restyle(self) -> None:
+        for path in ("Filter (whitelist)", "Filter (blacklist)"):
+            try:
+                re.compile(self.get(path))
+                self.delete_status(path)
+            except re.error as error:  # noqa: PERF203 - two of them
+                self.set_status(path, "error", f"this is no regular expression: {error}")
+        self._draw()
+
+    def on_transforms(self) -> None:
+        """Follow the frames."""
+        now = time.monotonic()
+        if now >= self._next:
+            self._next = now + self.updateInterval
+            self._draw()
+
+    @Slot()
+    def _on_tick(self) -> None:
+        # Frames that are not updated any more fade without a transform.
+        super()._on_tick()
+        if self.enabled and self._silent:
+            self._draw()
+
+    def _is_chosen(self, name: str) -> bool:
+        if self.is_frame_enabled(name):
+            try:
+                return bool(
+                    (not self.whitelist or re.search(self.whitelist, name))
+                    and not (self.blacklist and re.search(self.blacklist, name))
+                )
+            except re.error:
+                return True
+        return False
+
+    def _draw(self) -> None:
+        scene = self.scene
+        buffer = scene.transforms if scene is not None else None
+        if scene is None or buffer is None or not self.enabled:
+            return
+        tree = buffer.tree()
+        shown: list[_Frame] = []
+        for name in sorted(tree):
+            info = tree[name]
+            if len(shown) >= _MAX_FRAMES:
+                self.set_status("Frames", "warn", f"only the first {_MAX_FRAMES} frames are shown")
+                break
+            if not self._is_chosen(name):
+                continue
+            try:
+                pose = scene.look_up(name)
+            except TransformException as error:
+                self.set_status(name, "warn", f"no transform: {error}")
+                continue
+            self.delete_status(name)
+            shown.append(_Frame(name, pose, self._share(info), info.parent))
+        self._silent = any(frame.share < 1 for frame in shown)
+        shown = [frame for frame in shown if frame.share > 0]
+        for line in list(self.status_lines):
+            if line not in tree and line in self.frames:
+                self.delete_status(line)
+        self._fill(shown)
+        names = [frame.name for frame in shown]
+        if names != self.frames:
+            report(self, frames=names)
+
+    def _share(self, info: FrameInfo) -> float:
+        """Return the opacity of a frame by its age: 1 while it is updated, 0 after the timeout."""
+        if info.static or not info.parent:
+            return 1.0
+        left = (self.frameTimeout - info.silence) / (self.frameTimeout * (1 - _FADE_AFTER))
+        return float(np.clip(left, 0.0, 1.0))
+
+    def _fill(self, frames: list[_Frame]) -> None:
+        names = [frame.name for frame in frames]
+        poses = stack_poses([frame.pose for frame in frames])
+        shares = np.array([frame.share for frame in frames])
+        scale, alpha = self.markerScale, self.markerAlpha
+        self._axes.visible = self.showAxes
+        self._arrows.visible = self.showArrows
+        self._names.visible = self.showNames
+        low = float(shares.min()) if len(shares) else 1.0
+        self._axes.set_axes(poses, _AXIS_M * scale, _AXIS_RADIUS_M * scale, alpha * low)
+        at = poses[:, :3, 3] if len(poses) else np.zeros((0, 3))
+        tint = np.ones((len(names), 4), np.float32)
+        tint[:, 3] = shares * alpha
+        self._names.set_texts(names, at, _NAME_M * scale, tint if names else (1, 1, 1, 1))
+        where = {name: index for index, name in enumerate(names)}
+        pairs = [(where[f.name], where[f.parent]) for f in frames if f.parent in where]
+        arrows, lengths = [], []
+        for child, parent in pairs:
+            way = at[parent] - at[child]
+            length = float(np.linalg.norm(way))
+            if length > 1e-4:
+                arrows.append(_pointing(at[child], way / length))
+                lengths.append(length)
+        far = np.array(lengths)
+        head = np.minimum(_HEAD_M * scale, far)
+        self._arrows.set_arrows(
+            np.array(arrows).reshape(-1, 4, 4),
+            (far - head, _SHAFT_M * scale),
+            (head, _HEAD_WIDTH_M * scale),
+            (*_SHAFT_COLOUR[:3], alpha * low),
+            (*_HEAD_COLOUR[:3], alpha * low),
+        )
+
+
+def _pointing(origin: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a pose at a point whose x is along a direction of length 1."""
+    helper = np.array([0.0, 0.0, 1.0]) if abs(x[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    y = np.cross(helper, x)
+    y /= np.linalg.norm(y)
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = x, y, np.cross(x, y), origin
+    return pose

@@ -1,0 +1,869 @@
+"""What a scene draws: groups of points, lines, meshes, maps and labels, as numpy arrays.
+
+Displays fill these; the renderer (:mod:`rosglass.scene.renderer`) uploads what has changed and
+draws it, the picker intersects it with rays. No Qt here. Arrays are never written after they were
+given: a change gives a new one, so that a renderer in another thread may still read the old one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from rosglass.errors import Error
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "BOX",
+    "CONE",
+    "CYLINDER",
+    "SPHERE",
+    "Colouring",
+    "Drawable",
+    "Group",
+    "Item",
+    "Labels",
+    "Lines",
+    "MapImage",
+    "Mesh",
+    "Points",
+    "Shape",
+    "instance_matrix",
+    "rgba_bytes",
+]
+
+#: What RViz takes for opaque: more than this is drawn without blending.
+OPAQUE = 0.9998
+#: Vertices, instances and points of one drawable: bytes of a GPU buffer stay below 2 GiB.
+_MAX_COUNT = 20_000_000
+_IDENTITY = np.eye(4)
+_IDENTITY.setflags(write=False)
+
+
+class Item:
+    """A member of the tree that is drawn.
+
+    Attributes:
+        parent: The group that it is in; None outside of one.
+    """
+
+    def __init__(self) -> None:
+        self.parent: Group | None = None
+        self._visible = True
+        self._pose: NDArray[np.float64] = _IDENTITY
+
+    @property
+    def visible(self) -> bool:
+        """Whether it is drawn, as far as its groups are."""
+        return self._visible
+
+    @visible.setter
+    def visible(self, visible: bool) -> None:
+        if visible != self._visible:
+            self._visible = visible
+            self.touch()
+
+    @property
+    def pose(self) -> NDArray[np.float64]:
+        """Its pose in its group, a matrix of 4 x 4; of the root's children in the fixed frame."""
+        return self._pose
+
+    @pose.setter
+    def pose(self, pose: NDArray[np.float64]) -> None:
+        if pose.shape != (4, 4) or not np.isfinite(pose).all():
+            raise Error(f"a pose must be a finite matrix of 4 x 4, got {pose.tolist()!r:.200}")
+        if not np.array_equal(pose, self._pose):
+            self._pose = pose
+            self.touch()
+
+    def touch(self) -> None:
+        """Request a new picture from every scene that this item is in."""
+        item: Item | None = self
+        while item is not None:
+            if item.parent is None and isinstance(item, Group) and item.on_change is not None:
+                item.on_change()
+            # What is hidden changes no picture; hiding itself does.
+            if not item._visible and item is not self:
+                return
+            item = item.parent
+
+    def remove(self) -> None:
+        """Take it out of its group; safe to call twice."""
+        if self.parent is not None:
+            self.parent.discard(self)
+
+
+class Group(Item):
+    """Items that move, and are shown and hidden, together.
+
+    Attributes:
+        on_change: Called after each change of anything in it; set on the root only.
+        alpha: Opacity from 0 to 1, multiplied with that of everything in it.
+    """
+
+    def __init__(self, *items: Item) -> None:
+        super().__init__()
+        self.on_change: Callable[[], None] | None = None
+        self._alpha = 1.0
+        self._items: dict[Item, None] = {}
+        for item in items:
+            self.add(item)
+
+    def __iter__(self) -> Iterator[Item]:
+        return iter(list(self._items))
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    @property
+    def alpha(self) -> float:
+        """Opacity from 0 to 1, multiplied with that of everything in it."""
+        return self._alpha
+
+    @alpha.setter
+    def alpha(self, alpha: float) -> None:
+        if alpha != self._alpha:
+            self._alpha = alpha
+            self.touch()
+
+    def add(self, *items: Item) -> None:
+        """Add items as the last ones, out of their former groups."""
+        for item in items:
+            item.remove()
+            item.parent = self
+            self._items[item] = None
+        self.touch()
+
+    def discard(self, item: Item) -> None:
+        """Take an item out, if it is in."""
+        if item in self._items:
+            del self._items[item]
+            item.parent = None
+            self.touch()
+
+    def clear(self) -> None:
+        """Take everything out."""
+        for item in self:
+            item.parent = None
+        if self._items:
+            self._items.clear()
+            self.touch()
+
+    def drawables(self) -> Iterator[tuple[Drawable, NDArray[np.float64], float]]:
+        """Iterate over what is drawn: drawable, pose in the root's frame, opacity of its groups."""
+        if self._visible:
+            yield from self._walk(self._pose, self._alpha)
+
+    def _walk(
+        self, pose: NDArray[np.float64], alpha: float
+    ) -> Iterator[tuple[Drawable, NDArray[np.float64], float]]:
+        for item in list(self._items):
+            if not item._visible:
+                continue
+            own = item._pose
+            placed = pose if own is _IDENTITY else own if pose is _IDENTITY else pose @ own
+            if isinstance(item, Group):
+                yield from item._walk(placed, alpha * item._alpha)
+            elif isinstance(item, Drawable) and item.count:
+                yield item, placed, alpha
+
+
+class Drawable(Item):
+    """Data of one kind that is drawn at once.
+
+    Attributes:
+        owner: What a pick of it finds; None where it cannot be picked.
+        geometry: Counts changes of the data that the renderer uploads.
+        look: Counts changes of colours, sizes and the like, which are few numbers.
+        count: How many of its kind there are; nothing is drawn for 0.
+        layer: Translucent drawables of a lower layer are drawn first, e.g. maps.
+        double_sided: Not used by kinds without faces.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.owner: Any = None
+        self.geometry = self.look = 0
+        self.count = 0
+        self.layer = 0
+
+    def changed(self, *, geometry: bool = False) -> None:
+        """Announce that its look, or all its data, has changed."""
+        self.look += 1
+        self.geometry += geometry
+        self.touch()
+
+    @property
+    def opaque(self) -> bool:
+        """Whether nothing behind it shines through."""
+        return True
+
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Return the corners of the box around it in its own frame; None for nothing finite."""
+        raise NotImplementedError
+
+
+def _box_of(points: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    finite = points[np.isfinite(points).all(axis=1)] if len(points) else points
+    if not len(finite):
+        return None
+    return finite.min(axis=0).astype(np.float64), finite.max(axis=0).astype(np.float64)
+
+
+def rgba_bytes(colours: ArrayLike, count: int) -> NDArray[np.uint8]:
+    """Return colours as (count, 4) bytes, one for each or the same for all.
+
+    Args:
+        colours: RGB or RGBA, floats from 0 to 1 or bytes; shape (3), (4), (count, 3), (count, 4).
+        count: How many are wanted.
+
+    Raises:
+        Error: They have another shape.
+    """
+    given = np.asarray(colours)
+    if given.dtype != np.uint8:
+        with np.errstate(invalid="ignore"):
+            scaled = np.nan_to_num(np.asarray(given, np.float32), nan=0.0, posinf=1.0, neginf=0.0)
+            given = (np.clip(scaled, 0, 1) * 255 + 0.5).astype(np.uint8)
+    if given.ndim == 1:
+        given = given[np.newaxis, :]
+    if given.ndim != 2 or given.shape[1] not in (3, 4) or len(given) not in (1, count):
+        raise Error(f"expected 1 or {count} colours of 3 or 4 numbers, got shape {given.shape}")
+    out = np.full((count, 4), 255, np.uint8)
+    out[:, : given.shape[1]] = given
+    return out
+
+
+def _checked(name: str, given: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Return an array of floats of the shape (n, *shape).
+
+    Raises:
+        Error: It has another shape, or too many rows.
+    """
+    array = np.ascontiguousarray(given, np.float32)
+    if array.size == 0:
+        array = array.reshape(0, *shape)
+    if array.shape[1:] != shape:
+        raise Error(f"{name}: expected shape (n, {', '.join(map(str, shape))}), got {array.shape}")
+    if len(array) > _MAX_COUNT:
+        raise Error(
+            f"{name}: {len(array)} are more than the {_MAX_COUNT} that can be drawn at once"
+        )
+    return array
+
+
+class Colouring(NamedTuple):
+    """How points get their colours, in the shader.
+
+    Attributes:
+        mode: ``flat``, ``bgra`` (the bytes of the channel), ``rainbow`` or ``gradient`` (by the
+            channel), ``axis`` (rainbow by the place).
+        low, high: The range of the channel, or of the axis in metres.
+        invert: Whether the rainbow is turned around.
+        first, last: RGB at both ends of a gradient; `first` is the flat colour.
+        axis: Four numbers; x, y, z of a point in its own frame and 1 are multiplied with these.
+    """
+
+    mode: str = "flat"
+    low: float = 0.0
+    high: float = 1.0
+    invert: bool = False
+    first: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    last: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    axis: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 0.0)
+
+
+class Points(Drawable):
+    """Points, as they lie in a message: one row of `stride` bytes for each.
+
+    Attributes:
+        data: All bytes.
+        stride: Bytes from one point to the next, divisible by 4.
+        position: Where x, y, z (float32) are in a row.
+        channel: Where the channel is in a row; -1 for none.
+        channel_is_bytes: Whether the channel is four bytes B, G, R, A; otherwise one float32.
+        style: ``points`` (pixels), ``squares``, ``flat squares``, ``spheres``, ``boxes`` (metres).
+        size: Pixels of the screen for ``points``, metres for the others.
+        colouring: How they get their colours.
+        alpha: Opacity, 0 to 1.
+    """
+
+    STYLES = ("points", "squares", "flat squares", "spheres", "boxes")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.data: NDArray[np.uint8] = np.zeros(0, np.uint8)
+        self.stride, self.position, self.channel = 16, 0, -1
+        self.channel_is_bytes = False
+        self.style, self.size = "points", 3.0
+        self.colouring = Colouring()
+        self.alpha = 1.0
+        self._box: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+        self._boxed = -1
+
+    def set_data(
+        self,
+        data: Any,
+        count: int,
+        stride: int,
+        *,
+        position: int = 0,
+        channel: int = -1,
+        channel_is_bytes: bool = False,
+    ) -> None:
+        """Take bytes, without a copy.
+
+        Args:
+            data: Anything with the buffer protocol; kept, and never to be changed again.
+            count: How many points.
+            stride: Bytes from one to the next.
+            position: Offset of three float32.
+            channel: Offset of the channel; -1 for none.
+            channel_is_bytes: Whether it is B, G, R, A.
+
+        Raises:
+            Error: An offset is beyond a row or not divisible by 4, or `data` is too short.
+        """
+        view = np.frombuffer(data, np.uint8)
+        offsets = (stride, position, max(channel, 0))
+        if min(offsets) < 0 or any(n % 4 for n in offsets) or stride < 12 or count < 0:
+            raise Error(f"stride {stride}, position {position}, channel {channel}: not usable")
+        if position + 12 > stride or channel + 4 > stride:
+            raise Error(f"position {position} or channel {channel} is beyond a row of {stride}")
+        if count > _MAX_COUNT or count * stride > len(view):
+            raise Error(f"{count} points of {stride} bytes are more than {len(view)} bytes hold")
+        self.data, self.count, self.stride = view, count, stride
+        self.position, self.channel, self.channel_is_bytes = position, channel, channel_is_bytes
+        self.changed(geometry=True)
+
+    def set_points(self, points: ArrayLike, colours: ArrayLike | None = None) -> None:
+        """Take positions of shape (n, 3) in metres, and RGBA for each or all."""
+        xyz = _checked("points", points, (3,))
+        rows = np.zeros((len(xyz), 4), np.float32)
+        rows[:, :3] = xyz
+        if colours is not None:
+            rgba = rgba_bytes(colours, len(xyz))
+            rows.view(np.uint8).reshape(-1, 16)[:, 12:] = rgba[:, (2, 1, 0, 3)]
+            self.colouring = self.colouring._replace(mode="bgra")
+        self.set_data(
+            rows.reshape(-1).view(np.uint8),
+            len(xyz),
+            16,
+            channel=12 if colours is not None else -1,
+            channel_is_bytes=True,
+        )
+
+    def set_look(
+        self,
+        *,
+        style: str | None = None,
+        size: float | None = None,
+        colouring: Colouring | None = None,
+        alpha: float | None = None,
+    ) -> None:
+        """Change what is given.
+
+        Raises:
+            Error: The style is unknown.
+        """
+        if style is not None and style not in self.STYLES:
+            raise Error(f"style {style!r} is none of {', '.join(self.STYLES)}")
+        before = (self.style, self.size, self.colouring, self.alpha)
+        self.style = self.style if style is None else style
+        self.size = self.size if size is None else size
+        self.colouring = self.colouring if colouring is None else colouring
+        self.alpha = self.alpha if alpha is None else alpha
+        if before != (self.style, self.size, self.colouring, self.alpha):
+            self.changed()
+
+    @property
+    def opaque(self) -> bool:
+        """Whether nothing behind it shines through."""
+        return self.alpha >= OPAQUE
+
+    def xyz(self) -> NDArray[np.float32]:
+        """Return the positions, (n, 3), in their own frame; a view of the bytes."""
+        if not self.count:
+            return np.zeros((0, 3), np.float32)
+        strides = (self.stride, 4)
+        rows: NDArray[np.float32] = np.ndarray(
+            (self.count, 3), np.float32, self.data.data, self.position, strides
+        )
+        return rows
+
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Return the corners of the box around it in its own frame; None for nothing finite."""
+        if self._boxed != self.geometry:
+            self._boxed, self._box = self.geometry, _box_of(self.xyz())
+        return self._box
+
+
+class Lines(Drawable):
+    """Straight lines between pairs of points.
+
+    Attributes:
+        rows: A row for each: start, end (float32 x 3 each), RGBA of both (uint8 x 4 each).
+        width: Pixels of the screen, or metres.
+        in_metres: Whether `width` is metres.
+    """
+
+    ROW = np.dtype([("start", "<f4", 3), ("end", "<f4", 3), ("first", "u1", 4), ("last", "u1", 4)])
+
+    def __init__(self, width: float = 1.0, *, in_metres: bool = False) -> None:
+        super().__init__()
+        self.rows: NDArray[Any] = np.zeros(0, self.ROW)
+        self.width, self.in_metres, self.alpha = width, in_metres, 1.0
+        self._opaque = True
+
+    def set_segments(self, segments: ArrayLike, colours: ArrayLike = (1.0, 1.0, 1.0, 1.0)) -> None:
+        """Take lines.
+
+        Args:
+            segments: Shape (n, 2, 3), metres.
+            colours: For all, for each, or of both ends of each: shape (n, 2, 4).
+        """
+        points = _checked("segments", segments, (2, 3))
+        given = np.asarray(colours)
+        if given.ndim == 3:
+            ends = rgba_bytes(given.reshape(-1, given.shape[2]), 2 * len(points)).reshape(-1, 2, 4)
+        else:
+            ends = np.repeat(rgba_bytes(given, len(points))[:, np.newaxis], 2, axis=1)
+        # One that is not finite would cover the view.
+        good = np.isfinite(points).all(axis=(1, 2))
+        rows = np.zeros(int(good.sum()), self.ROW)
+        rows["start"], rows["end"] = points[good, 0], points[good, 1]
+        rows["first"], rows["last"] = ends[good, 0], ends[good, 1]
+        self._opaque = bool((ends[..., 3] == 255).all())
+        self.rows, self.count = rows, len(rows)
+        self.changed(geometry=True)
+
+    def set_strip(self, points: ArrayLike, colours: ArrayLike = (1.0, 1.0, 1.0, 1.0)) -> None:
+        """Take a line through points of shape (n, 3), with a colour for all or for each point."""
+        line = _checked("points", points, (3,))
+        given = np.asarray(colours)
+        if given.ndim == 2 and len(given) == len(line):
+            given = np.stack([given[:-1], given[1:]], axis=1)
+        self.set_segments(
+            np.stack([line[:-1], line[1:]], axis=1), given if len(line) > 1 else (1, 1, 1)
+        )
+
+    def set_look(self, *, width: float | None = None, alpha: float | None = None) -> None:
+        """Change the width, in pixels or metres, or the opacity."""
+        before = self.width, self.alpha
+        self.width = self.width if width is None else width
+        self.alpha = self.alpha if alpha is None else alpha
+        if before != (self.width, self.alpha):
+            self.changed()
+
+    @property
+    def opaque(self) -> bool:
+        """Whether nothing behind it shines through."""
+        return self._opaque and self.alpha >= OPAQUE
+
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Return the corners of the box around it in its own frame; None for nothing finite."""
+        return _box_of(np.concatenate([self.rows["start"], self.rows["end"]]))
+
+
+class Shape:
+    """Vertices and triangles that meshes share, uploaded once for each.
+
+    Args:
+        positions: (n, 3), metres.
+        normals: (n, 3); made from the triangles if None.
+        indices: (m, 3) or (m * 3) numbers of vertices; if None, each three vertices are a triangle.
+        colours: RGBA for each vertex; white if None.
+        uv: (n, 2) places in the texture, from its upper left corner; 0 if None.
+
+    Raises:
+        Error: The shapes of the arrays don't fit, or an index is beyond the vertices.
+    """
+
+    ROW = np.dtype(
+        [("position", "<f4", 3), ("normal", "<f4", 3), ("uv", "<f4", 2), ("rgba", "u1", 4)]
+    )
+
+    def __init__(
+        self,
+        positions: ArrayLike,
+        normals: ArrayLike | None = None,
+        indices: ArrayLike | None = None,
+        *,
+        colours: ArrayLike | None = None,
+        uv: ArrayLike | None = None,
+    ) -> None:
+        at = _checked("positions", positions, (3,))
+        if indices is None:
+            faces = np.arange(len(at) // 3 * 3, dtype=np.uint32).reshape(-1, 3)
+        else:
+            given = np.asarray(indices)
+            if given.size % 3 or (given.size and (given.min() < 0 or given.max() >= len(at))):
+                raise Error(f"indices: expected triangles of {len(at)} vertices")
+            faces = np.ascontiguousarray(given, np.uint32).reshape(-1, 3)
+        good: NDArray[np.bool_] = np.asarray(np.isfinite(at).all(axis=1))
+        if not good.all():
+            faces = faces[good[faces].all(axis=1)]
+            at = np.where(good[:, np.newaxis], at, np.float32(0))
+        rows = np.zeros(len(at), self.ROW)
+        rows["position"] = at
+        rows["normal"] = (
+            _normals(at, faces) if normals is None else _fitting("normals", normals, at, 3)
+        )
+        rows["rgba"] = 255 if colours is None else rgba_bytes(colours, len(at))
+        if uv is not None:
+            rows["uv"] = _fitting("uv", uv, at, 2)
+        #: A row for each vertex.
+        self.rows: NDArray[Any] = rows
+        #: Numbers of vertices, three for each triangle.
+        self.faces: NDArray[np.uint32] = faces
+        #: Whether no vertex is translucent.
+        self.opaque = bool((rows["rgba"][:, 3] == 255).all())
+        #: Corners of the box around it.
+        self.box = _box_of(at[np.unique(faces)] if len(faces) else at[:0])
+
+
+def _fitting(name: str, given: ArrayLike, at: NDArray[Any], width: int) -> NDArray[np.float32]:
+    array = _checked(name, given, (width,))
+    if len(array) != len(at):
+        raise Error(f"{name}: expected {len(at)}, one for each vertex, got {len(array)}")
+    return np.nan_to_num(array, nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def _normals(at: NDArray[np.float32], faces: NDArray[np.uint32]) -> NDArray[np.float32]:
+    """Return the normals of vertices: the mean of their triangles', by area."""
+    a, b, c = at[faces[:, 0]], at[faces[:, 1]], at[faces[:, 2]]
+    flat = np.cross(b - a, c - a)
+    out = np.zeros_like(at)
+    for corner in range(3):
+        np.add.at(out, faces[:, corner], flat)
+    length = np.linalg.norm(out, axis=1, keepdims=True)
+    unit: NDArray[np.float32] = np.divide(out, length, out=np.zeros_like(out), where=length > 0)
+    return unit
+
+
+def instance_matrix(
+    position: Sequence[float] = (0.0, 0.0, 0.0),
+    rotation: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
+    scale: Sequence[float] | float = 1.0,
+) -> NDArray[np.float64]:
+    """Return the matrix of a place, a quaternion (x, y, z, w) and a scale.
+
+    A quaternion of length 0 is no rotation, others are normalised, as RViz does it.
+    """
+    x, y, z, w = (float(number) for number in rotation)
+    n = x * x + y * y + z * z + w * w
+    m = np.eye(4)
+    if n > 0 and math.isfinite(n):
+        s = 2.0 / n
+        m[0, 0], m[0, 1], m[0, 2] = (
+            1 - s * (y * y + z * z),
+            s * (x * y - z * w),
+            s * (x * z + y * w),
+        )
+        m[1, 0], m[1, 1], m[1, 2] = (
+            s * (x * y + z * w),
+            1 - s * (x * x + z * z),
+            s * (y * z - x * w),
+        )
+        m[2, 0], m[2, 1], m[2, 2] = (
+            s * (x * z - y * w),
+            s * (y * z + x * w),
+            1 - s * (x * x + y * y),
+        )
+    m[:3, :3] *= np.broadcast_to(np.asarray(scale, np.float64), 3)
+    m[:3, 3] = position
+    return m
+
+
+class Mesh(Drawable):
+    """A shape, drawn once or many times.
+
+    Attributes:
+        shape: What is drawn.
+        instances: A row for each time: matrix (float32, 16, column by column), RGBA (float32, 4).
+        lit: Whether the headlight shades it.
+        texture: Pixels (h, w, 4) of uint8, or None.
+        colour: RGBA, multiplied with that of vertices, instances and texture.
+    """
+
+    ROW = np.dtype([("matrix", "<f4", 16), ("rgba", "<f4", 4)])
+
+    def __init__(
+        self, shape: Shape, colour: Sequence[float] = (1.0, 1.0, 1.0, 1.0), *, lit: bool = True
+    ) -> None:
+        super().__init__()
+        self.shape, self.lit = shape, lit
+        self.colour = tuple(colour)
+        self.texture: NDArray[np.uint8] | None = None
+        self.texture_opaque = True
+        #: Counts textures, which are uploaded apart.
+        self.textures = 0
+        self.instances: NDArray[Any] = np.zeros(0, self.ROW)
+        self._opaque = True
+        self.set_instances(np.eye(4)[np.newaxis])
+
+    def set_instances(self, matrices: ArrayLike, colours: ArrayLike = (1.0, 1.0, 1.0, 1.0)) -> None:
+        """Draw it once for each matrix.
+
+        Args:
+            matrices: Shape (n, 4, 4); those that are not finite are left out.
+            colours: RGBA from 0 to 1, for each or all.
+        """
+        given = _checked("matrices", matrices, (4, 4))
+        rgba = np.broadcast_to(np.asarray(colours, np.float32), (len(given), 4))
+        good = np.isfinite(given).all(axis=(1, 2))
+        rows = np.zeros(int(good.sum()), self.ROW)
+        rows["matrix"] = given[good].transpose(0, 2, 1).reshape(-1, 16)
+        rows["rgba"] = np.clip(np.nan_to_num(rgba[good]), 0, 1)
+        self._opaque = bool((rows["rgba"][:, 3] >= OPAQUE).all())
+        self.instances = rows
+        self.count = len(rows) if len(self.shape.faces) else 0
+        self.changed(geometry=True)
+
+    def set_shape(self, shape: Shape) -> None:
+        """Draw another shape in the same places."""
+        self.shape = shape
+        self.count = len(self.instances) if len(shape.faces) else 0
+        self.changed(geometry=True)
+
+    def set_texture(self, pixels: NDArray[np.uint8] | None) -> None:
+        """Put an image of shape (h, w, 4) on it; None for none.
+
+        Raises:
+            Error: It has another shape, or more than 16384 rows or columns.
+        """
+        if pixels is not None and (
+            pixels.ndim != 3 or pixels.shape[2] != 4 or not 0 < max(pixels.shape) <= 16384
+        ):
+            raise Error(f"texture: expected up to 16384 x 16384 x 4 bytes, got {pixels.shape}")
+        self.texture = None if pixels is None else np.ascontiguousarray(pixels, np.uint8)
+        self.texture_opaque = pixels is None or bool((pixels[..., 3] == 255).all())
+        self.textures += 1
+        self.changed()
+
+    def set_look(self, *, colour: Sequence[float] | None = None, lit: bool | None = None) -> None:
+        """Change the colour, RGBA from 0 to 1, or whether it is lit."""
+        before = self.colour, self.lit
+        self.colour = self.colour if colour is None else tuple(colour)
+        self.lit = self.lit if lit is None else lit
+        if before != (self.colour, self.lit):
+            self.changed()
+
+    @property
+    def opaque(self) -> bool:
+        """Whether nothing behind it shines through."""
+        return (
+            self._opaque and self.shape.opaque and self.texture_opaque and self.colour[3] >= OPAQUE
+        )
+
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Return the corners of the box around it in its own frame; None for nothing finite."""
+        if self.shape.box is None or not self.count:
+            return None
+        low, high = self.shape.box
+        corners = np.array(
+            [
+                [x, y, z, 1.0]
+                for x in (low[0], high[0])
+                for y in (low[1], high[1])
+                for z in (low[2], high[2])
+            ]
+        )
+        matrices = self.instances["matrix"].reshape(-1, 4, 4).transpose(0, 2, 1)
+        return _box_of((matrices @ corners.T).transpose(0, 2, 1)[..., :3].reshape(-1, 3))
+
+
+class MapImage(Drawable):
+    """A rectangle of cells in the plane z = 0, each an index into a palette.
+
+    Attributes:
+        cells: (rows, columns) of uint8; row 0 is at y = 0, column 0 at x = 0.
+        palette: (256, 4) RGBA bytes.
+        size: Metres in x and y.
+        alpha: Opacity, 0 to 1.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.cells: NDArray[np.uint8] = np.zeros((0, 0), np.uint8)
+        self.palette: NDArray[np.uint8] = np.zeros((256, 4), np.uint8)
+        self.size = (0.0, 0.0)
+        self.alpha = 1.0
+        self.layer = -1
+
+    def set_cells(self, cells: NDArray[np.uint8], resolution: float) -> None:
+        """Take cells of a size in metres.
+
+        Raises:
+            Error: They are not bytes in two dimensions of up to 16384, or the size is not positive.
+        """
+        if cells.ndim != 2 or cells.dtype != np.uint8 or max(cells.shape, default=0) > 16384:
+            raise Error(f"expected up to 16384 x 16384 cells, got {cells.shape} of {cells.dtype}")
+        if not (math.isfinite(resolution) and resolution > 0):
+            raise Error(f"resolution: expected a positive number of metres, got {resolution}")
+        self.cells = np.ascontiguousarray(cells)
+        self.size = (cells.shape[1] * resolution, cells.shape[0] * resolution)
+        self.count = int(cells.size > 0)
+        self.changed(geometry=True)
+
+    def set_palette(self, palette: NDArray[np.uint8]) -> None:
+        """Take the colours, (256, 4) RGBA bytes."""
+        if palette.shape != (256, 4) or palette.dtype != np.uint8:
+            raise Error(f"palette: expected 256 x 4 bytes, got {palette.shape} of {palette.dtype}")
+        self.palette = np.ascontiguousarray(palette)
+        self.changed(geometry=True)
+
+    def set_look(self, *, alpha: float | None = None, below: bool | None = None) -> None:
+        """Change the opacity, or whether it is drawn below all else that is translucent."""
+        before = self.alpha, self.layer
+        self.alpha = self.alpha if alpha is None else alpha
+        self.layer = self.layer if below is None else -2 if below else -1
+        if before != (self.alpha, self.layer):
+            self.changed()
+
+    @property
+    def opaque(self) -> bool:
+        """Whether nothing behind it shines through."""
+        return self.alpha >= OPAQUE and bool((self.palette[:, 3] == 255).all())
+
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Return the corners of the box around it in its own frame; None for nothing finite."""
+        return (np.zeros(3), np.array([*self.size, 0.0])) if self.count else None
+
+
+class Labels(Drawable):
+    """Texts that face the viewer.
+
+    Attributes:
+        texts: One for each; several lines are allowed.
+        positions: (n, 3), metres; where the middle of each is, or its left edge.
+        heights: Of a line, in metres, or in pixels of the screen.
+        colours: (n, 4) RGBA bytes.
+        in_pixels: Whether `heights` are pixels.
+        align: ``centre`` or ``left``.
+    """
+
+    MAX_LENGTH = 1000
+    MAX_COUNT = 2000
+
+    def __init__(self, *, in_pixels: bool = False, align: str = "centre") -> None:
+        super().__init__()
+        self.texts: tuple[str, ...] = ()
+        self.positions: NDArray[np.float32] = np.zeros((0, 3), np.float32)
+        self.heights: NDArray[np.float32] = np.zeros(0, np.float32)
+        self.colours: NDArray[np.uint8] = np.zeros((0, 4), np.uint8)
+        self.in_pixels, self.align, self.alpha = in_pixels, align, 1.0
+        #: Counts changes of the texts, which are painted anew.
+        self.texts_changed = 0
+
+    def set_texts(
+        self,
+        texts: Sequence[str],
+        positions: ArrayLike,
+        heights: ArrayLike = 0.1,
+        colours: ArrayLike = (1.0, 1.0, 1.0, 1.0),
+    ) -> None:
+        """Take texts, positions (n, 3), heights and colours for each or all.
+
+        Raises:
+            Error: There are not as many positions, or more than 2000.
+        """
+        at = _checked("positions", positions, (3,))
+        if len(at) != len(texts) or len(texts) > self.MAX_COUNT:
+            raise Error(
+                f"expected up to {self.MAX_COUNT} texts with a position each, got "
+                f"{len(texts)} and {len(at)}"
+            )
+        cut = tuple(text[: self.MAX_LENGTH] for text in texts)
+        if cut != self.texts:
+            self.texts = cut
+            self.texts_changed += 1
+        self.positions = at
+        self.heights = np.broadcast_to(np.asarray(heights, np.float32), len(at)).copy()
+        self.colours = rgba_bytes(colours, len(at))
+        self.count = len(at)
+        self.changed(geometry=True)
+
+    @property
+    def opaque(self) -> bool:
+        """Whether nothing behind it shines through: never, for the edges of letters are soft."""
+        return False
+
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Return the corners of the box around it in its own frame; None for nothing finite."""
+        return _box_of(self.positions)
+
+
+# -- shapes ----------------------------------------------------------------------------------------
+
+
+def _box_shape() -> Shape:
+    corners, normals = [], []
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            u, v = (axis + 1) % 3, (axis + 2) % 3
+            quad = [(-side, -1), (side, -1), (side, 1), (-side, 1)]
+            for a, b in quad:
+                at = [0.0, 0.0, 0.0]
+                at[axis], at[u], at[v] = side * 0.5, a * 0.5, b * 0.5
+                corners.append(at)
+                normals.append([side * (n == axis) for n in range(3)])
+    first = 4 * np.arange(6)[:, np.newaxis]
+    faces = np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])])
+    return Shape(corners, normals, faces)
+
+
+def _turned(profile: list[tuple[float, float, float, float]], around: int = 32) -> Shape:
+    """Return a shape turned around z: a profile of (radius, z, normal outward, normal along z)."""
+    angles = np.linspace(0, 2 * np.pi, around + 1)
+    c, s = np.cos(angles), np.sin(angles)
+    at = [np.stack([r * c, r * s, np.full_like(c, z)], axis=1) for r, z, _, _ in profile]
+    normal = [np.stack([n * c, n * s, np.full_like(c, m)], axis=1) for _, _, n, m in profile]
+    faces = []
+    for ring in range(len(profile) - 1):
+        if profile[ring][:2] == profile[ring + 1][:2]:
+            continue  # a sharp edge: the same ring twice, with two normals
+        a = ring * (around + 1) + np.arange(around)
+        b = a + around + 1
+        faces += [np.stack([a, a + 1, b + 1], axis=1), np.stack([a, b + 1, b], axis=1)]
+    return Shape(np.concatenate(at), np.concatenate(normal), np.concatenate(faces))
+
+
+def _sphere_shape(rings: int = 16) -> Shape:
+    tilt = np.linspace(-np.pi / 2, np.pi / 2, rings + 1)
+    return _turned(
+        [(0.5 * math.cos(t), 0.5 * math.sin(t), math.cos(t), math.sin(t)) for t in tilt], 2 * rings
+    )
+
+
+#: One metre in every direction, around the origin.
+BOX = _box_shape()
+#: Of one metre in diameter, around the origin.
+SPHERE = _sphere_shape()
+#: Of one metre in diameter and height, around the origin, along z.
+CYLINDER = _turned(
+    [
+        (0, -0.5, 0, -1),
+        (0.5, -0.5, 0, -1),
+        (0.5, -0.5, 1, 0),
+        (0.5, 0.5, 1, 0),
+        (0.5, 0.5, 0, 1),
+        (0, 0.5, 0, 1),
+    ]
+)
+_SLOPE = math.hypot(1, 0.5)
+#: Of one metre in diameter and height, from z = 0 to its tip at z = 1.
+CONE = _turned(
+    [
+        (0, 0, 0, -1),
+        (0.5, 0, 0, -1),
+        (0.5, 0, 1 / _SLOPE, 0.5 / _SLOPE),
+        (0, 1, 1 / _SLOPE, 0.5 / _SLOPE),
+    ]
+)

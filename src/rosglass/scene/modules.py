@@ -1,0 +1,43 @@
+"""Registers the QML module ``RosScene 1.0``."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from typing import Any
+
+from PySide6.QtQml import qmlRegisterType
+
+from rosglass.scene.displays.grid import AxesDisplay, GridDisplay
+from rosglass.scene.displays.map import GridCellsDisplay, MapDisplay
+from rosglass.scene.displays.path import PathDisplay
+from rosglass.scene.displays.tf import TFDisplay
+from rosglass.scene.scene import Scene
+from rosglass.scene.scene_view import SceneView
+
+__all__ = ["DISPLAYS", "register"]
+
+#: The displays; in QML, each has the name of its class.
+DISPLAYS = (
+    AxesDisplay,
+    GridCellsDisplay,
+    GridDisplay,
+    MapDisplay,
+    PathDisplay,
+    TFDisplay,
+)
+Scene.TYPES.update({display.TYPE: display for display in DISPLAYS})
+
+
+@cache
+def register() -> None:
+    """Register the types with Qt; only the first call has an effect.
+
+    Call it before the first window: with Qt's threaded render loop, Python code in the GUI thread
+    that waits for the render thread would wait for ever, as that needs the GIL.
+    """
+    os.environ.setdefault("QSG_RENDER_LOOP", "basic")
+    # PySide takes texts for names, which its hints do not say.
+    register_type: Any = qmlRegisterType
+    for kind in (SceneView, *DISPLAYS):
+        register_type(kind, "RosScene", 1, 0, kind.__name__)

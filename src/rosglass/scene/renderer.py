@@ -1,0 +1,850 @@
+"""Draws a scene with QRhi: OpenGL, Vulkan, Metal or Direct3D; the only file that touches it.
+
+One :class:`SceneRenderer` belongs to one view. In :meth:`~SceneRenderer.synchronize` the GUI thread
+waits; it takes a :class:`Frame`, the list of what is to be drawn. :meth:`~SceneRenderer.render`
+uploads what has
+changed and draws it. What is not in the list any more is freed.
+
+What PySide needs (found in 6.8 and 6.11): data goes over as ``VoidPtr``; resources of QRhi are
+freed with ``deleteLater()`` only; an exception in :meth:`render` must never leave an update batch
+or a pass open.
+"""
+
+from __future__ import annotations
+
+import logging
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from PySide6.QtCore import QByteArray, QSize, Qt
+from PySide6.QtGui import (
+    QColor,
+    QFont,
+    QFontMetricsF,
+    QImage,
+    QPainter,
+    QRhi,
+    QRhiBuffer,
+    QRhiCommandBuffer,
+    QRhiDepthStencilClearValue,
+    QRhiGraphicsPipeline,
+    QRhiSampler,
+    QRhiShaderResourceBinding,
+    QRhiShaderStage,
+    QRhiTexture,
+    QRhiTextureSubresourceUploadDescription,
+    QRhiTextureUploadDescription,
+    QRhiTextureUploadEntry,
+    QRhiVertexInputAttribute,
+    QRhiVertexInputBinding,
+    QRhiVertexInputLayout,
+    QRhiViewport,
+    QShader,
+)
+from PySide6.QtQuick import QQuickRhiItemRenderer
+from shiboken6 import Shiboken
+
+from rosglass.scene.drawing import Labels, Lines, MapImage, Mesh, Points
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+    from PySide6.QtGui import QRhiResourceUpdateBatch
+    from PySide6.QtQuick import QQuickRhiItem
+
+    from rosglass.scene.camera import Camera
+    from rosglass.scene.drawing import Drawable, Shape
+
+__all__ = ["Frame", "SceneRenderer"]
+
+_log = logging.getLogger("rosglass.scene")
+
+_SHADERS = Path(__file__).with_name("shaders")
+_STAGES = (
+    QRhiShaderResourceBinding.StageFlag.VertexStage
+    | QRhiShaderResourceBinding.StageFlag.FragmentStage
+)
+_FRAGMENT = QRhiShaderResourceBinding.StageFlag.FragmentStage
+_Format = QRhiVertexInputAttribute.Format
+_PerInstance = QRhiVertexInputBinding.Classification.PerInstance
+_Topology = QRhiGraphicsPipeline.Topology
+#: In the names of drivers that draw with the processor.
+_SOFTWARE = ("llvmpipe", "lavapipe", "softpipe", "swiftshader", "basic render")
+#: Bytes of the blocks in shaders/frame.glsl.
+_FRAME_BYTES, _OBJECT_BYTES = 144, 144
+#: Metres from the origin of what is drawn at which the origin moves: 32 bits stay exact to 0.1 mm.
+_ORIGIN_STEP_M = 1000.0
+#: Points that software draws while the camera moves: more are thinned out.
+MOVING_POINTS = 60_000
+_MODES = {"flat": 0.0, "bgra": 1.0, "rainbow": 2.0, "gradient": 3.0, "axis": 4.0}
+_INDEX_UINT32 = QRhiCommandBuffer.IndexFormat.IndexUInt32
+#: Pixels of a line of text in the image of labels.
+_LINE_PX = 32
+
+
+class Frame(NamedTuple):
+    """What one picture shows.
+
+    Attributes:
+        drawables: Drawable, pose in the fixed frame, opacity of its groups.
+        camera: From where.
+        background: Behind everything; its alpha below 1 lets other items shine through.
+        pixel_ratio: Pixels for each unit of the screen.
+        moving: Whether the camera is being moved, so that speed counts more than completeness.
+    """
+
+    drawables: Sequence[tuple[Drawable, NDArray[np.float64], float]]
+    camera: Camera
+    background: QColor
+    pixel_ratio: float = 1.0
+    moving: bool = False
+
+
+@cache
+def _shader(name: str) -> QShader:
+    return QShader.fromSerialized(QByteArray((_SHADERS / f"{name}.qsb").read_bytes()))
+
+
+def _pointer(array: NDArray[Any]) -> Any:
+    pointer: Any = Shiboken.VoidPtr
+    return pointer(array.ctypes.data, array.nbytes)
+
+
+class _Device:
+    """The graphics interface of a window, with what all drawables share on it.
+
+    Args:
+        rhi: Qt's.
+        samples: Samples for each pixel of the target.
+        target: What is drawn into.
+    """
+
+    def __init__(self, rhi: QRhi, samples: int, target: Any) -> None:
+        self.rhi, self.samples, self.target = rhi, samples, target
+        driver = rhi.driverInfo()  # its name lives no longer than it
+        name = bytes(driver.deviceName.data()).decode(errors="replace").lower()
+        #: Whether the processor draws.
+        self.is_software = any(word in name for word in _SOFTWARE)
+        self.has_point_size = rhi.isFeatureSupported(QRhi.Feature.VertexShaderPointSize)
+        self.largest_texture = rhi.resourceLimit(QRhi.ResourceLimit.TextureSizeMax)
+        self.correction = np.array(rhi.clipSpaceCorrMatrix().copyDataTo(), np.float64).reshape(4, 4)
+        self._resources: set[Any] = set()
+        self._pipelines: dict[Any, QRhiGraphicsPipeline] = {}
+        self.frame_block = self.uniform(_FRAME_BYTES)
+        self.smooth = self._sampler(QRhiSampler.Filter.Linear, QRhiSampler.AddressMode.Repeat)
+        self.sharp = self._sampler(QRhiSampler.Filter.Nearest, QRhiSampler.AddressMode.ClampToEdge)
+        self.white: QRhiTexture | None = None
+        self.shapes: dict[Shape, _ShapeBuffers] = {}
+
+    def keep(self, resource: Any) -> Any:
+        """Create a resource, and free it with the device at the latest.
+
+        Raises:
+            MemoryError: The graphics interface refuses it.
+        """
+        self._resources.add(resource)
+        if not resource.create():
+            self.free(resource)
+            raise MemoryError(f"the graphics interface refused a {type(resource).__name__}")
+        return resource
+
+    def free(self, *resources: Any) -> None:
+        """Free resources; None is allowed."""
+        for resource in resources:
+            if resource is not None and resource in self._resources:
+                self._resources.discard(resource)
+                resource.deleteLater()
+
+    def close(self) -> None:
+        """Free everything."""
+        for resource in list(self._resources):
+            self.free(resource)
+        self._pipelines.clear()
+        self.shapes.clear()
+
+    def _sampler(self, kind: Any, mode: Any) -> Any:
+        return self.keep(self.rhi.newSampler(kind, kind, QRhiSampler.Filter.None_, mode, mode))
+
+    def uniform(self, size: int) -> QRhiBuffer:
+        """Return a small block for shaders."""
+        made: QRhiBuffer = self.keep(
+            self.rhi.newBuffer(QRhiBuffer.Type.Dynamic, QRhiBuffer.UsageFlag.UniformBuffer, size)
+        )
+        return made
+
+    def fill(
+        self,
+        batch: QRhiResourceUpdateBatch,
+        buffer: QRhiBuffer | None,
+        array: NDArray[Any],
+        usage: Any = QRhiBuffer.UsageFlag.VertexBuffer,
+    ) -> QRhiBuffer:
+        """Upload an array, into the same buffer if it is large enough and not much too large."""
+        size = max(array.nbytes, 16)
+        if buffer is None or not size <= buffer.size() <= 4 * size:
+            self.free(buffer)
+            buffer = self.keep(self.rhi.newBuffer(QRhiBuffer.Type.Static, usage, size))
+        assert buffer is not None
+        if array.nbytes:
+            batch.uploadStaticBuffer(buffer, 0, array.nbytes, _pointer(array))
+        return buffer
+
+    def texture(
+        self, batch: QRhiResourceUpdateBatch, pixels: NDArray[np.uint8], old: QRhiTexture | None
+    ) -> QRhiTexture:
+        """Upload an image of (h, w) or (h, w, 4) bytes; one that is too large is thinned out."""
+        step = -(-max(pixels.shape[:2]) // self.largest_texture)
+        if step > 1:
+            pixels = np.ascontiguousarray(pixels[::step, ::step])
+        height, width = pixels.shape[:2]
+        kind = QRhiTexture.Format.R8 if pixels.ndim == 2 else QRhiTexture.Format.RGBA8
+        size = QSize(width, height)
+        if old is None or old.pixelSize() != size or old.format() != kind:
+            self.free(old)
+            old = self.keep(self.rhi.newTexture(kind, size))
+        assert old is not None
+        part = QRhiTextureSubresourceUploadDescription(QByteArray(pixels.tobytes()))
+        part.setDataStride(pixels.strides[0])
+        entry = QRhiTextureUploadEntry(0, 0, part)
+        batch.uploadTexture(old, QRhiTextureUploadDescription(entry))
+        return old
+
+    def white_texture(self, batch: QRhiResourceUpdateBatch) -> QRhiTexture:
+        """Return what is bound where there is no image."""
+        if self.white is None:
+            self.white = self.texture(batch, np.full((1, 1, 4), 255, np.uint8), None)
+        return self.white
+
+    def bindings(self, block: QRhiBuffer, *images: tuple[QRhiTexture, QRhiSampler]) -> Any:
+        """Return what a drawable's shaders read: the frame's block, its own, its images."""
+        binding = QRhiShaderResourceBinding
+        made = self.rhi.newShaderResourceBindings()
+        made.setBindings(
+            [
+                binding.uniformBuffer(0, _STAGES, self.frame_block),
+                binding.uniformBuffer(1, _STAGES, block),
+                *(
+                    binding.sampledTexture(2 + at, _FRAGMENT, texture, sampler)
+                    for at, (texture, sampler) in enumerate(images)
+                ),
+            ]
+        )
+        return self.keep(made)
+
+    def pipeline(
+        self,
+        shaders: tuple[str, str],
+        layout: tuple[tuple[tuple[int, bool], ...], tuple[tuple[int, int, Any, int], ...]],
+        topology: Any,
+        blend: bool,
+        bindings: Any,
+    ) -> QRhiGraphicsPipeline:
+        """Return a pipeline, made when it is first needed.
+
+        Args:
+            shaders: Names of the vertex and the fragment shader.
+            layout: Stride and "per instance" of each buffer; buffer, location, format and offset of
+                each attribute.
+            topology: What the vertices are.
+            blend: Whether it is translucent; it does not hide what is behind it then.
+            bindings: Of any drawable of this kind.
+        """
+        key = (shaders, layout, topology, blend)
+        if key in self._pipelines:
+            return self._pipelines[key]
+        made = self.rhi.newGraphicsPipeline()
+        kinds = (QRhiShaderStage.Type.Vertex, QRhiShaderStage.Type.Fragment)
+        made.setShaderStages(
+            [
+                QRhiShaderStage(kind, _shader(name))
+                for kind, name in zip(kinds, shaders, strict=True)
+            ]
+        )
+        buffers, attributes = layout
+        inputs = QRhiVertexInputLayout()
+        inputs.setBindings(
+            [
+                QRhiVertexInputBinding(stride, _PerInstance)
+                if each
+                else QRhiVertexInputBinding(stride)
+                for stride, each in buffers
+            ]
+        )
+        inputs.setAttributes([QRhiVertexInputAttribute(*attribute) for attribute in attributes])
+        made.setVertexInputLayout(inputs)
+        made.setTopology(topology)
+        made.setDepthTest(True)
+        made.setDepthWrite(not blend)
+        made.setDepthOp(QRhiGraphicsPipeline.CompareOp.LessOrEqual)
+        # Premultiplied: what Qt Quick expects of an item, opaque or not.
+        mix: Any = QRhiGraphicsPipeline.TargetBlend()
+        mix.enable = blend
+        mix.srcColor = mix.srcAlpha = QRhiGraphicsPipeline.BlendFactor.One
+        mix.dstColor = mix.dstAlpha = QRhiGraphicsPipeline.BlendFactor.OneMinusSrcAlpha
+        made.setTargetBlends([mix])
+        made.setSampleCount(self.samples)
+        made.setShaderResourceBindings(bindings)
+        made.setRenderPassDescriptor(self.target.renderPassDescriptor())
+        self._pipelines[key] = self.keep(made)
+        return made
+
+
+class _ShapeBuffers:
+    """Vertices and triangles of a shape on the device, shared by all meshes that draw it."""
+
+    def __init__(self, device: _Device, batch: QRhiResourceUpdateBatch, shape: Shape) -> None:
+        self.vertices = device.fill(batch, None, shape.rows)
+        self.indices = device.fill(batch, None, shape.faces, QRhiBuffer.UsageFlag.IndexBuffer)
+        self.count = shape.faces.size
+        self.users = 0
+
+
+_QUAD = _Topology.TriangleStrip
+_SHAPE_LAYOUT = (
+    (0, 0, _Format.Float3, 0),
+    (0, 1, _Format.Float3, 12),
+    (0, 2, _Format.Float2, 24),
+    (0, 3, _Format.UNormByte4, 32),
+    *((1, 4 + column, _Format.Float4, 16 * column) for column in range(5)),
+)
+
+
+class _Pass(NamedTuple):
+    """One picture that is being drawn.
+
+    Attributes:
+        commands: Where drawing is recorded.
+        viewport: All of the target.
+        thin: Of points, only every `thin`-th is drawn.
+    """
+
+    commands: QRhiCommandBuffer
+    viewport: QRhiViewport
+    thin: int
+
+
+class _OnDevice:
+    """One drawable on the device: a class for each kind gives what it uploads and draws."""
+
+    def __init__(self, device: _Device, drawable: Any) -> None:
+        self.device, self.drawable = device, drawable
+        self.block = device.uniform(_OBJECT_BYTES)
+        self._geometry = self._look = -1
+        self._placed: Any = None
+        self.seen = True
+        self.bound: Any = None
+
+    def prepare(
+        self,
+        batch: QRhiResourceUpdateBatch,
+        place: NDArray[np.float64],
+        alpha: float,
+    ) -> None:
+        """Upload what has changed."""
+        drawable = self.drawable
+        if self._geometry != drawable.geometry:
+            self.upload(batch)
+            self._geometry = drawable.geometry
+        key = (alpha, drawable.look, place.tobytes())
+        if key != self._placed:
+            self._placed = key
+            block = np.zeros(_OBJECT_BYTES // 4, np.float32)
+            block[:16] = place.T.reshape(-1)
+            self.fill_block(block[16:].reshape(5, 4), alpha)
+            batch.updateDynamicBuffer(self.block, 0, block.nbytes, _pointer(block))
+
+    def upload(self, batch: QRhiResourceUpdateBatch) -> None:
+        """Upload the data."""
+        raise NotImplementedError
+
+    def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
+        """Fill colour, a, b, c, d of the shader's block."""
+        raise NotImplementedError
+
+    def draw(self, run: _Pass, blend: bool) -> None:
+        """Draw it."""
+        raise NotImplementedError
+
+    def begin(self, run: _Pass, pipeline: Any) -> None:
+        """Set pipeline, viewport (on Vulkan only after the pipeline) and bindings."""
+        run.commands.setGraphicsPipeline(pipeline)
+        run.commands.setViewport(run.viewport)
+        run.commands.setShaderResources(self.bound)
+
+    def close(self) -> None:
+        """Free everything."""
+        self.device.free(self.block, self.bound)
+
+
+class _PointsOnDevice(_OnDevice):
+    def __init__(self, device: _Device, drawable: Points) -> None:
+        super().__init__(device, drawable)
+        self._buffer: Any = None
+        self.bound = device.bindings(self.block)
+
+    def upload(self, batch: QRhiResourceUpdateBatch) -> None:
+        points = self.drawable
+        self._buffer = self.device.fill(
+            batch, self._buffer, points.data[: points.count * points.stride]
+        )
+
+    def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
+        points = self.drawable
+        paint = points.colouring
+        block[0] = (1, 1, 1, points.alpha * alpha)
+        block[1] = (_MODES[paint.mode], paint.low, paint.high, paint.invert)
+        block[2] = (*paint.first, points.size)
+        block[3] = (*paint.last, points.style != "points")
+        block[4] = paint.axis
+
+    def draw(self, run: _Pass, blend: bool) -> None:
+        points = self.drawable
+        native = points.style == "points" and self.device.has_point_size
+        vertex = "points" if native else "boxes" if points.style == "boxes" else "quads"
+        fragment = "spheres" if points.style == "spheres" else "flat"
+        channel = points.channel if points.channel >= 0 else points.position
+        layout = (
+            ((points.stride * run.thin, not native),),
+            (
+                (0, 0, _Format.Float3, points.position),
+                (0, 1, _Format.UNormByte4 if points.channel_is_bytes else _Format.Float, channel),
+            ),
+        )
+        topology = (
+            _Topology.Points if native else _Topology.Triangles if vertex == "boxes" else _QUAD
+        )
+        pipeline = self.device.pipeline(
+            (f"{vertex}.vert", f"{fragment}.frag"), layout, topology, blend, self.bound
+        )
+        self.begin(run, pipeline)
+        run.commands.setVertexInput(0, [(self._buffer, 0)])
+        count = -(-points.count // run.thin)
+        if native:
+            run.commands.draw(count)
+        else:
+            run.commands.draw(36 if vertex == "boxes" else 4, count)
+
+    def close(self) -> None:
+        super().close()
+        self.device.free(self._buffer)
+
+
+class _LinesOnDevice(_OnDevice):
+    _LAYOUT = (
+        ((32, True),),
+        (
+            (0, 0, _Format.Float3, 0),
+            (0, 1, _Format.Float3, 12),
+            (0, 2, _Format.UNormByte4, 24),
+            (0, 3, _Format.UNormByte4, 28),
+        ),
+    )
+
+    def __init__(self, device: _Device, drawable: Lines) -> None:
+        super().__init__(device, drawable)
+        self._buffer: Any = None
+        self.bound = device.bindings(self.block)
+
+    def upload(self, batch: QRhiResourceUpdateBatch) -> None:
+        self._buffer = self.device.fill(batch, self._buffer, self.drawable.rows)
+
+    def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
+        block[0] = (1, 1, 1, self.drawable.alpha * alpha)
+        block[1] = (self.drawable.width, self.drawable.in_metres, 0, 0)
+
+    def draw(self, run: _Pass, blend: bool) -> None:
+        pipeline = self.device.pipeline(
+            ("lines.vert", "flat.frag"), self._LAYOUT, _QUAD, blend, self.bound
+        )
+        self.begin(run, pipeline)
+        run.commands.setVertexInput(0, [(self._buffer, 0)])
+        run.commands.draw(4, self.drawable.count)
+
+    def close(self) -> None:
+        super().close()
+        self.device.free(self._buffer)
+
+
+class _MeshOnDevice(_OnDevice):
+    def __init__(self, device: _Device, drawable: Mesh) -> None:
+        super().__init__(device, drawable)
+        self._instances: Any = None
+        self._shape: Shape | None = None
+        self._texture: QRhiTexture | None = None
+        self._textures = -1
+
+    def prepare(
+        self, batch: QRhiResourceUpdateBatch, place: NDArray[np.float64], alpha: float
+    ) -> None:
+        mesh = self.drawable
+        if self._textures != mesh.textures:
+            self._textures = mesh.textures
+            self.device.free(self.bound)
+            if mesh.texture is None:
+                self.device.free(self._texture)
+                self._texture = None
+            else:
+                self._texture = self.device.texture(batch, mesh.texture, self._texture)
+            image = self._texture or self.device.white_texture(batch)
+            self.bound = self.device.bindings(self.block, (image, self.device.smooth))
+        super().prepare(batch, place, alpha)
+
+    def upload(self, batch: QRhiResourceUpdateBatch) -> None:
+        shape = self.drawable.shape
+        if shape is not self._shape:
+            if shape not in self.device.shapes:
+                self.device.shapes[shape] = _ShapeBuffers(self.device, batch, shape)
+            self.device.shapes[shape].users += 1
+            self._leave_shape()
+            self._shape = shape
+        self._instances = self.device.fill(batch, self._instances, self.drawable.instances)
+
+    def _leave_shape(self) -> None:
+        shared = self.device.shapes.get(self._shape) if self._shape is not None else None
+        if shared is not None:
+            shared.users -= 1
+            if not shared.users:
+                self.device.free(shared.vertices, shared.indices)
+                assert self._shape is not None
+                del self.device.shapes[self._shape]
+        self._shape = None
+
+    def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
+        red, green, blue, own = self.drawable.colour
+        block[0] = (red, green, blue, own * alpha)
+        block[1, 0] = self.drawable.lit
+
+    def draw(self, run: _Pass, blend: bool) -> None:
+        assert self._shape is not None
+        shape = self.device.shapes[self._shape]
+        pipeline = self.device.pipeline(
+            ("mesh.vert", "mesh.frag"),
+            (((36, False), (80, True)), _SHAPE_LAYOUT),
+            _Topology.Triangles,
+            blend,
+            self.bound,
+        )
+        self.begin(run, pipeline)
+        run.commands.setVertexInput(
+            0,
+            [(shape.vertices, 0), (self._instances, 0)],
+            shape.indices,
+            0,
+            _INDEX_UINT32,
+        )
+        run.commands.drawIndexed(shape.count, self.drawable.count)
+
+    def close(self) -> None:
+        super().close()
+        self._leave_shape()
+        self.device.free(self._instances, self._texture)
+
+
+class _MapOnDevice(_OnDevice):
+    def __init__(self, device: _Device, drawable: MapImage) -> None:
+        super().__init__(device, drawable)
+        self._cells: QRhiTexture | None = None
+        self._palette: QRhiTexture | None = None
+        self._sent: Any = None
+
+    def upload(self, batch: QRhiResourceUpdateBatch) -> None:
+        drawable, device = self.drawable, self.device
+        if self._sent is None or self._sent[0] is not drawable.cells:
+            self._cells = device.texture(batch, drawable.cells, self._cells)
+        if self._sent is None or self._sent[1] is not drawable.palette:
+            self._palette = device.texture(batch, drawable.palette[np.newaxis], self._palette)
+        self._sent = drawable.cells, drawable.palette
+        assert self._cells is not None
+        assert self._palette is not None
+        device.free(self.bound)
+        self.bound = device.bindings(
+            self.block, (self._cells, device.sharp), (self._palette, device.sharp)
+        )
+
+    def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
+        block[0] = (1, 1, 1, self.drawable.alpha * alpha)
+        block[1, :2] = self.drawable.size
+
+    def draw(self, run: _Pass, blend: bool) -> None:
+        pipeline = self.device.pipeline(
+            ("map.vert", "map.frag"), ((), ()), _QUAD, blend, self.bound
+        )
+        self.begin(run, pipeline)
+        run.commands.draw(4)
+
+    def close(self) -> None:
+        super().close()
+        self.device.free(self._cells, self._palette)
+
+
+class _LabelsOnDevice(_OnDevice):
+    ROW = np.dtype(
+        [("position", "<f4", 3), ("size", "<f4", 2), ("place", "<f4", 4), ("rgba", "u1", 4)]
+    )
+    _LAYOUT = (
+        ((ROW.itemsize, True),),
+        (
+            (0, 0, _Format.Float3, 0),
+            (0, 1, _Format.Float2, 12),
+            (0, 2, _Format.Float4, 20),
+            (0, 3, _Format.UNormByte4, 36),
+        ),
+    )
+
+    def __init__(self, device: _Device, drawable: Labels) -> None:
+        super().__init__(device, drawable)
+        self._buffer: Any = None
+        self._texture: QRhiTexture | None = None
+        self._painted = -1
+        self._places: NDArray[np.float32] = np.zeros((0, 4), np.float32)
+        self._shapes: NDArray[np.float32] = np.zeros((0, 2), np.float32)
+
+    def upload(self, batch: QRhiResourceUpdateBatch) -> None:
+        labels = self.drawable
+        if self._painted != labels.texts_changed:
+            self._painted = labels.texts_changed
+            pixels, self._places, self._shapes = _paint_texts(
+                labels.texts, min(self.device.largest_texture, 4096)
+            )
+            self._texture = self.device.texture(batch, pixels, self._texture)
+            self.device.free(self.bound)
+            self.bound = self.device.bindings(self.block, (self._texture, self.device.smooth))
+        rows = np.zeros(labels.count, self.ROW)
+        rows["position"] = np.nan_to_num(labels.positions, nan=0.0, posinf=0.0, neginf=0.0)
+        # One that has no place is not shown.
+        shown = np.isfinite(labels.positions).all(axis=1)
+        rows["size"] = self._shapes * labels.heights[:, np.newaxis] * shown[:, np.newaxis]
+        rows["place"], rows["rgba"] = self._places, labels.colours
+        self._buffer = self.device.fill(batch, self._buffer, rows)
+
+    def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
+        block[0] = (1, 1, 1, self.drawable.alpha * alpha)
+        block[1, :2] = (self.drawable.in_pixels, self.drawable.align == "left")
+
+    def draw(self, run: _Pass, blend: bool) -> None:
+        pipeline = self.device.pipeline(
+            ("labels.vert", "labels.frag"), self._LAYOUT, _QUAD, blend, self.bound
+        )
+        self.begin(run, pipeline)
+        run.commands.setVertexInput(0, [(self._buffer, 0)])
+        run.commands.draw(4, self.drawable.count)
+
+    def close(self) -> None:
+        super().close()
+        self.device.free(self._buffer, self._texture)
+
+
+def _paint_texts(
+    texts: Sequence[str], limit: int
+) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.float32]]:
+    """Paint texts into one image.
+
+    Args:
+        texts: The texts.
+        limit: Largest width and height of the image, in pixels.
+
+    Returns:
+        The image (h, w), one byte for each pixel; place of each text as shares of it (left, top,
+        width, height); width and height of each in lines.
+    """
+    font = QFont("DejaVu Sans")
+    font.setPixelSize(int(_LINE_PX * 0.75))
+    metrics = QFontMetricsF(font)
+    boxes = []
+    for text in texts:
+        lines = text.split("\n") or [""]
+        wide = max(metrics.horizontalAdvance(line) for line in lines)
+        boxes.append((min(int(wide) + 5, limit - 2), min(len(lines) * _LINE_PX, limit - 2)))
+    places, x, y, row, width = [], 0, 0, 0, 1
+    for wide, high in boxes:
+        if x and x + wide > limit // 2:
+            x, y, row = 0, y + row, 0
+        places.append((x, y))
+        x, row, width = x + wide, max(row, high), max(width, x + wide)
+    height = min(max(y + row, 1), limit)
+    width = min(width, limit)
+    image = QImage(width, height, QImage.Format.Format_Alpha8)
+    image.fill(0)
+    painter = QPainter(image)
+    painter.setFont(font)
+    painter.setPen(Qt.GlobalColor.white)
+    for text, (left, top), (wide, high) in zip(texts, places, boxes, strict=True):
+        painter.setClipRect(left, top, wide, high)
+        painter.drawText(
+            left + 2,
+            top,
+            wide,
+            high,
+            Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter,
+            text,
+        )
+    painter.end()
+    view = np.frombuffer(image.constBits(), np.uint8).reshape(height, image.bytesPerLine())
+    sizes = np.array(boxes, np.float32).reshape(-1, 2)
+    shares: NDArray[np.float32] = np.concatenate(
+        [np.array(places, np.float32).reshape(-1, 2), sizes], axis=1
+    )
+    shares /= np.array([width, height, width, height], np.float32)
+    return np.ascontiguousarray(view[:, :width]), shares, sizes / np.float32(_LINE_PX)
+
+
+_KINDS: dict[type, type[_OnDevice]] = {
+    Points: _PointsOnDevice,
+    Lines: _LinesOnDevice,
+    Mesh: _MeshOnDevice,
+    MapImage: _MapOnDevice,
+    Labels: _LabelsOnDevice,
+}
+
+
+class SceneRenderer(QQuickRhiItemRenderer):
+    """Draws the frames of one view.
+
+    Args:
+        take_frame: Returns what to draw; called while the GUI thread waits.
+        on_problem: Called in the render thread with what could not be drawn, in words; empty again
+            once all could.
+    """
+
+    def __init__(
+        self, take_frame: Callable[[], Frame | None], on_problem: Callable[[str], None]
+    ) -> None:
+        super().__init__()
+        self._take_frame, self._on_problem = take_frame, on_problem
+        self._device: _Device | None = None
+        self._frame: Frame | None = None
+        self._on_device: dict[Drawable, _OnDevice] = {}
+        self._origin = np.zeros(3)
+        self._problem = ""
+        #: How many pictures were drawn.
+        self.count = 0
+
+    def initialize(self, commands: QRhiCommandBuffer) -> None:  # noqa: ARG002 - Qt's signature
+        """Start using a graphics interface, or a target of other samples."""
+        try:
+            target = self.renderTarget()
+            device = self._device
+            if device is not None and (device.rhi, device.samples) == (
+                self.rhi(),
+                target.sampleCount(),
+            ):
+                device.target = target
+                return
+            self.close()
+            self._device = _Device(self.rhi(), target.sampleCount(), target)
+        except Exception as error:
+            self._report(f"the 3D view cannot draw: {error}")
+
+    def synchronize(self, item: QQuickRhiItem) -> None:  # noqa: ARG002 - Qt's signature
+        """Take the next frame; the GUI thread waits."""
+        try:
+            self._frame = self._take_frame()
+        except Exception as error:
+            _log.exception("the 3D view")
+            self._report(f"the 3D view cannot draw: {error}")
+
+    def render(self, commands: QRhiCommandBuffer) -> None:
+        """Draw the frame."""
+        device, frame = self._device, self._frame
+        if device is None or frame is None:
+            return
+        problem = ""
+        batch = device.rhi.nextResourceUpdateBatch()
+        try:
+            ready, problem = self._prepare(device, frame, batch)
+        except Exception as error:
+            _log.exception("the 3D view")
+            ready, problem = [], f"the 3D view cannot draw: {error}"
+        target = self.renderTarget()
+        commands.beginPass(target, frame.background, QRhiDepthStencilClearValue(1.0, 0), batch)
+        try:
+            size = target.pixelSize()
+            viewport = QRhiViewport(0, 0, size.width(), size.height())
+            run = _Pass(commands, viewport, self._thinning(device, frame))
+            for on_device, blend in ready:
+                on_device.draw(run, blend)
+        except Exception as error:
+            _log.exception("the 3D view")
+            problem = f"the 3D view cannot draw: {error}"
+        finally:
+            commands.endPass()
+        self.count += 1
+        self._report(problem)
+
+    def _thinning(self, device: _Device, frame: Frame) -> int:
+        """Return k where only every k-th point is drawn, as the processor draws a moving view."""
+        if not (frame.moving and device.is_software):
+            return 1
+        points = sum(one.count for one, _, _ in frame.drawables if isinstance(one, Points))
+        return max(1, points // MOVING_POINTS)
+
+    def _prepare(
+        self, device: _Device, frame: Frame, batch: QRhiResourceUpdateBatch
+    ) -> tuple[list[tuple[_OnDevice, bool]], str]:
+        """Upload what has changed; return what to draw in which order, and what cannot be drawn."""
+        eye = np.array(frame.camera.eye)
+        if np.abs(eye - self._origin).max() > _ORIGIN_STEP_M:
+            self._origin = np.round(eye)
+        origin = self._origin
+        self._send_camera(device, frame, batch)
+        opaque: list[tuple[_OnDevice, bool]] = []
+        blended: list[tuple[int, float, int, _OnDevice]] = []
+        problem = ""
+        for one in self._on_device.values():
+            one.seen = False
+        for drawable, pose, alpha in frame.drawables:
+            on_device = self._on_device.get(drawable)
+            try:
+                if on_device is None:
+                    on_device = _KINDS[type(drawable)](device, drawable)
+                    self._on_device[drawable] = on_device
+                on_device.seen = True
+                place = pose.copy()
+                place[:3, 3] -= origin
+                on_device.prepare(batch, place, alpha)
+            except Exception as error:  # the others are drawn all the same
+                problem = f"{type(drawable).__name__} of {drawable.owner}: {error}"
+                continue
+            if drawable.opaque and alpha >= 0.9998:
+                opaque.append((on_device, False))
+            else:
+                box = drawable.bounds() if isinstance(drawable, Mesh) else None
+                middle = (
+                    pose[:3, 3] if box is None else (pose @ np.append((box[0] + box[1]) / 2, 1))[:3]
+                )
+                far = float(np.sum((middle - eye) ** 2))
+                blended.append((drawable.layer, -far, len(blended), on_device))
+        for drawable, one in list(self._on_device.items()):
+            if not one.seen:
+                one.close()
+                del self._on_device[drawable]
+        return [*opaque, *((one, True) for *_, one in sorted(blended))], problem
+
+    def _send_camera(self, device: _Device, frame: Frame, batch: QRhiResourceUpdateBatch) -> None:
+        camera = frame.camera
+        block = np.zeros(_FRAME_BYTES // 4, np.float32)
+        view = np.array(camera.view, np.float64)
+        view[:3, 3] += view[:3, :3] @ self._origin
+        block[:16] = view.T.reshape(-1)
+        block[16:32] = (device.correction @ camera.projection).T.reshape(-1)
+        size = self.renderTarget().pixelSize()
+        flat = abs(float(camera.projection[3, 3])) > 0.5
+        block[32:36] = (size.width(), size.height(), frame.pixel_ratio, flat)
+        batch.updateDynamicBuffer(device.frame_block, 0, block.nbytes, _pointer(block))
+
+    def _report(self, problem: str) -> None:
+        if problem != self._problem:
+            self._problem = problem
+            self._on_problem(problem)
+
+    def close(self) -> None:
+        """Free everything on the device; in the render thread."""
+        for one in self._on_device.values():
+            one.close()
+        self._on_device.clear()
+        if self._device is not None:
+            self._device.close()
+            self._device = None

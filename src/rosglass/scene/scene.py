@@ -1,0 +1,270 @@
+"""The scene: fixed frame, transforms, and the displays that draw into it."""
+# ruff: noqa: N815 - the names of properties and signals are QML's
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from rosglass.comm.names import similar
+from rosglass.comm.time import Time
+from rosglass.errors import Error, LookupException, TransformException
+from rosglass.qml.callbacks import weak_callback
+from rosglass.qml.element import Element, single_shot
+from rosglass.qml.runtime import runtime_of
+from rosglass.qml.tf_buffer import TfLink
+from rosglass.qt import Signal, Slot, is_alive
+from rosglass.rviz.property_values import shown
+from rosglass.scene.drawing import Group, instance_matrix
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from rosglass.qml.runtime import Runtime
+    from rosglass.qt import QtCore
+    from rosglass.scene.display import Display
+    from rosglass.tf import TransformBuffer
+
+__all__ = ["Scene"]
+
+_log = logging.getLogger("rosglass.scene")
+#: Milliseconds between two looks at transforms that have changed.
+_TRANSFORMS_MS = 33
+
+
+class Scene(Element):
+    """What is shown: displays, placed in one frame by the robot's transforms.
+
+    One belongs to each ``SceneView``. Used in the GUI thread.
+
+    Attributes:
+        root: All drawables, in the fixed frame.
+    """
+
+    #: The picture has changed.
+    changed = Signal()
+    fixedFrameChanged = Signal()
+    #: A display was added: itself.
+    displayAdded = Signal(object)
+    #: A display was removed: itself.
+    displayRemoved = Signal(object)
+    #: Transforms were received, or data has to be placed anew.
+    placed = Signal()
+
+    #: Types of displays by their name in RViz, e.g. ``Grid``.
+    TYPES: ClassVar[dict[str, type[Display]]] = {}
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self.root = Group()
+        self._fixed_frame = "map"
+        self._displays: list[Display] = []
+        self._link: TfLink | None = None
+        self._watch: Any = None
+        super().__init__(parent, runtime)
+        self._timer = single_shot(self, self._follow)
+        self._tree_changed = False
+        self.root.on_change = self.changed.emit
+
+    def _find_runtime(self) -> Runtime | None:
+        if self._runtime is None:
+            # Made by a view: QML knows the view only.
+            view = self.parent()
+            self._runtime = runtime_of(view) if view is not None else None
+        return self._runtime
+
+    # -- displays --------------------------------------------------------------------------------
+
+    @property
+    def displays(self) -> list[Display]:
+        """All displays, in the order in which they were added."""
+        return list(self._displays)
+
+    def add(self, kind: str | Display, name: str = "", **settings: Any) -> Display:
+        """Add a display.
+
+        Args:
+            kind: A display, or the name of its type in RViz, e.g. ``PointCloud2``.
+            name: Its name; that of the type by default.
+            settings: Values of its properties, e.g. ``topic="/points"``.
+
+        Raises:
+            Error: There is no such type or property, or a value does not fit.
+        """
+        if isinstance(kind, str):
+            found = self.TYPES.get(kind.rpartition("/")[2])
+            if found is None:
+                hint = similar(kind, self.TYPES) or f"; there are: {', '.join(sorted(self.TYPES))}"
+                raise Error(f"there is no type of displays {shown(kind)}{hint}")
+            display = found(self, self._runtime)
+            by_name = {setting.name: path for path, setting in found.SETTINGS.items()}
+            try:
+                for key, value in settings.items():
+                    if key not in by_name:
+                        raise Error(f"{kind} has no property {key!r}{similar(key, by_name)}")
+                    display.set(by_name[key], value)
+            except Error:
+                display.deleteLater()
+                raise
+        else:
+            display = kind
+        if name:
+            display.name = name
+        self.adopt(display)
+        return display
+
+    def adopt(self, display: Display) -> None:
+        """Show a display; one of another scene is not taken."""
+        if display in self._displays:
+            return
+        self._displays.append(display)
+        root, displays = display.root, self._displays
+
+        def forget() -> None:
+            # QML has destroyed it: only its Python half is left.
+            root.remove()
+            if display in displays:
+                displays.remove(display)
+
+        display.destroyed.connect(forget)
+        display.join(self)
+        self.displayAdded.emit(display)
+
+    def remove(self, display: Display) -> None:
+        """Remove a display.
+
+        Raises:
+            Error: It is not in this scene.
+        """
+        if display not in self._displays:
+            raise Error(f"{display.label} is not in this scene")
+        self._displays.remove(display)
+        display.leave()
+        self.displayRemoved.emit(display)
+        display.deleteLater()
+
+    def move(self, display: Display, index: int) -> None:
+        """Move a display to another place of the list."""
+        self._displays.remove(display)
+        self._displays.insert(index, display)
+
+    def find(self, name: str) -> Display | None:
+        """Return the first display of a name."""
+        return next((one for one in self._displays if one.name == name), None)
+
+    # -- frames ----------------------------------------------------------------------------------
+
+    @property
+    def fixed_frame(self) -> str:
+        """The frame in which everything is placed.
+
+        Raises:
+            Error: It is set to no name of a frame.
+        """
+        return self._fixed_frame
+
+    @fixed_frame.setter
+    def fixed_frame(self, frame: str) -> None:
+        if not isinstance(frame, str) or not frame.strip("/ "):
+            raise Error(f"expected the name of a frame, e.g. 'map', got {shown(frame)}")
+        frame = frame.lstrip("/")
+        if frame != self._fixed_frame:
+            self._fixed_frame = frame
+            self.fixedFrameChanged.emit()
+            self._place_anew()
+
+    @property
+    def transforms(self) -> TransformBuffer | None:
+        """The robot's transforms; None while there is no node."""
+        return None if self._link is None else self._link.buffer
+
+    def frames(self) -> list[str]:
+        """Return the names of all frames."""
+        buffer = self.transforms
+        return [] if buffer is None else sorted(buffer.tree())
+
+    def look_up(self, frame: str, stamp: int = 0, target: str = "") -> NDArray[np.float64]:
+        """Return the pose of a frame in the fixed frame.
+
+        Args:
+            frame: The frame.
+            stamp: Nanoseconds; 0 for the newest.
+            target: Another frame than the fixed one.
+
+        Raises:
+            TransformException: It is not known; the text says why.
+        """
+        target = target or self._fixed_frame
+        if frame == target:
+            return instance_matrix()
+        buffer = self.transforms
+        if buffer is None:
+            raise LookupException("not connected yet")
+        found = buffer.lookup_transform(target, frame, Time(stamp) if stamp else None)
+        return instance_matrix(found.translation, found.rotation)
+
+    def now(self) -> int:
+        """Return the robot's time in nanoseconds; 0 while there is no node."""
+        node = self.node
+        return 0 if node is None else node.now().nanoseconds
+
+    # -- following the robot ---------------------------------------------------------------------
+
+    def _wanted(self) -> tuple[Any, ...] | None:
+        return None if self.node is None else (self.node,)
+
+    def _create_endpoint(self, wanted: tuple[Any, ...]) -> None:
+        session = self._session
+        assert session is not None
+        link = self._link = TfLink.join(session, wanted[0], "", self)
+        watch = self._watch = link.buffer.on_update(
+            weak_callback(self._on_transforms), session.executor
+        )
+
+        def leave() -> None:
+            watch.close()
+            link.leave(self)
+
+        self._cleanup["transforms"] = leave
+        self._place_anew()
+
+    def _on_closed(self, endpoint: Any) -> None:  # noqa: ARG002 - the base class's signature
+        leave = self._cleanup.pop("transforms", None)
+        if leave is not None:
+            leave()
+        self._link = self._watch = None
+
+    def _on_transforms(self) -> None:
+        if is_alive(self) and not self._timer.isActive():
+            self._timer.start(_TRANSFORMS_MS)
+
+    @Slot()
+    def _follow(self) -> None:
+        self._each(lambda display: display.on_transforms())
+        self.placed.emit()
+
+    def _place_anew(self) -> None:
+        self._each(lambda display: display.on_fixed_frame())
+        self.placed.emit()
+
+    def reset(self) -> None:
+        """Drop all data that was received."""
+        self._each(lambda display: display.reset())
+
+    def _each(self, job: Callable[[Display], None]) -> None:
+        for display in self._alive():
+            if display.enabled:
+                try:
+                    job(display)
+                except TransformException as error:
+                    display.set_status("Transform", "error", str(error))
+                except Exception as error:
+                    _log.exception("%s", display.label)
+                    display.set_status("Display", "error", repr(error))
+
+    def _alive(self) -> Iterator[Display]:
+        return (display for display in self.displays if is_alive(display))

@@ -1,0 +1,316 @@
+"""The item ``SceneView``: a scene in a QML interface, drawn by Qt's own graphics layer."""
+# ruff: noqa: N802, N815 - the names of slots, signals and events are Qt's
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
+from PySide6.QtQuick import QQuickRhiItem, QQuickWindow, QSGRendererInterface
+from shiboken6 import Shiboken
+
+from rosglass.errors import Error
+from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
+from rosglass.scene.events import Button, Drag, Modifier, Touch, Wheel
+from rosglass.scene.picking import pick
+from rosglass.scene.renderer import Frame, SceneRenderer
+from rosglass.scene.scene import Scene
+from rosglass.scene.views import create_view
+
+if TYPE_CHECKING:
+    from rosglass.qml.runtime import Runtime
+    from rosglass.scene.camera import Camera
+    from rosglass.scene.display import Display
+    from rosglass.scene.picking import Hit
+    from rosglass.scene.views import ViewController
+
+__all__ = ["NO_GPU", "SceneView"]
+
+NO_GPU = (
+    "The 3D view needs OpenGL, Vulkan, Metal or Direct3D, which this program does not have: Qt "
+    "draws with its software renderer. Unset QT_QUICK_BACKEND; without a graphics card, Mesa's "
+    "llvmpipe will do (on Debian: sudo apt install libgl1-mesa-dri)."
+)
+#: Seconds after its last move at which a camera counts as still.
+_STILL_S = 0.2
+#: RViz's background.
+_BACKGROUND = QColor(48, 48, 48)
+
+
+class SceneView(QQuickRhiItem):
+    """A 3D view of the robot and what it sees.
+
+    Displays, tools and views are declared inside it or added at run time. It draws only when
+    something has changed. See its page in ``docs/scene.md``.
+    """
+
+    fixedFrameChanged = Signal()
+    backgroundChanged = Signal()
+    problemChanged = Signal()
+    viewChanged = Signal()
+    #: The camera was moved, or the size changed.
+    cameraChanged = Signal()
+    #: A picture was drawn.
+    framePainted = Signal()
+
+    def __init__(self, parent: Any = None, runtime: Runtime | None = None) -> None:
+        super().__init__(parent)
+        self._runtime = runtime
+        self._background = QColor(_BACKGROUND)
+        self._problem = ""
+        #: The renderers that C++ still has: letting go of one too early frees it twice.
+        self._renderers: list[SceneRenderer] = []
+        #: What is shown.
+        self.scene = Scene(self, runtime)
+        self.scene.changed.connect(self.update)
+        self.scene.placed.connect(self._on_placed)
+        self.scene.fixedFrameChanged.connect(self.fixedFrameChanged)
+        self._view: ViewController = create_view("Orbit")
+        self._moved_at = -1.0
+        self._still = QtCore.QTimer(self)
+        self._still.setSingleShot(True)
+        self._still.setInterval(int(_STILL_S * 1000))
+        self._still.timeout.connect(self.update)
+        self.setAcceptedMouseButtons(Qt.MouseButton.AllButtons)
+        self.setAcceptHoverEvents(True)
+        self.setFlag(QQuickRhiItem.Flag.ItemAcceptsInputMethod, False)
+        self.windowChanged.connect(self._on_window)
+        self.setAcceptTouchEvents(True)
+        self._pointed = QtCore.QPointF()
+        self._fingers: dict[int, QtCore.QPointF] = {}
+        self._clean_up_when_destroyed()
+
+    def _clean_up_when_destroyed(self) -> None:
+        # PySide never frees the Python half of an item that QML has made.
+        state, renderers, root = self.__dict__, self._renderers, self.scene.root
+
+        def end() -> None:
+            root.on_change = None
+            root.clear()
+            # C++ deletes them a little later, with the scene graph.
+            kept = list(renderers)
+            state.clear()
+            _ORPHANS.extend(kept)
+            _drop_orphans()
+
+        self.destroyed.connect(end)
+
+    # -- properties ------------------------------------------------------------------------------
+
+    def _get_fixed_frame(self) -> str:
+        return self.scene.fixed_frame
+
+    def _set_fixed_frame(self, frame: str) -> None:
+        try:
+            self.scene.fixed_frame = frame
+        except Error as error:
+            self.scene._refuse(f"SceneView: fixedFrame: {error}")
+
+    #: The frame in which everything is placed.
+    fixedFrame = Property(str, _get_fixed_frame, _set_fixed_frame, notify=fixedFrameChanged)
+
+    def _get_background(self) -> QColor:
+        return self._background
+
+    def _set_background(self, colour: QColor) -> None:
+        if colour != self._background:
+            self._background = QColor(colour)
+            self.setAlphaBlending(colour.alpha() < 255)
+            self.backgroundChanged.emit()
+            self.update()
+
+    #: What is behind everything; where it is translucent, items below the view shine through.
+    background = Property(QColor, _get_background, _set_background, notify=backgroundChanged)
+
+    #: Why nothing, or not everything, is drawn; empty without a problem.
+    problem = Property(str, lambda self: self._problem, notify=problemChanged)
+
+    def _get_view_name(self) -> str:
+        return self._view.TYPE
+
+    def _set_view_name(self, name: str) -> None:
+        try:
+            self.select_view(name)
+        except Error as error:
+            self.scene._refuse(f"SceneView: view: {error}")
+
+    #: The type of the view: ``Orbit``, ``XYOrbit``, ``FPS``, ``TopDownOrtho``,
+    #: ``ThirdPersonFollower``.
+    view = Property(str, _get_view_name, _set_view_name, notify=viewChanged)
+
+    # -- displays --------------------------------------------------------------------------------
+
+    def adopt_display(self, display: Display) -> None:
+        """Show a display that QML has declared inside this view."""
+        self.scene.adopt(display)
+
+    # -- the camera ------------------------------------------------------------------------------
+
+    @property
+    def controller(self) -> ViewController:
+        """What moves the camera."""
+        return self._view
+
+    def select_view(self, name: str) -> None:
+        """Change to another type of view, which starts where this one is.
+
+        Raises:
+            Error: There is no such type.
+        """
+        made = create_view(name)
+        if type(made) is type(self._view):
+            return
+        made.mimic(self._view)
+        self._view = made
+        self.viewChanged.emit()
+        self.camera_moved()
+
+    def camera(self) -> Camera:
+        """Return the camera of the next picture; its pixels are units of this item."""
+        return self._view.camera(self.width(), self.height())
+
+    def camera_moved(self) -> None:
+        """Draw from where the camera is now."""
+        self._moved_at = time.monotonic()
+        self._still.start()
+        self.cameraChanged.emit()
+        self.update()
+
+    @Slot()
+    def _on_placed(self) -> None:
+        """Let the camera follow its target frame."""
+        frame = self._view.target_frame
+        if not frame or frame == "<Fixed Frame>":
+            return
+        pose, reason = None, ""
+        try:
+            pose = self.scene.look_up(frame)
+        except Error as error:
+            reason = str(error)
+        if self._view.update_target(pose, reason):
+            self.cameraChanged.emit()
+            self.update()
+
+    def pick(self, x: float, y: float, radius: float = 2.0) -> Hit | None:
+        """Return what is nearest to the camera at a place; None for nothing.
+
+        Args:
+            x: Units of this item, from its left edge.
+            y: The same, from its upper edge.
+            radius: How far from there points and lines may be.
+        """
+        return pick(self.scene.root.drawables(), self.camera(), x, y, radius)
+
+    def geometryChange(self, new: Any, old: Any) -> None:
+        """Draw in the new size."""
+        super().geometryChange(new, old)
+        if new.size() != old.size() and is_alive(self):
+            self.cameraChanged.emit()
+            self.update()
+
+    # -- drawing ---------------------------------------------------------------------------------
+
+    def createRenderer(self) -> SceneRenderer:
+        """Return what draws; called by Qt in the render thread."""
+        self._renderers[:] = [one for one in self._renderers if Shiboken.isValid(one)]
+        made = SceneRenderer(self._take_frame, self._on_problem)
+        self._renderers.append(made)
+        return made
+
+    def _take_frame(self) -> Frame:
+        window = self.window()
+        return Frame(
+            list(self.scene.root.drawables()),
+            self.camera(),
+            self._background,
+            window.effectiveDevicePixelRatio() if window is not None else 1.0,
+            time.monotonic() - self._moved_at < _STILL_S,
+        )
+
+    def _on_problem(self, problem: str) -> None:
+        # From the render thread, in the middle of drawing.
+        QtCore.QTimer.singleShot(0, self, lambda: self._set_problem(problem))
+
+    def _set_problem(self, problem: str) -> None:
+        if is_alive(self) and problem != self._problem:
+            self._problem = problem
+            self.problemChanged.emit()
+            if problem:
+                self.scene._set_problem(problem)
+
+    def _on_window(self, window: QQuickWindow | None) -> None:
+        if window is None:
+            return
+        api = window.rendererInterface().graphicsApi()
+        self._set_problem(NO_GPU if api == QSGRendererInterface.GraphicsApi.Software else "")
+
+    # -- mouse, touch, keys ----------------------------------------------------------------------
+
+    def mousePressEvent(self, event: Any) -> None:
+        """Start a drag."""
+        self.forceActiveFocus(Qt.FocusReason.MouseFocusReason)
+        self._pointed = event.position()
+        event.accept()
+
+    def mouseMoveEvent(self, event: Any) -> None:
+        """Drag the camera."""
+        at, before = event.position(), self._pointed
+        self._pointed = at
+        moved = at - before
+        drag = Drag(
+            at.x(),
+            at.y(),
+            moved.x(),
+            moved.y(),
+            Button(event.buttons().value & _BUTTONS),
+            Modifier(event.modifiers().value & _MODIFIERS),
+            (self.width(), self.height()),
+        )
+        self._view.on_drag(drag)
+        self.camera_moved()
+        event.accept()
+
+    def hoverMoveEvent(self, event: Any) -> None:
+        """Remember what is pointed at, for keys."""
+        self._pointed = event.position()
+
+    def wheelEvent(self, event: Any) -> None:
+        """Zoom."""
+        held = Modifier(event.modifiers().value & _MODIFIERS)
+        self._view.on_wheel(Wheel(event.angleDelta().y() / 120, held))
+        self.camera_moved()
+        event.accept()
+
+    def touchEvent(self, event: Any) -> None:
+        """Rotate by one finger; move, zoom and turn by two."""
+        now = {point.id(): point.position() for point in event.points()}
+        ids = [one for one in now if one in self._fingers]
+        if ids and len(now) == len(self._fingers):
+            before = [(self._fingers[one].x(), self._fingers[one].y()) for one in ids]
+            after = [(now[one].x(), now[one].y()) for one in ids]
+            self._view.on_touch(Touch.between(before, after, (self.width(), self.height())))
+            self.camera_moved()
+        released = event.touchPointStates() & Qt.TouchPointState.TouchPointReleased
+        self._fingers = {} if released else now
+        event.accept()
+
+    def keyPressEvent(self, event: Any) -> None:
+        """Look at what is under the mouse (F), or return to the start (Z)."""
+        point = self.pick(self._pointed.x(), self._pointed.y()) if event.text() in "fF" else None
+        if event.text() and self._view.on_key(event.text(), None if point is None else point.point):
+            self.camera_moved()
+            event.accept()
+        else:
+            event.ignore()
+
+
+_BUTTONS = int(Button.LEFT | Button.RIGHT | Button.MIDDLE)
+_MODIFIERS = int(Modifier.SHIFT | Modifier.CTRL | Modifier.ALT)
+#: Renderers of items that are gone, until C++ has deleted them.
+_ORPHANS: list[SceneRenderer] = []
+
+
+def _drop_orphans() -> None:
+    _ORPHANS[:] = [one for one in _ORPHANS if Shiboken.isValid(one)]

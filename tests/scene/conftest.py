@@ -1,0 +1,133 @@
+"""A real ``SceneView`` in a window under Xvfb, beside a robot made of memory."""
+
+from __future__ import annotations
+
+import os
+import sys
+import uuid
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+# Python draws: a render thread of its own would wait for the GIL that the GUI thread holds.
+os.environ.setdefault("QSG_RENDER_LOOP", "basic")
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+    from qt_waiting import QtWaiting
+
+HAVE_QT6 = find_spec("PySide6") is not None
+SIZE = (400, 300)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    here = str(Path(__file__).parent)
+    for item in items:
+        if str(item.path).startswith(here) and not HAVE_QT6:
+            item.add_marker(pytest.mark.skip("the 3D view needs Qt 6 (PySide6)"))
+
+
+@pytest.fixture(scope="session")
+def app() -> Iterator[Any]:
+    from rosglass.demo.processes import VirtualScreen
+
+    with VirtualScreen() as screen:
+        os.environ.update(DISPLAY=screen.display, QT_QPA_PLATFORM="xcb", QT_QUICK_BACKEND="rhi")
+        from PySide6.QtGui import QGuiApplication
+
+        import rosglass.scene
+
+        app = QGuiApplication.instance() or QGuiApplication(["test"])
+        rosglass.scene.register()
+        yield app
+        # The screen ends the process with it, if Qt still uses it.
+        for window in app.allWindows():
+            window.close()
+        if "pytest" not in sys.modules:
+            app.quit()
+
+
+@pytest.fixture
+def wait(app: Any) -> QtWaiting:
+    """Runs the event loop until a condition holds."""
+    from qt_waiting import QtWaiting
+
+    return QtWaiting()
+
+
+class SceneBench:
+    """A window with a view, and a robot.
+
+    Attributes:
+        view: The ``SceneView``.
+        robot: The robot's node.
+    """
+
+    def __init__(self, wait: QtWaiting, folder: Path) -> None:
+        from PySide6.QtQuick import QQuickView
+
+        import rosglass
+        from rosglass.qml import Session, install
+
+        self.wait, self._folder, self._count = wait, folder, 0
+        url = f"local://scene-{uuid.uuid4().hex}"
+        self.robot = rosglass.connect(url, "robot")
+        self.session = Session(url)
+        self.window = QQuickView()
+        install(self.window.engine(), self.session)
+        self.session.init("view")
+        wait(lambda: self.session.node is not None)
+        self.window.resize(*SIZE)
+        self.window.setResizeMode(QQuickView.ResizeMode.SizeRootObjectToView)
+
+    def load(self, body: str = "", imports: str = "") -> Any:
+        """Show a view with what is declared in it, and return it."""
+        from PySide6.QtCore import QUrl
+
+        self._count += 1
+        # The engine remembers what is in a folder.
+        file = self._folder / str(self._count) / "View.qml"
+        file.parent.mkdir()
+        file.write_text(
+            f"import QtQuick\nimport RosScene 1.0\n{imports}\n"
+            f'SceneView {{ fixedFrame: "map"\n{body}\n}}'
+        )
+        self.window.setSource(QUrl.fromLocalFile(str(file)))
+        assert not self.window.errors(), [error.toString() for error in self.window.errors()]
+        self.view = self.window.rootObject()
+        self.window.show()
+        self.wait(self.window.isExposed)
+        return self.view
+
+    def picture(self) -> NDArray[Any]:
+        """Return what the window shows, (height, width, 3)."""
+        import numpy as np
+        from PySide6.QtGui import QImage
+
+        image = self.window.grabWindow().convertToFormat(QImage.Format.Format_RGB888)
+        rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
+        return rows[:, : image.width() * 3].reshape(image.height(), image.width(), 3).copy()
+
+    def drawn(self) -> int:
+        """Return how many pictures were drawn."""
+        return sum(one.count for one in self.view._renderers)
+
+    def close(self) -> None:
+        from rosglass.qt import send_deferred_deletes
+
+        self.window.close()
+        self.window.deleteLater()
+        send_deferred_deletes()
+        self.session.close()
+        self.robot.close()
+
+
+@pytest.fixture
+def bench(wait: QtWaiting, tmp_path: Path) -> Iterator[SceneBench]:
+    made = SceneBench(wait, tmp_path)
+    yield made
+    made.close()

@@ -1,0 +1,135 @@
+"""The displays Map and GridCells."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from rosglass.scene.displays.map import palette
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conftest import SceneBench
+
+
+def grid(width: int, height: int, value: int, /, **info: Any) -> dict[str, Any]:
+    about = {"resolution": 1.0, "width": width, "height": height}
+    origin = {"position": {"x": -width / 2, "y": -height / 2}, "orientation": {"w": 1.0}}
+    return {
+        "header": {"frame_id": "map"},
+        "info": {**about, "origin": origin, **info},
+        "data": np.full(width * height, value, np.int8),
+    }
+
+
+@pytest.fixture
+def show(bench: SceneBench) -> Callable[..., Any]:
+    """Publishes maps and updates, and returns the display once it has received them."""
+    view = bench.load('view: "TopDownOrtho"; MapDisplay { topic: "/map"; alpha: 1 }')
+    (display,) = view.scene.displays
+    kinds = {
+        "/map": bench.robot.create_publisher("/map", "nav_msgs/OccupancyGrid"),
+        "/map_updates": bench.robot.create_publisher(
+            "/map_updates", "map_msgs/OccupancyGridUpdate"
+        ),
+    }
+    for publisher in kinds.values():
+        bench.wait(publisher.subscription_count)
+
+    def send(message: dict[str, Any], topic: str = "/map") -> Any:
+        before = display._intake.received
+        kinds[topic].publish(message)
+        bench.wait(lambda: display._intake is not None and display._intake.received > before)
+        bench.wait.settled(bench.session)
+        return display
+
+    return send
+
+
+def middle(bench: SceneBench) -> tuple[int, ...]:
+    return tuple(int(part) for part in bench.picture()[155, 205])
+
+
+def test_a_map_is_drawn_in_rviz_colours(bench: SceneBench, show: Callable[..., Any]) -> None:
+    display = show(grid(20, 10, 100))
+    assert display.statusLevel == "ok", display.statusText
+    assert (display.columns, display.rows, display.resolution) == (20, 10, 1.0)
+    assert middle(bench) == (0, 0, 0)
+    display.colorScheme = "costmap"
+    assert middle(bench) == (255, 0, 255)
+    show(grid(20, 10, -1))
+    assert middle(bench) == (0x70, 0x89, 0x86)
+
+
+def test_an_update_changes_a_part(bench: SceneBench, show: Callable[..., Any]) -> None:
+    show(grid(20, 10, 0))
+    assert middle(bench) == (255, 255, 255)
+    part = {"header": {"frame_id": "map"}, "x": 10, "y": 4, "width": 2, "height": 2}
+    display = show({**part, "data": np.full(4, 100, np.int8)}, "/map_updates")
+    assert display.statusLevel == "ok", display.statusText
+    assert display._cells[4:6, 10:12].tolist() == [[100, 100], [100, 100]]
+    assert int((display._cells == 100).sum()) == 4
+    display = show({**part, "x": 19, "data": np.full(4, 100, np.int8)}, "/map_updates")
+    assert "x 19, y 4, 2 x 2 cells: beyond the map of 20 x 10 cells" in display.statusText
+    assert int((display._cells == 100).sum()) == 4
+
+
+@pytest.mark.parametrize(
+    ("message", "text"),
+    [
+        (grid(20, 10, 0, width=30), "data: 200 cells, where 30 x 10 are 300"),
+        (grid(20, 10, 0, width=0), "width 0, height 10: expected 1 to 16384 cells"),
+        (grid(20, 10, 0, width=4_000_000_000), "width 4000000000"),
+        (grid(20, 10, 0, resolution=float("nan")), "info.resolution: expected metres above 0"),
+        (grid(20, 10, 0, origin={"position": {"x": float("inf")}}), "is not finite"),
+    ],
+)
+def test_a_bad_map_is_an_error_in_words(
+    bench: SceneBench, show: Callable[..., Any], message: dict[str, Any], text: str
+) -> None:
+    show(grid(20, 10, 100))
+    display = show(message)
+    assert display.statusLevel == "error"
+    assert text in display.statusText
+    assert middle(bench) == (0, 0, 0), "the last good map stays"
+
+
+def test_palettes_have_the_colours_of_rviz() -> None:
+    colours = palette("map")
+    assert colours[(0, 50, 100), :].tolist() == [[255] * 4, [128, 128, 128, 255], [0, 0, 0, 255]]
+    assert colours[(110, 128, 254), :].tolist() == [
+        [0, 255, 0, 255],
+        [255, 0, 0, 255],
+        [255, 255, 0, 255],
+    ]
+    colours = palette("costmap")
+    assert colours[(0, 50, 99), :].tolist() == [
+        [0, 0, 0, 0],
+        [127, 0, 128, 255],
+        [0, 255, 255, 255],
+    ]
+    assert palette("raw")[7].tolist() == [7, 7, 7, 255]
+
+
+def test_cells_are_squares(bench: SceneBench) -> None:
+    view = bench.load(
+        'view: "TopDownOrtho"; GridCellsDisplay { topic: "/cells"; color: "#00ffff" }'
+    )
+    (display,) = view.scene.displays
+    publisher = bench.robot.create_publisher("/cells", "nav_msgs/GridCells")
+    cell = {"header": {"frame_id": "map"}, "cell_width": 2.0, "cell_height": 2.0}
+
+    def send(message: dict[str, Any]) -> None:
+        before = display.received
+        bench.wait(lambda: publisher.publish(message) or display.received > before)
+
+    send({**cell, "cells": [{"x": 0.0, "y": 0.0, "z": 0.0}]})
+    picture = bench.picture()
+    cyan = (picture == (0, 255, 255)).all(axis=2).sum()
+    assert 300 <= cyan <= 500, cyan  # 2 m by 2 m, at 10 pixels for a metre
+    publisher.publish({**cell, "cell_width": 0.0})
+    bench.wait(lambda: display.statusLevel == "error")
+    assert "cell_width 0.0, cell_height 2.0: expected metres above 0" in display.statusText

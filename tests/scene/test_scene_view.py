@@ -1,0 +1,181 @@
+"""The item SceneView: what it draws, when, and what it says where it cannot."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+if TYPE_CHECKING:
+    from conftest import SceneBench
+
+STAMP = {"sec": 0, "nanosec": 0}
+
+
+def has_colour(picture: Any, red: int, green: int, blue: int, tolerance: int = 40) -> int:
+    """Return how many pixels have a colour."""
+    off = np.abs(picture.astype(int) - (red, green, blue)).max(axis=2)
+    return int((off <= tolerance).sum())
+
+
+def test_axes_are_drawn_in_the_middle(bench: SceneBench) -> None:
+    bench.load("AxesDisplay { length: 2 }")
+    picture = bench.picture()
+    assert tuple(picture[5, 5]) == (48, 48, 48)
+    for colour in ((255, 0, 0), (0, 255, 0), (0, 0, 255)):
+        assert has_colour(picture, *colour) > 100
+    # Blue, z, points up from the middle.
+    rows, columns = np.nonzero(np.abs(picture.astype(int) - (0, 0, 255)).max(axis=2) < 40)
+    assert rows.min() < 120
+    assert abs(columns.mean() - 200) < 5
+
+
+def test_nothing_is_drawn_while_nothing_changes(bench: SceneBench) -> None:
+    view = bench.load("AxesDisplay {}")
+    bench.wait(lambda: bench.drawn() > 0)
+    bench.picture()
+    before = bench.drawn()
+    bench.wait.nothing_happens(0.5)
+    assert bench.drawn() == before
+    view.scene.displays[0].length = 3
+    bench.wait(lambda: bench.drawn() > before)
+
+
+def test_items_are_drawn_over_it_and_shine_through_from_below(bench: SceneBench) -> None:
+    view = bench.load(
+        'background: "transparent"; AxesDisplay {}\n'
+        'Rectangle { z: -1; anchors.fill: parent; color: "#00ffff" }\n'
+        'Rectangle { width: 50; height: 50; color: "#ff00ff" }'
+    )
+    picture = bench.picture()
+    assert tuple(picture[10, 10]) == (255, 0, 255)
+    assert view.problem == ""
+
+
+def test_a_display_in_a_frame_follows_it(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    view = bench.load('AxesDisplay { frame: "tool"; length: 0.3 }')
+    (axes,) = view.scene.displays
+    bench.wait(lambda: "no transform from [tool]" in axes.statusText)
+    assert axes.statusLevel == "error"
+    assert has_colour(bench.picture(), 0, 0, 255) == 0
+    broadcaster = TransformBroadcaster(bench.robot)
+
+    def send() -> bool:
+        broadcaster.send_transform(
+            Transform((0, 0, 2), (0, 0, 0, 1), Time.from_parts(7, 0), "map", "tool")
+        )
+        return axes.statusLevel == "ok"
+
+    bench.wait(send)
+    rows, _ = np.nonzero(np.abs(bench.picture().astype(int) - (0, 0, 255)).max(axis=2) < 40)
+    assert len(rows)
+    assert rows.mean() < 110
+
+
+def test_a_path_is_shown_and_fades_when_its_publisher_is_gone(bench: SceneBench) -> None:
+    view = bench.load('PathDisplay { topic: "/plan"; lineStyle: "Billboards"; lineWidth: 0.2 }')
+    (path,) = view.scene.displays
+    publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
+    poses = [
+        {"pose": {"position": {"x": x, "y": 0.0, "z": 0.0}, "orientation": {"w": 1.0}}}
+        for x in (-3.0, 0.0, 3.0)
+    ]
+
+    def send() -> bool:
+        publisher.publish({"header": {"frame_id": "map"}, "poses": poses})
+        return bool(path.received)
+
+    bench.wait(send)
+    assert path.statusLevel == "ok"
+    assert "messages received" in path.statusText
+    bright = has_colour(bench.picture(), 25, 255, 0)
+    assert bright > 100
+    publisher.close()
+    bench.wait(lambda: path.statusLevel == "warn")
+    assert "its publisher is gone; the last message is of" in path.statusText
+    assert has_colour(bench.picture(), 25, 255, 0) == 0
+
+
+def test_a_topic_of_another_type_is_an_error_in_words(bench: SceneBench) -> None:
+    view = bench.load('PathDisplay { topic: "/scan" }')
+    (path,) = view.scene.displays
+    publisher = bench.robot.create_publisher("/scan", "sensor_msgs/LaserScan")
+
+    def send() -> bool:
+        publisher.publish({})
+        return path.statusLevel == "error"
+
+    bench.wait(send)
+    assert "the topic's type is sensor_msgs/msg/LaserScan, not nav_msgs/Path" in path.statusText
+
+
+@pytest.mark.parametrize(
+    ("settings", "error"),
+    [
+        ({"topic": "/a b"}, "expected the name of a topic"),
+        ({"color": "no colour"}, "expected a colour"),
+        ({"alpha": 2.0}, "is not from 0.0 to 1.0"),
+        ({"colour": "red"}, "has no property 'colour'; did you mean"),
+    ],
+)
+def test_python_gets_errors_for_bad_settings(
+    bench: SceneBench, settings: dict[str, Any], error: str
+) -> None:
+    from rosglass.errors import Error
+
+    view = bench.load()
+    with pytest.raises(Error, match=error):
+        view.scene.add("Path", **settings)
+    assert view.scene.displays == []
+
+
+def test_displays_are_added_and_removed_from_python(bench: SceneBench) -> None:
+    from rosglass.errors import Error
+
+    view = bench.load()
+    grid = view.scene.add("rviz_default_plugins/Grid", "Floor", planeCellCount=4)
+    assert view.scene.find("Floor") is grid
+    assert has_colour(bench.picture(), 104, 104, 106, 20) > 50
+    view.scene.remove(grid)
+    assert has_colour(bench.picture(), 104, 104, 106, 20) == 0
+    with pytest.raises(Error, match="is not in this scene"):
+        view.scene.remove(grid)
+    with pytest.raises(Error, match="there is no type of displays 'Gird'"):
+        view.scene.add("Gird")
+
+
+def test_an_error_in_a_setting_names_it(bench: SceneBench, caplog: Any) -> None:
+    bench.load("AxesDisplay { length: -1 }")
+    assert "display 'Axes': length: -1.0 is not from 0.0001" in caplog.text
+
+
+def test_made_and_destroyed_many_times(bench: SceneBench) -> None:
+    for _ in range(5):
+        bench.load('GridDisplay {} AxesDisplay {} PathDisplay { topic: "/plan" } TFDisplay {}')
+        bench.picture()
+        assert bench.view.problem == ""
+
+
+def test_picking_finds_the_nearest_drawable(bench: SceneBench) -> None:
+    from rosglass.scene.drawing import BOX, Mesh, Points, instance_matrix
+
+    view = bench.load()
+    box, cloud = Mesh(BOX), Points()
+    box.owner, cloud.owner = "box", "cloud"
+    cloud.set_points([[0, 0, 1.5], [5, 5, 0], [float("nan"), 0, 0]])
+    view.scene.root.add(box, cloud)
+    middle = view.camera().project((0, 0, 0))
+    hit = view.pick(middle.x, middle.y)
+    assert hit.drawable is box
+    assert np.abs(np.array(hit.point)).max() == pytest.approx(0.5)
+    above = view.camera().project((0, 0, 1.5))
+    hit = view.pick(above.x + 1, above.y)
+    assert (hit.drawable, hit.number) == (cloud, 0)
+    assert hit.point == pytest.approx((0, 0, 1.5))
+    assert view.pick(2, 2) is None
+    box.pose = instance_matrix((50, 50, 0))
+    assert view.pick(middle.x, middle.y) is None
