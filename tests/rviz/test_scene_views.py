@@ -66,7 +66,7 @@ class Both:
         self._wait.frames(3)
 
     def drag(self, button: Button, held: Modifier, dx: int, dy: int) -> None:
-        x, y = 300, 320
+        x, y = 150, 120
         self._send("MouseMove", x, y, Button.NONE, Button.NONE, held)
         self._send("MouseButtonPress", x, y, button, button, held)
         for _ in range(2):
@@ -112,6 +112,8 @@ def both(app: Any, wait: Any) -> Iterator[Callable[[str], Both]]:
     tools = app.rviz.tools
     tool = tools.current
     tools.select(tools.find("rviz/MoveCamera"))
+    # An RViz that has drawn nothing yet crashes when its view is replaced.
+    wait.frames(2)
 
     def both(name: str) -> Both:
         app.rviz.views.kind = f"rviz/{name}"
@@ -141,8 +143,8 @@ def test_the_same_mouse_leads_to_the_same_camera(
         assert eye() == pytest.approx(pair.eye, abs=within), steps
     camera, ours = Camera(app.window), pair.view.camera(*pair.size)
     camera.update()
-    for point in ((0, 0, 0), (0.5, -0.5, 0), (-0.5, 0.2, 0.3)):
-        seen = pytest.approx(camera.project(point)[:2], abs=1, nan_ok=True)
+    for point in ((0, 0, 0), (30, -20, 0), (-0.5, 0.2, 0.3)):
+        seen = pytest.approx(camera.project(point)[:2], rel=3e-3, abs=1, nan_ok=True)
         assert ours.project(point)[:2] == seen, point
 
 
