@@ -39,8 +39,13 @@ def load_yaml(text: str, loader: Any = None) -> list[Any]:
         raise yaml.YAMLError(f"{type(error).__name__}: {error}") from error
 
 
-def check_yaml(text: str) -> None:
-    """Raise yaml.YAMLError if a text is too large to be loaded, or too deep."""
+def check_yaml(text: str, max_values: int = _MAX_VALUES) -> None:
+    """Raise yaml.YAMLError if a text is too large to be loaded, or too deep.
+
+    Args:
+        text: The text.
+        max_values: Maximum number of values, with aliases expanded.
+    """
     import yaml  # noqa: PLC0415
 
     #: Anchor and number of values of each open list and mapping; the text itself is the first.
@@ -70,8 +75,8 @@ def check_yaml(text: str) -> None:
         if size:
             sizes[anchor] = size
             open_[-1] = open_[-1][0], open_[-1][1] + size
-        if open_[-1][1] > _MAX_VALUES:
-            problem = f"it has more than {_MAX_VALUES} values"
+        if open_[-1][1] > max_values:
+            problem = f"it has more than {max_values} values"
         if problem:
             mark: Any = event.start_mark
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=mark)
