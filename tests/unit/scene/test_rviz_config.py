@@ -367,6 +367,30 @@ def test_texts_stay_texts(value: str) -> None:
 
 
 @pytest.mark.parametrize(
+    "text",
+    ["1.10", "0.50", "1.", "007", "-0", "+5", "1e5", "2.2e-7", "yes", "True", "0x1F", "1:30"],
+)
+def test_unquoted_texts_are_written_as_they_were_read(text: str) -> None:
+    found = config(f"  Displays:\n    - {{Class: rviz/Grid, Name: {text}, V: {text}}}\n")
+    assert found.displays[0].name == text
+    assert found.displays[0].settings["V"] == text
+    assert RvizConfig.parse(found.dump()) == found
+    assert texts(found.dump())["Visualization Manager"]["Displays"][0]["V"] == text
+
+
+def test_the_order_of_keys_is_kept() -> None:
+    text = (
+        "Window Geometry:\n  Y: 1\n  X: 2\n"
+        "Visualization Manager:\n"
+        "  Tools: []\n"
+        "  Displays:\n    - Name: a\n      Class: rviz/Grid\n      Alpha: 1\n"
+        "  Views:\n    Saved: []\n    Current:\n      Yaw: 1\n      Class: rviz/Orbit\n"
+        "  Global Options: {}\n"
+    )
+    assert RvizConfig.parse(text).dump() == text
+
+
+@pytest.mark.parametrize(
     "value", [True, False, None, 0, -5, 10**12, 0.0, -0.5, 1e-5, 1e22, 0.029999999329447746, [], {}]
 )
 def test_values_keep_their_types(value: object) -> None:
