@@ -1,7 +1,7 @@
-"""Interfaces over RViz: QML and widgets drawn over its 3D view, and its camera steered from ROS.
+"""RViz with QML and widget overlays on its 3D view, and with a camera controlled by ROS services.
 
-Needs RViz 1 with its Python bindings, and the Python they are made for: on Debian 12,
-``/usr/bin/python3`` or a virtual environment made from it with ``--system-site-packages``.
+Requires RViz 1 with its Python bindings, and the Python they were built for: on Debian 12,
+``/usr/bin/python3`` or a virtual environment of it with ``--system-site-packages``.
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> object:
-    # Imported on first use: what has nothing to do with Qt can be imported without RViz.
+    # Imported on first use, because modules without Qt must be importable without RViz.
     if name not in _HOMES:
         raise AttributeError(f"module 'rosglass.rviz' has no attribute {name!r}")
     if "rosglass.qt" not in sys.modules and find_spec("rviz") is not None:
-        # RViz's Qt; without RViz, the error is about RViz, not about Qt 5.
+        # RViz needs Qt 5. Without RViz, the error should be about RViz, not about Qt 5.
         os.environ.setdefault("ROSGLASS_QT", "pyside2")
     with InterruptsDeferred():
         value: object = getattr(import_module(f"rosglass.rviz.{_HOMES[name]}"), name)

@@ -1,4 +1,4 @@
-"""RViz from Python, without an interface: its tools, displays, views, camera and config."""
+"""RViz's tools, displays, views, camera and config, for Python and for the object ``rviz``."""
 
 from __future__ import annotations
 
@@ -27,26 +27,26 @@ _log = logging.getLogger("rosglass.rviz")
 
 
 class Access(QtCore.QObject):
-    """The seam to the 3D view: what interfaces can read, change and follow; ``Application.rviz``.
+    """The interface to RViz, ``Application.rviz``; use it in the GUI thread only.
 
-    Parts are made when they are first asked for. Used in the GUI thread.
+    Its parts are created on first use.
 
     Args:
-        window: RViz.
-        session: The node that receives transforms.
+        window: RViz's window.
+        session: The session whose node receives transforms.
     """
 
     #: RViz is about to draw.
     before_frame = Signal()
-    #: A config file was loaded: every display, view and tool is another one now. Its path.
+    #: A config file was loaded, which replaces all displays, views and tools. Argument: its path.
     config_loaded = Signal(str)
-    #: :attr:`fullscreen` is another.
+    #: :attr:`fullscreen` has changed.
     fullscreen_changed = Signal()
-    #: :attr:`bare` is another.
+    #: :attr:`bare` has changed.
     bare_changed = Signal()
-    #: Another frame is the fixed one.
+    #: :attr:`fixed_frame` has changed.
     fixed_frame_changed = Signal()
-    #: :attr:`frame_rate` is another.
+    #: :attr:`frame_rate` has changed.
     frame_rate_changed = Signal()
 
     def __init__(self, window: Window, session: Session) -> None:
@@ -56,7 +56,7 @@ class Access(QtCore.QObject):
         window.before_frame.connect(self._on_frame)
         window.config_loaded.connect(self.config_loaded)
         window.bare.changed.connect(self.bare_changed)
-        # RViz signals it before it does it.
+        # RViz emits the signal before it resizes the window.
         window.fullscreen_changed.connect(
             lambda _: QtCore.QTimer.singleShot(0, self.fullscreen_changed.emit)
         )
@@ -65,23 +65,23 @@ class Access(QtCore.QObject):
         self._timer.timeout.connect(self._measure)
         self._timer.start()
         options = window.manager.getRootDisplayGroup().subProp("Global Options")
-        # RViz has no signal of its own for it.
+        # RViz has no signal for a changed fixed frame.
         self._hook = Hook(self.fixed_frame_changed.emit)
         self._hook.watch(options.subProp("Fixed Frame"), "changed()")
 
     @cached_property
     def tools(self) -> Tools:
-        """The tools."""
+        """RViz's tools."""
         return Tools(self.window)
 
     @cached_property
     def displays(self) -> Displays:
-        """The displays."""
+        """RViz's displays."""
         return Displays(self.window)
 
     @cached_property
     def frames(self) -> Frames:
-        """Where the robot's frames are."""
+        """The robot's coordinate frames."""
         return Frames(self._session, self.window)
 
     @cached_property
@@ -91,17 +91,17 @@ class Access(QtCore.QObject):
 
     @cached_property
     def views(self) -> Views:
-        """The types of views, and the saved ones."""
+        """The view types and the saved views."""
         return Views(self.window)
 
     @cached_property
     def picker(self) -> Picker:
-        """Points under pixels, and screenshots."""
+        """Picking of 3D points, and screenshots."""
         return Picker(self.window)
 
     @cached_property
     def trackers(self) -> Trackers:
-        """Points followed on the 3D view."""
+        """Trackers of points in the 3D view."""
         return Trackers(self.window, lambda: self.frames)
 
     @property
@@ -126,7 +126,7 @@ class Access(QtCore.QObject):
 
     @property
     def bare(self) -> bool:
-        """Whether RViz's window shows the 3D view alone."""
+        """Whether RViz's window shows only the 3D view."""
         return self.window.bare.on
 
     @bare.setter
@@ -134,10 +134,10 @@ class Access(QtCore.QObject):
         self.window.bare.on = bare
 
     def load_config(self, file: str) -> None:
-        """Load a ``.rviz`` file as soon as the event loop is reached.
+        """Load a ``.rviz`` file from the event loop, after the current event.
 
         Raises:
-            Error: The file is missing or is no config of RViz.
+            Error: The file is missing or is not an RViz config.
         """
         path = config_file(file)
 
@@ -151,10 +151,10 @@ class Access(QtCore.QObject):
         QtCore.QTimer.singleShot(0, load)
 
     def save_config(self, file: str = "") -> None:
-        """Save RViz's config; without a file, where it was loaded from.
+        """Save RViz's config, by default to the file it was loaded from.
 
         Raises:
-            Error: There is no such folder, or no config is loaded.
+            Error: The folder does not exist, or no config file is loaded and none is given.
         """
         if not (file or self.window.config):
             raise Error("no config file is loaded; say where to save it")
@@ -162,11 +162,11 @@ class Access(QtCore.QObject):
 
     @property
     def frame_rate(self) -> float:
-        """How many frames RViz has drawn in the last second."""
+        """Frames that RViz drew in the last second."""
         return self._rate
 
     def close(self) -> None:
-        """Stop following RViz and the robot; safe to call twice."""
+        """Stop observing RViz and the robot; safe to call twice."""
         self._timer.stop()
         for name, part in list(self.__dict__.items()):
             if name in ("displays", "frames"):

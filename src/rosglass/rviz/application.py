@@ -1,4 +1,4 @@
-"""RViz in this process, with overlays; ``rosglass rviz`` is such a program."""
+"""RViz in this process, with overlays, as in ``rosglass rviz``."""
 
 from __future__ import annotations
 
@@ -45,16 +45,16 @@ __all__ = ["Application"]
 _log = logging.getLogger("rosglass.rviz")
 #: rviz::RenderSystem::disableAntiAliasing(), before the first window.
 _NO_ANTI_ALIASING = "_ZN4rviz12RenderSystem19disableAntiAliasingEv"
-#: Seconds after which the process ends once it was asked to, whatever RViz is doing.
+#: Seconds after a request to quit until the process ends, whatever RViz is doing.
 _EXIT_TIMEOUT_S = 1.7
-#: Milliseconds that overlays have to name their node.
+#: Milliseconds within which an overlay may choose the node's name.
 _NODE_DELAY_MS = 2000
-#: Milliseconds between checks whether RViz's node was shut down.
+#: Milliseconds between checks that RViz's node is running.
 _CHECK_PERIOD_MS = 300
 
 
 class Application(Handle):
-    """RViz with its overlays, and the node that they talk through.
+    """RViz with overlays, and the node of the overlays.
 
     ::
 
@@ -62,41 +62,42 @@ class Application(Handle):
             app.add_qml("dashboard.qml")
             sys.exit(app.run())
 
-    Must be made in the main thread, once per process: RViz's renderer cannot be started again.
-    Makes the Qt application unless there is one, PySide2's or PyQt5's. Making it waits for the
-    master, and says so in the log and in a window.
+    Create it in the main thread, once per process, because RViz's renderer cannot be restarted.
+    It creates the Qt application unless there is one (of PySide2 or PyQt5), and waits for the ROS
+    master, which the log and a window show.
 
     Args:
-        config: The ``.rviz`` file, ``package://name/path`` for one in a ROS package; empty for
-            RViz's default one.
+        config: The ``.rviz`` file, or ``package://name/path`` for one in a ROS package; empty for
+            RViz's default config.
         url: The ROS 1 master of RViz and of the overlays, e.g. ``ros1://robot:11311``; empty for
             ``ROS_MASTER_URI``.
-        name: Name of RViz's node; empty for ``rviz`` with what makes it unique, as RViz does.
-        session: The node that overlays talk through, instead of one of its own; it is left open at
-            the end.
-        fixed_frame: The frame that RViz shows everything in, instead of the one in the config.
-        fullscreen: Fill the screen.
-        bare: Show the 3D view alone, without menu, tool bar, docked panels and status bar.
-        splash: Show RViz's splash screen.
-        anti_aliasing: Smooth edges in the 3D view, where RViz can. Without a graphics card, RViz
-            takes several times as long for each frame with it.
-        renderer: What draws overlays in QML: ``opengl``, ``software`` (Qt's own renderer, without
-            shaders, particles and films), or ``auto`` for the one that is faster here.
-        allow_network: Let Qt fetch what QML and texts name on other machines: pictures, files of
-            QML, modules. Otherwise it cannot in this process, from now on.
-        timeout: Seconds to wait for the master; None for as long as it takes.
-        import_paths: Further folders with QML modules; ``package://`` as well.
-        arguments: What QML finds in ``Qt.application.arguments``.
-        ros_arguments: Remappings such as ``scan:=/robot/scan``, as RViz's own command line has
-            them; for the overlays' node as well, its name excepted.
+        name: Name of RViz's node; empty for ``rviz`` with a unique suffix, as in RViz itself.
+        session: The session of the overlays, instead of a new one; it stays open after
+            :meth:`close`.
+        fixed_frame: RViz's fixed frame, instead of the config's.
+        fullscreen: Whether to fill the screen.
+        bare: Whether to show only the 3D view, without menu, tool bar, docked panels and status
+            bar.
+        splash: Whether to show RViz's splash screen.
+        anti_aliasing: Whether to smooth edges in the 3D view. Without a graphics card, this makes
+            each frame several times slower.
+        renderer: Renderer of QML overlays: ``opengl``, ``software`` (Qt's software renderer,
+            without shaders, particles and video), or ``auto`` for the faster one on this machine.
+        allow_network: Whether Qt may load images, QML files and modules from other machines;
+            otherwise network access is disabled for this process from now on.
+        timeout: Seconds to wait for the master; None waits forever.
+        import_paths: Additional folders with QML modules, also as ``package://`` URLs.
+        arguments: Value of ``Qt.application.arguments`` in QML.
+        ros_arguments: Remappings such as ``scan:=/robot/scan``, as on RViz's command line; they
+            apply to the overlays' node, too, except for the name.
 
     Raises:
         UnsupportedError: RViz, its bindings or a display are missing; the message says what to
             install.
         ConnectionLostError: The master does not answer in time.
-        RosArgumentError: One of `ros_arguments` is not valid.
-        Error: A file is missing or broken, a name or an address is not valid, this is not the main
-            thread, or there is an RViz in this process already.
+        RosArgumentError: One of `ros_arguments` is invalid.
+        Error: A file is missing or broken, a name or address is invalid, this is not the main
+            thread, or this process has created an RViz before.
         KeyboardInterrupt: Ctrl-C was pressed.
     """
 
@@ -155,7 +156,7 @@ class Application(Handle):
                 Application._made = True
                 if not anti_aliasing:
                     cpp_function("librviz", _NO_ANTI_ALIASING)()
-                #: RViz.
+                #: RViz's window.
                 self.window = Window(config, splash=splash)
         if received:
             _raise_signal(received[0])
@@ -163,7 +164,7 @@ class Application(Handle):
             raise ConnectionLostError(f"the ROS master at {options.master} is not waited for")
         self.window.bare.on = bare
         self._owns_session = session is None
-        #: The node that QML talks through.
+        #: The session of the overlays.
         self.session = session or Session(
             url or _master_url(options),
             connect=connect_beside_rviz,
@@ -172,17 +173,17 @@ class Application(Handle):
         self.session.killed.connect(self._on_killed)
         self._screen = LostScreen(self.window.ids, [roscpp.shut_down, self._close_node])
         self.window.before_frame.connect(self._screen.check)
-        #: RViz's tools, displays, views and camera.
+        #: Interface to RViz's tools, displays, views and camera.
         self.rviz = Access(self.window, self.session)
         self.session.shared[ACCESS] = self.rviz
-        #: The overlays, the lowest first.
+        #: The overlays, lowest first.
         self.overlays = Stack(self.window)
-        #: Their entries in RViz's Displays panel.
+        #: The overlays' entries in RViz's Displays panel.
         self.entries = Entries(
             self.window, self.overlays, self.session, self.rviz.frames, self._import_paths
         )
         self._menu = OverlayMenu(self.window, self.entries)
-        #: RViz's camera.
+        #: The view controller of RViz's camera.
         self.view = self.rviz.view
         #: Keyboard navigation.
         self.view_keys = ViewKeys(self.window, self.view, self.overlays)
@@ -190,7 +191,7 @@ class Application(Handle):
         self.view_services = ViewServices(self.view, self.session, self.node_name)
         #: The view controller's entry in the Displays panel.
         self.view_entry = ViewEntry(self.window, self.entries, self.view, self.view_services)
-        #: Whether the master of RViz is there.
+        #: Monitors RViz's ROS master.
         self.master = MasterWatch(options.master)
         self.master.problem_changed.connect(self._show_problem)
         self._problem: Any = None
@@ -208,7 +209,7 @@ class Application(Handle):
 
     @property
     def fixed_frame(self) -> str:
-        """RViz's fixed frame; RViz reports one that does not exist in its status."""
+        """RViz's fixed frame; if it does not exist, RViz's status says so."""
         return str(self.window.manager.getFixedFrame())
 
     @fixed_frame.setter
@@ -221,14 +222,14 @@ class Application(Handle):
         self.window.load_config(config)
 
     def save_config(self, config: str | os.PathLike[str] = "") -> None:
-        """Save what RViz shows into a ``.rviz`` file; see :meth:`Window.save_config`."""
+        """Save RViz's config to a ``.rviz`` file; see :meth:`Window.save_config`."""
         self.window.save_config(config)
 
     def add(self, overlay: Overlay) -> Overlay:
         """Show an overlay.
 
         Raises:
-            Error: There is one of this name.
+            Error: The name is taken.
         """
         self.overlays.add(overlay)
         return overlay
@@ -237,13 +238,13 @@ class Application(Handle):
         """Show a QML file over the 3D view.
 
         Args:
-            file: The file; ``package://name/path`` for one in a ROS package.
-            name: The overlay's name; empty for the file's, with a number if that is taken.
-            options: Of :class:`QmlOverlay`.
+            file: The file, or ``package://name/path`` for one in a ROS package.
+            name: The overlay's name; empty for the file's, numbered if that is taken.
+            options: Options of :class:`QmlOverlay`.
 
         Raises:
             QmlError: The file is missing, or has errors and is not watched.
-            Error: There is an overlay of this name.
+            Error: The name is taken.
         """
         paths = [*self._import_paths, *options.pop("import_paths", ())]
         overlay = QmlOverlay(file, self.session, name, import_paths=paths, **options)
@@ -264,16 +265,16 @@ class Application(Handle):
         return name
 
     def show(self) -> None:
-        """Show RViz; :meth:`run` does it when this was not called."""
+        """Show RViz's window; :meth:`run` calls this."""
         self.window.widget.show()
         if self._fullscreen:
             self.window.fullscreen = True
         self._fullscreen = False
 
     def connect(self) -> None:
-        """Connect as RViz's node name with ``_overlays``, unless an overlay has named the node.
+        """Create the overlays' node as RViz's node name plus ``_overlays``, unless an overlay did.
 
-        :meth:`run` does it after two seconds: robots reach the camera by it.
+        :meth:`run` calls this after two seconds, because the node provides the camera's services.
         """
         if not self._closed and not self.session.is_initialized:
             namespace, _, name = self.node_name.rpartition("/")
@@ -283,10 +284,10 @@ class Application(Handle):
         """Show RViz until it is closed.
 
         Args:
-            end_process: End the process soon after, whatever still runs in it.
+            end_process: Whether to end the process soon after, even if threads still run.
 
         Returns:
-            The exit code: 0, what :meth:`quit` was given, 130 after Ctrl-C, 143 after SIGTERM.
+            The exit code: 0, the argument of :meth:`quit`, 130 after Ctrl-C, or 143 after SIGTERM.
         """
         self.show()
         QtCore.QTimer.singleShot(_NODE_DELAY_MS, self.connect)
@@ -304,13 +305,13 @@ class Application(Handle):
         self.session.executor.post(lambda: QtCore.QCoreApplication.exit(code))
 
     def screenshot(self, file: str | os.PathLike[str]) -> None:
-        """Save a picture of RViz's window, 3D view and overlays included.
+        """Save a picture of RViz's window, including 3D view and overlays.
 
         Args:
-            file: PNG or JPEG, by the end of its name.
+            file: The picture file; its suffix determines the format, e.g. PNG or JPEG.
 
         Raises:
-            Error: The window is not shown, or the picture cannot be written.
+            Error: The window is not shown, or the file cannot be written.
         """
         self.rviz.picker.screenshot(file, window=True)
 
@@ -348,7 +349,7 @@ class Application(Handle):
         if self._running:
             QtCore.QCoreApplication.exit(0)
         elif not self._closed:
-            # RViz itself is still handling the event.
+            # RViz is still handling the close event.
             QtCore.QTimer.singleShot(0, self.close)
 
     def _check_node(self) -> None:
@@ -378,10 +379,10 @@ class Application(Handle):
 
 
 def _qt_application(arguments: Sequence[str]) -> Any:
-    """Return the Qt application of the process, made if there is none.
+    """Return the Qt application of the process, created if there is none.
 
     Raises:
-        UnsupportedError: There is no display that RViz can draw on.
+        UnsupportedError: No display is available that RViz can draw on.
     """
     existing = QtCore.QCoreApplication.instance()
     if existing is not None:
@@ -392,7 +393,7 @@ def _qt_application(arguments: Sequence[str]) -> Any:
         return existing
     platform = os.environ.setdefault("QT_QPA_PLATFORM", "xcb")
     if platform != "xcb":
-        # On Wayland, RViz draws through XWayland.
+        # On Wayland, RViz needs XWayland.
         raise UnsupportedError(
             f"RViz draws on X11 only, and QT_QPA_PLATFORM is {platform}: unset it; without a "
             "screen, use a virtual one: xvfb-run -s '-screen 0 1280x800x24' rosglass rviz ..."
@@ -404,7 +405,7 @@ def _qt_application(arguments: Sequence[str]) -> Any:
 
 
 def _master_url(options: Ros1Options) -> str:
-    """Return the master's URL, with a name instead of an address where there is one."""
+    """Return the master's URL as ``ros1://host:port``; ``ros1://`` if its URI has a path."""
     master = options.master.removeprefix("http://")
     return "ros1://" if "/" in master else f"ros1://{master}"
 
@@ -415,7 +416,7 @@ def _check_frame(frame: str) -> None:
 
 
 def _attempt(step: Callable[[], object]) -> None:
-    """Run a step of closing; log its errors, because half an RViz crashes the process."""
+    """Run a step of closing; log its errors, because a half-closed RViz crashes the process."""
     try:
         step()
     except Exception:

@@ -1,4 +1,4 @@
-"""RViz's camera: where a point is seen, what lies behind a pixel, and pictures of the 3D view."""
+"""Projection of points into RViz's 3D view and back, and pictures of the view."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ if TYPE_CHECKING:
 __all__ = ["Camera", "Picker", "Seen"]
 
 
-#: RViz's main 3D view; number 0 is a hidden window of one pixel.
+#: Ogre's name of RViz's 3D view; number 0 is a hidden window of one pixel.
 _TARGET = "OgreWindow(1)"
 
 
 class Seen(NamedTuple):
-    """Where a point is seen.
+    """A point projected into the 3D view; all values are NaN behind the camera.
 
     Attributes:
-        x: Units of the widget with the 3D view, from its left edge; NaN behind the camera.
-        y: The same, from its upper edge.
-        depth: Metres from the camera; NaN behind it.
+        x: Units of the widget with the 3D view, from its left edge.
+        y: Units of the widget, from its upper edge.
+        depth: Metres from the camera.
     """
 
     x: float
@@ -48,10 +48,10 @@ _NOWHERE = Seen(math.nan, math.nan, math.nan)
 
 
 class Camera:
-    """The camera of RViz's 3D view, as it was when :meth:`update` was called last.
+    """The camera of RViz's 3D view at the last call of :meth:`update`; for the GUI thread only.
 
-    Used in the GUI thread. RViz moves its camera between ``before_frame`` and drawing, so that what
-    is read there is one frame old.
+    RViz moves its camera between ``before_frame`` and drawing, so a handler of that signal reads
+    the camera of the previous frame.
     """
 
     def __init__(self, window: Window) -> None:
@@ -63,12 +63,12 @@ class Camera:
 
     @property
     def eye(self) -> tuple[float, float, float]:
-        """Where the camera is, in the fixed frame."""
+        """The camera's position in the fixed frame."""
         x, y, z = self._eye
         return float(x), float(y), float(z)
 
     def update(self) -> bool:
-        """Read the camera; return whether the projection has changed."""
+        """Read the camera from RViz; return whether the projection has changed."""
         viewport = ogre().Root.getSingleton().getRenderTarget(_TARGET).getViewport(0)
         camera = viewport.getCamera()
         self._eye = _numbers(camera.getDerivedPosition())
@@ -76,7 +76,7 @@ class Camera:
         view[:3, :3] = _numbers(camera.getViewMatrix().linear())
         view[:3, 3] = -view[:3, :3] @ self._eye
         whole = _numbers(camera.getProjectionMatrix()) @ view
-        # RViz makes its window's width even; the widget's own may be one less.
+        # RViz rounds its window's width up to an even number, unlike the widget's.
         ratio = self._window.view_size()[2]
         size = (viewport.getActualWidth() / ratio, viewport.getActualHeight() / ratio)
         same = size == self._size and np.array_equal(whole, self._whole)
@@ -84,13 +84,13 @@ class Camera:
         return not same
 
     def project(self, point: Sequence[float]) -> Seen:
-        """Return where a point is seen.
+        """Return a point's position in the view.
 
         Args:
             point: x, y, z in RViz's fixed frame, metres.
 
         Raises:
-            Error: It is not three numbers.
+            Error: `point` is not three numbers.
         """
         at = _point(point)
         clip = self._whole @ np.append(at, 1.0)
@@ -102,15 +102,15 @@ class Camera:
         return Seen(float((x + 1) / 2 * width), float((1 - y) / 2 * height), depth)
 
     def unproject(self, x: float, y: float, depth: float) -> tuple[float, float, float] | None:
-        """Return the point of the fixed frame that is seen at a place.
+        """Return the point of the fixed frame at a position in the view.
 
         Args:
             x: Units of the widget with the 3D view, from its left edge.
-            y: The same, from its upper edge.
-            depth: What OpenGL's depth buffer holds there, 0 to 1.
+            y: Units of the widget, from its upper edge.
+            depth: Value of OpenGL's depth buffer at this position, 0 to 1.
 
         Returns:
-            Metres; None where there is nothing, i.e. depth 1.
+            x, y, z in metres; None if nothing was drawn there, i.e. at depth 1.
         """
         width, height = self._size
         if not 0 <= depth < 1 or not width or not height:
@@ -140,27 +140,27 @@ def _point(point: Sequence[float]) -> NDArray[np.float64]:
 
 
 class Picker:
-    """Picks points and takes pictures by drawing the 3D view once more; takes milliseconds."""
+    """Picks points and takes pictures by redrawing the 3D view, which takes milliseconds."""
 
     def __init__(self, window: Window) -> None:
         self._window = window
         self._busy = False
 
     def pick(self, x: float, y: float, radius: float = 0.0) -> tuple[float, float, float] | None:
-        """Return the point that is seen at a place.
+        """Return the point of the scene at a position in the view.
 
-        What is translucent (the grid, for instance) and overlays count for nothing.
+        Ignores overlays and translucent objects such as the grid.
 
         Args:
             x: Units of the widget with the 3D view, from its left edge.
-            y: The same, from its upper edge.
-            radius: How far around to look for what is nearest to the place, in the same units.
+            y: Units of the widget, from its upper edge.
+            radius: Radius in which to search for the nearest object, in the same units.
 
         Returns:
-            x, y, z in the fixed frame, metres; None where there is nothing, or outside.
+            x, y, z in the fixed frame, in metres; None if nothing is there, or outside the view.
 
         Raises:
-            Error: They are no finite numbers, or the 3D view is not drawn now.
+            Error: An argument is not a finite number, or the 3D view cannot be drawn now.
         """
         if not all(math.isfinite(number) for number in (x, y, radius)) or not 0 <= radius <= 100:
             raise Error(
@@ -188,14 +188,14 @@ class Picker:
         depth = float(depths[rows[nearest], columns[nearest]])
         seen_x = (int(columns[nearest]) + left + 0.5) / ratio
         seen_y = (height - 0.5 - (int(rows[nearest]) + bottom)) / ratio
-        # Made now: what is drawn is drawn by the camera of this moment.
+        # A new camera: the view was drawn with the current one.
         return Camera(self._window).unproject(seen_x, seen_y, depth)
 
     def picture(self) -> Any:
-        """Return the 3D view with its overlays, a ``QImage``.
+        """Return a picture of the 3D view with its overlays, a ``QImage``.
 
         Raises:
-            Error: It is not drawn now.
+            Error: The view cannot be drawn now.
         """
         width, height = self._size()
         pixels = np.zeros((height, width), np.uint32)
@@ -208,14 +208,14 @@ class Picker:
         """Save a picture of the 3D view with its overlays.
 
         Args:
-            file: Where to; its ending says the format, e.g. ``.png`` or ``.jpg``.
-            window: Show RViz's whole window instead, as it is on the screen.
+            file: The picture file; its suffix determines the format, e.g. ``.png`` or ``.jpg``.
+            window: Whether to include the rest of RViz's window.
 
         Returns:
-            The file.
+            The absolute path.
 
         Raises:
-            Error: It cannot be written; the error says why.
+            Error: The view cannot be drawn now, or the file cannot be written.
         """
         path = Path(file).expanduser().absolute()
         known = sorted(
@@ -234,7 +234,7 @@ class Picker:
     def _grab_window(self) -> Any:
         widget = self._window.widget
         grabbed = widget.grab().toImage()
-        # Qt knows nothing of what Ogre has drawn.
+        # Qt's picture does not contain what Ogre draws.
         at = self._window.panel.mapTo(widget, self._window.panel.rect().topLeft())
         painter = QtGui.QPainter(grabbed)
         view = self.picture()

@@ -1,4 +1,4 @@
-"""RViz's displays: their list, status and properties; adding and removing them."""
+"""RViz's displays: list, status, properties, adding and removing."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ if TYPE_CHECKING:
 __all__ = ["Display", "Displays", "Status", "status_of"]
 
 
-#: Milliseconds between checks of what RViz has no signal for.
+#: Milliseconds between checks for changes that RViz does not signal.
 _PERIOD_MS = 200
 _MAX_NAME_LENGTH = 1000
 _SIGNALS = ("displayAdded(rviz::Display*)", "displayRemoved(rviz::Display*)")
 
 
 class Status(NamedTuple):
-    """The status of a display."""
+    """The status of a display, or of RViz."""
 
     #: ``ok``, ``warn`` or ``error``.
     level: str
-    #: What it says about itself, one line for each; empty where it says nothing.
+    #: The status messages, one per line.
     text: str
 
 
 def status_of(item: Any) -> Status:
-    """Return the status below a display, or of RViz below its root."""
+    """Return the status of a display; of RViz for the root display group."""
     for index in range(item.numChildren()):
         child = item.childAt(index)
         if class_of(child) == "rviz::StatusList":
@@ -56,13 +56,13 @@ def status_of(item: Any) -> Status:
 
 
 class Display:
-    """One display; its name and class stay readable once it is gone. Made by :class:`Displays`."""
+    """One display, created by :class:`Displays`; name and class stay readable after removal."""
 
     def __init__(self, owner: Displays, handle: Any) -> None:
         self._owner = owner
-        #: RViz's display; None once it is gone.
+        #: RViz's display; None after removal.
         self.handle: Any = handle
-        #: The class, e.g. ``rviz/Grid``.
+        #: The class id, e.g. ``rviz/Grid``.
         self.class_id = str(handle.getClassId())
         self._state = self._read()
 
@@ -73,26 +73,26 @@ class Display:
         return str(handle.getName()), bool(handle.isEnabled()), status_of(handle)
 
     def refresh(self) -> bool:
-        """Read its state; return whether it has changed."""
+        """Read the state from RViz; return whether it has changed."""
         before, self._state = self._state, self._read()
         return before != self._state
 
     @property
     def exists(self) -> bool:
-        """Whether RViz still has it."""
+        """Whether RViz has not removed it."""
         return self.handle is not None
 
     @property
     def at(self) -> int:
-        """Its address in memory; 0 once it is gone."""
+        """Its address in memory; 0 after removal."""
         return 0 if self.handle is None else address(self.handle)
 
     @property
     def name(self) -> str:
-        """Its name in the panel; several displays may have the same.
+        """Its name in the panel, which need not be unique.
 
         Raises:
-            Error: It is set to no text of one line, or the display is gone.
+            Error: When setting it: the name is not a line of text, or the display was removed.
         """
         return self._read()[0]
 
@@ -106,7 +106,7 @@ class Display:
         """Whether it is shown.
 
         Raises:
-            Error: It is set once the display is gone.
+            Error: When setting it: the display was removed.
         """
         return self.exists and self._read()[1]
 
@@ -117,14 +117,14 @@ class Display:
 
     @property
     def status(self) -> Status:
-        """Its status; an error once it is gone."""
+        """Its status; an error after removal."""
         return self._read()[2] if self.exists else Status("error", f"{self.name} was removed")
 
     def properties(self) -> list[dict[str, Any]]:
         """Return all its properties; see :func:`rosglass.rviz.properties.describe_properties`.
 
         Raises:
-            Error: It is gone.
+            Error: The display was removed.
         """
         return describe_properties(self.require())
 
@@ -132,10 +132,10 @@ class Display:
         """Return the value of a property; see :func:`rosglass.rviz.properties.read_property`.
 
         Args:
-            path: E.g. ``Offset/X``.
+            path: Path of the property, e.g. ``Offset/X``.
 
         Raises:
-            Error: It has no such property, or is gone.
+            Error: The property does not exist, or the display was removed.
         """
         return read_property(find_property(self.require(), path, self.name))
 
@@ -143,21 +143,22 @@ class Display:
         """Change a property; see :func:`rosglass.rviz.properties.write_property`.
 
         Args:
-            path: E.g. ``Offset/X``.
+            path: Path of the property, e.g. ``Offset/X``.
             value: Its new value.
 
         Raises:
-            Error: It has no such property or is gone, or the property cannot hold the value.
+            Error: The property does not exist, does not accept the value, or the display was
+                removed.
         """
         found = find_property(self.require(), path, self.name)
         write_property(found, value, f"{self.name}/{path}")
         self._owner.emit_changes()
 
     def remove(self) -> None:
-        """Remove it from RViz.
+        """Remove the display from RViz.
 
         Raises:
-            Error: It is gone.
+            Error: It was removed before.
         """
         self._owner.remove(self)
 
@@ -165,7 +166,7 @@ class Display:
         """Return RViz's display.
 
         Raises:
-            Error: It is gone.
+            Error: It was removed.
         """
         if self.handle is None:
             raise Error(f"the display {self.name} was removed or moved; ask for it again")
@@ -173,13 +174,13 @@ class Display:
 
 
 class Displays(Watched):
-    """The displays of an RViz, those in groups included.
+    """The displays of an RViz, including those in groups.
 
-    What changes of one is its name, its status, or whether it is shown; one that is dragged to
-    another group is another one then.
+    `changed` reports a new name, a new status, and showing or hiding. A display that the user
+    drags to another group is removed and added again.
     """
 
-    #: RViz's own status has changed, e.g. to an unknown fixed frame.
+    #: :attr:`status` has changed.
     status_changed = Signal()
 
     def __init__(self, window: Window) -> None:
@@ -197,26 +198,26 @@ class Displays(Watched):
 
     @property
     def classes(self) -> list[str]:
-        """Ids of the classes that can be added."""
+        """Class ids of the displays that can be added."""
         return list(declared(DISPLAY))
 
     @property
     def status(self) -> Status:
-        """RViz's own status, e.g. whether the fixed frame is known."""
+        """RViz's own status, e.g. an error for an unknown fixed frame."""
         return status_of(self._root)
 
     def find(self, name: str) -> Display | None:
-        """Return the first display of a name."""
+        """Return the first display with the given name; None if there is none."""
         return next((display for display in self._items if display.name == name), None)
 
     def get(self, path: str | Sequence[str]) -> Any:
         """Return the value of a property of any display, or of RViz.
 
         Args:
-            path: E.g. ``Grid/Color`` or ``Global Options/Background Color``.
+            path: Path of the property, e.g. ``Grid/Color`` or ``Global Options/Background Color``.
 
         Raises:
-            Error: There is no such property.
+            Error: The property does not exist.
         """
         return read_property(self._find_property(path))
 
@@ -224,14 +225,14 @@ class Displays(Watched):
         """Change a property of any display, or of RViz; see :meth:`get`.
 
         Raises:
-            Error: There is no such property, or it cannot hold the value.
+            Error: The property does not exist, or does not accept the value.
         """
         names = path if isinstance(path, str) else "/".join(map(str, path))
         write_property(self._find_property(names), value, names[:120])
         self.emit_changes()
 
     def options(self) -> list[dict[str, Any]]:
-        """Return RViz's global options, as `describe_properties` does."""
+        """Return RViz's global options; see `describe_properties`."""
         return describe_properties(self._root)
 
     def _find_property(self, path: str | Sequence[str]) -> Any:
@@ -244,7 +245,7 @@ class Displays(Watched):
         return find_property(self._root, names, "RViz")
 
     def _require_first(self, path: str) -> None:
-        """Raise an Error if nothing in the panel has the first name of a path."""
+        """Raise an Error if no display or property of RViz has the first name of a path."""
         first, _, below = path.partition("/")
         displays = [display.name for display in self._items]
         known = [*(str(c.getName()) for c in child_properties(self._root)), *displays]
@@ -257,15 +258,15 @@ class Displays(Watched):
             raise Error(f"nothing in the Displays panel is called {shown(first)}{hint}")
 
     def add(self, class_id: str, name: str = "", *, enabled: bool = True) -> Display:
-        """Add a display, as the last one.
+        """Append a display.
 
         Args:
-            class_id: E.g. ``rviz/Grid``.
-            name: Its name; that of the class by default.
-            enabled: Whether it is shown.
+            class_id: Class id, e.g. ``rviz/Grid``.
+            name: Its name; by default the class name.
+            enabled: Whether to show it.
 
         Raises:
-            Error: There is no such class, or it could not be loaded.
+            Error: The class does not exist, or could not be loaded.
         """
         class_id = require_class_id(class_id, DISPLAY)
         shown = _plain_name(name) if name else class_id.rpartition("/")[2]
@@ -282,7 +283,7 @@ class Displays(Watched):
         return made
 
     def remove(self, display: Display) -> None:
-        """Remove a display, with those in it.
+        """Remove a display, and if it is a group, the displays in it.
 
         Raises:
             Error: It was removed before.
@@ -293,15 +294,15 @@ class Displays(Watched):
     def _delete(self, handle: Any) -> None:
         self.flush_panels()
         wrapped = as_pyside(handle, QtCore.QObject)
-        # As RViz's own panel does it: displays may have sent signals from other threads.
+        # Like RViz's panel: delete it later, because other threads may have emitted its signals.
         handle.disconnect()
         handle.getParent().takeChild(handle)
         wrapped.deleteLater()
 
     def flush_panels(self) -> None:
-        """Deliver what is queued for RViz's panels.
+        """Deliver the calls that are queued for RViz's panels.
 
-        They hide and show properties later, and crash if a display was removed in between.
+        They hide and show properties, and crash if the display of these is deleted first.
         """
         event = int(QtCore.QEvent.Type.MetaCall)
         for tree in self._window.widget.findChildren(QtWidgets.QTreeView):
@@ -332,7 +333,7 @@ class Displays(Watched):
 
 
 def _walk(group: Any) -> Iterator[tuple[Any, bool]]:
-    """Iterate over a group and the displays in it, each with whether it is a group."""
+    """Iterate over a group and all displays in it, as pairs (display, is it a group)."""
     yield group, True
     for index in range(group.numDisplays()):
         inner = group.getGroupAt(index)

@@ -1,5 +1,5 @@
-"""Overlays as entries of RViz's Displays panel, and the menu Overlays."""
-# ruff: noqa: N802 - the names of what C++ calls are RViz's
+"""The overlays' entries in RViz's Displays panel, and the Overlays menu."""
+# ruff: noqa: N802 - C++ calls these methods by their RViz names
 
 from __future__ import annotations
 
@@ -48,23 +48,23 @@ __all__ = [
 
 @cache
 def overlay_icon() -> Any:
-    """Return the icon of overlays, a pane over a view."""
+    """Return the icon of overlays: a pane over a view."""
     rect = pyqt().QRectF
     return _icon(lambda painter: painter.drawRoundedRect(rect(2, 2, 24, 20), 3, 3), 9, 11, 21, 19)
 
 
 @cache
 def camera_icon() -> Any:
-    """Return the icon of the view controller, a camera."""
+    """Return the icon of the view controller: a camera."""
     lens = [pyqt().QPointF(x, y) for x, y in ((17, 16), (29, 8), (29, 24))]
     return _icon(lambda painter: painter.drawPolygon(*lens), 2, 8, 19, 16)
 
 
 def _icon(draw_grey: Callable[[Any], None], *blue: float) -> Any:
-    """Return an icon: something grey behind a blue pane.
+    """Return an icon: a grey shape behind a blue pane.
 
     Args:
-        draw_grey: Draws it, within 32x32 pixels.
+        draw_grey: Draws the shape, within 32x32 pixels.
         blue: Left, top, width and height of the pane.
     """
     core, gui = pyqt(), pyqt("QtGui")
@@ -84,7 +84,7 @@ def _icon(draw_grey: Callable[[Any], None], *blue: float) -> Any:
 _OK, _WARN, _ERROR = 0, 1, 2
 _QML = (QML_CLASS, REFERENCE_QML_CLASS)
 _CONFIGURATION, _CONFIG = "Configuration", "Overlay Configuration"
-#: Properties of an entry -> attributes of its overlay.
+#: Names of an entry's properties -> attributes of its overlay.
 _ATTRIBUTES = {
     "Z-Index": "z",
     "Scale": "scale",
@@ -96,7 +96,7 @@ _ATTRIBUTES = {
 
 @cache
 def _classes() -> tuple[Any, Any]:
-    """Return our classes of RViz's display, and of the property above registered ones."""
+    """Return our subclasses of RViz's display, and of the property that holds registered ones."""
     bindings, core = rviz(), pyqt()
 
     class Held(bindings.Property):  # type: ignore[name-defined,misc]
@@ -106,7 +106,7 @@ def _classes() -> tuple[Any, Any]:
         def save(self, config: Any) -> None:
             """Do nothing: the entry saves it."""
 
-    # A plain display cannot be derived from in Python.
+    # Python cannot derive from a plain Display.
     class Display(bindings.DisplayGroup):  # type: ignore[name-defined,misc]
         entry: Any = None
 
@@ -124,19 +124,19 @@ def _classes() -> tuple[Any, Any]:
 
         @log_errors(core.Qt.ItemFlags())
         def getViewFlags(self, column: int) -> Any:
-            # Nothing can be dropped into it.
+            # Unlike other groups, it accepts no dropped displays.
             return bindings.DisplayGroup.getViewFlags(self, column) & ~core.Qt.ItemIsDropEnabled
 
     return Display, Held
 
 
 def display_class() -> Any:
-    """Return our class of RViz's display, whose `entry` saves and loads."""
+    """Return our subclass of RViz's display, whose `entry` saves and loads it."""
     return _classes()[0]
 
 
 def set_status(display: Any, row: str, level: int, text: str) -> None:
-    """Set a line of a display's status; the level is 0 for ok, 1 for a warning, 2 for an error."""
+    """Set a row of a display's status; the level is 0 for ok, 1 for a warning, 2 for an error."""
     core = pyqt()
     core.QMetaObject.invokeMethod(
         display,
@@ -149,13 +149,13 @@ def set_status(display: Any, row: str, level: int, text: str) -> None:
 
 
 class Entry(QtCore.QObject):
-    """One entry of the Displays panel, and its overlay once there is one.
+    """An overlay's entry in the Displays panel; it may exist before its overlay.
 
     Args:
-        class_id: RViz's name for what it is.
-        session: The node that QML talks through.
-        choices: What choosers of properties offer.
-        import_paths: Further folders with QML modules.
+        class_id: The overlay's class id.
+        session: The session of QML overlays.
+        choices: Suggestions of the property editors.
+        import_paths: Additional folders with QML modules.
     """
 
     def __init__(
@@ -168,13 +168,13 @@ class Entry(QtCore.QObject):
         super().__init__()
         self.class_id, self._session, self._choices = class_id, session, choices
         self._import_paths = import_paths
-        #: Called when its check box, or that of a group it is in, was clicked, when it is to show
-        #: something else, and when RViz has deleted it. No signal: PySide2 takes entries that have
-        #: gone for ones that it can still disconnect.
+        #: Called when the entry was switched on or off (also by its group), when its Path has
+        #: changed, and when RViz has deleted it. Not a signal, because PySide2 would try to
+        #: disconnect deleted entries.
         self.touched: Callable[[], object] = _nothing
-        #: Called when it has another name; with itself.
+        #: Called with the entry when it was renamed.
         self.renamed: Callable[[Entry], object] = _nothing
-        #: Called when something that RViz does not see, and its file would keep, is another now.
+        #: Called when data that belongs into the config file has changed unknown to RViz.
         self.edited: Callable[[], object] = _nothing
         self.overlay: Overlay | None = None
         self._failed, self._shown_file = "", ""
@@ -203,24 +203,25 @@ class Entry(QtCore.QObject):
         ]
         for signal, slot in shown:
             signal.connect(slot)
-        #: Of the display, and of its own properties; Python does not see what connections hold.
+        #: Connections of the display and of its own properties; kept here because Qt's
+        #: connections hold no reference to their Python slots.
         self._watches: tuple[list[Any], list[Any]] = (shown, [])
         for name in self.own.properties:
             self._watch_own(name)
 
     @property
     def is_qml(self) -> bool:
-        """Whether it shows a QML file."""
+        """Whether the overlay is a QML file."""
         return self.class_id in _QML
 
     @property
     def alive(self) -> bool:
-        """Whether RViz still has it."""
+        """Whether RViz has not deleted the display."""
         return not pyqt("sip").isdeleted(self.display)
 
     @property
     def file(self) -> str:
-        """The QML file, as it was given."""
+        """The QML file, as given in Path."""
         return str(self.own.properties["Path"].get()) if self.is_qml else ""
 
     def _register_properties(self) -> None:
@@ -250,10 +251,10 @@ class Entry(QtCore.QObject):
         changed.connect(slot)
         self._watches[1].append((changed, slot))
 
-    # The overlay.
+    # Overlay.
 
     def make_overlay(self) -> None:
-        """Make the overlay of the entry; an error becomes its status."""
+        """Create the overlay; an error becomes the entry's status."""
         if self.overlay is not None or self._failed or not self.alive:
             return
         name = str(self.display.getName())
@@ -277,31 +278,31 @@ class Entry(QtCore.QObject):
 
     @property
     def waiting(self) -> bool:
-        """Whether it has no overlay because of an error, or without a file."""
+        """Whether it has no overlay because of an error or a missing Path."""
         return self.overlay is None and (bool(self._failed) or (self.is_qml and not self.file))
 
     @property
     def outdated(self) -> bool:
-        """Whether its overlay shows another file than Path says."""
+        """Whether its overlay shows a file other than Path."""
         return self.overlay is not None and self.file != self._shown_file
 
     def shows(self, file: Path) -> bool:
-        """Return whether a file is its Path."""
+        """Return whether Path refers to the given file."""
         try:
             return self.is_qml and locate(self.file) == locate(file)
         except QmlError:
             return False
 
     def retry(self) -> None:
-        """Try again to make its overlay."""
+        """Try again to create the overlay."""
         self._failed = ""
         self.touched()
 
     def attach(self, overlay: Overlay) -> None:
-        """Connect an overlay with this entry, and restore what was saved for it.
+        """Connect an overlay to this entry, and restore its saved values.
 
         Args:
-            overlay: As yet without an entry; one of QML may be loaded already or not.
+            overlay: An overlay without an entry; a QML overlay that is not loaded is loaded.
         """
         self.overlay, self._shown_file = overlay, self.file
         if hasattr(overlay, "style_sheet") and "Style Sheet" not in self.own.properties:
@@ -324,7 +325,7 @@ class Entry(QtCore.QObject):
         properties.configChanged.connect(self._on_config)
         self._show_registered()
         self._show_problem(overlay.problem)
-        # One whose file has errors has reported them.
+        # A problem means that loading has failed already.
         if isinstance(overlay, QmlOverlay) and not overlay.loaded and not overlay.problem:
             try:
                 overlay.load()
@@ -332,7 +333,7 @@ class Entry(QtCore.QObject):
                 overlay.tell_problem(str(error))
 
     def detach(self) -> Overlay | None:
-        """Disconnect the overlay, return it, and keep what it would save."""
+        """Disconnect and return the overlay, and keep the values it would save."""
         overlay, self.overlay = self.overlay, None
         if overlay is None:
             return None
@@ -341,7 +342,7 @@ class Entry(QtCore.QObject):
         if is_alive(overlay):
             overlay.arranged.disconnect(self._follow)
             overlay.problem_changed.disconnect(self._show_problem)
-        # Those of QML end with their engine.
+        # The properties of QML overlays are deleted with their engine.
         if is_alive(properties):
             properties.registered.disconnect(self._show_registered)
             properties.configChanged.disconnect(self._on_config)
@@ -352,12 +353,12 @@ class Entry(QtCore.QObject):
         return overlay
 
     def close(self) -> None:
-        """Release RViz's display, which the caller removes; once, after :meth:`detach`."""
+        """Disconnect from the display, which the caller removes; call it after :meth:`detach`."""
         self._own_tree.close()
         shown, own = self._watches
-        # Those of a display that is gone have ended with it.
+        # The signals of a deleted display are gone.
         for signal, slot in (*own, *(shown if self.alive else ())):
-            # RViz disconnects a display from everything before it removes it.
+            # RViz disconnects a display from everything before removing it.
             with suppress(TypeError):
                 signal.disconnect(slot)
         self._watches = ([], [])
@@ -366,7 +367,7 @@ class Entry(QtCore.QObject):
             self.display.entry = None
 
     def copy_from(self, overlay: Overlay) -> None:
-        """Copy the values of an overlay that a program has made, before :meth:`attach`."""
+        """Copy the values of an overlay that the program created; call before :meth:`attach`."""
         if isinstance(overlay, QmlOverlay):
             self.own.properties["Path"].set(str(overlay.file))
         for name, attribute in _ATTRIBUTES.items():
@@ -396,7 +397,7 @@ class Entry(QtCore.QObject):
             self.display.setEnabled(overlay.visible)
 
     def _show_registered(self, _found: object = None) -> None:
-        """Show the registered properties of the overlay, once there are any."""
+        """Add the overlay's registered properties to the panel, once there are any."""
         overlay = self.overlay
         if overlay is not None and overlay.properties.properties and self._tree is None:
             _, held = _classes()
@@ -411,7 +412,7 @@ class Entry(QtCore.QObject):
         return "Qml" if self.is_qml else "Overlay"
 
     def status(self, row: str, level: int, text: str) -> None:
-        """Set a line of the entry's status."""
+        """Set a row of the entry's status."""
         if self.alive:
             set_status(self.display, row, level, text)
 
@@ -423,7 +424,7 @@ class Entry(QtCore.QObject):
     # Files.
 
     def save(self, config: Any) -> None:
-        """Write what a ``.rviz`` file keeps of it to RViz's ``Config``."""
+        """Save the entry to RViz's ``Config``."""
         for name, value in self.own.save().items():
             config.mapSetValue(name, value)
         overlay = self.overlay
@@ -450,24 +451,24 @@ class Entry(QtCore.QObject):
 
 
 def _nothing(*_: Any) -> None:
-    """Ignore a change."""
+    """Do nothing: the default callback."""
 
 
 class Entries(QtCore.QObject):
-    """Keeps one entry per overlay in the panel, and one overlay per entry of a config file.
+    """Keeps the panel's entries and the overlays in sync: one entry per overlay, and vice versa.
 
-    RViz makes a placeholder of each display whose class it cannot load, which keeps what the file
-    has for it; ours take the places of those that are overlays.
+    RViz creates a placeholder for each display of a config file whose class it cannot load, and
+    keeps the display's config in it. Entries replace the placeholders of overlays.
 
     Args:
-        window: RViz.
+        window: RViz's window.
         stack: The overlays.
-        session: The node that QML talks through.
+        session: The session of QML overlays.
         frames: The robot's frames.
-        import_paths: Further folders with QML modules.
+        import_paths: Additional folders with QML modules.
     """
 
-    #: Placeholders have been looked for, and replaced.
+    #: The panel was searched for placeholders, and those found were replaced.
     replaced = Signal()
 
     def __init__(
@@ -481,21 +482,21 @@ class Entries(QtCore.QObject):
         super().__init__()
         self._window, self._stack, self._session = window, stack, session
         self._import_paths = import_paths
-        #: What choosers of properties offer.
+        #: Suggestions of the property editors.
         self.choices = Choices(
             session, frames, lambda text: window.widget.statusBar().showMessage(text)
         )
         self._entries: list[Entry] = []
-        #: Overlays that the program has brought, which outlive the displays of a config file.
+        #: Overlays added by the program: they stay when another config file is loaded.
         self._program_overlays: list[Overlay] = []
-        #: As the panel has shown them last; what came since may belong between others.
+        #: The overlays in the panel's order at the last synchronization.
         self._order: list[Overlay] = []
         self._new = False
         self._other_classes: dict[str, Callable[[], Any]] = {}
         self._loading = False
         self._scheduled = self._settling = self._closed = False
         self._watched: set[int] = set()
-        # RViz's panel handles other events while it duplicates displays, too.
+        # RViz processes other events in the middle of duplicating displays.
         self._after_event = AfterEvent(self._replace_placeholders)
         stack.changed.connect(self._schedule)
         window.before_frame.connect(self._check_displays)
@@ -511,7 +512,7 @@ class Entries(QtCore.QObject):
         return next((entry for entry in self._entries if entry.overlay is overlay), None)
 
     def add_qml(self, file: str, name: str = "") -> Entry:
-        """Add an entry for a QML file to the panel, which shows its errors."""
+        """Add an entry for a QML file to the panel; the entry shows the file's errors."""
         entry = self._make(QML_CLASS)
         entry.own.properties["Path"].set(file)
         entry.display.setName(name or QtCore.QFileInfo(file).completeBaseName())
@@ -520,11 +521,11 @@ class Entries(QtCore.QObject):
         return entry
 
     def register_class(self, class_id: str, make: Callable[[], Any]) -> None:
-        """Register a class of displays that are no overlays; their placeholders are replaced.
+        """Register another class of displays whose placeholders are replaced.
 
         Args:
-            class_id: The class.
-            make: Returns an object with a `display`, which has that object as its `entry`.
+            class_id: The displays' class id.
+            make: Returns an object whose attribute `display` has the object as its `entry`.
         """
         self._other_classes[class_id] = make
         self._replace_placeholders()
@@ -542,7 +543,7 @@ class Entries(QtCore.QObject):
         for entry in list(self._entries):
             self.remove(entry)
 
-    # Keeping in step.
+    # Synchronization.
 
     @Slot()
     def _schedule(self, *_: Any) -> None:
@@ -581,7 +582,7 @@ class Entries(QtCore.QObject):
         self._apply_panel_order()
 
     def _apply_panel_order(self) -> None:
-        """Stack overlays in the order of the panel, once the user has moved any."""
+        """Stack overlays in the order of the panel, after the user has moved any."""
         order = [
             display.entry.overlay
             for display in self._displays()
@@ -592,15 +593,15 @@ class Entries(QtCore.QObject):
         if moved or self._new:
             self._stack.put_in_order(order)
         if moved and not self._new:
-            # RViz itself does not count it as a change.
+            # RViz itself does not mark its config as modified.
             self._window.manager.notifyConfigChanged()
         self._new = False
 
     def _add_entry(self, overlay: Overlay) -> None:
-        """Connect an overlay of the program with an entry that waits for it, or a new one."""
+        """Connect an overlay of the program to an entry that waits for it, or to a new one."""
         if overlay not in self._program_overlays:
             self._program_overlays.append(overlay)
-            # A file may have one of a class that is not registered.
+            # The config may have a placeholder of its class, if that was not registered before.
             self._replace_all()
         class_id = QML_CLASS if isinstance(overlay, QmlOverlay) else class_id_of(type(overlay))
         for entry in self._entries:
@@ -622,7 +623,7 @@ class Entries(QtCore.QObject):
         return entry.class_id == class_id
 
     def _show(self, entry: Entry) -> None:
-        """Show or hide an overlay as its entry says; make it when it is first shown."""
+        """Show or hide the overlay of an entry; create it on first use."""
         enabled = bool(entry.display.isEnabled())
         if entry.overlay is None and enabled:
             self._unmodified(entry.make_overlay)
@@ -668,7 +669,7 @@ class Entries(QtCore.QObject):
             self._stack.remove(overlay)
 
     def _check_displays(self) -> None:
-        """Notice what has no signal: groups that are switched, placeholders without a panel."""
+        """Detect changes for which RViz has no signal, e.g. of a group's check box."""
         for entry in self._entries if not self._closed else ():
             overlay = entry.overlay
             enabled = entry.alive and bool(entry.display.isEnabled())
@@ -682,7 +683,7 @@ class Entries(QtCore.QObject):
 
     @Slot()
     def _on_config_loading(self) -> None:
-        """Disconnect the program's overlays from the displays that RViz is about to delete."""
+        """Detach the program's overlays from the displays that RViz is about to delete."""
         self._loading = self._new = True
         self._after_event.ask()
         for entry in list(self._entries):
@@ -694,7 +695,7 @@ class Entries(QtCore.QObject):
     # Placeholders.
 
     def _watch_panel(self) -> None:
-        """Follow the panel's tree, which a config may have replaced."""
+        """Connect to the panel's tree model, which loading a config may have replaced."""
         for view in self._window.frame.findChildren(pyqt("QtWidgets").QTreeView):
             model = view.model()
             if model is None or model.metaObject().className() != "rviz::PropertyTreeModel":
@@ -717,7 +718,7 @@ class Entries(QtCore.QObject):
                 self._unmodified(partial(self._replace, display))
 
     def _displays(self, group: Any = None) -> Iterator[Any]:
-        """Iterate over the displays in the order of the panel, those in groups included."""
+        """Iterate over the displays in the panel's order, including those in groups."""
         group = self._window.manager.getRootDisplayGroup() if group is None else group
         for at in range(group.numDisplays()):
             display = group.getDisplayAt(at)
@@ -764,11 +765,11 @@ _FILTER = "QML files (*.qml);;All files (*)"
 
 
 class OverlayMenu(QtCore.QObject):
-    """The menu Overlays; its lists are filled when they are opened.
+    """The Overlays menu; opening it fills its lists.
 
     Args:
-        window: RViz.
-        entries: Its overlays.
+        window: RViz's window.
+        entries: The overlays' entries.
     """
 
     def __init__(self, window: Window, entries: Entries) -> None:
@@ -794,7 +795,7 @@ class OverlayMenu(QtCore.QObject):
             part.clear()
             for entry in self._entries:
                 if entry.alive and fits(entry):
-                    # An ampersand would mark a key.
+                    # A single ampersand marks the shortcut key.
                     name = str(entry.display.getName()).replace("&", "&&")
                     chosen = part.addAction(name)
                     chosen.triggered.connect(log_errors()(lambda *_, entry=entry: act(entry)))

@@ -1,7 +1,7 @@
-"""How QML over RViz sees objects of Python: properties, slots and errors, made from declarations.
+"""Declarations of the properties and slots by which QML over RViz sees Python objects.
 
-Also misspelled members: Qt takes a value for a member that an object does not have, as JavaScript's
-own objects do, and reads such a member as undefined, both without a word.
+Also reports misspelled members: Qt silently lets JavaScript assign a member that an object does not
+have, and reads it as undefined.
 """
 
 from __future__ import annotations
@@ -47,23 +47,23 @@ __all__ = [
     "to_python",
 ]
 
-#: The type of a property that takes anything, and refuses by itself what it cannot hold.
+#: Type of a property that accepts any value in Qt, and validates it in Python.
 VARIANT: Any = "QVariant"
-#: The type of a list; Qt reads lists of texts into what it has of them already, and so twice.
+#: Type of list properties; with a list of strings, Qt would append to the old value.
 LIST: Any = "QVariantList"
 _OWNERSHIP: Any = QtQml.QQmlEngine.ObjectOwnership
 
 
 class Face(QtCore.QObject):
-    """The object with which QML reaches an object of Python, its `model`.
+    """The QML object that wraps a Python object, its `model`.
 
     Args:
-        model: The object.
-        runtime: Of the engine that sees it.
-        parent: What it ends with.
+        model: The Python object.
+        runtime: The QML engine's runtime.
+        parent: Its QObject parent.
     """
 
-    #: Its name in errors.
+    #: Name in error messages.
     CALLED: ClassVar[str] = "object"
 
     def __init__(self, model: Any, runtime: Runtime, parent: QtCore.QObject) -> None:
@@ -73,24 +73,24 @@ class Face(QtCore.QObject):
         self._held: QJSValue | None = spell_checked(runtime, self)
 
     def release(self) -> None:
-        """Give ownership to JavaScript, which may hold it for longer than its model exists."""
+        """Transfer ownership to JavaScript, which may use it longer than the model exists."""
         self.setParent(None)
         self.runtime.keep(self)
-        # JavaScript collects only what it has known.
+        # JavaScript collects only objects that it has a wrapper of.
         self._held = None
 
 
 class ItemFaces(QtCore.QObject):
-    """The faces of all tools or all displays, one for each as long as it exists.
+    """The QML objects of all tools or all displays, created on demand.
 
     Args:
         items: The tools or displays.
-        kind: The class of their faces, with signals `existsChanged` and `changed`.
-        runtime: Of the engine that sees them.
-        parent: What they end with.
+        kind: Class of their QML objects, with signals `existsChanged` and `changed`.
+        runtime: The QML engine's runtime.
+        parent: QObject parent of the QML objects.
     """
 
-    #: Another list of faces.
+    #: The list of items has changed.
     changed = Signal()
     added = Signal(QtCore.QObject)
     removed = Signal(QtCore.QObject)
@@ -106,7 +106,7 @@ class ItemFaces(QtCore.QObject):
         items.changed.connect(self._on_changed)
 
     def of(self, item: Any) -> Any:
-        """Return the face of an item; None for None."""
+        """Return the QML object of an item; None for None."""
         if item is None:
             return None
         if item not in self._faces:
@@ -114,11 +114,11 @@ class ItemFaces(QtCore.QObject):
         return self._faces[item]
 
     def all(self) -> list[Any]:
-        """Return the faces of all items, in RViz's order."""
+        """Return the QML objects of all items, in RViz's order."""
         return [self.of(item) for item in self._items.all]
 
     def known(self) -> list[Any]:
-        """Return the faces that QML has asked for."""
+        """Return the QML objects created so far."""
         return list(self._faces.values())
 
     @Slot(object)
@@ -142,7 +142,7 @@ class ItemFaces(QtCore.QObject):
             self._faces[item].changed.emit()
 
 
-# Declarations. Those that use them have `CALLED`, and `runtime`, the engine's.
+# Declarations, for classes with the attributes `CALLED` and `runtime`.
 
 
 def member(
@@ -156,18 +156,19 @@ def member(
     gives: Callable[[Any], Any] | None = None,
     otherwise: Any = None,
 ) -> Any:
-    """Return a QML property that stands for an attribute.
+    """Return a QML property that reads and writes a Python attribute.
 
     Args:
         name: Its name in QML.
-        kind: Its type for Qt; :data:`VARIANT` where `takes` is to refuse values.
-        notify: The signal of its changes; None where it never changes.
-        of: Path of the attribute from the face; ``model.`` and the name in Python's spelling by
-            default.
-        takes: What a new value goes through; None for a property that cannot be set.
-        sets: Called with the face and the new value, instead of setting the attribute.
-        gives: What the attribute's value goes through; one for QJSValue becomes a JavaScript value.
-        otherwise: Its value where reading the attribute raises an Error, which is thrown.
+        kind: Its type in Qt; :data:`VARIANT` if `takes` validates values.
+        notify: Its change signal; None for a constant property.
+        of: Path of the attribute, relative to the QML object; by default ``model.`` and the name
+            in snake case.
+        takes: Converter of new values; None for a read-only property.
+        sets: Called with the QML object and the new value, instead of setting the attribute.
+        gives: Converter of the attribute's value, applied before the one to `kind`.
+        otherwise: Its value if reading the attribute raises an Error, which is thrown into
+            JavaScript.
     """
     path = of or f"model.{_snake(name)}"
     get, (owner, _, attribute) = attrgetter(path), path.rpartition(".")
@@ -199,14 +200,14 @@ def member(
 
 
 def slot(optional: int = 0, /, **takes: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Make a method callable from QML; its Errors are thrown.
+    """Return a decorator that makes a method callable from QML, and throws its Errors there.
 
-    JavaScript gets null for None, an object for a QObject, and undefined where the method is
-    annotated to return None.
+    QML gets null for None, an object for a QObject, and undefined from a method that is annotated
+    to return None.
 
     Args:
-        optional: How many of the last parameters QML may leave out.
-        takes: What each argument goes through, by the name of the parameter in QML.
+        optional: Number of optional parameters, at the end.
+        takes: Converter of each argument, by the parameter's name in QML.
     """
     names = list(takes)
     least = len(names) - optional
@@ -249,14 +250,14 @@ def slot(optional: int = 0, /, **takes: Callable[[Any], Any]) -> Callable[[Any],
 
 
 def passing(name: str, optional: int = 0, to: str = "", /, **takes: Callable[[Any], Any]) -> Any:
-    """Return a slot that hands its arguments to a method, and returns nothing.
+    """Return a slot that passes its arguments to a method, and returns nothing.
 
     Args:
         name: Its name in QML.
         optional: See :func:`slot`.
-        to: Path of the method from the face; ``model.`` and the name in Python's spelling by
-            default.
-        takes: See :func:`slot`; those of :func:`options` are keywords for the method.
+        to: Path of the method, relative to the QML object; by default ``model.`` and the name in
+            snake case.
+        takes: See :func:`slot`; :func:`options` become keyword arguments of the method.
     """
     get = attrgetter(to or f"model.{_snake(name)}")
 
@@ -271,7 +272,7 @@ def passing(name: str, optional: int = 0, to: str = "", /, **takes: Callable[[An
 
 
 def _snake(name: str) -> str:
-    """Return a QML name in Python's spelling."""
+    """Return a QML name in snake case."""
     return re.sub(r"(?<=[a-z])(?=[A-Z0-9])", "_", name).lower()
 
 
@@ -286,28 +287,28 @@ def _to_js(runtime: Runtime, value: Any) -> QJSValue:
 
 @contextlib.contextmanager
 def errors_to_js(runtime: Runtime | None, what: str, *given: Any) -> Iterator[None]:
-    """Throw errors into the JavaScript that is running; where none is, raise them.
+    """Throw errors into the calling JavaScript; raise them if Python is the caller.
 
     Args:
-        runtime: Of the engine; None where there is none.
-        what: What was called or set, for the error.
+        runtime: The QML engine's runtime; None without an engine.
+        what: The called function or the property, for the error.
         given: The arguments.
     """
     try:
         yield
     except Error as error:
-        # Once a getter of JavaScript's own has thrown, the engine no longer knows its caller.
+        # The engine no longer knows its caller after a JavaScript getter has thrown.
         sure = any(isinstance(value, QJSValue) for value in given)
         if runtime is None or not (sure or runtime.caller().file != "<python>"):
             raise Error(f"{what}: {error}") from error
         runtime.throw(f"{what}: {error}")
 
 
-# What values go through.
+# Converters.
 
 
 def to_python(value: Any) -> Any:
-    """Return what JavaScript gave: plain values, colours, vectors as dicts, and our own objects.
+    """Return a JavaScript value as plain values, colours, dicts for vectors, or QObjects.
 
     Raises:
         ConversionError: It is a function, refers to itself, or is too large.
@@ -326,12 +327,12 @@ def to_python(value: Any) -> Any:
 
 
 def anything(value: Any) -> Any:
-    """Return a value as it is: the method refuses what it does not take."""
+    """Return a value unchanged: the called method validates it."""
     return value
 
 
 def _of_kind(kind: type, wanted: str, parameter: str) -> Callable[[Any], Any]:
-    # Qt would make one of anything.
+    # Qt itself would convert any value.
     def take(value: Any) -> Any:
         if not isinstance(value, kind):
             prefix = f"{parameter}: " if parameter else ""
@@ -345,14 +346,14 @@ def text(wanted: str = "a text", parameter: str = "") -> Callable[[Any], str]:
     """Return a converter for strings.
 
     Args:
-        wanted: What it is to be, for the error.
-        parameter: Which parameter it is for, if the error is to name it.
+        wanted: Description of a valid value, for the error.
+        parameter: Name of the parameter, for the error.
     """
     return _of_kind(str, wanted, parameter)
 
 
 def switch(parameter: str = "") -> Callable[[Any], bool]:
-    """Return a converter for true and false; see :func:`text`."""
+    """Return a converter for booleans; see :func:`text`."""
     return _of_kind(bool, "true or false", parameter)
 
 
@@ -362,10 +363,10 @@ def point(parameter: str = "") -> Callable[[Any], tuple[float, float, float]]:
 
 
 def point_of(value: Any, parameter: str = "") -> tuple[float, float, float]:
-    """Return a point that is given as a vector, an object with x, y and z, or a list of three.
+    """Return a point given as a vector, an object with x, y and z, or a list of three numbers.
 
     Raises:
-        Error: It is none, or its numbers are not finite.
+        Error: It is not a point, or its numbers are not finite.
     """
     parts = list(value) if isinstance(value, (list, tuple)) else []
     if isinstance(value, dict) and {"x", "y", "z"} <= set(value):
@@ -386,7 +387,7 @@ def property_path(example: str) -> Callable[[Any], str | list[str]]:
     """Return a converter for the path of a property, a string or a list of names.
 
     Args:
-        example: Such a path, for the error.
+        example: A valid path, for the error.
     """
 
     def take(value: Any) -> str | list[str]:
@@ -399,14 +400,14 @@ def property_path(example: str) -> Callable[[Any], str | list[str]]:
 
 
 class _Keywords(dict[str, Any]):
-    """Options as keyword arguments."""
+    """Options, marked to become keyword arguments."""
 
 
 def options(**kinds: type) -> Callable[[Any], dict[str, Any]]:
-    """Return a converter for an object with options; :func:`passing` makes keywords of them.
+    """Return a converter for an object with options, which :func:`passing` turns into keywords.
 
     Args:
-        kinds: The kind of each option, `str` or `bool`.
+        kinds: The type of each option, `str` or `bool`.
     """
     known = ", ".join(kinds)
 
@@ -426,9 +427,9 @@ def options(**kinds: type) -> Callable[[Any], dict[str, Any]]:
 
 # Misspelled members.
 
-#: JavaScript asks any object for these, to find out what it is.
+#: Members that JavaScript itself looks up in any object.
 _ASKED = {"toJSON", "then"}
-#: What is looked at last, where neither the object nor JavaScript has a member of a name.
+#: Inserts a proxy at the end of the prototype chain, for names found nowhere else.
 _PROXY = """(function (guard, item) {
     const last = Object.getPrototypeOf(item)
     return new Proxy(last, {get: guard.read, set: guard.write})
@@ -438,10 +439,10 @@ _MAX_WARNINGS = 1000
 
 
 class _Guard(QtCore.QObject):
-    """Answers for missing members; its slots leave no trace in JavaScript's stack.
+    """Handler of the proxy that reports missing members; does not appear in JavaScript's stack.
 
     Args:
-        runtime: Of the engine.
+        runtime: The QML engine's runtime.
     """
 
     def __init__(self, runtime: Runtime) -> None:
@@ -466,8 +467,8 @@ class _Guard(QtCore.QObject):
 
     @Slot(QJSValue, QJSValue, QJSValue, result=QJSValue)
     def read(self, last: QJSValue, name: QJSValue, item: QJSValue) -> QJSValue:
-        """Return a member of JavaScript's own; log a warning if it does not exist either."""
-        # Symbols are asked for by JavaScript itself.
+        """Return a member of JavaScript's Object; log a warning if there is none."""
+        # Only JavaScript itself looks up symbols.
         if not name.isString():
             return QJSValue()
         asked = name.toString()
@@ -486,7 +487,7 @@ class _Guard(QtCore.QObject):
 
     @Slot(QJSValue, QJSValue, QJSValue, QJSValue, result=bool)
     def write(self, last: QJSValue, name: QJSValue, value: QJSValue, item: QJSValue) -> bool:
-        """Throw into the JavaScript that assigns to a missing member."""
+        """Throw an error into the JavaScript that assigns to a missing member."""
         del last, value
         self._runtime.throw(_missing(item, name.toString()))
         return True
@@ -496,9 +497,9 @@ def spell_checked(runtime: Runtime, item: QtCore.QObject) -> QJSValue:
     """Return the JavaScript object of a QObject, which reports misspelled members.
 
     Args:
-        runtime: Of the engine.
-        item: Not seen by JavaScript before. Unless JavaScript owns it, hold the result for as long
-            as members are to be checked: otherwise JavaScript may make a new, unchecked one.
+        runtime: The QML engine's runtime.
+        item: A QObject that JavaScript has no wrapper of yet. Unless JavaScript owns it, keep the
+            result: otherwise JavaScript may create a new, unchecked wrapper.
     """
     guard = runtime.findChild(_Guard) or _Guard(runtime)
     return guard.wrap(item)
@@ -506,7 +507,7 @@ def spell_checked(runtime: Runtime, item: QtCore.QObject) -> QJSValue:
 
 def _missing(value: QJSValue, name: str) -> str:
     item = object_of(value)
-    # A JavaScript object may inherit from ours.
+    # A JavaScript object may have ours as its prototype.
     known = _members(item) if isinstance(item, QtCore.QObject) else []
     called = getattr(item, "CALLED", "object")
     return f"{called} has no member {name!r:.80}{similar(name, known)}"

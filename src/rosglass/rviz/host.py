@@ -1,8 +1,8 @@
-"""RViz's, Ogre's and Qt 5's bindings: the only module that imports them and converts their objects.
+"""The bindings of RViz, Ogre and PyQt5, which only this module imports.
 
-RViz's bindings are made for PyQt5, our interfaces for PySide2; both use the same Qt, and an object
-of one is wrapped anew for the other (reference: docs/architecture.md, section 6). Functions without
-bindings are called by their names in the C++ library (Itanium C++ ABI).
+RViz's bindings use PyQt5, rosglass uses PySide2. Both share one Qt, and this module converts the
+wrappers of objects (docs/architecture.md, section 6). C++ functions without bindings are called by
+their mangled names (Itanium C++ ABI).
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def require_rviz() -> None:
     """Load the bindings.
 
     Raises:
-        UnsupportedError: They are missing or broken, or this process uses another Qt than RViz;
+        UnsupportedError: They are missing or broken, or this process uses a Qt other than RViz's;
             the message says what to install.
     """
     require_bindings()
@@ -72,7 +72,7 @@ def _load(name: str) -> ModuleType:
 
 @contextlib.contextmanager
 def _advising(name: str) -> Iterator[None]:
-    """Turn an ImportError into what to install."""
+    """Turn an ImportError into an error that says what to install."""
     try:
         yield
     except ImportError as error:
@@ -85,7 +85,7 @@ def _advising(name: str) -> Iterator[None]:
 @cache
 def rviz() -> Any:
     """Return RViz's bindings (``rviz.bindings``)."""
-    # The package itself would load each module that PyQt5 has.
+    # Importing the package itself would load all modules of PyQt5.
     package = importlib.util.find_spec("rviz")
     places = (package and package.submodule_search_locations) or ()
     found = PathFinder.find_spec(_BINDINGS, list(places))
@@ -100,13 +100,13 @@ def rviz() -> Any:
 
 @cache
 def pyqt(module: str = "QtCore") -> Any:
-    """Return a module of PyQt5, which RViz's bindings take and give."""
+    """Return a module of PyQt5, for arguments and results of RViz's bindings."""
     return _load(f"PyQt5.{module}")
 
 
 @cache
 def ogre() -> Any:
-    """Return Ogre's bindings; its singletons are RViz's once RViz has made its renderer."""
+    """Return Ogre's bindings, which share RViz's singletons once RViz has created its renderer."""
     return _load("Ogre")
 
 
@@ -118,11 +118,11 @@ def ogre_overlay() -> Any:
 
 
 def as_pyside(item: Any, kind: type[_T]) -> _T:
-    """Return the PySide2 wrapper of an object that RViz's bindings gave.
+    """Return the PySide2 wrapper of a PyQt5 object.
 
     Args:
-        item: The object.
-        kind: What it is for us, e.g. ``QtWidgets.QWidget``.
+        item: The object, from RViz's bindings.
+        kind: PySide2's class for it, e.g. ``QtWidgets.QWidget``.
     """
     shiboken = importlib.import_module("shiboken2")
     wrapped: _T = shiboken.wrapInstance(int(pyqt("sip").unwrapinstance(item)), kind)
@@ -130,7 +130,7 @@ def as_pyside(item: Any, kind: type[_T]) -> _T:
 
 
 def as_pyqt(item: QtCore.QObject, kind: Any) -> Any:
-    """Return the PyQt5 wrapper of one of our objects, e.g. to give it to RViz.
+    """Return the PyQt5 wrapper of a PySide2 object, e.g. for RViz's bindings.
 
     Args:
         item: The object.
@@ -142,10 +142,10 @@ def as_pyqt(item: QtCore.QObject, kind: Any) -> Any:
 
 @cache
 def _library(name: str) -> ctypes.CDLL:
-    """Return a library that RViz has loaded.
+    """Return a C++ library that RViz has loaded.
 
     Raises:
-        UnsupportedError: It has not.
+        UnsupportedError: It is not loaded.
     """
     for line in Path("/proc/self/maps").read_text().splitlines():
         file = line.split(maxsplit=5)[-1]
@@ -155,15 +155,15 @@ def _library(name: str) -> ctypes.CDLL:
 
 
 def cpp_function(library: str, symbol: str, result: Any = None) -> Any:
-    """Return a function.
+    """Return a C++ function.
 
     Args:
-        library: Its library, such as ``librviz``.
-        symbol: Its name there.
-        result: The type in ctypes of what it returns; None for nothing.
+        library: Its library, e.g. ``librviz``.
+        symbol: Its mangled name.
+        result: The ctypes type of its result; None for void.
 
     Raises:
-        UnsupportedError: This RViz has it not.
+        UnsupportedError: The library does not have it.
     """
     try:
         found = _library(library)[symbol]
@@ -176,10 +176,10 @@ def cpp_function(library: str, symbol: str, result: Any = None) -> Any:
 
 
 class Hook(QtCore.QObject):
-    """Calls a function for each signal of an RViz object, at once, without its arguments.
+    """Connects signals of RViz objects to a function, without the signals' arguments.
 
     Args:
-        call: Called in the middle of whatever RViz does: it may look, and must change nothing.
+        call: Called immediately, in the middle of RViz's work, so it must not change RViz.
     """
 
     def __init__(self, call: Callable[[], None]) -> None:
@@ -187,7 +187,7 @@ class Hook(QtCore.QObject):
         self._call = call
 
     def watch(self, sender: Any, *signals: str) -> None:
-        """Connect signals of an object of RViz's bindings."""
+        """Connect signals of an RViz object."""
         wrapped = as_pyside(sender, QtCore.QObject)
         for signal in signals:
             Qt5Core.QObject.connect(wrapped, Qt5Core.SIGNAL(signal), self, Qt5Core.SLOT("_on()"))
@@ -198,25 +198,24 @@ class Hook(QtCore.QObject):
 
 
 def address(item: Any) -> int:
-    """Return the address of an object of RViz, unique among those that exist now."""
+    """Return the address of an RViz object, unique among existing objects."""
     return int(pyqt("sip").unwrapinstance(item))
 
 
 def class_of(item: Any) -> str:
-    """Return the C++ class of an object of RViz, e.g. ``rviz::GridDisplay``."""
+    """Return the C++ class of an RViz object, e.g. ``rviz::GridDisplay``, from Qt's metaobject."""
     return str(as_pyside(item, QtCore.QObject).metaObject().className())
 
 
 def is_a(item: Any, kind: str) -> bool:
-    """Return whether an object of RViz is of a C++ class, or of one derived from it."""
+    """Return whether an RViz object is an instance of a C++ class, or of a derived class."""
     return bool(as_pyside(item, QtCore.QObject).inherits(kind))
 
 
 def type_name(item: Any) -> str:
-    """Return the C++ class of an object of RViz that :func:`class_of` may not know.
+    """Return the mangled C++ class name of an RViz object, e.g. ``N4rviz10FailedToolE``.
 
-    Returns:
-        As compilers write it, e.g. ``N4rviz10FailedToolE``.
+    Unlike :func:`class_of`, it also knows classes without a metaobject.
     """
     # Itanium C++ ABI, section 2.5.2 "Virtual Table Components" and 2.9.5 "RTTI Layout".
     word = ctypes.sizeof(ctypes.c_void_p)
@@ -227,13 +226,13 @@ def type_name(item: Any) -> str:
 
 
 class AfterEvent:
-    """Calls a function once RViz is done with the event that it is handling.
+    """Calls a function after RViz has finished handling the current event.
 
-    RViz handles other events while it loads a file or duplicates displays, timers included, and
-    then goes on. Only what is deleted later waits for so long.
+    RViz runs a nested event loop while it loads a file or duplicates displays. Timers fire in it,
+    but deferred deletion waits until it has ended.
 
     Args:
-        call: The function; called once, however often it was asked for until it has returned.
+        call: The function; requests made until it has returned are merged into one call.
     """
 
     def __init__(self, call: Callable[[], None]) -> None:
@@ -243,7 +242,7 @@ class AfterEvent:
     def ask(self) -> None:
         """Schedule the call."""
         if self._token is None:
-            # Python must hold it while C++ deletes it.
+            # Python must keep its wrapper until C++ has deleted the object.
             token = self._token = QtCore.QObject()
             token.destroyed.connect(self._on_destroyed)
             token.deleteLater()

@@ -1,4 +1,4 @@
-"""Mouse, touch and keys of RViz's 3D view, offered to the overlays from the top."""
+"""Routing of mouse, touch and keyboard events of RViz's 3D view to the overlays."""
 
 from __future__ import annotations
 
@@ -32,36 +32,36 @@ __all__ = [
 
 
 _E = QtCore.QEvent
-#: A button of the mouse went down.
+#: Presses of a mouse button.
 PRESS = frozenset({_E.MouseButtonPress, _E.MouseButtonDblClick})
 #: Mouse events with a position and buttons.
 MOUSE = PRESS | {_E.MouseButtonRelease, _E.MouseMove}
-#: Touch screens.
+#: Touch events.
 TOUCH = frozenset({_E.TouchBegin, _E.TouchUpdate, _E.TouchEnd, _E.TouchCancel})
-#: Keys, and whether one is a shortcut of the window.
+#: Key events, including Qt's question whether a key is a shortcut.
 KEYS = frozenset({_E.KeyPress, _E.KeyRelease, _E.ShortcutOverride})
-#: Something is dragged here from elsewhere.
+#: Drag and drop events.
 DRAG = frozenset({_E.DragEnter, _E.DragMove, _E.Drop})
 
-#: Every button that a mouse may have.
+#: All mouse buttons that Qt knows.
 BUTTONS = [QtCore.Qt.MouseButton(1 << bit) for bit in range(27)]
-#: A place that is in no widget and no item.
+#: A position outside of all widgets and items.
 FAR_OUTSIDE = QtCore.QPointF(-1e5, -1e5)
 
 
 def release_outside(button: Any, left: Any) -> Any:
-    """Return a mouse release far outside of everything.
+    """Return a mouse release event outside of all widgets and items.
 
     Args:
-        button: What goes up.
-        left: The buttons that are still down.
+        button: The released button.
+        left: The buttons that are still pressed.
     """
     none = QtCore.Qt.NoModifier
     return QtGui.QMouseEvent(_E.MouseButtonRelease, FAR_OUTSIDE, button, left, none)
 
 
 def position(event: Any) -> Any:
-    """Return where an event happened, a QPointF; None for one that has no place."""
+    """Return an event's position, a QPointF; None for events without a position."""
     kind = event.type()
     if kind in MOUSE:
         return event.localPos()
@@ -78,13 +78,13 @@ def position(event: Any) -> Any:
 
 
 def scaled(event: Any, factor: float) -> Any:
-    """Return a copy of an event with its positions multiplied; itself when it has none."""
+    """Return a copy of an event with scaled positions; the event itself if it has none."""
     make = _MAKERS.get(event.type())
     if make is None:
         return event
     made = make(event, factor)
     if isinstance(event, QtGui.QInputEvent):
-        # QML computes the speed of a flick from it.
+        # QML computes the speed of a flick from the timestamp.
         made.setTimestamp(event.timestamp())
     return made
 
@@ -174,30 +174,30 @@ _MAKERS: dict[Any, Callable[[Any, float], Any]] = {
 
 
 _NONE = QtCore.Qt.NoButton
-#: Events after which RViz's window may miss the release of buttons and fingers.
+#: Events of RViz's window after which it may miss the release of buttons and fingers.
 _LOSING = frozenset({_E.WindowDeactivate, _E.WindowBlocked, _E.Hide})
-#: Milliseconds after which it is noticed that the mouse went away without a word.
+#: Milliseconds between checks whether the mouse has left the view without an event.
 _HOVER_CHECK_MS = 100
 
 
 class Owner(enum.Enum):
-    """The owner of the mouse until its buttons are up, other than an overlay."""
+    """Owner of the mouse that is not an overlay, until all buttons are released."""
 
     RVIZ = 1
-    #: It went with an overlay, or belongs to what lies below a modal popup.
+    #: No receiver: the overlay was removed, or a modal popup blocks the press.
     NONE = 2
 
 
 class Input(QtCore.QObject):  # type: ignore[misc]
-    """Routes the events of RViz's 3D view.
+    """Routes the events of RViz's 3D view to the overlays and to RViz.
 
-    The topmost overlay is asked first, popups before all others. The one that takes a button has
-    the mouse until every button is up, and the keys from then on. What no overlay takes is RViz's,
-    unless a modal popup is shown.
+    It offers an event to the overlays from the top, popups first. The overlay that accepts a press
+    grabs the mouse until all buttons are released, and gets the keyboard focus. RViz gets events
+    that no overlay accepts, unless a modal popup is shown.
 
     Args:
-        window: RViz.
-        stack: Its overlays.
+        window: RViz's window.
+        stack: The overlays.
     """
 
     def __init__(self, window: Window, stack: Stack) -> None:
@@ -211,7 +211,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         self._focused: Overlay | None = None
         self._depth = 0
         self._later: list[Callable[[], None]] = []
-        #: What handles each kind of event; returns whether it took it.
+        #: Handlers by event type; each returns whether it accepts the event.
         self.routes: dict[Any, Callable[[Any], bool]] = {
             **dict.fromkeys(KEYS | {_E.InputMethod, _E.InputMethodQuery}, self._key),
             **dict.fromkeys(TOUCH, self._touch),
@@ -237,11 +237,11 @@ class Input(QtCore.QObject):  # type: ignore[misc]
 
     @property
     def focused(self) -> Overlay | None:
-        """The overlay that gets the keys; None where RViz does."""
+        """The overlay with the keyboard focus; None if RViz has it."""
         return self._focused
 
     def focus(self, overlay: Overlay | None) -> None:
-        """Give the keyboard focus to an overlay, or to RViz."""
+        """Give the keyboard focus to an overlay, or to RViz with None."""
         before, self._focused = self._focused, overlay
         self._panel.setAttribute(QtCore.Qt.WA_InputMethodEnabled, overlay is not None)
         if overlay is not None and not self._panel.hasFocus():
@@ -254,7 +254,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
                     which.set_focus(which is overlay)
 
     def forget(self, overlay: Overlay) -> None:
-        """Take mouse, touch and focus away from an overlay."""
+        """Take mouse, touch and keyboard focus away from an overlay."""
         if self._owner is overlay:
             self._owner = Owner.NONE
             self._leave(overlay)
@@ -271,21 +271,21 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             self.focus(None)
 
     def after_event(self, call: Callable[[], None]) -> None:
-        """Call a function once no overlay handles an event."""
+        """Call a function when no overlay is handling an event."""
         if self._depth:
             self._later.append(call)
         else:
             call()
 
     def close(self) -> None:
-        """Leave all events to RViz."""
+        """Stop filtering RViz's events."""
         self._look_around.stop()
         for watched in (self._panel, self._window.widget):
             if is_alive(watched):
                 watched.removeEventFilter(self)
 
     def eventFilter(self, watched: Any, event: Any) -> bool:  # noqa: N802 - Qt's name
-        """Return whether an overlay takes an event, and RViz must not get it."""
+        """Return whether an overlay accepts an event, so that RViz must not get it."""
         if not is_alive(self._panel):
             return False
         if watched is not self._panel:
@@ -294,7 +294,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
                 self._cancel_input()
             return False
         route = self.routes.get(event.type())
-        # Without overlays, RViz is as if this were not here.
+        # Without visible overlays, RViz gets its events unchanged.
         if route is None or not (self._owner or self._stack.topmost_first()):
             return False
         accepted = event.isAccepted()
@@ -308,14 +308,15 @@ class Input(QtCore.QObject):  # type: ignore[misc]
                 for call in later:
                     call()
         if event.type() not in DRAG:
-            # What is left to RViz arrives there as it came; touch does as the mouse, by Qt.
+            # RViz gets an event with its original flag, except for touch: it must ignore touch, so
+            # that Qt sends mouse events for it.
             event.setAccepted(taken or (accepted and event.type() not in TOUCH))
         return taken
 
-    # Offering
+    # Delivery
 
     def _offer(self, event: Any) -> tuple[Overlay | None, bool]:
-        """Return the overlay that takes an event, and whether RViz may have it otherwise."""
+        """Return the overlay that accepts an event, or None and whether RViz may get it."""
         for overlay in self._stack.topmost_first():
             if self._deliver(overlay, event):
                 return overlay, False
@@ -337,7 +338,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
 
     def _press(self, event: Any) -> bool:
         if event.buttons() == event.button():
-            # The one before may have ended in another window, unheard.
+            # The release of the previous press may have gone to another window.
             self._end_capture()
         if self._owner is None:
             overlay, open_to_rviz = self._offer(event)
@@ -391,11 +392,11 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             self._leave(owner)
 
     def hover(self, overlay: Overlay | None) -> None:
-        """Set the overlay that the mouse is over, and leave the one before."""
+        """Set the overlay under the mouse, and end hovering over the previous one."""
         before, self._hovered = self._hovered, overlay
         if before is not None and before is not overlay:
             self._leave(before)
-            # RViz sets its tool's shape with the next event that it gets.
+            # RViz sets its tool's cursor again on its next event.
             self._panel.unsetCursor()
         if overlay is not None:
             self._show_cursor(overlay)
@@ -404,7 +405,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             self._look_around.stop()
 
     def _update_hover(self) -> None:
-        """Notice that the mouse has left RViz's view, which gets no event for that."""
+        """End hovering if the mouse has left RViz's view, which may get no event for it."""
         over = QtWidgets.QApplication.widgetAt(QtGui.QCursor.pos())
         if self._owner is None and over is not self._panel:
             self.hover(None)
@@ -428,7 +429,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         return self._owner is not Owner.RVIZ
 
     def _offer_to_owner(self, event: Any) -> bool:
-        """Offer an event to the overlay under the mouse, or with the focus."""
+        """Send an event to the overlay under the mouse, or to the one with the keyboard focus."""
         if event.type() == _E.ContextMenu and event.reason() == QtGui.QContextMenuEvent.Keyboard:
             return self._key(event)
         if self._owner is Owner.RVIZ:
@@ -447,7 +448,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             if self._touched is not None:
                 self._stack.clicked(self._touched)
                 self.focus(self._touched)
-            # What is not taken, Qt offers anew as the mouse.
+            # Qt sends mouse events for a touch that is not accepted.
             return overlay is not None or not open_to_rviz
         touched = self._touched
         if touched is None:
@@ -472,7 +473,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         self._dragged = None if event.type() == _E.Drop else over
         if before is not None and before is not over:
             self._deliver(before, QtGui.QDragLeaveEvent())
-        # Qt sends moves only to a widget that has accepted DragEnter.
+        # Qt sends DragMove only to a widget that has accepted DragEnter.
         event.setAccepted(over is not None or event.type() in (_E.DragEnter, _E.DragLeave))
         return True
 
@@ -491,8 +492,8 @@ class Input(QtCore.QObject):  # type: ignore[misc]
     def _focus_event(self, event: Any) -> bool:
         changes = [event.type() == _E.FocusIn]
         if event.reason() == QtCore.Qt.PopupFocusReason:
-            # A menu has all of the mouse and the keys while it is open: what is held must end, but
-            # Qt Quick could not be given the keys back when it closes.
+            # An open menu grabs mouse and keyboard, so presses must be cancelled. Overlays regain
+            # the focus at once, because Qt Quick does not get it back when the menu closes.
             changes = [] if changes[0] else [False, True]
             if changes:
                 self._cancel_input()
@@ -502,10 +503,10 @@ class Input(QtCore.QObject):  # type: ignore[misc]
                     self._focused.set_focus(focus)
         return False
 
-    # What happens around
+    # Window and overlay changes
 
     def _cancel_input(self) -> None:
-        """End what is pressed: its release may never arrive."""
+        """Cancel presses and touches, because their release may never arrive."""
         if self._owner is not None and not isinstance(self._owner, Owner):
             owner, self._owner = self._owner, Owner.NONE
             self._leave(owner)
@@ -525,7 +526,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
 
 
 def _moved(event: Any) -> Any:
-    """Return the mouse move that updates hovering after a release."""
+    """Return a mouse move at the position of a release, to update hovering."""
     made = QtGui.QMouseEvent(
         _E.MouseMove,
         event.localPos(),

@@ -1,4 +1,4 @@
-"""How an overlay is shown over RViz's 3D view: panels of an Ogre overlay with its picture."""
+"""Display of an overlay's picture over RViz's 3D view, by panels of an Ogre overlay."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ if TYPE_CHECKING:
 __all__ = ["HIGHEST_Z", "Drawing", "Layer", "Work"]
 
 
-#: Ogre draws overlays of higher order later, and knows no higher order than this.
+#: Ogre's highest z order; overlays of higher order are drawn later.
 HIGHEST_Z = 650
 _numbers = itertools.count()
-#: RViz's two windows, of which one is never seen.
+#: Ogre's names of RViz's two windows, one of which is hidden.
 _WINDOWS = ("OgreWindow(0)", "OgreWindow(1)")
 _GROUP = "General"
-#: Pixels that are blended in the time that a panel takes to be drawn.
+#: Cost of drawing another panel, in pixels that could be blended in that time.
 _PANEL_COST_PIXELS = 2000
-#: Tiles that panels may cover without need before they are placed anew.
+#: Number of empty tiles that panels may additionally cover before they are rearranged.
 _SLACK = 128
-#: Shows a texture as it is. OpenGL's own way adds a second colour, for Ogre asks for that always.
+#: Draws the texture only; OpenGL's fixed pipeline would add the specular colour that Ogre enables.
 _SHADER = """#version 120
 uniform sampler2D picture;
 void main() { gl_FragColor = texture2D(picture, gl_TexCoord[0].st); }
@@ -42,13 +42,13 @@ void main() { gl_FragColor = texture2D(picture, gl_TexCoord[0].st); }
 
 
 class Layer:
-    """One texture, shown by panels over the whole 3D view.
+    """A texture of the size of the 3D view, drawn by panels where it is not empty.
 
-    Made and used in the GUI thread, between two frames of RViz. Ogre owns what is made, and it is
-    released by :meth:`close`.
+    For the GUI thread only, between two frames of RViz. Ogre owns its resources;
+    :meth:`close` releases them.
 
     Args:
-        name: For Ogre's messages.
+        name: Name in Ogre's log messages.
     """
 
     def __init__(self, name: str) -> None:
@@ -62,41 +62,41 @@ class Layer:
         self._panels: list[Any] = []
         self._before: NDArray[np.uint32] | None = None
         self._covered = np.zeros((0, 0), np.bool_)
-        #: Tiles, each with a panel; and what is shown of each, without its empty edges.
+        #: Each panel's rectangle, and its visible part without empty edges.
         self._rects: list[Rect] = []
         self._shown: list[Rect | None] = []
         self._waste = 0
         self._opacity = 1.0
         self._visible = True
-        #: Seconds that the last picture took: finding out what is another, and uploading that.
+        #: Seconds that :meth:`update` last spent on comparing and on uploading.
         self.compared = self.uploaded = 0.0
         self._closed = False
 
     def set_z(self, z: int) -> None:
-        """Set its order, from 0 to :data:`HIGHEST_Z`: higher ones are drawn later."""
+        """Set the z order, from 0 to :data:`HIGHEST_Z`; higher layers are drawn later."""
         if not self._closed:
             self._overlay.setZOrder(z)
 
     def set_visible(self, visible: bool) -> None:
-        """Show or hide it."""
+        """Show or hide the layer."""
         if visible != self._visible and not self._closed:
             self._visible = visible
             self._show()
 
     def set_opacity(self, opacity: float) -> None:
-        """Set its opacity, from 0 to 1."""
+        """Set the opacity, from 0 to 1."""
         if opacity != self._opacity:
             self._opacity = opacity
             self._blend()
 
     @property
     def rectangles(self) -> int:
-        """How many panels show it now."""
+        """Number of visible panels."""
         return len(self._rects)
 
     @property
     def covered(self) -> float:
-        """Share of the view that panels cover, and RViz has to blend."""
+        """Share of the view that the panels cover, and RViz has to blend."""
         whole = 1 if self._before is None else self._before.size
         return sum(rect.area for rect in self._shown if rect) / max(whole, 1)
 
@@ -106,12 +106,12 @@ class Layer:
         """Show a picture.
 
         Args:
-            pixels: Shape (height, width) of the view, each pixel 0xAARRGGBB with premultiplied
-                colours.
-            within: Where it may be another than the last one; None for anywhere.
+            pixels: Array of the view's shape (height, width), each pixel 0xAARRGGBB with
+                premultiplied colours.
+            within: Rectangles that may have changed; None for the whole picture.
 
         Returns:
-            What has changed since the last picture, and was given to the graphics card.
+            The rectangles that have changed and were uploaded to the graphics card.
         """
         if self._closed:
             return []
@@ -137,7 +137,7 @@ class Layer:
         return rects
 
     def close(self) -> None:
-        """Remove it from the view, with its texture; safe to call twice."""
+        """Remove the panels and the texture; safe to call twice."""
         if self._closed:
             return
         self._closed = True
@@ -152,7 +152,7 @@ class Layer:
         self._drop_panels()
         self._drop_texture()
         name = f"{self._name}/{width}x{height}"
-        # Without depth 1, the call is taken for another overload, which makes a texture of depth 0.
+        # Without depth 1, the bindings call another overload, which creates a texture of depth 0.
         self._texture = o.TextureManager.getSingleton().createManual(
             name, _GROUP, o.TEX_TYPE_2D, width, height, 1, 0, o.PF_A8R8G8B8, o.TU_DYNAMIC_WRITE_ONLY
         )
@@ -161,7 +161,7 @@ class Layer:
         render.setLightingEnabled(False)
         render.setDepthCheckEnabled(False)
         render.setDepthWriteEnabled(False)
-        # Qt gives colours that are multiplied with their alpha already.
+        # Qt's colours are premultiplied with alpha.
         render.setSceneBlending(o.SBF_ONE, o.SBF_ONE_MINUS_SOURCE_ALPHA)
         self._pass = render
         self._unit = render.createTextureUnitState(name)
@@ -173,9 +173,9 @@ class Layer:
         if self._unit is None:
             return
         o, part = ogre(), self._opacity
-        # Multiplying by one would cost software OpenGL a third more.
+        # With software OpenGL, multiplying by one would cost a third more.
         how = o.LBX_SOURCE1 if part == 1 else o.LBX_MODULATE
-        # Both, for colours are multiplied with their alpha already.
+        # Premultiplied colours have to fade like their alpha.
         one, faint = o.ColourValue(1, 1, 1, 1), o.ColourValue(part, part, part, part)
         self._unit.setColourOperationEx(how, o.LBS_TEXTURE, o.LBS_MANUAL, one, faint)
         self._unit.setAlphaOperation(how, o.LBS_TEXTURE, o.LBS_MANUAL, 1.0, part)
@@ -184,7 +184,7 @@ class Layer:
     def _upload(self, pixels: NDArray[np.uint32], rect: Rect) -> None:
         o = ogre()
         assert self._before is not None
-        # Ogre wants memory that it could write to.
+        # Ogre's bindings require writable memory.
         part = pixels[rect.top : rect.bottom, rect.left : rect.right]
         part = np.require(part, requirements=["C", "W"])
         self._before[rect.top : rect.bottom, rect.left : rect.right] = part
@@ -195,7 +195,7 @@ class Layer:
         )
 
     def _place(self, changed: list[Rect], width: int, height: int) -> None:
-        """Place panels where the picture is not empty; keep those that fit well enough."""
+        """Rearrange the panels if they no longer fit the non-empty tiles, and trim changed ones."""
         waste = uncovered(self._covered, self._rects)
         if waste is None or waste - self._waste > _SLACK:
             changed = self._rects = cover(self._covered, width, height, worth=_PANEL_COST_PIXELS)
@@ -206,7 +206,7 @@ class Layer:
                 self._fit(number, width, height)
 
     def _make_panels(self) -> None:
-        """Show as many panels as there are rectangles."""
+        """Show one panel per rectangle; create missing ones and hide the others."""
         o = ogre_overlay()
         self._shown = [None] * len(self._rects)
         while len(self._panels) < len(self._rects):
@@ -224,7 +224,7 @@ class Layer:
         self._show()
 
     def _fit(self, number: int, width: int, height: int) -> None:
-        """Shrink a panel to what is on it."""
+        """Trim a panel to the non-empty part of its rectangle."""
         assert self._before is not None
         rect, panel = trimmed(self._before, self._rects[number]), self._panels[number]
         if rect == self._shown[number]:
@@ -260,7 +260,7 @@ class Layer:
 
 @cache
 def fragment_program() -> str:
-    """Return the name of Ogre's program for all layers; empty where there are no shaders."""
+    """Return the name of the layers' fragment program; empty if shaders are not supported."""
     o = ogre()
     name = "rosglass/picture"
     program = o.HighLevelGpuProgramManager.getSingleton().createProgram(
@@ -272,24 +272,24 @@ def fragment_program() -> str:
 
 
 def _use_own_context() -> None:
-    """Make Ogre's OpenGL context current: windows of Qt leave theirs, or none, when they go."""
+    """Make Ogre's OpenGL context current: a closed Qt window leaves another one, or none."""
     root = ogre().Root.getSingleton()
     system = root.getRenderSystem()
-    # Ogre takes its own to be current still, unless it has used another window's since.
+    # Ogre switches contexts only when the window changes, so switch to each in turn.
     for name in _WINDOWS:
         system._setRenderTarget(root.getRenderTarget(name))
 
 
 class Work(NamedTuple):
-    """Milliseconds that overlays took before a frame of RViz."""
+    """Time spent on overlays before a frame of RViz, in milliseconds."""
 
     #: Drawing.
     render: float = 0.0
-    #: Reading what was drawn by OpenGL.
+    #: Reading pixels back from OpenGL.
     read_back: float = 0.0
-    #: Finding out what has changed, and where anything is.
+    #: Comparing with the previous picture, and arranging panels.
     compare: float = 0.0
-    #: Handing what has changed to the graphics card.
+    #: Uploading changes to the graphics card.
     upload: float = 0.0
 
     @property
@@ -299,41 +299,41 @@ class Work(NamedTuple):
 
 
 class Drawing:
-    """An overlay with the layer that shows it.
+    """Draws an overlay into its layer.
 
     Args:
-        overlay: The overlay.
+        overlay: The overlay to draw.
     """
 
     def __init__(self, overlay: Overlay) -> None:
         self.overlay = overlay
-        #: What shows it.
+        #: The layer that shows the overlay.
         self.layer = Layer(overlay.name)
-        #: Whether it has changed since it was drawn.
+        #: Whether the overlay has to be drawn again.
         self.dirty = True
         self._size = (0, 0, 0.0)
         self._fits = False
         self._failed = False
 
     def mark(self) -> None:
-        """Mark it to be drawn before the next frame in which it is shown."""
+        """Mark the overlay to be drawn before the next frame in which it is visible."""
         self.dirty = True
 
     @property
     def shown(self) -> bool:
-        """Whether it is visible."""
+        """Whether the overlay is visible."""
         return self.overlay.visible and self.overlay.opacity > 0
 
     def before_frame(self, width: int, height: int, ratio: float) -> Work | None:
-        """Draw it, if it is shown and has changed.
+        """Draw the overlay if it is visible and has changed.
 
         Args:
-            width: Pixels of the 3D view.
-            height: Pixels.
-            ratio: Pixels of the screen for one of Qt's.
+            width: Width of the 3D view in pixels.
+            height: Its height in pixels.
+            ratio: The screen's pixel ratio.
 
         Returns:
-            What it took; None when there was nothing to do.
+            The time it took; None if there was nothing to draw.
         """
         overlay, layer = self.overlay, self.layer
         if not self.shown:
@@ -342,7 +342,7 @@ class Drawing:
         size = (width, height, ratio * overlay.scale)
         work = self._draw(size) if self.dirty or size != self._size else None
         layer.set_opacity(overlay.opacity)
-        # What failed to be drawn would show what was true before.
+        # Do not show outdated content after a failure.
         layer.set_visible(not self._failed)
         return work
 
@@ -362,7 +362,7 @@ class Drawing:
             _check(pixels, size)
             drawn = time.perf_counter() - started
             if pixels is not None:
-                # What failed to be shown before may be anywhere.
+                # After a failure, the texture may differ anywhere.
                 layer.update(pixels, None if self._failed else overlay.painted)
             done = True
         if done and self._failed:
@@ -375,7 +375,7 @@ class Drawing:
         return Work(*(1e3 * part for part in parts))
 
     def close(self) -> None:
-        """Remove it from the view; the caller closes the overlay."""
+        """Remove the layer; the caller closes the overlay."""
         self.layer.close()
 
 

@@ -1,9 +1,9 @@
-"""Ends the process when its X server is gone or its window was destroyed.
+"""Ends the process when its X server has exited or its window was destroyed.
 
-Qt and Xlib call ``exit()`` where the connection to the X server breaks, which destroys what other
-threads still use. Where a window is gone, Mesa's software renderer ignores the error and draws in
-an uninitialised size, over any memory of the process. Neither can go on without, so the program
-ends before they do.
+When the connection to the X server breaks, Qt and Xlib call ``exit()``, which destroys objects that
+other threads still use. When a window is destroyed, Mesa's software renderer ignores the error, and
+draws with an uninitialised size over arbitrary memory. This module ends the process before either
+happens.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 __all__ = ["LostScreen"]
 
 _log = logging.getLogger("rosglass.rviz")
-#: Seconds that unregistering may take, and that the thread waits which has called ``exit()``.
+#: Maximum seconds for unregistering, and seconds that the thread calling ``exit()`` is paused.
 _UNREGISTER_TIMEOUT_S, _EXIT_PAUSE_S = 1.5, 4
-#: Seconds that an X server may take to end, from its first window to its last connection.
+#: Seconds that an exiting X server may take from closing windows to closing connections.
 _SERVER_END_S = 0.3
 _EXIT_CODE = 1
 #: xproto.h: XCB_CW_EVENT_MASK, XCB_EVENT_MASK_STRUCTURE_NOTIFY, XCB_DESTROY_NOTIFY.
@@ -67,7 +67,7 @@ _IoErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 
 
 class _Connection:
-    """A separate connection to the X server, which reports destroyed windows."""
+    """A separate connection to the X server that reports destroyed windows."""
 
     def __init__(self) -> None:
         xcb = ctypes.CDLL("libxcb.so.1")
@@ -78,11 +78,11 @@ class _Connection:
 
     @property
     def is_broken(self) -> bool:
-        """Whether the X server is gone."""
+        """Whether the X server has closed the connection."""
         return bool(self._xcb.xcb_connection_has_error(self._given))
 
     def watch(self, window: int) -> None:
-        """Subscribe to the destruction of a window."""
+        """Select the event for the destruction of a window."""
         mask = ctypes.c_uint32(_STRUCTURE)
         self._xcb.xcb_change_window_attributes(
             self._given, ctypes.c_uint32(window), ctypes.c_uint32(_EVENT_MASK), ctypes.byref(mask)
@@ -90,7 +90,7 @@ class _Connection:
         self._xcb.xcb_flush(self._given)
 
     def destroyed(self) -> set[int]:
-        """Return the windows that were destroyed since; does not wait."""
+        """Return the windows destroyed since the last call, without blocking."""
         found = set()
         while event := self._xcb.xcb_poll_for_event(self._given):
             if ctypes.c_uint8.from_address(event).value & 0x7F == _DESTROYED:
@@ -103,12 +103,11 @@ class _Connection:
 
 
 class LostScreen(Handle):
-    """Ends the process, with exit code 1, once its screen or its window is gone.
+    """Ends the process with exit code 1 when its X server or its window is lost.
 
     Args:
-        windows: The X server's numbers of the windows that RViz cannot do without.
-        unregister: What is to be done before, in threads of their own; not waited for any longer
-            than a second and a half.
+        windows: X window ids of RViz's windows.
+        unregister: Functions to call before, each in its own thread, for at most 1.5 seconds.
     """
 
     def __init__(self, windows: Sequence[int], unregister: Sequence[Callable[[], object]]) -> None:
@@ -119,8 +118,8 @@ class LostScreen(Handle):
         self._lock = threading.Lock()
         self._closed = self._ending = False
         self._reader, self._writer = os.pipe()
-        # The thread that calls exit() may be any, and in the midst of anything: it wakes ours by
-        # closing the pipe, and waits for the end. All of that is C's: Python may be gone by then.
+        # Any thread may call exit() at any time. It then closes the pipe, which wakes our thread,
+        # and sleeps until the process ends. The handlers are C functions: Python may be unusable.
         self._pause = _Time(_EXIT_PAUSE_S, 0)
         libc = ctypes.CDLL(None)
         before_exit = libc["__cxa_atexit"]
@@ -139,7 +138,7 @@ class LostScreen(Handle):
         atexit.register(self.close)
 
     def check(self) -> None:
-        """Check screen and windows before drawing; does not return if one is gone."""
+        """Check windows before drawing; does not return if one was destroyed."""
         with self._lock:
             gone = not self._closed and self._windows & self._connection.destroyed()
         if gone:
@@ -148,7 +147,7 @@ class LostScreen(Handle):
             time.sleep(_EXIT_PAUSE_S)
 
     def close(self) -> None:
-        """Stop watching, so that RViz's windows can be closed; safe to call twice."""
+        """Stop watching, before RViz's windows are closed; safe to call twice."""
         with self._lock:
             closed, self._closed = self._closed, True
         if closed:
@@ -176,7 +175,7 @@ class LostScreen(Handle):
 
     def _on_error(self, display: int, event: Any) -> int:
         error = event.contents
-        # Mesa asks for the size before each frame; its window was destroyed after the last look.
+        # Mesa requests the size before each frame: the window was destroyed after the last check.
         if (error.error_code, error.request_code) == (_NO_DRAWABLE, _GET_GEOMETRY):
             self._end()
         return int(self._error_before(display, event))
@@ -186,7 +185,7 @@ class LostScreen(Handle):
         return 0
 
     def _end(self, *, broken: bool = False) -> None:
-        """End the process; a second thread that asks for it waits."""
+        """End the process; a second thread that calls this waits for it."""
         with self._lock:
             ending, self._ending = self._ending, True
         if ending:
@@ -205,7 +204,7 @@ class LostScreen(Handle):
         os._exit(_EXIT_CODE)
 
     def _breaks(self) -> bool:
-        """Return whether a window is gone because the X server ends."""
+        """Return whether a window was destroyed because the X server is exiting."""
         until = time.monotonic() + _SERVER_END_S
         while time.monotonic() < until:
             with self._lock:
@@ -216,5 +215,5 @@ class LostScreen(Handle):
         return False
 
 
-#: What C still reads after Python has ended.
+#: Keeps memory alive that C reads after Python's exit.
 _KEPT: list[_Time] = []

@@ -1,4 +1,4 @@
-"""The ROS master of RViz: waiting for it, and noticing that it was lost or replaced."""
+"""Waiting for RViz's ROS master, and detecting its loss or restart."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ if TYPE_CHECKING:
 __all__ = ["MasterWatch", "wait_for_master"]
 
 _log = logging.getLogger("rosglass.rviz")
-#: Seconds between requests to the master while waiting for it and later, and its timeout.
+#: Seconds between requests to the master while waiting and while RViz runs, and their timeout.
 _WAIT_PERIOD_S, _WATCH_PERIOD_S, _TIMEOUT_S = 0.25, 2.0, 2.0
-#: Milliseconds after which a window shows that RViz waits.
+#: Milliseconds of waiting after which a window is shown.
 _WINDOW_DELAY_MS = 700
 #: The default port of roscore.
 _PORT = 11311
 
 
 class _Asker:
-    """Asks a master for its process id periodically, in a thread of its own.
+    """Requests a master's process id periodically, in its own thread.
 
     Args:
-        uri: The master's.
-        every: Seconds between two questions.
-        answered: Called in the GUI thread with the number, or with what went wrong.
+        uri: The master's URI.
+        every: Seconds between two requests.
+        answered: Called in the GUI thread with the process id or an Error.
     """
 
     def __init__(self, uri: str, every: float, answered: Callable[[Any], None]) -> None:
@@ -60,25 +60,25 @@ class _Asker:
             self._answered(answer)
 
     def close(self) -> None:
-        """Stop asking; safe to call twice."""
+        """Stop the requests; safe to call twice."""
         self._end.set()
         self._thread.join(_TIMEOUT_S / 4)
         self._executor.close()
 
 
 def wait_for_master(uri: str, timeout: float | None, ended: Callable[[], bool]) -> bool:
-    """Wait until a master answers, and show that it is waited for.
+    """Wait until a master answers; show a window if it takes long.
 
     Args:
-        uri: The master's.
-        timeout: Seconds to wait; None for as long as it takes.
-        ended: Whether the program is to end.
+        uri: The master's URI.
+        timeout: Seconds to wait; None waits forever.
+        ended: Returns whether to stop waiting because the program ends.
 
     Returns:
-        Whether it answers; not when the program is to end, or the user does not want to wait.
+        Whether the master answered; False if the program ends or the user cancels.
 
     Raises:
-        ConnectionLostError: It did not answer in time.
+        ConnectionLostError: The master did not answer in time.
     """
     started = time.monotonic()
     loop = QtCore.QEventLoop()
@@ -123,7 +123,7 @@ def wait_for_master(uri: str, timeout: float | None, ended: Callable[[], bool]) 
 
 
 def _advice(uri: str) -> str:
-    """Return what to do where a master does not answer."""
+    """Return advice for a master that does not answer."""
     address = urlsplit(uri)
     port = "" if address.port in (None, _PORT) else f" -p {address.port}"
     host = address.hostname or ""
@@ -145,32 +145,32 @@ def _waiting_window(uri: str, problem: str, cancel: Callable[[], None]) -> Any:
 
 
 class MasterWatch(QtCore.QObject):
-    """Notices that the master of a running RViz is gone, and that another one took its place.
+    """Detects the loss and the restart of a running RViz's master.
 
     Args:
-        uri: The master's.
+        uri: The master's URI.
     """
 
-    #: What is wrong with the master; empty when it is all right.
+    #: :attr:`problem` has changed. Argument: the new text.
     problem_changed = Signal(str)
 
     def __init__(self, uri: str) -> None:
         super().__init__()
         self._uri, self._problem = uri, ""
-        #: The number of the master's process; -1 before its first answer.
+        #: The master's process id; -1 before its first answer.
         self.number = -1
-        #: Whether another one took its place, which knows nothing of this RViz.
+        #: Whether another master has replaced it, at which RViz is not registered.
         self.replaced = False
         self._asker = _Asker(uri, _WATCH_PERIOD_S, self.on_answer)
 
     @property
     def problem(self) -> str:
-        """What is wrong with the master; empty when it is all right."""
+        """Error text; empty if the master answers."""
         return self._problem
 
     @property
     def advice(self) -> str:
-        """What to do about the problem, in a line; empty without one."""
+        """Advice on the problem in one line; empty without a problem."""
         if not self._problem:
             return ""
         if self.replaced:
@@ -182,7 +182,7 @@ class MasterWatch(QtCore.QObject):
         self._asker.close()
 
     def on_answer(self, answer: Any) -> None:
-        """Handle the process id of the master, or the error of the request."""
+        """Handle the master's process id, or the Error of the request."""
         problem = ""
         self.replaced = not isinstance(answer, Error) and self.number not in (-1, answer)
         if isinstance(answer, Error):

@@ -1,4 +1,4 @@
-"""The geometry of RViz's views: a camera that looks at a point, in 3D or from above."""
+"""Geometry of an orbit camera: points, frames, and interpolation between camera poses."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ if TYPE_CHECKING:
 
 __all__ = ["NEAREST", "STEEPEST", "Orbit", "Place", "Point", "ease", "shortest_turn"]
 
-#: Radians of pitch at which RViz stops: straight from above, yaw would mean nothing.
+#: RViz's maximum pitch in radians: straight from above, yaw would be undefined.
 STEEPEST = math.pi / 2 - 0.001
-#: Metres between a camera and what it looks at, at least.
+#: Minimum distance between camera and focus, in metres.
 NEAREST = 0.01
 
 
 class Point(NamedTuple):
-    """A point, or the way from one to another, in metres."""
+    """A point or a vector, in metres."""
 
     x: float
     y: float
@@ -29,21 +29,21 @@ class Point(NamedTuple):
         return Point(self.x + x, self.y + y, self.z + z)
 
     def __sub__(self, other: Sequence[float]) -> Point:
-        """Return the way from `other` to here."""
+        """Return the vector from `other` to this point."""
         x, y, z = _numbers(other)
         return Point(self.x - x, self.y - y, self.z - z)
 
     def turned(self, yaw: float) -> Point:
-        """Return it turned around z.
+        """Return the vector rotated around z.
 
         Args:
-            yaw: Radians.
+            yaw: Angle in radians.
         """
         c, s = math.cos(yaw), math.sin(yaw)
         return Point(c * self.x - s * self.y, s * self.x + c * self.y, self.z)
 
     def towards(self, other: Sequence[float], part: float) -> Point:
-        """Interpolate between this and `other`, by a share from 0 to 1."""
+        """Interpolate linearly between this point and `other`; `part` is from 0 to 1."""
         x, y, z = _numbers(other)
         return Point(
             self.x + (x - self.x) * part,
@@ -62,19 +62,19 @@ class Place(NamedTuple):
     """The position and yaw of a frame.
 
     Attributes:
-        point: Its origin, in the fixed frame.
-        yaw: Radians around z.
+        point: Its origin in the fixed frame.
+        yaw: Rotation around z, in radians.
     """
 
     point: Point
     yaw: float
 
     def seen(self, point: Point) -> Point:
-        """Return a point of the fixed frame as it is seen from here."""
+        """Transform a point from the fixed frame into this frame."""
         return (point - self.point).turned(-self.yaw)
 
     def outside(self, point: Point) -> Point:
-        """Return a point that is seen from here as it is in the fixed frame."""
+        """Transform a point from this frame into the fixed frame."""
         return self.point + point.turned(self.yaw)
 
 
@@ -82,10 +82,10 @@ class Orbit(NamedTuple):
     """A camera that looks at a point (RViz's ``rviz/Orbit``, orbit_view_controller.cpp).
 
     Attributes:
-        focus: What it looks at, in the fixed frame.
-        distance: Metres from there.
-        yaw: Radians around z; 0 where the camera is in the direction of x from its focus.
-        pitch: Radians above the plane of x and y.
+        focus: The point it looks at, in the fixed frame.
+        distance: Distance from the focus, in metres.
+        yaw: Angle around z in radians; at 0, the camera is in x direction from its focus.
+        pitch: Angle above the xy plane, in radians.
     """
 
     focus: Point
@@ -95,19 +95,19 @@ class Orbit(NamedTuple):
 
     @property
     def eye(self) -> Point:
-        """Where the camera is, in the fixed frame."""
+        """The camera's position in the fixed frame."""
         flat = math.cos(self.pitch) * self.distance
         height = math.sin(self.pitch) * self.distance
         return self.focus + Point(math.cos(self.yaw) * flat, math.sin(self.yaw) * flat, height)
 
     @classmethod
     def between(cls, eye: Point, focus: Point, yaw: float = 0.0) -> Orbit:
-        """Return the camera that looks from a point at another one.
+        """Return the camera at one point that looks at another.
 
         Args:
-            eye: Where it is.
-            focus: What it looks at.
-            yaw: What to take where it looks straight down or up.
+            eye: Position of the camera.
+            focus: The point it looks at.
+            yaw: Yaw to use if it looks straight down or up.
         """
         x, y, z = eye - focus
         flat = math.hypot(x, y)
@@ -118,10 +118,9 @@ class Orbit(NamedTuple):
         return cls(focus, distance, yaw, pitch)
 
     def towards(self, other: Orbit, part: float) -> Orbit:
-        """Interpolate between this and `other`, by a share from 0 to 1; turns the short way.
+        """Interpolate between this camera and `other`; `part` is from 0 to 1.
 
-        Distances are passed in equal ratios, so that a camera that comes from far seems to move
-        evenly.
+        It turns the shorter way, and changes the distance exponentially, so that a zoom looks even.
         """
         return Orbit(
             self.focus.towards(other.focus, part),
@@ -131,18 +130,18 @@ class Orbit(NamedTuple):
         )
 
     def carried(self, before: Place, after: Place) -> Orbit:
-        """Return it carried along with a frame.
+        """Return the camera moved along with a frame.
 
         Args:
-            before: Where the frame was.
-            after: Where it is now.
+            before: The frame's old pose.
+            after: Its new pose.
         """
         turn = shortest_turn(before.yaw, after.yaw)
         focus = after.point + (self.focus - before.point).turned(turn)
         return self._replace(focus=focus, yaw=self.yaw + turn)
 
     def is_near(self, other: Orbit) -> bool:
-        """Return whether the two look the same: RViz keeps 32 bits of each number."""
+        """Return whether the two are equal in 32-bit floats, which RViz uses."""
         return (
             max(abs(n) for n in self.focus - other.focus) <= 1e-6 * max(1.0, self.distance)
             and abs(self.distance / other.distance - 1) <= 1e-6
@@ -152,15 +151,15 @@ class Orbit(NamedTuple):
 
 
 def shortest_turn(start: float, end: float) -> float:
-    """Return the radians from one angle to another, from -pi to pi."""
+    """Return the difference between two angles, in the range -pi to pi."""
     return math.remainder(end - start, math.tau)
 
 
 def ease(progress: float) -> float:
-    """Return the progress of a movement after a share of its time, both 0 to 1, by a sigmoid.
+    """Map the elapsed share of a movement's time to the share of its way, both 0 to 1.
 
-    As in hector_rviz_plugins' view controller, 1 / (1 + e^(-12 (p - 0.5))), stretched so that it
-    begins at 0 and ends at 1.
+    The sigmoid 1 / (1 + e^(-12 (p - 0.5))) of hector_rviz_plugins' view controller, scaled to start
+    at 0 and end at 1.
     """
     if progress <= 0:
         return 0.0

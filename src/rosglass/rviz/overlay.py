@@ -1,4 +1,4 @@
-"""The base class of overlays, their classes in ``.rviz`` files, and what guards RViz from them."""
+"""The base class of overlays, their class ids in ``.rviz`` files, and their error logging."""
 
 from __future__ import annotations
 
@@ -41,34 +41,33 @@ __all__ = [
 ]
 
 
-#: The smallest and the largest scale of an overlay.
+#: Minimum and maximum scale of an overlay.
 SCALES = (0.1, 10.0)
 
 
 class Overlay(QtCore.QObject):
-    """Something drawn over RViz's 3D view, which may take part of its mouse and keys.
+    """Something drawn over RViz's 3D view that can handle mouse, touch and keyboard input.
 
-    Derive from it to draw with anything: give :meth:`draw` and, where it is to be operated,
-    :meth:`deliver`. Everything runs in the GUI thread; errors are logged, and RViz
-    goes on.
+    Base class: implement :meth:`resize` and :meth:`draw`, and :meth:`deliver` to handle input. All
+    methods run in the GUI thread. Errors they raise are logged, and RViz continues.
 
     Args:
-        name: Its name among the overlays of an RViz.
-        z: Overlays of higher `z` are above those of lower; among equals, the later one.
-        scale: How many pixels of the 3D view one unit of the overlay takes, 0.1 to 10.
-        opacity: From 0 (nothing is seen) to 1.
+        name: Name, unique among the overlays of an RViz.
+        z: Stacking order: higher values are on top; of equal values, the overlay added last.
+        scale: Pixels of the 3D view per unit of the overlay, 0.1 to 10.
+        opacity: From 0 (invisible) to 1.
 
     Raises:
-        Error: A number is out of its range, or the name is empty.
+        Error: A number is out of range, or the name is empty.
     """
 
-    #: What it shows is to be drawn again.
+    #: The overlay has to be drawn again.
     changed = Signal()
-    #: `z`, `scale`, `opacity` or `visible` is another now.
+    #: `z`, `scale`, `opacity` or `visible` has changed.
     arranged = Signal()
-    #: Something else is in its place, which has neither the mouse nor the keys; itself.
+    #: The content was replaced, so that mouse and focus must be released. Argument: the overlay.
     renewed = Signal(object)
-    #: Something is wrong with it, or no longer, if empty.
+    #: :attr:`problem` has changed. Argument: the new text, empty if the problem is solved.
     problem_changed = Signal(str)
 
     def __init__(self, name: str, *, z: int = 0, scale: float = 1.0, opacity: float = 1.0) -> None:
@@ -76,23 +75,23 @@ class Overlay(QtCore.QObject):
         if not name:
             raise Error("an overlay needs a name, e.g. 'Dashboard'")
         self.name = name
-        #: What it lets be set in RViz's Displays panel, and kept with RViz's config.
+        #: Properties that RViz's Displays panel shows and its config file saves.
         self.properties = RegisteredProperties()
         self._z, self._scale, self._opacity, self._visible = 0, 1.0, 1.0, True
         self._problem = ""
-        #: Above all overlays that are no popups.
+        #: Whether it is above all overlays that are not popups.
         self.is_popup = False
-        #: While it is shown, nothing below it gets any input, RViz's view included.
+        #: Whether it blocks all input to what is below it, including RViz's view, while visible.
         self.is_modal = False
-        #: Seconds of the last :meth:`draw` that went into reading back what OpenGL drew.
+        #: Seconds that the last :meth:`draw` spent reading pixels back from OpenGL.
         self.read_back = 0.0
-        #: Where the last :meth:`draw` has painted, if that is known; None for anywhere.
+        #: Rectangles that the last :meth:`draw` painted; None if unknown.
         self.painted: list[Rect] | None = None
         self.z, self.scale, self.opacity = z, scale, opacity
 
     @property
     def z(self) -> int:
-        """Its order: overlays of higher values are above those of lower."""
+        """Stacking order: higher values are on top."""
         return self._z
 
     @z.setter
@@ -104,7 +103,7 @@ class Overlay(QtCore.QObject):
 
     @property
     def scale(self) -> float:
-        """Pixels of the 3D view for one unit."""
+        """Pixels of the 3D view per unit of the overlay."""
         return self._scale
 
     @scale.setter
@@ -116,7 +115,7 @@ class Overlay(QtCore.QObject):
 
     @property
     def opacity(self) -> float:
-        """From 0 (nothing is seen) to 1."""
+        """From 0 (invisible) to 1."""
         return self._opacity
 
     @opacity.setter
@@ -128,7 +127,7 @@ class Overlay(QtCore.QObject):
 
     @property
     def visible(self) -> bool:
-        """Whether it is shown; what is not shown gets no input either."""
+        """Whether it is shown; a hidden overlay gets no input."""
         return self._visible
 
     @visible.setter
@@ -139,64 +138,64 @@ class Overlay(QtCore.QObject):
 
     @property
     def problem(self) -> str:
-        """What is wrong with it; empty when nothing is."""
+        """Error text of the overlay; empty if it works."""
         return self._problem
 
     def tell_problem(self, problem: str) -> None:
-        """Say what is wrong with it, or that nothing is, with an empty text."""
+        """Set :attr:`problem`; an empty text clears it."""
         if problem != self._problem:
             self._problem = problem
             self.problem_changed.emit(problem)
 
     def attach(self, window: Window) -> None:
-        """Called first, with the RViz that it is shown over."""
+        """Called before any other method, with the RViz window to draw over."""
 
     def _missing(self, method: str) -> str:
         return f"overlay {self.name}: its class {type(self).__name__} has to give {method}"
 
     def resize(self, width: int, height: int, ratio: float) -> None:
-        """Fit it to the 3D view.
+        """Set the size to draw.
 
         Args:
-            width: Pixels that :meth:`draw` is to draw.
-            height: Pixels.
-            ratio: Pixels for one unit of the overlay, its scale and the screen's pixel ratio in it.
+            width: Width in pixels of the array that :meth:`draw` returns.
+            height: Height in pixels.
+            ratio: Pixels per unit of the overlay: its scale times the screen's pixel ratio.
         """
         raise NotImplementedError(self._missing("resize(width, height, ratio)"))
 
     def draw(self) -> NDArray[np.uint32] | None:
-        """Return what is to be seen, or None for the same as before.
+        """Return the pixels to show, or None if they have not changed.
 
         Returns:
-            Array of shape (height, width) as :meth:`resize` asked for, each pixel 0xAARRGGBB with
-            premultiplied colours. It is read before the next call.
+            Array of shape (height, width) as set by :meth:`resize`, each pixel 0xAARRGGBB with
+            premultiplied colours. The caller reads it before the next call.
         """
         raise NotImplementedError(self._missing("draw()"))
 
     def deliver(self, event: QtCore.QEvent) -> bool:
-        """Handle an event of the mouse, of touch or of the keyboard.
+        """Handle a mouse, touch or keyboard event.
 
         Args:
-            event: Its positions are in units of the overlay.
+            event: The event, with positions in units of the overlay.
 
         Returns:
-            Whether it was for this overlay; otherwise overlays below and RViz get it.
+            Whether the overlay accepts the event; otherwise the overlays below and RViz get it.
         """
         del event
         return False
 
     def leave(self) -> None:
-        """Called when the mouse has left it, and a press has ended without effect."""
+        """Called when the mouse has left the overlay: end hovering, and cancel any press."""
 
     def set_focus(self, focus: bool) -> None:
-        """Called when it gets or loses the keyboard focus."""
+        """Called when the overlay gets or loses the keyboard focus."""
 
     def cursor(self) -> QtGui.QCursor | None:
-        """Return the mouse's shape over it now; None where it is RViz's."""
+        """Return the mouse cursor at the current position; None for the default one."""
         return None
 
     def close(self) -> None:
-        """Release everything; safe to call twice."""
+        """Release all resources; safe to call twice."""
 
 
 def _is_number(value: object) -> bool:
@@ -204,9 +203,9 @@ def _is_number(value: object) -> bool:
 
 
 _T = TypeVar("_T", bound="type[Overlay]")
-#: Class id of a QML file.
+#: Class id of QML overlays.
 QML_CLASS = "rosglass/QmlOverlay"
-#: What hector_rviz_overlay calls it.
+#: hector_rviz_overlay's class id of QML overlays.
 REFERENCE_QML_CLASS = "hector_rviz_overlay_controls/QmlOverlay"
 _CLASS_ID = re.compile(r"[A-Za-z_]\w*/[A-Za-z_]\w*\Z", re.ASCII)
 _makers: dict[str, Callable[[str], Overlay]] = {}
@@ -214,18 +213,16 @@ _ids: dict[type[Any], str] = {}
 
 
 def register(kind: _T, class_id: str = "", make: Callable[[str], Overlay] | None = None) -> _T:
-    """Register a class of overlays, so that a ``.rviz`` file restores them; also as a decorator.
-
-    Do it before the file is loaded.
+    """Register an overlay class, so that ``.rviz`` files loaded later restore it; also a decorator.
 
     Args:
         kind: The class.
-        class_id: Its name in files, e.g. ``my_robot/Gauges``; the Python package and the class by
-            default.
-        make: Returns a new one of a name; the class itself, called with the name, by default.
+        class_id: Its name in files, e.g. ``my_robot/Gauges``; by default the Python package and the
+            class name.
+        make: Factory that returns a new overlay of the given name; defaults to the class itself.
 
     Raises:
-        Error: It is no class of overlays, or the class id is taken or not valid.
+        Error: `kind` is not an overlay class, or the class id is taken or invalid.
     """
     if not isinstance(kind, type) or not issubclass(kind, Overlay):
         raise Error(f"{kind!r:.80} is no class derived from rosglass.rviz.Overlay")
@@ -247,7 +244,7 @@ def class_id_of(kind: type[Overlay]) -> str:
 
 
 def maker_of(class_id: str) -> Callable[[str], Overlay] | None:
-    """Return what makes an overlay of a class id; None for ids that are not registered."""
+    """Return the factory of a class id; None if it is not registered."""
     return _makers.get(class_id)
 
 
@@ -259,23 +256,23 @@ def _own_id(kind: type[Any]) -> str:
 
 
 _log = logging.getLogger("rosglass.rviz")
-#: Names of variables that may hold the overlay that a function belongs to, the best first.
+#: Local variables that may hold a function's overlay, in order of preference.
 _OWNER_NAMES = ("self", "overlay", "panel", "popup", "dialog", "root", "widget")
 
 
 @contextlib.contextmanager
 def guarded(overlay: Overlay, doing: str) -> Iterator[None]:
-    """Catch what an overlay raises, in its methods, slots and paint events, and log it.
+    """Catch and log the exceptions of an overlay's methods, slots and paint events.
 
     Args:
-        overlay: Whose code runs.
-        doing: What it does, e.g. ``drawing``.
+        overlay: The overlay whose code runs.
+        doing: The action for the log, e.g. ``drawing``.
     """
     last = ""
 
     def report(kind: type[BaseException], error: BaseException, trace: Any) -> None:
         nonlocal last
-        # An open menu runs an event loop of its own, with everything else in it.
+        # An open menu runs a nested event loop, so the exception may be another overlay's.
         owner = _owner(trace) or overlay
         text = f"{_describe(kind, error, trace)} (while {doing})"
         if text != last:
@@ -283,7 +280,7 @@ def guarded(overlay: Overlay, doing: str) -> Iterator[None]:
         last = text
 
     before = sys.excepthook
-    # Qt's bindings hand to it what is raised in virtual functions and slots.
+    # Qt's bindings pass exceptions of virtual functions and slots to the hook.
     sys.excepthook = report
     try:
         yield
@@ -294,13 +291,13 @@ def guarded(overlay: Overlay, doing: str) -> Iterator[None]:
 
 
 def log_uncaught_errors() -> Callable[[], None]:
-    """Log exceptions of slots and virtual functions, for which PyQt5 would abort the process.
+    """Log exceptions of slots and virtual functions; PyQt5 would abort the process for them.
 
-    It becomes the problem of the overlay that the traceback points to. A hook of the program's own
-    is called as well.
+    An exception becomes the problem of the overlay found in the traceback. The program's own
+    ``sys.excepthook`` is called as well.
 
     Returns:
-        Ends it.
+        A function that restores the previous hook.
     """
     before = sys.excepthook
 
@@ -323,7 +320,7 @@ def log_uncaught_errors() -> Callable[[], None]:
 
 
 def _report(overlay: Overlay, text: str, raised: Any) -> None:
-    # What is drawn anew raises anew with each frame, and a timer each time.
+    # Frames and timers repeat the same error.
     level = logging.DEBUG if text == overlay.problem else logging.ERROR
     _log.log(level, "overlay %s: %s", overlay.name, text, exc_info=raised)
     overlay.tell_problem(text)
@@ -333,14 +330,14 @@ def _describe(kind: type[BaseException], error: BaseException, trace: TracebackT
     try:
         frames = traceback.extract_tb(trace)
     except RecursionError:
-        # There is no room left to look at it.
+        # No stack is left for reading the traceback.
         frames = traceback.StackSummary()
     place = f"{frames[-1].filename}:{frames[-1].lineno}: " if frames else ""
     return f"{place}{kind.__name__}: {error}"
 
 
 def _owner(trace: TracebackType | None) -> Overlay | None:
-    """Return the overlay whose code has raised: the innermost one that a function knows."""
+    """Return the overlay whose code raised: the one found in the innermost frame."""
     found: Overlay | None = None
     while trace is not None and threading.current_thread() is threading.main_thread():
         known = trace.tb_frame.f_locals
@@ -354,7 +351,7 @@ def _owner(trace: TracebackType | None) -> Overlay | None:
 
 
 def _overlay_of(thing: object) -> Overlay | None:
-    """Return an overlay itself, or the one that shows a widget."""
+    """Return `thing` if it is an overlay, or the overlay that shows the widget `thing`."""
     if isinstance(thing, Overlay):
         return thing if is_alive(thing) and hasattr(thing, "name") else None
     widget: Any = thing

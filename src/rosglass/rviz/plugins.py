@@ -1,4 +1,4 @@
-"""What RViz can make, by the packages that declare it, and what there is of it."""
+"""RViz's plugin classes as declared by packages, and the common base of `Tools` and `Displays`."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ __all__ = ["DISPLAY", "TOOL", "VIEW", "Plugin", "Watched", "declared", "require_
 
 DISPLAY, TOOL, VIEW = "rviz::Display", "rviz::Tool", "rviz::ViewController"
 _EXAMPLES = {DISPLAY: "rviz/Grid", TOOL: "rviz/Measure", VIEW: "rviz/Orbit"}
-#: Where Debian has its packages, which rospack finds without any variable.
+#: Prefix of Debian's ROS packages, which rospack finds without environment variables.
 _SYSTEM = "/usr/share"
 _MAX_ID_LENGTH = 200
 
 
 class Plugin(NamedTuple):
-    """A class that RViz can make."""
+    """A plugin class of RViz."""
 
-    #: E.g. ``rviz/Measure``.
+    #: Class id, e.g. ``rviz/Measure``.
     class_id: str
-    #: What its package says about it.
+    #: Description from its package.
     description: str
 
 
 @cache
 def declared(base: str) -> dict[str, Plugin]:
-    """Return the classes of a kind by their id; found once per process, as RViz does.
+    """Return the plugin classes of a type by class id; like RViz, searches once per process.
 
     Args:
-        base: :data:`DISPLAY`, :data:`TOOL` or :data:`VIEW`.
+        base: Base class: :data:`DISPLAY`, :data:`TOOL` or :data:`VIEW`.
     """
     found: dict[str, Plugin] = {}
     for file in _descriptions():
@@ -57,10 +57,10 @@ def declared(base: str) -> dict[str, Plugin]:
 
 
 def require_class_id(class_id: object, base: str) -> str:
-    """Return the id of a class, if it is one.
+    """Return a class id unchanged.
 
     Raises:
-        Error: It is no text of the form ``package/Class``.
+        Error: It is not a string of the form ``package/Class``.
     """
     if isinstance(class_id, str) and len(class_id) <= _MAX_ID_LENGTH:
         package, slash, name = class_id.partition("/")
@@ -72,7 +72,7 @@ def require_class_id(class_id: object, base: str) -> str:
 
 
 def _descriptions() -> Iterator[str]:
-    """Iterate over files that describe plugins of RViz (REP 140, section "<export>")."""
+    """Iterate over the plugin description files of RViz (REP 140, section "<export>")."""
     folders = dict(workspace(os.environ).packages())
     for manifest in Path(_SYSTEM).glob("*/package.xml"):
         folders.setdefault(manifest.parent.name, str(manifest.parent))
@@ -89,29 +89,29 @@ def _classes(file: str) -> list[ElementTree.Element]:
     try:
         return list(ElementTree.parse(file).getroot().iter("class"))
     except (OSError, ElementTree.ParseError):
-        # RViz logs it.
+        # RViz itself logs the error.
         return []
 
 
 class Watched(QtCore.QObject):
-    """All tools, or all displays, of an RViz.
+    """Base class of RViz's list of tools and list of displays.
 
-    A base class: :meth:`_sync_items` brings :attr:`_items` up to date, and :meth:`_sync_rest` says
-    what else has changed. Signals are emitted once RViz has finished what it was doing, so that
-    slots may add and remove items.
+    Derived classes implement :meth:`_sync_items`, which updates :attr:`_items`, and
+    :meth:`_sync_rest`. Signals are emitted from the event loop, when RViz has finished its work, so
+    that slots may add and remove items.
     """
 
-    #: One came: itself.
+    #: An item was added. Argument: the item.
     added = Signal(object)
-    #: One went: itself.
+    #: An item was removed. Argument: the item.
     removed = Signal(object)
-    #: One is another way than before: itself.
+    #: An item has changed. Argument: the item.
     changed = Signal(object)
 
     def __init__(self, window: Window) -> None:
         super().__init__()
         self._window = window
-        #: Each has `handle`, None once it is gone, `exists`, and `refresh()`.
+        #: Items have `handle` (None after removal), `exists` and `refresh()`.
         self._items: list[Any] = []
         self._known: list[Any] = []
         self._scheduled = False
@@ -123,7 +123,7 @@ class Watched(QtCore.QObject):
         return list(self._items)
 
     def emit_changes(self) -> None:
-        """Emit signals for what has changed since the last call."""
+        """Emit the signals of all changes since the last call."""
         self._scheduled = False
         self._sync_items()
         before, self._known = self._known, list(self._items)
@@ -139,11 +139,11 @@ class Watched(QtCore.QObject):
         emit_rest()
 
     def _sync_items(self) -> None:
-        """Update the items; drop what RViz is about to delete before its address is reused."""
+        """Update the items; drop handles that RViz is about to delete: addresses are reused."""
         raise NotImplementedError(f"{type(self).__name__} has to give _sync_items()")
 
     def _sync_rest(self) -> Callable[[], None]:
-        """Read what else may change beside the items; return what emits its signals."""
+        """Read other state that may have changed; return a function that emits its signals."""
         raise NotImplementedError(f"{type(self).__name__} has to give _sync_rest()")
 
     def _on_change(self) -> None:

@@ -24,37 +24,37 @@ _log = logging.getLogger("rosglass.rviz")
 
 
 class Anchor(enum.Enum):
-    """Which point of a popup is at its place: shares of its width and height."""
+    """The point of a popup that :meth:`Popup.move` positions, in shares of its width and height."""
 
     TOP_LEFT = (0.0, 0.0)
     TOP_RIGHT = (1.0, 0.0)
     CENTER = (0.5, 0.5)
     BOTTOM_LEFT = (0.0, 1.0)
     BOTTOM_RIGHT = (1.0, 1.0)
-    #: The corner with which most of it is inside the view.
+    #: The corner that keeps most of the popup inside the view.
     AUTO = (-1.0, -1.0)
 
 
 class Popup(WidgetOverlay):
-    """A widget of its own size above all overlays that are no popups.
+    """A widget of its own size, above all overlays that are not popups, and kept inside the view.
 
-    It is kept inside the view. What it follows may leave the view, or be behind the camera: it is
-    not seen then, or in the middle of the view if it is modal.
+    While the point that it follows is outside the view or behind the camera, it is hidden; a modal
+    popup is centered instead.
 
     Args:
-        content: The widget, or what returns it.
-        name: Its name; that of the widget's class by default.
-        modal: Whether nothing below it gets input, RViz's view included.
-        modal_color: What a modal one covers everything below with.
-        anchor: Which point of it is at its place.
-        light_dismiss: Whether a press beside it hides it; it then takes that press.
-        options: Of :class:`WidgetOverlay`.
+        content: The widget, or a function that returns it.
+        name: Its name; by default that of the widget's class.
+        modal: Whether to block all input to what is below it, including RViz's view.
+        modal_color: Colour in which a modal popup covers everything below it.
+        anchor: The point of the popup that :meth:`move` positions.
+        light_dismiss: Whether a press outside hides the popup; the press then has no other effect.
+        options: Options of :class:`WidgetOverlay`.
 
     Raises:
-        Error: It is no widget, or part of another one.
+        Error: `content` is not a widget, or has a parent.
     """
 
-    #: A press beside it has hidden it.
+    #: A press outside has hidden the popup.
     dismissed = Signal()
 
     def __init__(
@@ -76,7 +76,7 @@ class Popup(WidgetOverlay):
         self._anchor, self._place = anchor, (math.nan, math.nan)
         self._free = True
         self._tracker: Tracker | None = None
-        #: What of its problem is that the frame it follows is not known.
+        #: The tracker's problem that the popup shows as its own.
         self._lost = ""
         self._trackers: Trackers | None = None
         self._light_dismiss = light_dismiss
@@ -88,7 +88,7 @@ class Popup(WidgetOverlay):
 
     @property
     def anchor(self) -> Anchor:
-        """Which point of it is at its place."""
+        """The point of the popup that :meth:`move` positions."""
         return self._anchor
 
     @anchor.setter
@@ -98,20 +98,20 @@ class Popup(WidgetOverlay):
 
     @property
     def place(self) -> tuple[float, float]:
-        """Where its anchor is, in units from the upper left corner of the view."""
+        """The anchor's position, in units from the upper left corner of the view."""
         if not self._free:
             return self._place
         return self.root.width() / 2, self.root.height() / 2
 
     def move(self, x: float, y: float) -> None:
-        """Move it to a place inside the view, and stop following a point.
+        """Move the anchor to a position in the view, and stop following a point.
 
         Args:
             x: Units from the left edge of the view.
-            y: The same, from its upper edge.
+            y: Units from the upper edge.
 
         Raises:
-            Error: That is no place.
+            Error: The position is not finite.
         """
         if not (math.isfinite(x) and math.isfinite(y)):
             raise Error(f"popup {self.name}: ({x:g}, {y:g}) is no place")
@@ -121,15 +121,15 @@ class Popup(WidgetOverlay):
     def follow(
         self, trackers: Trackers, point: Sequence[float] = (0, 0, 0), frame: str = ""
     ) -> None:
-        """Follow a point of the scene; a frame that is unknown yet becomes its `problem`.
+        """Follow a point of the scene; an unknown frame becomes the popup's `problem`.
 
         Args:
-            trackers: Those of the RViz it is shown over, ``app.rviz.trackers``.
+            trackers: RViz's trackers, ``app.rviz.trackers``.
             point: x, y, z in metres.
-            frame: Whose; empty for RViz's fixed frame.
+            frame: The frame of the point; empty for RViz's fixed frame.
 
         Raises:
-            Error: It is no point.
+            Error: `point` is not a point.
         """
         tracker = trackers.add(point, frame, lambda: self.scale)
         self._stop_following()
@@ -142,7 +142,7 @@ class Popup(WidgetOverlay):
         self._move_to_point(at.x(), at.y())
 
     def close(self) -> None:
-        """Delete the widgets."""
+        """Delete the widgets; safe to call twice."""
         self._stop_following()
         super().close()
 
@@ -153,14 +153,14 @@ class Popup(WidgetOverlay):
             self._show_lost()
 
     def _show_lost(self) -> None:
-        # Other problems stay.
+        # Keep a problem of another origin.
         before, self._lost = self._lost, str(self._tracker.problem) if self._tracker else ""
         if self.problem in ("", before):
             self.tell_problem(self._lost)
 
     def _check_stale(self) -> None:
         if self._tracker is not None and self._tracker.stale:
-            # Popups have no entry in the panel that would show it.
+            # Unlike other overlays, popups have no entry in the panel to show it.
             _log.warning("popup %s: %s", self.name, self._tracker.problem)
         self._put()
 
@@ -169,7 +169,7 @@ class Popup(WidgetOverlay):
         self._put()
 
     def _put(self) -> None:
-        """Place the content by its size, the size of the view, and the point that it follows."""
+        """Position the content in the view, by its size and the position of its anchor."""
         content = self.content
         if not is_alive(content):
             return
@@ -177,7 +177,7 @@ class Popup(WidgetOverlay):
         room = content.parentWidget().size()
         seen = self._tracker is None or (0 <= x <= room.width() and 0 <= y <= room.height())
         if self.is_modal and not seen:
-            # All else is blocked until it is answered.
+            # A modal popup blocks all input, so it must stay visible.
             x, y, seen = room.width() / 2, room.height() / 2, True
         content.setVisible(seen)
         self._veil.setVisible(seen and self._tracker is not None and bool(self._tracker.stale))
@@ -200,7 +200,7 @@ class Popup(WidgetOverlay):
 
 
 class _PopupWidget(QtWidgets.QWidget):  # type: ignore[misc]
-    """What fills the view around a popup's content."""
+    """The widget that fills the view around a popup's content."""
 
     def __init__(self, content: Any, put: Callable[[], None], pressed: Callable[[], None]) -> None:
         super().__init__()
@@ -208,11 +208,11 @@ class _PopupWidget(QtWidgets.QWidget):  # type: ignore[misc]
         self.color: Any = None
         self.takes_presses = False
         content.setParent(self)
-        # Without a background of its own, the scene would be seen between its widgets.
+        # Without its own background, the scene would show through between its widgets.
         content.setAutoFillBackground(True)
 
     def event(self, event: Any) -> bool:
-        """Follow sizes, and notice presses."""
+        """Reposition the content when sizes change, and handle presses."""
         kind = event.type()
         if kind in (QtCore.QEvent.Resize, QtCore.QEvent.LayoutRequest, QtCore.QEvent.Show):
             self._put()
@@ -223,13 +223,13 @@ class _PopupWidget(QtWidgets.QWidget):  # type: ignore[misc]
         return bool(super().event(event))
 
     def paintEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
-        """Cover what is below a modal popup."""
+        """Paint the colour that covers everything below a modal popup."""
         if self.color is not None:
             QtGui.QPainter(self).fillRect(event.rect(), self.color)
 
 
 class _Veil(QtWidgets.QWidget):  # type: ignore[misc]
-    """Greys out a popup whose frame is stale; it gets no events itself."""
+    """A grey shade over a popup whose frame is stale; transparent to the mouse."""
 
     def __init__(self, base: Any) -> None:
         super().__init__(base)
@@ -237,20 +237,20 @@ class _Veil(QtWidgets.QWidget):  # type: ignore[misc]
         self.hide()
 
     def paintEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
-        """Draw it half transparent."""
+        """Paint a half-transparent grey."""
         QtGui.QPainter(self).fillRect(event.rect(), QtGui.QColor(128, 128, 128, 150))
 
 
 class MoveBar(QtWidgets.QLabel):  # type: ignore[misc]
-    """A bar by which a popup is moved; part of its content.
+    """A bar inside a popup's content, by which the user drags the popup.
 
     Args:
-        text: What it shows.
+        text: The bar's text.
     """
 
     def __init__(self, text: str = "") -> None:
         super().__init__(text)
-        #: What it moves.
+        #: The popup to move.
         self.popup: Popup | None = None
         self._from: Any = None
         self._start = (0.0, 0.0)
@@ -263,7 +263,7 @@ class MoveBar(QtWidgets.QLabel):  # type: ignore[misc]
             return
         across, down = self.popup.anchor.value
         if self.popup.anchor is Anchor.AUTO:
-            # The corner must not change under the hand.
+            # The anchor corner must not change while dragging.
             across = down = 0.0
             self.popup.anchor = Anchor.TOP_LEFT
         box = self.popup.content.geometry()
@@ -271,7 +271,7 @@ class MoveBar(QtWidgets.QLabel):  # type: ignore[misc]
         self._from = event.screenPos()
 
     def mouseMoveEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
-        """Drag it."""
+        """Move the popup with the mouse."""
         if self._from is not None and self.popup is not None:
             way = (event.screenPos() - self._from) / self.popup.scale
             self.popup.move(self._start[0] + way.x(), self._start[1] + way.y())
@@ -287,7 +287,7 @@ def _inside(start: float, most: float) -> int:
 
 
 class Button(enum.Flag):
-    """Buttons of a dialog."""
+    """The buttons of a dialog."""
 
     OK = 1
     CANCEL = 2
@@ -308,20 +308,20 @@ _TEXTS = {
 
 
 class Dialog(Popup):
-    """A popup with title and buttons. It hides itself when one is pressed, other than Apply.
+    """A popup with a title bar and buttons; every button except Apply hides it.
 
     Args:
-        title: What its bar shows, by which it is moved.
-        content: The widget in it, or what returns it.
-        name: Its name among the overlays; the title by default.
-        buttons: Which ones it has, from left to right as in :class:`Button`.
-        options: Of :class:`Popup`.
+        title: Text of the bar by which the user drags the dialog.
+        content: The widget in it, or a function that returns it.
+        name: Its name among the overlays; by default the title.
+        buttons: Its buttons, shown from left to right in the order of :class:`Button`.
+        options: Options of :class:`Popup`.
 
     Raises:
-        Error: The content is no widget, or there are no buttons.
+        Error: `content` is not a widget, or there are no buttons.
     """
 
-    #: The :class:`Button` that was pressed.
+    #: A button was pressed. Argument: the :class:`Button`.
     clicked = Signal(object)
 
     def __init__(
@@ -344,7 +344,7 @@ class Dialog(Popup):
         column = QtWidgets.QVBoxLayout(frame)
         row = QtWidgets.QHBoxLayout()
         row.addStretch()
-        #: Its buttons.
+        #: The dialog's push buttons.
         self.buttons: dict[Button, Any] = {}
         for button in chosen:
             made = self.buttons[button] = QtWidgets.QPushButton(_TEXTS[button])
@@ -366,7 +366,7 @@ class Dialog(Popup):
 def message(
     title: str, text: str, name: str = "", *, buttons: Button = Button.OK, **options: Any
 ) -> Dialog:
-    """Return a dialog that shows a text; modal unless `options` say otherwise."""
+    """Return a dialog that shows a text; modal unless `options` contain ``modal=False``."""
     label = QtWidgets.QLabel(text)
     label.setTextFormat(QtCore.Qt.PlainText)
     label.setWordWrap(True)

@@ -1,5 +1,5 @@
-"""RViz's tree of properties: any property by its path, and registered ones with their editors."""
-# ruff: noqa: N802 - the names of what C++ calls are RViz's
+"""RViz's property tree: access to any property by its path, and editors of registered ones."""
+# ruff: noqa: N802 - C++ calls these methods by their RViz names
 
 from __future__ import annotations
 
@@ -42,15 +42,15 @@ __all__ = [
 
 _MAX_TEXT_LENGTH = 10_000
 _INT32 = (-(2**31), 2**31 - 1)
-#: What RViz keeps as text with its parts between semicolons, and the names of the parts.
+#: Properties whose value is a text of numbers with semicolons between them -> their names.
 _PARTS = {"rviz::VectorProperty": "xyz", "rviz::QuaternionProperty": "xyzw"}
 _COLOUR = "rviz::ColorProperty"
-#: The status of a display, which cannot be changed.
+#: Read-only properties that show a display's status.
 _STATUS = ("rviz::StatusList", "rviz::StatusProperty")
 
 
 def child_properties(item: Any) -> Iterator[Any]:
-    """Iterate over the properties below one, without displays and their status."""
+    """Iterate over a property's children, except for displays and their status."""
     for index in range(item.numChildren()):
         child = item.childAt(index)
         if class_of(child) not in _STATUS and not is_a(child, "rviz::Display"):
@@ -58,15 +58,15 @@ def child_properties(item: Any) -> Iterator[Any]:
 
 
 def find_property(item: Any, path: str | Sequence[str], whose: str = "") -> Any:
-    """Return a property below another one.
+    """Return a property by its path below another property.
 
     Args:
-        item: The upper one.
+        item: The other property.
         path: Names with slashes between them, e.g. ``Offset/X``, or a list of names.
         whose: Name of `item`, for the error.
 
     Raises:
-        Error: There is none of this path; the error says which there are.
+        Error: The property does not exist; the error lists existing ones.
     """
     names = path if isinstance(path, str) else "/".join(map(str, path))
     found = _below(item, names)
@@ -82,7 +82,7 @@ def find_property(item: Any, path: str | Sequence[str], whose: str = "") -> Any:
 
 
 def _below(item: Any, path: str) -> Any:
-    # Names of topics and links have slashes of their own.
+    # Names may contain slashes, e.g. those of topics and links.
     for child in child_properties(item):
         name = str(child.getName())
         if path == name:
@@ -98,8 +98,8 @@ def read_property(item: Any) -> Any:
     """Return the value of a property.
 
     Returns:
-        Bool, int, float or text; colours as ``#rrggbb``, vectors and quaternions as dicts of x, y,
-        z and w, in RViz's order; None where it only holds others.
+        A bool, int, float or str; ``#rrggbb`` for colours, dicts of x, y, z (and w) for vectors and
+        quaternions, in RViz's order; None for a property that has only children.
     """
     value, kind = item.getValue(), class_of(item)
     if kind == _COLOUR:
@@ -112,22 +112,22 @@ def read_property(item: Any) -> Any:
     if isinstance(value, int):
         return int(value)
     if isinstance(value, float):
-        # RViz keeps 32 bits of each; these are the fewest digits that mean the same.
+        # RViz uses 32-bit floats: return the shortest decimal number that is equal to it.
         return float(str(np.float32(value)))
     return str(value)
 
 
 def write_property(item: Any, value: Any, name: str = "") -> None:
-    """Change a property, as if it were done in the panel.
+    """Change a property, like the user in the panel.
 
     Args:
         item: The property.
-        value: As :func:`read_property` gives it; colours also as ``QColor`` or by name, vectors as
-            lists.
-        name: What to call it in errors.
+        value: A value as from :func:`read_property`; a colour may also be a ``QColor`` or a name, a
+            vector a list.
+        name: Its name in errors.
 
     Raises:
-        Error: It cannot be changed, or holds no such value, or RViz keeps another one.
+        Error: The property is read-only, the value is invalid, or RViz does not accept it.
     """
     name = name or str(item.getName())
     kind = class_of(item)
@@ -143,15 +143,15 @@ def write_property(item: Any, value: Any, name: str = "") -> None:
 
 
 def describe_properties(item: Any, path: str = "") -> list[dict[str, Any]]:
-    """Return the properties below one as dicts.
+    """Return the properties below another one as nested dicts.
 
     Args:
-        item: The upper one.
-        path: Where it is; empty at the top.
+        item: The other property.
+        path: Its path; empty at the top.
 
     Returns:
-        Of each `name`, `path` (for :func:`find_property`), `value`, `kind`, `description`,
-        `readOnly`, `hidden` and `properties`, those below it.
+        A dict for each, with `name`, `path` (for :func:`find_property`), `value`, `kind`,
+        `description`, `readOnly`, `hidden`, and in `properties` its children.
     """
     found = []
     for child in child_properties(item):
@@ -173,7 +173,7 @@ def describe_properties(item: Any, path: str = "") -> list[dict[str, Any]]:
 
 
 def _kind(item: Any) -> str:
-    """Return the kind of a property: ``bool``, ``int``, ``float``, ``color``, ..."""
+    """Return a property's kind: ``bool``, ``int``, ``float``, ``color``, ..."""
     kind = class_of(item).removeprefix("rviz::").removesuffix("Property").lower()
     if kind:
         return {"rostopic": "topic", "tfframe": "frame"}.get(kind, kind)
@@ -183,7 +183,7 @@ def _kind(item: Any) -> str:
 
 
 def _convert(item: Any, kind: str, value: Any, name: str) -> tuple[Any, Any]:
-    """Return a value as :func:`read_property` would give it, and as RViz takes it."""
+    """Return a value as returned by :func:`read_property`, and as set in RViz."""
     if kind == _COLOUR:
         return _colour(value, name)
     if kind in _PARTS:
@@ -211,7 +211,7 @@ def _convert(item: Any, kind: str, value: Any, name: str) -> tuple[Any, Any]:
 
 
 def _choices(item: Any) -> list[str]:
-    """Return the choices of a property, which only its editor knows."""
+    """Return the choices of an enum property, which only its editor knows."""
     widgets = pyqt("QtWidgets")
     host = widgets.QWidget()
     editor = item.createEditor(host, widgets.QStyleOptionViewItem())
@@ -223,7 +223,7 @@ def _choices(item: Any) -> list[str]:
 
 def _number(value: Any, name: str) -> float:
     if isinstance(value, (int, float)) and not isinstance(value, bool):
-        # Ogre ends the process at a place that is no number.
+        # Ogre aborts the process on a position that is not finite.
         with np.errstate(over="ignore"):
             if math.isfinite(value) and np.isfinite(np.float32(value)):
                 return float(value)
@@ -272,10 +272,10 @@ _log = logging.getLogger("rosglass.rviz")
 
 
 class Choices:
-    """What the editors of properties offer, and where they report mistakes.
+    """Suggestions of the property editors, and their error reports.
 
     Args:
-        session: Whose node knows the topics; there are none without a node.
+        session: The session whose node lists the topics.
         frames: The robot's frames.
         notify: Shows a text to the user, e.g. in RViz's status bar.
     """
@@ -284,7 +284,7 @@ class Choices:
         self._session, self._frames, self._notify = session, frames, notify
 
     def topics(self, type_name: str) -> list[str]:
-        """Return the topics of a type, of all types where it is empty."""
+        """Return the topics of a type; an empty type returns all topics."""
         node = self._session.node
         if node is None:
             return []
@@ -300,13 +300,13 @@ class Choices:
         return sorted(name for name, kinds in names.items() if not wanted or wanted in kinds)
 
     def frames(self, *, fixed: bool) -> list[str]:
-        """Return the known frames, after the fixed frame if that is wanted."""
+        """Return the known frames; with `fixed`, the first one is the fixed frame."""
         buffer = self._frames.buffer
         known = sorted(buffer.tree()) if buffer is not None else []
         return [FIXED_FRAME, *known] if fixed else known
 
     def set_property(self, model: RegisteredProperty, value: Any) -> None:
-        """Set a property to what the user has chosen; report a value that it refuses."""
+        """Set a property to the user's choice; report an invalid value."""
         try:
             if not model.readOnly:
                 model.set(value)
@@ -314,18 +314,18 @@ class Choices:
             self.report(f"{'/'.join(model.path)}: {error}")
 
     def report(self, text: str) -> None:
-        """Log a mistake of the user, and show it."""
+        """Log a user error, and show it to the user."""
         _log.warning("property %s", text)
         self._notify(text)
 
 
 def make_editor(model: RegisteredProperty, parent: Any, choices: Choices) -> Any:
-    """Return the widget that edits a property; None where RViz's own will do.
+    """Return a property's editor widget; None to use RViz's own.
 
     Args:
         model: The property.
-        parent: The widget that it is shown in.
-        choices: What choosers offer.
+        parent: The editor's parent widget.
+        choices: Suggestions for topics and frames.
     """
     kind, options = model.kind.NAME, model.kind.options
     if kind == "int":
@@ -375,7 +375,7 @@ def _line_with_button() -> Any:
     core, widgets = pyqt(), pyqt("QtWidgets")
 
     class LineWithButton(widgets.QLineEdit):  # type: ignore[name-defined,misc]
-        """A text, and a button that opens a dialog to choose it with."""
+        """A text field with a button that opens a colour or file dialog."""
 
         def __init__(self, model: RegisteredProperty, parent: Any, choices: Choices) -> None:
             super().__init__(parent)
@@ -387,7 +387,7 @@ def _line_with_button() -> Any:
                 widgets.QLineEdit.TrailingPosition,
             )
             window = self.window()
-            # The dialog takes the focus, which ends this editor.
+            # Later, because the dialog takes the focus, which closes this editor.
             action.triggered.connect(
                 lambda: core.QTimer.singleShot(0, lambda: _choose(model, window, choices))
             )
@@ -421,10 +421,10 @@ def _choose(model: RegisteredProperty, window: Any, choices: Choices) -> None:
 
 
 def log_errors(otherwise: Any = None) -> Callable[[Any], Any]:
-    """Make a function that C++ calls log its exceptions, and return a default instead."""
+    """Return a decorator for callbacks of C++: it logs exceptions and returns a default."""
 
     def decorate(function: Any) -> Any:
-        # To make the help text of one of its functions, PySide2 loads whatever it knows.
+        # Copy the names only: PySide2 evaluates the other attributes to build help texts.
         @wraps(function, assigned=("__name__", "__qualname__"))
         def call(*arguments: Any) -> Any:
             try:
@@ -439,26 +439,26 @@ def log_errors(otherwise: Any = None) -> Callable[[Any], Any]:
 
 
 def owned_by_rviz(item: Any) -> Any:
-    """Return a property that RViz deletes, together with the property above it."""
+    """Transfer ownership of a property to RViz, which deletes it with its parent."""
     pyqt("sip").transferto(item, None)
     return item
 
 
 @cache
 def _classes() -> tuple[Any, Any]:
-    """Return our classes of RViz's ``Property`` and ``BoolProperty``."""
+    """Return our subclasses of RViz's ``Property`` and ``BoolProperty``."""
     bindings, core = rviz(), pyqt()
 
     class _Shown:
-        """The base of both; `view` is set right after it is created."""
+        """Mixin of both; `view` is set right after creation."""
 
         view: PropertyView | None = None
 
         def load(self, config: Any) -> None:
-            """Do nothing: the display loads them."""
+            """Do nothing: the display loads the value."""
 
         def save(self, config: Any) -> None:
-            """Do nothing: the display saves them."""
+            """Do nothing: the display saves the value."""
 
     def flags(item: Any, base: Any, column: int) -> Any:
         found = base.getViewFlags(item, column)
@@ -495,12 +495,12 @@ def _classes() -> tuple[Any, Any]:
 
 
 class PropertyView:
-    """One property in the tree, with the parts of a vector and the properties below it.
+    """A registered property in RViz's tree, with child items for the parts of a vector.
 
     Args:
-        model: The property.
-        above: RViz's property that it stands below.
-        choices: What choosers offer; reports refused edits.
+        model: The registered property.
+        above: Its parent in RViz's tree.
+        choices: Suggestions for the editor; reports invalid edits.
     """
 
     def __init__(self, model: RegisteredProperty, above: Any, choices: Choices) -> None:
@@ -532,13 +532,13 @@ class PropertyView:
             signal.connect(slot)
 
     def swatch(self) -> Any:
-        """Return the colour that is shown beside the value, if it is one."""
+        """Return the colour to show beside the value; None for other kinds."""
         if self.model.kind.NAME != "color":
             return None
         return pyqt("QtGui").QColor(self.model.kind.saved(self.model.get()))
 
     def close(self) -> None:
-        """Stop following the property."""
+        """Disconnect from the registered property."""
         watches, self._watches = self._watches, []
         for signal, slot in watches if is_alive(self.model) else ():
             signal.disconnect(slot)
@@ -581,7 +581,7 @@ class PropertyView:
 
 
 def _for_rviz(model: RegisteredProperty) -> Any:
-    """Return a value as RViz's tree shows it."""
+    """Return a property's value as RViz's tree shows it."""
     saved = model.kind.saved(model.get())
     return "; ".join(f"{part:g}" for part in saved.values()) if isinstance(saved, dict) else saved
 
@@ -594,16 +594,16 @@ def _from_text(text: str, parts: list[str]) -> dict[str, str]:
 
 
 def _plain(value: Any) -> Any:
-    """Return the Python value of what an editor gave."""
+    """Return the Python value of an edited item."""
     return value.value() if isinstance(value, pyqt().QVariant) else value
 
 
 class PropertyTree:
-    """All properties of one owner, below one of RViz's.
+    """Shows all registered properties of an owner below one of RViz's properties.
 
     Args:
-        owner: Whose properties.
-        above: RViz's property that they stand below.
+        owner: The registered properties.
+        above: Their parent in RViz's tree.
         choices: See :class:`PropertyView`.
     """
 
@@ -621,11 +621,11 @@ class PropertyTree:
             self._enter(found)
 
     def item(self, found: RegisteredProperty) -> Any:
-        """Return what stands for a property in RViz's tree."""
+        """Return the item of a property in RViz's tree."""
         return self._views[found].item
 
     def close(self) -> None:
-        """Stop following the owner, and remove its properties from the tree."""
+        """Disconnect from the owner, and remove its properties from the tree."""
         if is_alive(self._owner):
             self._owner.registered.disconnect(self._added)
             self._owner.unregistered.disconnect(self._gone)
@@ -633,7 +633,7 @@ class PropertyTree:
             self._leave(found)
 
     def _on_registered(self, found: object) -> None:
-        # QML can emit every signal that it sees, with anything.
+        # QML can emit the signal with any argument.
         if isinstance(found, RegisteredProperty) and found not in self._watched:
             self._enter(found)
 
@@ -655,9 +655,9 @@ class PropertyTree:
         self._hide(found)
 
     def _show(self, found: RegisteredProperty) -> None:
-        """Add a property to the tree, or remove it.
+        """Add a property to the tree, or remove a hidden one.
 
-        RViz's own way of hiding one, by a signal that comes later, crashes when it is gone by then.
+        RViz itself hides properties with a queued call, which crashes if the property was deleted.
         """
         if found.hidden:
             self._hide(found)
@@ -679,7 +679,7 @@ class PropertyTree:
 
 
 def remove_from_tree(item: Any) -> None:
-    """Remove a property from RViz's tree, and delete it later."""
+    """Remove a property from RViz's tree, and delete it from the event loop."""
     if not _is_deleted(item):
         above = item.getParent()
         if above is not None:

@@ -1,4 +1,4 @@
-"""Which values registered properties take, and how ``.rviz`` files keep values of any shape."""
+"""The kinds of registered properties, and conversion of values to and from RViz's ``Config``."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _MAX_SHOWN, _MAX_SHOWN_DEPTH = 80, 4
 
 
 def shown(value: object) -> str:
-    """Return a value as JavaScript writes it, in one line of at most 80 characters."""
+    """Return a value in JavaScript's notation, in one line of at most 80 characters."""
     text = _shown_text(value, 0)
     return text if len(text) <= _MAX_SHOWN else f"{text[: _MAX_SHOWN - 3]}..."
 
@@ -47,7 +47,7 @@ def _shown_text(value: object, depth: int) -> str:
     if isinstance(value, (dict, list, tuple)) and depth >= _MAX_SHOWN_DEPTH:
         return "..."
     if isinstance(value, dict):
-        # No more of it than can be shown.
+        # Convert no more than can be shown.
         parts = [f"{key}: {_shown_text(value[key], depth + 1)}" for key in list(value)[:_MAX_SHOWN]]
         return f"{{{', '.join(parts)}}}"
     if isinstance(value, (list, tuple)):
@@ -66,24 +66,24 @@ _CONTROL = re.compile(r"[\0-\x08\x0b-\x1f\x7f\ud800-\udfff]")
 
 
 class Kind:
-    """What a property holds.
+    """The type of a property's values, with validation and conversion.
 
     Args:
-        options: What narrows its values, by the names of :attr:`OPTIONS`.
+        options: Options listed in :attr:`OPTIONS`, e.g. limits.
 
     Raises:
-        Error: An option does not fit.
+        Error: An option is invalid.
     """
 
-    #: What the `kind` of a property says.
+    #: Name of the kind.
     NAME: ClassVar[str] = ""
-    #: The value of a property without a default.
+    #: Default value of properties that declare none.
     DEFAULT: ClassVar[Any] = None
-    #: What it takes, in words.
+    #: Description of valid values.
     WANTED: ClassVar[str] = "no value"
-    #: Names of its options.
+    #: Names of the kind's options.
     OPTIONS: ClassVar[tuple[str, ...]] = ()
-    #: Whether properties may stand below one of this kind.
+    #: Whether a property of this kind may have children.
     HOLDS_OTHERS: ClassVar[bool] = True
 
     def __init__(self, **options: Any) -> None:
@@ -91,28 +91,28 @@ class Kind:
 
     @property
     def default(self) -> Any:
-        """The value of a property without a default."""
+        """Default value of properties that declare none."""
         return self.DEFAULT
 
     def read(self, value: Any) -> Any:
-        """Return a value as the property holds it.
+        """Return a value converted to the property's type.
 
         Raises:
-            Error: The property cannot hold it.
+            Error: The value is invalid.
         """
         if value is not None:
             raise self._refusal(value)
         return None
 
     def saved(self, value: Any) -> Any:
-        """Return what a ``.rviz`` file keeps of a value: text, number, bool, or a flat dict."""
+        """Return a value for ``.rviz`` files: a str, number, bool, or flat dict."""
         return value
 
     def restore(self, saved: Any) -> Any:
-        """Return the value that a file keeps, where every scalar is text.
+        """Return a value read from a file, in which scalars may be text.
 
         Raises:
-            Error: The property cannot hold it.
+            Error: The value is invalid.
         """
         return self.read(saved)
 
@@ -139,7 +139,7 @@ class _Bool(Kind):
 
 
 class _Number(Kind, ABC):
-    """A number between the options `min` and `max`, which editors change by `step`."""
+    """A number between `min` and `max`; editors change it in steps of `step`."""
 
     DEFAULT: ClassVar[Any] = 0
     OPTIONS = ("min", "max", "step")
@@ -232,7 +232,7 @@ class _String(Kind):
 
 
 class _Path(_String):
-    """A file; `filter` is what its chooser shows, e.g. ``QML files (*.qml)``."""
+    """A file; `filter` is for its file dialog, e.g. ``QML files (*.qml)``."""
 
     NAME, OPTIONS = "path", ("filter",)
 
@@ -297,7 +297,7 @@ class _Color(Kind):
         if isinstance(value, (QtGui.QColor, str)):
             colour = QtGui.QColor(value)
             if colour.isValid():
-                # Another way of writing the same colour is no other value.
+                # Normalise it: the same colour in another notation is equal.
                 return QtGui.QColor(colour.name(QtGui.QColor.NameFormat.HexArgb))
         raise self._refusal(value)
 
@@ -308,7 +308,7 @@ class _Color(Kind):
 
 
 class _Parts(Kind, ABC):
-    """Numbers with names; kept as RViz keeps its own vectors: ``X: 1, Y: 2, Z: 3``."""
+    """Named numbers, saved like RViz's own vectors: ``X: 1, Y: 2, Z: 3``."""
 
     HOLDS_OTHERS = False
     NAMES: ClassVar[tuple[str, ...]] = ()
@@ -317,8 +317,8 @@ class _Parts(Kind, ABC):
     def _make(self, parts: list[float]) -> Any: ...
 
     def parts(self, value: Any) -> dict[str, float]:
-        """Return the numbers by name, in capitals."""
-        # Qt keeps 32 bits of each; these are the fewest digits that mean the same.
+        """Return the numbers by their names in capitals."""
+        # Qt uses 32-bit floats: return the shortest decimal number that is equal to it.
         numbers = [float(str(np.float32(getattr(value, name)()))) for name in self.NAMES]
         return dict(zip((name.upper() for name in self.NAMES), numbers, strict=True))
 
@@ -392,7 +392,7 @@ class _Quaternion(_Parts):
     def read(self, value: Any) -> QtGui.QQuaternion:
         if isinstance(value, QtGui.QQuaternion):
             value = self.parts(value)
-        # Four numbers in a row: Qt has w first, ROS has it last.
+        # Refuse lists: Qt has w first, ROS has it last.
         if not isinstance(value, dict):
             raise self._refusal(value)
         quaternion: QtGui.QQuaternion = self._from(value)
@@ -403,7 +403,7 @@ class _Quaternion(_Parts):
         return QtGui.QQuaternion(w, x, y, z)
 
 
-#: The kinds by name.
+#: All kinds by name.
 KINDS: dict[str, type[Kind]] = {
     kind.NAME: kind
     for kind in (
@@ -438,15 +438,15 @@ _WORDS: dict[str, Any] = {
 }
 _WANTED = "null, true, false, a number, a text, a list or a map of these"
 _MAX_DEPTH = 50
-#: What YAML has no way to write, or what would not come back as it was.
+#: Characters that YAML cannot represent, or would not preserve.
 _UNWRITABLE = re.compile(r"[\0-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff\ufeff\u2028\u2029]")
 
 
 def writable(value: Any, path: str) -> Any:
-    """Return a value with lists for tuples, after a look whether a file can keep it.
+    """Return a value with tuples as lists, after checking that a file can store it.
 
     Raises:
-        ConversionError: It cannot; the error says where in it.
+        ConversionError: A file cannot store it; the error names the part.
     """
     return _writable(value, path, 0)
 
@@ -473,9 +473,9 @@ def to_config(config: Any, value: Any, *, plain: bool = False) -> None:
     """Write a value to RViz's ``Config``.
 
     Args:
-        config: RViz's; as yet empty.
-        value: From :func:`writable`.
-        plain: Write texts as they are, for a reader who knows what is a text.
+        config: An empty ``Config``.
+        value: A value from :func:`writable`.
+        plain: Whether to write strings unquoted, for readers that know the type.
     """
     if isinstance(value, dict) and value:
         for key, inner in value.items():
@@ -489,7 +489,7 @@ def to_config(config: Any, value: Any, *, plain: bool = False) -> None:
 
 def _text(value: Any) -> str:
     if isinstance(value, str):
-        # What would be read as something else is kept as JSON would have it.
+        # Write a text as a JSON string if it would be read as another type.
         return value if _scalar(value) == value and value[:1] != '"' else json.dumps(value)
     if isinstance(value, float) and not math.isfinite(value):
         return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
@@ -513,7 +513,7 @@ def _scalar(text: str) -> Any:
 
 
 def from_config(config: Any) -> Any:
-    """Return what :func:`to_config`, or the overlays of hector_rviz_overlay, have written."""
+    """Return a value written by :func:`to_config` or by hector_rviz_overlay."""
     return _typed(plain_config(config))
 
 
@@ -526,7 +526,7 @@ def _typed(value: Any) -> Any:
 
 
 def plain_config(config: Any) -> Any:
-    """Return an RViz ``Config`` as dicts, lists and scalars, which are text in a file's."""
+    """Return an RViz ``Config`` as dicts, lists and scalars; scalars from files are text."""
     kinds = type(config)
     kind = config.getType()
     if kind == kinds.Map:
@@ -541,7 +541,7 @@ def plain_config(config: Any) -> Any:
 
 
 def merged(older: Mapping[str, Any], newer: Mapping[str, Any]) -> dict[str, Any]:
-    """Return `newer`, with what is only in `older`."""
+    """Return `newer` plus the keys that only `older` has, recursively."""
     found = {**older, **newer}
     for key, value in newer.items():
         before = older.get(key)

@@ -1,4 +1,4 @@
-"""An interface written in QML, drawn over RViz's 3D view."""
+"""QML files as overlays on RViz's 3D view."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ __all__ = ["QmlInput", "QmlOverlay", "Scene"]
 
 
 class _Control(QtQuick.QQuickRenderControl):  # type: ignore[misc]
-    """A render control that names the window of its scene: items get keys only there."""
+    """A render control that returns RViz's window, without which items get no keyboard focus."""
 
     panel: Any = None
     _apart = False
 
     @contextmanager
     def apart(self) -> Iterator[None]:
-        """Name no window: the scene would be drawn in units of the window, not in pixels."""
+        """Return no window while rendering, so that the scene is drawn in pixels, not in units."""
         self._apart = True
         try:
             yield
@@ -65,7 +65,7 @@ class _Control(QtQuick.QQuickRenderControl):  # type: ignore[misc]
             return None
         window = self.panel.window()
         if offset is not None:
-            # By it, items find their place on the screen.
+            # Items need it to compute their position on the screen.
             at = self.panel.mapTo(window, Qt5Core.QPoint(0, 0))
             offset.setX(at.x())
             offset.setY(at.y())
@@ -73,28 +73,27 @@ class _Control(QtQuick.QQuickRenderControl):  # type: ignore[misc]
 
 
 class Scene(QtCore.QObject):
-    """A window of Qt Quick that is drawn when it is asked for.
+    """An offscreen Qt Quick window, drawn on request.
 
-    A unit of the window's size is one of the interface, so that popups and `Window` know how much
-    room there is. Its content is scaled instead: texts are drawn sharp at any scale, as they would
-    not be if the picture were.
+    The window's size is in units of the interface, so that popups and `Window` know the available
+    space. The scene is scaled rather than its picture, so that text is sharp at any scale.
 
     Args:
-        renderer: What draws it.
+        renderer: Draws the window.
     """
 
-    #: Something in it looks another way now.
+    #: The scene has to be drawn again.
     changed = Signal()
 
     def __init__(self, renderer: Renderer) -> None:
         super().__init__()
         self._control = _Control()
-        #: The window; its coordinates, and so those of its events, are units times `factor`.
+        #: The window; its events have positions in units times `factor`.
         self.window: Any = QtQuick.QQuickWindow(self._control)
         self.window.setColor(QtGui.QColor(0, 0, 0, 0))
-        #: What to multiply units with for the window's events.
+        #: Ratio of the window's event coordinates to units.
         self.factor = 1.0
-        #: What draws it.
+        #: Draws the window.
         self.renderer = renderer
         self._item: Any = None
         self._units = Qt5Core.QSizeF(0, 0)
@@ -104,15 +103,15 @@ class Scene(QtCore.QObject):
         renderer.start(self._control, self.window)
 
     def show_in(self, panel: Any) -> None:
-        """Set the widget that shows it, whose window has its keys, shortcuts and cursor."""
+        """Set the widget that shows the scene; its window provides focus, shortcuts and cursor."""
         self._control.panel = panel
 
     def show_item(self, item: Any) -> None:
-        """Show a root item in place of the one before; it gets the window's size."""
+        """Replace the root item, and give it the window's size."""
         if is_alive(self._item):
             self._item.setParentItem(None)
         self._item = item
-        # PySide2 deletes it once Python holds no reference to what it was put into.
+        # PySide2 deletes the item when Python has no reference to its parent item.
         self._content = self.window.contentItem()
         item.setParentItem(self._content)
         item.setSize(self._units)
@@ -122,16 +121,16 @@ class Scene(QtCore.QObject):
         """Set the size.
 
         Args:
-            width: Pixels of the picture.
-            height: Pixels.
-            ratio: Pixels for one unit.
+            width: Width of the picture in pixels.
+            height: Its height in pixels.
+            ratio: Pixels per unit.
         """
         self._units = Qt5Core.QSizeF(width / ratio, height / ratio)
         self.factor = self.renderer.fit(width, height, ratio)
         content = self.window.contentItem()
         content.setTransformOrigin(QtQuick.QQuickItem.TopLeft)
         content.setScale(self.factor)
-        # Popups of Controls take their size from this item, which no window system sets.
+        # Popups of Qt Quick Controls use this item's size, which Qt does not set here.
         content.setSize(self._units)
         if is_alive(self._item):
             self._item.setSize(self._units)
@@ -140,17 +139,17 @@ class Scene(QtCore.QObject):
         """Return the rendered picture.
 
         Returns:
-            Shape (height, width), each pixel 0xAARRGGBB with premultiplied colours; valid until
-            the next call, or event.
+            Array of shape (height, width), each pixel 0xAARRGGBB with premultiplied colours; valid
+            until the next call or event.
         """
         return self.renderer.draw()
 
     def rest(self) -> None:
-        """Let the last picture go: it may be long until the next one."""
+        """Release the memory of the last picture."""
         self.renderer.rest()
 
     def close(self) -> None:
-        """Delete the window once no event is handled any more; safe to call twice."""
+        """Delete the window after the current event; safe to call twice."""
         if self._closed:
             return
         self._closed = True
@@ -167,31 +166,31 @@ _INPUT_METHOD = frozenset({_E.InputMethod, _E.InputMethodQuery})
 _FOR_SCENE = PRESS | TOUCH | DRAG | KEYS | _INPUT_METHOD
 _FOR_SCENE |= {_E.MouseMove, _E.MouseButtonRelease, _E.Wheel, _E.DragLeave}
 _TOUCH_ENDS = frozenset({_E.TouchEnd, _E.TouchCancel})
-#: Seconds for which the list of items that take note of the mouse is kept.
+#: Lifetime in seconds of the cached list of hoverable items.
 _ITEMS_MAX_AGE_S = 0.25
 
 
 class QmlInput:
-    """Input of a QQuickWindow, for the class that has ``_window`` and ``_ratio``.
+    """Mixin that sends input to a QQuickWindow, ``_window``.
 
-    Qt reports by ``accepted`` whether an item took a button, a key or the wheel. It does not for
-    hovering, for what pointer handlers wait for, and for touch, so the items are asked.
+    Qt reports by ``accepted`` whether an item accepts a press, a key or the wheel, but not for
+    hovering, pointer handlers and touch; for these, this class inspects the items.
     """
 
     _window: Any
-    #: The widget that shows it; Qt Quick sets the mouse's shape on the window of that.
+    #: The widget that shows the scene; Qt Quick sets the cursor of its window.
     _panel: Any = None
-    #: Units of the window for one of the overlay.
+    #: Ratio of the window's event coordinates to units of the overlay.
     _ratio = 1.0
-    #: The buttons that went down on an item and are not up yet.
+    #: The buttons pressed on an item.
     _held = Qt5Core.Qt.NoButton
-    #: Where the fingers are that went down on an item, for the window's events.
+    #: The last touch event sent to an item, if a finger is still down.
     _touch: _Touch | None = None
     _hoverable: Sequence[_VisibleItem] = ()
     _listed = 0.0
 
     def deliver(self, event: Any) -> bool:
-        """Send an event to the items; return whether one takes it."""
+        """Send an event to the items; return whether one accepts it."""
         window, kind = self._window, event.type()
         if kind not in _FOR_SCENE or not is_alive(window):
             return False
@@ -202,7 +201,7 @@ class QmlInput:
         if kind == _E.TouchBegin and not _takes_touch(window, at):
             return False
         if kind == _E.MouseButtonDblClick:
-            # A window gets the second press as a press first, then as a double click.
+            # Qt sends the second press of a double click twice: as press and as double click.
             taken = self._deliver(_as_press(event), at)
             return self._deliver(event, at) or taken if taken else False
         return self._deliver(event, at)
@@ -231,7 +230,7 @@ class QmlInput:
         return taken
 
     def leave(self) -> None:
-        """End hovering, and cancel what is pressed."""
+        """End hovering, and cancel presses."""
         window = self._window
         if not is_alive(window):
             return
@@ -244,12 +243,12 @@ class QmlInput:
             self._shown_in().unsetCursor()
 
     def _cancel(self) -> None:
-        """Release what is pressed: items see a cancelled press."""
+        """Release buttons and fingers so that items see a cancelled press."""
         window, content = self._window, self._window.contentItem()
         held, self._held = self._held, Qt5Core.Qt.NoButton
         touch, self._touch = self._touch, None
-        # Handlers ignore whether their item is enabled. A TapHandler releases what is
-        # released elsewhere, any other one of an event that comes while it is disabled itself.
+        # Handlers ignore whether their item is enabled. A TapHandler cancels on a release
+        # elsewhere, the others on an event while they themselves are disabled.
         disabled = [h for h in _all_handlers(content) if not _is_tap(h) and h.property("enabled")]
         content.setEnabled(False)
         for handler in filter(is_alive, disabled):
@@ -273,7 +272,7 @@ class QmlInput:
             Qt5Core.QCoreApplication.sendEvent(self._window, event)
 
     def cursor(self) -> Any:
-        """Return the shape that the item under the mouse wants; None for none in particular."""
+        """Return the cursor that the item under the mouse sets; None for the default one."""
         shown_in = self._shown_in()
         if shown_in is None or shown_in.cursor().shape() == Qt5Core.Qt.ArrowCursor:
             return None
@@ -291,13 +290,13 @@ class QmlInput:
 
 
 class _VisibleItem(NamedTuple):
-    """An item, with the items that clip it."""
+    """A visible item with the items that clip it."""
 
     item: Any
     clips: tuple[Any, ...]
 
     def has(self, at: Any) -> bool:
-        """Return whether a position of the window is in its visible part."""
+        """Return whether a position in the window is inside the item's visible part."""
         if not all(is_alive(item) for item in (self.item, *self.clips)):
             return False
         return bool(
@@ -310,18 +309,18 @@ class _VisibleItem(NamedTuple):
 class _Touch(NamedTuple):
     """The last touch event."""
 
-    #: Of the QTouchDevice; PySide2's object for it ends with the event.
+    #: Address of the QTouchDevice, because PySide2's wrapper ends with the event.
     device: int
     points: list[Any]
 
     @classmethod
     def of(cls, event: Any) -> _Touch:
-        """Return the touch of an event."""
+        """Copy the touch points of an event."""
         device = shiboken.getCppPointer(event.device())[0]
         return cls(device, [QtGui.QTouchEvent.TouchPoint(p) for p in event.touchPoints()])
 
     def ended(self) -> Iterator[Any]:
-        """Iterate over the events that release all fingers far outside."""
+        """Iterate over events that release all fingers outside of all items."""
         device = shiboken.wrapInstance(self.device, QtGui.QTouchDevice)
         for point in self.points:
             point.setState(Qt5Core.Qt.TouchPointReleased)
@@ -356,7 +355,7 @@ def _as_press(event: Any) -> Any:
 
 
 def _shown(window: Any) -> Iterator[_VisibleItem]:
-    """Iterate over all items that are shown."""
+    """Iterate over all visible items."""
     waiting = [_VisibleItem(item, ()) for item in window.contentItem().childItems()]
     while waiting:
         shown = waiting.pop()
@@ -368,7 +367,7 @@ def _shown(window: Any) -> Iterator[_VisibleItem]:
 
 
 def _all_handlers(item: Any) -> Iterator[Any]:
-    """Iterate over the pointer handlers of an item and all in it."""
+    """Iterate over the pointer handlers of an item and of its descendants."""
     yield from (c for c in item.children() if c.metaObject().className().endswith("Handler"))
     for child in item.childItems():
         yield from _all_handlers(child)
@@ -394,7 +393,7 @@ def _takes_press(handler: Any, button: Any) -> bool:
 
 
 def _is_for_touch(item: Any) -> bool:
-    # Every item says that it accepts touch, until it gets some.
+    # acceptTouchEvents() is true for every item until it gets a touch event.
     return item.metaObject().className() in ("QQuickMultiPointTouchArea", "QQuickPinchArea")
 
 
@@ -409,26 +408,26 @@ def _takes_touch(window: Any, at: Any) -> bool:
 
 _log = logging.getLogger("rosglass.rviz")
 _IMPORTS = Path(__file__).with_name("imports")
-#: In `Session.shared`: the overlays that talk through it.
+#: Key in `Session.shared` of the list of overlays that use the session.
 _USERS = "overlays"
-#: Milliseconds after a drawing until what has come since is looked at.
+#: Milliseconds between drawing and :meth:`QmlOverlay._on_idle`.
 _IDLE_DELAY_MS = 1000
 
 
 class QmlOverlay(QmlInput, Overlay):
-    """A QML file over RViz's 3D view.
+    """A QML file shown over RViz's 3D view.
 
     Args:
-        file: The QML file; its root must be a visual item.
-        session: The node its QML talks through.
-        name: Its name; that of the file by default.
-        watch: Show it anew whenever a file in its folder, or in `import_paths`, is saved.
-        import_paths: Further folders with QML modules; ``package://`` as well.
-        options: Of :class:`Overlay`.
+        file: The QML file; its root must be an Item.
+        session: The session that its QML uses.
+        name: Its name; by default that of the file.
+        watch: Whether to reload when a file in its folder or in `import_paths` is saved.
+        import_paths: Additional folders with QML modules, also as ``package://`` URLs.
+        options: Options of :class:`Overlay`.
 
     Raises:
-        QmlError: There is no such file or folder.
-        UnsupportedError: Neither OpenGL nor Qt's software renderer can draw here.
+        QmlError: A file or folder does not exist.
+        UnsupportedError: Neither OpenGL nor Qt's software renderer is available.
     """
 
     properties: RvizObject
@@ -457,7 +456,7 @@ class QmlOverlay(QmlInput, Overlay):
         except Exception:
             self._live.close()
             raise
-        #: What QML finds as ``rviz``.
+        #: The object ``rviz`` in QML.
         self.properties = RvizObject(self, self.engine)
         self.engine.rootContext().setContextProperty("rviz", self.properties)
         self._window = self._scene.window
@@ -479,17 +478,17 @@ class QmlOverlay(QmlInput, Overlay):
 
     @property
     def root(self) -> Any:
-        """The root item of what is shown; None before anything is."""
+        """The root item; None before the file was loaded."""
         return self._root
 
     @property
     def loaded(self) -> bool:
-        """Whether it shows the file, as it is now or as it was when it last had no errors."""
+        """Whether it shows the file, in its current or its last valid version."""
         return self._root is not None
 
     @property
     def watch(self) -> bool:
-        """Whether it is shown anew when a file is saved."""
+        """Whether it reloads when a file is saved."""
         return self._live.watch
 
     @watch.setter
@@ -497,11 +496,12 @@ class QmlOverlay(QmlInput, Overlay):
         self._live.watch = watch
 
     def load(self) -> None:
-        """Show the file; one with errors that is watched is shown once they are mended.
+        """Load and show the file; show its errors instead if it has any.
+
+        A watched file is reloaded when its errors are fixed.
 
         Raises:
-            QmlError: It has errors, and is not watched. They are shown in its place all the same,
-                until :meth:`reload` finds them mended.
+            QmlError: The file has errors and is not watched.
         """
         self.session.defer_connecting()
         try:
@@ -513,12 +513,12 @@ class QmlOverlay(QmlInput, Overlay):
             _log.error("%s", error)
 
     def reload(self) -> bool:
-        """Show the file as it is now; with errors, keep what is shown and show them over it.
+        """Reload the file; if it has errors, show them over the previous version.
 
-        Put off while a call from QML waits, which would return into an interface that is gone.
+        Deferred while a call from QML is waiting, which would return into deleted objects.
 
         Returns:
-            Whether it is shown.
+            Whether the new version is shown.
         """
         if self._loading or not self._live.is_ready():
             return False
@@ -543,7 +543,7 @@ class QmlOverlay(QmlInput, Overlay):
         finally:
             self._loading = False
         if self._closed:
-            # Something in it had it removed.
+            # Code in the file has removed the overlay.
             self._live.drop(made)
             return
         self._show_error("")
@@ -562,17 +562,17 @@ class QmlOverlay(QmlInput, Overlay):
         raise QmlError(f"{self.file}: the root of an overlay must be an Item, and is {what}")
 
     def _show(self, root: Any) -> None:
-        # What was pressed, and had the keys, is about to go.
+        # Release mouse and focus of the items that are about to be deleted.
         self.renewed.emit(self)
         self._root = root
         self._scene.show_item(root)
         self._not_drawn = ""
         self.tell_problem("")
-        # Films, and pictures of items, are no items that could be found.
+        # MediaPlayer and ImagePublisher are not items, so look for them in the file.
         self._warn_not_drawn(root, lambda: need_in_file(self.file, self.engine.importPathList()))
 
     def _on_idle(self) -> None:
-        """Release the picture, and warn of what was made since and is not drawn; popups, too."""
+        """Release the picture, and warn of items created since that the renderer cannot draw."""
         self._scene.rest()
         if not self._not_drawn and is_alive(self._window):
             self._warn_not_drawn(self._window.contentItem())
@@ -587,7 +587,7 @@ class QmlOverlay(QmlInput, Overlay):
             self.tell_problem(self.problem)
 
     def tell_problem(self, problem: str) -> None:
-        """Set its problem; errors of its file take precedence."""
+        """Set the problem; if empty, errors of the file remain."""
         super().tell_problem(problem or self._error or self._not_drawn)
 
     def _show_error(self, error: str) -> None:
@@ -615,7 +615,7 @@ class QmlOverlay(QmlInput, Overlay):
             item.setProperty("unit", 1 / self.scale)
 
     def _quit(self, *_: Any) -> None:
-        # RViz may ask about unsaved changes, which is not for the middle of a JavaScript function.
+        # Later, because RViz may open a dialog about unsaved changes.
         Qt5Core.QTimer.singleShot(0, self._close_rviz)
 
     def _close_rviz(self) -> None:
@@ -627,18 +627,18 @@ class QmlOverlay(QmlInput, Overlay):
         Qt5Core.QTimer.singleShot(0, lambda: Qt5Core.QCoreApplication.exit(code))
 
     def attach(self, window: Window) -> None:
-        """Be shown over an RViz."""
+        """Connect to RViz's window."""
         self._panel = window.panel
         self._shown_over = window
         self._scene.show_in(window.panel)
 
     def resize(self, width: int, height: int, ratio: float) -> None:
-        """Fit the interface to the 3D view."""
+        """Set the size of the scene."""
         self._scene.resize(width, height, ratio)
         self._ratio = self._scene.factor
 
     def draw(self) -> NDArray[np.uint32] | None:
-        """Render the scene, and read it back."""
+        """Render the scene."""
         self.session.go_on()
         pixels = self._scene.draw()
         self.read_back = self._scene.renderer.read_back
@@ -647,7 +647,7 @@ class QmlOverlay(QmlInput, Overlay):
         return pixels
 
     def close(self) -> None:
-        """Release the interface and its engine; safe to call twice."""
+        """Delete the scene and the QML engine; safe to call twice."""
         if self._closed:
             return
         self._closed = True
@@ -656,16 +656,16 @@ class QmlOverlay(QmlInput, Overlay):
         self._scene.changed.disconnect(self.changed)
         self._users.remove(self)
         self._errors.hide()
-        # QML sees it to its end.
+        # QML uses it until the engine is deleted.
         self.properties.setParent(self.engine)
-        # The last overlay may shut its node down, one of several not.
+        # Only the last overlay of the session may shut its node down.
         self._live.close(hold=bool(self._users))
         self._scene.close()
         self._root = None
 
 
 def _kind(root: Any) -> str:
-    """Return what QML calls an object."""
+    """Return the QML type name of an object."""
     kind = root.metaObject()
     while "_QML" in kind.className():
         kind = kind.superClass()

@@ -1,4 +1,4 @@
-"""Qt 5's modules as RViz's process has them; untyped, for their types would be Qt 6's."""
+"""The modules of Qt 5 for RViz's process, typed as Any because the type stubs are Qt 6's."""
 
 from __future__ import annotations
 

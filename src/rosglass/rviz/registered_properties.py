@@ -1,4 +1,4 @@
-"""Properties that an interface registers, shown in its entry of the Displays panel."""
+"""Properties that an overlay registers, shown below its entry in the Displays panel."""
 # ruff: noqa: N815 - the names of slots, signals and properties are QML's
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ _log = logging.getLogger("rosglass.rviz")
 
 
 class RegisteredProperty(QtCore.QObject):
-    """One property; made by :class:`RegisteredProperties` only.
+    """One registered property; created by :class:`RegisteredProperties` only.
 
     Args:
-        owner: Whose it is.
-        parent: The property that it stands below; None for none.
-        name: Its name there.
-        kind: What it holds.
-        default: Its value as yet.
+        owner: The properties that it belongs to.
+        parent: Its parent property; None at the top.
+        name: Its name, unique below the parent.
+        kind: The type of its values.
+        default: Its initial value.
     """
 
-    #: What errors call it.
+    #: Name in error messages.
     CALLED = "property"
 
     valueChanged = Signal(VARIANT)
-    #: Its description, range, choices, or whether it can be changed or seen.
+    #: Its description, limits, choices, `readOnly` or `hidden` have changed.
     aboutChanged = Signal()
 
     def __init__(
@@ -54,16 +54,16 @@ class RegisteredProperty(QtCore.QObject):
         self._owner, self._name = owner, name
         self.container = parent
         self.kind = kind
-        #: What JavaScript has for it, if there is any.
+        #: Its JavaScript object, if there is an engine.
         self.for_js: QJSValue | None = None
-        #: Properties below this one.
+        #: Its children, by name.
         self.properties: dict[str, RegisteredProperty] = {}
         self._value = default
         self._about: dict[str, Any] = {"description": "", "readOnly": False, "hidden": False}
 
     @property
     def path(self) -> tuple[str, ...]:
-        """Its name, after those of the properties that it stands below."""
+        """The names of its parents and its own."""
         return (*(self.container.path if self.container else ()), self._name)
 
     def get(self) -> Any:
@@ -71,10 +71,10 @@ class RegisteredProperty(QtCore.QObject):
         return self._value
 
     def set(self, value: Any) -> None:
-        """Change the value, also of a property that is read-only in the panel.
+        """Change the value, even if the property is read-only in the panel.
 
         Raises:
-            Error: The property cannot hold it.
+            Error: The value is invalid.
         """
         new = self.kind.read(to_python(value))
         if new != self._value or type(new) is not type(self._value):
@@ -86,11 +86,11 @@ class RegisteredProperty(QtCore.QObject):
         with errors_to_js(self._owner.runtime, f"property {'/'.join(self.path)}", value):
             self.set(value)
 
-    #: The value; one that does not fit throws.
+    #: The value; setting an invalid one throws.
     value = Property(VARIANT, get, _set_value, notify=valueChanged)
     name = Property(str, lambda self: self._name, constant=True)
-    #: Of `bool`, `int`, `float`, `string`, `path`, `topic`, `frame`, `enum`, `color`, `vector`,
-    #: `quaternion` and `container`.
+    #: One of `bool`, `int`, `float`, `string`, `path`, `topic`, `frame`, `enum`, `color`,
+    #: `vector`, `quaternion` and `container`.
     kindName = Property(str, lambda self: self.kind.NAME, constant=True)
 
     def _get_description(self) -> str:
@@ -107,7 +107,7 @@ class RegisteredProperty(QtCore.QObject):
     def _set_read_only(self, value: Any) -> None:
         self._change("readOnly", value, switch())
 
-    #: People cannot change it; the interface can.
+    #: Whether users cannot change it; the overlay can.
     readOnly = Property(VARIANT, _get_read_only, _set_read_only, notify=aboutChanged)
 
     def _get_hidden(self) -> bool:
@@ -116,7 +116,7 @@ class RegisteredProperty(QtCore.QObject):
     def _set_hidden(self, value: Any) -> None:
         self._change("hidden", value, switch())
 
-    #: It is not shown in the panel.
+    #: Whether the panel does not show it.
     hidden = Property(VARIANT, _get_hidden, _set_hidden, notify=aboutChanged)
 
     def _change(self, name: str, value: Any, takes: Callable[[Any], Any]) -> None:
@@ -130,11 +130,11 @@ class RegisteredProperty(QtCore.QObject):
             self.aboutChanged.emit()
 
     def adopt(self, kind: Kind, about: dict[str, Any]) -> None:
-        """Adopt a later registration; a value out of its range becomes the default.
+        """Apply a repeated registration; a value that has become invalid is reset to the default.
 
         Args:
-            kind: Of the same class as before.
-            about: `description`, `readOnly` and `hidden`, as far as they are given.
+            kind: The new kind, of the same class.
+            about: `description`, `readOnly` and `hidden`, if given.
         """
         changed = kind.options != self.kind.options
         self.kind = kind
@@ -148,7 +148,7 @@ class RegisteredProperty(QtCore.QObject):
                 self.set(kind.default)
 
     def restore(self, saved: Any) -> None:
-        """Take its value from a file; log one that does not fit."""
+        """Set the value from a file; log an invalid one."""
         own = saved.get("Value") if self.properties and isinstance(saved, dict) else saved
         if isinstance(saved, dict) and "Value" in saved and self.kind.HOLDS_OTHERS:
             own = saved["Value"]
@@ -164,17 +164,17 @@ class RegisteredProperty(QtCore.QObject):
         self.set(value)
 
 
-#: Options that every kind has.
+#: Options of all kinds.
 _COMMON = ("description", "readOnly", "hidden")
 
 
 def _registering(name: str, kind: str, *order: str) -> Any:
-    """Return the function that registers properties of a kind, for QML and Python.
+    """Return a method that registers properties of a kind, for QML and Python.
 
     Args:
-        name: Its name.
+        name: Name of the method.
         kind: See :attr:`RegisteredProperty.kindName`.
-        order: The arguments after the name of the property.
+        order: Its parameters after the property's name.
     """
     names = ("name", *order) if "description" in order else ("name", *order, "description")
 
@@ -185,55 +185,55 @@ def _registering(name: str, kind: str, *order: str) -> Any:
         return None
 
     call.__name__ = name
-    # A parent may come first, options come last, and one too many is an error of ours.
+    # Accept a parent first, options last, and one more to report it ourselves.
     for count in range(len(names) + 4):
         call = Slot(*[QJSValue] * count, result=QtCore.QObject)(call)
     return call
 
 
 class RegisteredProperties(QtCore.QObject):
-    """The properties of one overlay, and the free `config` beside them.
+    """The registered properties of an overlay, and its free-form `config`.
 
-    From QML, every function takes `[parent,] name, default, description` and at last a map of
+    In QML, the parameters of all functions are `[parent,] name, default, description` and a map of
     options: `readOnly`, `hidden`; `min`, `max` and `step` for numbers; `choices`, `messageType` and
-    `includeFixedFrame` also have their place among the others. From Python, options are keywords::
+    `includeFixedFrame` may also be positional. In Python, options are keyword arguments::
 
         speed = overlay.properties.registerFloatProperty("Speed", 0.5, "m/s", min=0, max=2)
         speed.valueChanged.connect(drive)
 
-    A property that there is already is returned as it is, with its value. What does not fit throws
-    into the calling JavaScript, or raises a :class:`rosglass.Error`.
+    Registering an existing property returns it with its current value. Invalid arguments throw into
+    the calling JavaScript, or raise a :class:`rosglass.Error`.
     """
 
-    #: A property came, below another or at the top.
+    #: A property was added, at the top or below another one. Argument: the property.
     registered = Signal(object)
-    #: A property is gone.
+    #: A property was removed. Argument: the property.
     unregistered = Signal(object)
-    #: Something that a file would keep is another now.
+    #: A value that files store has changed.
     edited = Signal()
     configChanged = Signal()
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
-        #: The engine's whose JavaScript calls; errors are thrown there.
+        #: Runtime of the QML engine that errors are thrown into; None to raise them.
         self.runtime: Runtime | None = None
-        #: Properties at the top, by name.
+        #: The properties at the top, by name.
         self.properties: dict[str, RegisteredProperty] = {}
         self._saved: dict[str, Any] = {}
         self._config: dict[str, Any] = {}
         self._older: set[RegisteredProperty] = set()
 
-    # The free map.
+    # The free-form map.
 
     def get_config(self) -> dict[str, Any]:
-        """Return the map that is kept with the display."""
+        """Return the map that is saved with the overlay's entry."""
         return self._config
 
     def set_config(self, config: Any) -> None:
-        """Change the map that is kept with the display, as a whole.
+        """Replace the map that is saved with the overlay's entry.
 
         Raises:
-            Error: A file could not keep it; the error says which part.
+            Error: A file cannot store it; the error names the part.
         """
         value = plain_from_js(config) if isinstance(config, QJSValue) else config
         if not isinstance(value, dict):
@@ -248,16 +248,16 @@ class RegisteredProperties(QtCore.QObject):
         with errors_to_js(self.runtime, "rviz.config", config):
             self.set_config(config)
 
-    #: Assign whole maps: a change inside of what was read is not seen.
+    #: Assign a new map to change it: changes inside the map are not detected.
     config = Property(VARIANT, get_config, _set_config, notify=configChanged)
 
-    # Registering.
+    # Registration.
 
-    #: A property without a value, below which others stand.
+    #: A property without a value, as parent of others.
     registerPropertyContainer = _registering("registerPropertyContainer", "container")
-    #: A check box.
+    #: A boolean, shown as a check box.
     registerBoolProperty = _registering("registerBoolProperty", "bool", "default")
-    #: A whole number.
+    #: An integer.
     registerIntProperty = _registering(
         "registerIntProperty", "int", "default", "description", "min", "max"
     )
@@ -267,7 +267,7 @@ class RegisteredProperties(QtCore.QObject):
     )
     #: A text.
     registerStringProperty = _registering("registerStringProperty", "string", "default")
-    #: One of the texts `choices`.
+    #: One of the strings in `choices`.
     registerEnumProperty = _registering("registerEnumProperty", "enum", "default", "choices")
     #: A colour.
     registerColorProperty = _registering("registerColorProperty", "color", "default")
@@ -275,7 +275,7 @@ class RegisteredProperties(QtCore.QObject):
     registerVectorProperty = _registering("registerVectorProperty", "vector", "default")
     #: A quaternion of x, y, z and w.
     registerQuaternionProperty = _registering("registerQuaternionProperty", "quaternion", "default")
-    #: The name of a topic of the type `messageType`.
+    #: The name of a topic of type `messageType`.
     registerRosTopicProperty = _registering(
         "registerRosTopicProperty", "topic", "default", "messageType"
     )
@@ -293,17 +293,17 @@ class RegisteredProperties(QtCore.QObject):
         default: Any = None,
         **options: Any,
     ) -> RegisteredProperty:
-        """Return the property of a name, created if there is none.
+        """Return the property with the given name; create it if there is none.
 
         Args:
             kind: See :attr:`RegisteredProperty.kindName`.
-            name: Unique below its parent.
-            parent: The property below which it stands.
-            default: Its value where no file has another.
-            options: Of all properties and of this kind.
+            name: Its name, unique below its parent.
+            parent: Its parent property; None at the top.
+            default: Its initial value, unless a file has one.
+            options: Options of all kinds and of this kind.
 
         Raises:
-            Error: Something does not fit; the error says what, and what would.
+            Error: An argument is invalid; the error says what is expected.
         """
         if not isinstance(name, str) or not name.strip():
             raise Error(f"the name must be a text, e.g. 'Speed', got {shown(name)}")
@@ -351,7 +351,7 @@ class RegisteredProperties(QtCore.QObject):
     def _sorted(
         kind: str, name: str, options: dict[str, Any]
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Split options into those of all kinds and those of this kind, and check them."""
+        """Validate options, and split them into those of all kinds and those of this kind."""
         own = KINDS[kind].OPTIONS
         for option, value in options.items():
             if option not in (*_COMMON, *own):
@@ -382,7 +382,7 @@ class RegisteredProperties(QtCore.QObject):
         return parent.properties
 
     def all(self) -> Iterator[RegisteredProperty]:
-        """Iterate over all properties, each before those below it."""
+        """Iterate over all properties, parents before their children."""
         waiting = list(self.properties.values())
         while waiting:
             found = waiting.pop(0)
@@ -390,7 +390,7 @@ class RegisteredProperties(QtCore.QObject):
             waiting[:0] = found.properties.values()
 
     def unregister(self, found: RegisteredProperty) -> None:
-        """Remove a property with those below it; its value is kept for one of its name."""
+        """Remove a property and its children; a later property of its name gets its value."""
         self._saved = self.save()
         siblings = found.container.properties if found.container else self.properties
         if siblings.get(found.path[-1]) is found:
@@ -398,20 +398,20 @@ class RegisteredProperties(QtCore.QObject):
             self.unregistered.emit(found)
 
     def begin_load(self) -> None:
-        """Allow properties to be registered with another kind, as the interface is loaded anew."""
+        """Allow existing properties to be registered with another kind, when QML is reloaded."""
         self._older = set(self.all())
 
     # Files.
 
     def save(self) -> dict[str, Any]:
-        """Return all values by name, nested; those that a file had for others stay in it."""
+        """Return all values as nested dicts, including a file's values of unknown properties."""
         return merged(self._saved, _saved(self.properties))
 
     def load(self, saved: dict[str, Any]) -> None:
-        """Restore values from a file, now or when a property is registered.
+        """Restore values from a file, for existing properties and for later ones.
 
         Args:
-            saved: As :meth:`save` gave it; scalars may be text.
+            saved: A result of :meth:`save`; scalars may be text.
         """
         self._saved = saved
         for found in self.all():
@@ -435,12 +435,12 @@ def _saved(properties: dict[str, RegisteredProperty]) -> dict[str, Any]:
 
 
 def _named(names: tuple[str, ...], given: list[Any], options: dict[str, Any]) -> dict[str, Any]:
-    """Return arguments by name: a parent first, where there is one, and options at last."""
+    """Return positional arguments by name, including a parent first and options last."""
     found = dict(options)
     if given and (given[0] is None or isinstance(given[0], QtCore.QObject)):
         found["parent"] = given.pop(0)
     usage = f"[parent,] {', '.join(names)}, {{options}}"
-    # The default of a vector is a map as well.
+    # A map may also be the default of a vector.
     at_last = min(2, len(names) - 1)
     if len(given) > at_last and isinstance(given[-1], dict):
         found.update(given.pop())

@@ -1,4 +1,4 @@
-"""What draws a scene of QML into memory: OpenGL, or Qt's software renderer, and which of them."""
+"""The renderers of QML scenes (OpenGL and Qt's software renderer), and the choice between them."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _gl() -> ctypes.CDLL:
 
 @contextlib.contextmanager
 def keep_context() -> Iterator[None]:
-    """Restore the current OpenGL context at the end: Ogre takes it to be its own."""
+    """Restore the current OpenGL context at the end, because Ogre expects its own."""
     library = _gl()
     display, context = library.glXGetCurrentDisplay(), library.glXGetCurrentContext()
     drawable = library.glXGetCurrentDrawable()
@@ -71,16 +71,16 @@ def keep_context() -> Iterator[None]:
 
 
 class Offscreen:
-    """An offscreen OpenGL context for all scenes of the process.
+    """The offscreen OpenGL context that all scenes of the process share.
 
     Raises:
-        UnsupportedError: This screen has no OpenGL that Qt can use.
+        UnsupportedError: Qt cannot use OpenGL on this screen.
     """
 
     def __init__(self) -> None:
         self._depth = 0
         wanted = QtGui.QSurfaceFormat.defaultFormat()
-        # Qt Quick sorts what is opaque by depth, and clips with the stencil.
+        # Qt Quick needs the depth buffer for opaque items, and the stencil buffer for clipping.
         wanted.setDepthBufferSize(24)
         wanted.setStencilBufferSize(8)
         with keep_context():
@@ -99,10 +99,10 @@ class Offscreen:
 
     @contextlib.contextmanager
     def current(self) -> Iterator[None]:
-        """Make it the current context; may be nested.
+        """Make the context current; may be nested.
 
         Raises:
-            UnsupportedError: The graphics driver has lost it.
+            UnsupportedError: The graphics driver has lost the context.
         """
         if self._depth:
             yield
@@ -122,21 +122,21 @@ class Offscreen:
 
 @cache
 def offscreen() -> Offscreen:
-    """Return the context of this process, made at the first call.
+    """Return the context of this process, created on the first call.
 
     Raises:
-        UnsupportedError: This screen has no OpenGL that Qt can use.
+        UnsupportedError: Qt cannot use OpenGL on this screen.
     """
     return Offscreen()
 
 
 def read_pixels(width: int, height: int, into: NDArray[np.uint32]) -> None:
-    """Read the current framebuffer from its lower left corner; the bottom row comes first.
+    """Read the current framebuffer from its lower left corner, bottom row first.
 
     Args:
-        width: Pixels.
-        height: Pixels.
-        into: Array of shape (height, width), each pixel 0xAARRGGBB.
+        width: Width in pixels.
+        height: Height in pixels.
+        into: Result: array of shape (height, width), each pixel 0xAARRGGBB.
     """
     assert into.shape == (height, width)
     assert into.flags.c_contiguous
@@ -145,13 +145,13 @@ def read_pixels(width: int, height: int, into: NDArray[np.uint32]) -> None:
 
 
 def read_depth(x: int, y: int, width: int = 1, height: int = 1) -> NDArray[np.float32]:
-    """Return depths of the current framebuffer.
+    """Read depths from the current framebuffer.
 
     Args:
         x: Left edge in pixels.
         y: Lower edge in pixels, from the bottom.
-        width: Pixels.
-        height: Pixels.
+        width: Width in pixels.
+        height: Height in pixels.
 
     Returns:
         Array of shape (height, width) from 0 (near plane) to 1 (nothing was drawn), bottom row
@@ -162,21 +162,21 @@ def read_depth(x: int, y: int, width: int = 1, height: int = 1) -> NDArray[np.fl
     return depths
 
 
-#: By this property of a context, Qt Quick finds the one scene that it expects a context to have.
+#: Property of an OpenGL context in which Qt Quick stores the single scene that it expects.
 _OWNER = "_q_sgrendercontext"
 
 
 class Renderer(Protocol):
-    """Draws one window of Qt Quick."""
+    """Draws a Qt Quick window into memory."""
 
-    #: Seconds that reading the last picture back took.
+    #: Seconds that :meth:`draw` last spent reading pixels back.
     read_back: float
 
     def start(self, control: Any, window: Any) -> None:
-        """Begin to draw a window; before anything else.
+        """Set the window to draw; call this first.
 
         Args:
-            control: The window's QQuickRenderControl, which can be `apart` while it renders.
+            control: The window's QQuickRenderControl, a `_Control`.
             window: The window.
         """
 
@@ -184,29 +184,29 @@ class Renderer(Protocol):
         """Set the size.
 
         Args:
-            width: Pixels of the picture.
-            height: Pixels.
-            ratio: Pixels for one unit of the interface.
+            width: Width of the picture in pixels.
+            height: Its height in pixels.
+            ratio: Pixels per unit of the interface.
 
         Returns:
-            What to multiply units of the interface with for those of the window.
+            Ratio of the window's event coordinates to units of the interface.
         """
 
     def draw(self) -> NDArray[np.uint32]:
-        """Return how the window looks; see :meth:`Scene.draw`."""
+        """Return the rendered picture; see :meth:`Scene.draw`."""
 
     def rest(self) -> None:
-        """Release the last picture: the next one may be long in coming."""
+        """Release the memory of the last picture."""
 
     def stop(self) -> None:
-        """Release everything."""
+        """Release all resources."""
 
 
 class OpenGLRenderer:
-    """Draws by OpenGL, in the one context that all scenes share.
+    """Draws with OpenGL, in the context shared by all scenes.
 
     Raises:
-        UnsupportedError: There is no OpenGL that Qt can use.
+        UnsupportedError: Qt cannot use OpenGL on this screen.
     """
 
     def __init__(self) -> None:
@@ -219,19 +219,19 @@ class OpenGLRenderer:
         self._pixels: NDArray[np.uint32] | None = None
 
     def start(self, control: Any, window: Any) -> None:
-        """Begin to draw a window."""
+        """Set the window to draw."""
         self._control, self._window = control, window
         with self._gl.current():
-            # Several scenes get on well in one context as long as none calls it its own.
+            # Reset it, so that several scenes can share the context.
             self._gl.context.setProperty(_OWNER, None)
             control.initialize(self._gl.context)
             self._gl.context.setProperty(_OWNER, None)
 
     def fit(self, width: int, height: int, ratio: float) -> float:
-        """Set the size; texts and shapes are scaled by the window's pixel ratio.
+        """Set the size; text and shapes are scaled by the window's pixel ratio.
 
         Raises:
-            UnsupportedError: OpenGL has no buffer of this size.
+            UnsupportedError: OpenGL cannot create a buffer of this size.
         """
         self._window.resize(math.ceil(width / ratio), math.ceil(height / ratio))
         with self._gl.current():
@@ -247,7 +247,7 @@ class OpenGLRenderer:
         return ratio
 
     def draw(self) -> NDArray[np.uint32]:
-        """Render into a buffer, and read all of it: Qt Quick does not say what has changed."""
+        """Render into a buffer, and read all of it, because Qt Quick does not report changes."""
         height, width = self._shape
         with self._gl.current():
             self._control.polishItems()
@@ -255,7 +255,7 @@ class OpenGLRenderer:
             with self._control.apart():
                 self._control.render()
             started = time.perf_counter()
-            # Not before: QML that waits for an answer may release it while rendering.
+            # After rendering: QML that waits for a reply in a nested event loop may release it.
             if self._pixels is None:
                 self._pixels = np.empty(self._shape, np.uint32)
             self._buffer.bind()
@@ -265,7 +265,7 @@ class OpenGLRenderer:
         return self._pixels[::-1]
 
     def rest(self) -> None:
-        """Release the last picture."""
+        """Release the memory of the last picture."""
         self._pixels = None
 
     def stop(self) -> None:
@@ -275,13 +275,13 @@ class OpenGLRenderer:
             self._drop_buffer()
 
     def _drop_buffer(self) -> None:
-        # Its memory is given back with the object, while the context is current.
+        # The caller has made the context current, which deleting the buffer requires.
         self._window.setRenderTarget(None)
         self._buffer = None
 
 
 class SoftwareRenderer:
-    """Draws by Qt's software renderer: no shaders, no particles, no video by OpenGL."""
+    """Draws with Qt's software renderer: no shaders, no particles, no OpenGL video."""
 
     def __init__(self) -> None:
         self.read_back = 0.0
@@ -292,7 +292,7 @@ class SoftwareRenderer:
         self._units = self._pixels = QtCore.QSize()
 
     def start(self, control: Any, window: Any) -> None:
-        """Begin to draw a window."""
+        """Set the window to draw."""
         self._control, self._window = control, window
         control.initialize(None)
 
@@ -306,7 +306,7 @@ class SoftwareRenderer:
         return float(ratio / own)
 
     def draw(self) -> NDArray[np.uint32]:
-        """Draw all of it into an image: Qt's `grab` draws everything anew."""
+        """Draw the whole scene into an image."""
         self._control.polishItems()
         self._control.sync()
         with self._control.apart(), self._in_pixels():
@@ -318,11 +318,11 @@ class SoftwareRenderer:
 
     @contextmanager
     def _in_pixels(self) -> Iterator[None]:
-        """Give the window the size of its picture: only that is drawn."""
+        """Resize the window to the size of its picture, to which Qt limits drawing."""
         if self._units == self._pixels:
             yield
             return
-        # QML is not to take note of it.
+        # QML must not see this size.
         blocked = self._window.blockSignals(True)
         self._window.resize(self._pixels)
         try:
@@ -332,7 +332,7 @@ class SoftwareRenderer:
             self._window.blockSignals(blocked)
 
     def rest(self) -> None:
-        """Release the last picture."""
+        """Release the memory of the last picture."""
         self._image = None
 
     def stop(self) -> None:
@@ -342,40 +342,40 @@ class SoftwareRenderer:
 
 
 class OverlayRendererChoice(RendererChoice):
-    """The renderer choice of the process, made with its first overlay in QML."""
+    """The choice of the process's renderer, made for its first QML overlay."""
 
     _subject = "overlays"
     _application = "rosglass.rviz.Application"
     _log = logging.getLogger("rosglass.rviz")
 
     def prefer(self, renderer: str) -> None:
-        """Set the user's choice, which takes precedence over Qt's environment variables.
+        """Set the user's choice, which overrides Qt's environment variables.
 
         Args:
             renderer: One of :data:`rosglass.qml.renderer_choice.RENDERERS`.
 
         Raises:
-            Error: There is no such renderer, or Qt has chosen another one already.
-            UnsupportedError: QSG_RHI asks for Qt's RHI, which overlays cannot use.
+            Error: The renderer is unknown, or Qt uses another one already.
+            UnsupportedError: QSG_RHI selects Qt's RHI, which overlays cannot use.
         """
         if os.environ.get("QSG_RHI", "0") not in ("", "0"):
             raise UnsupportedError("overlays cannot be drawn by Qt's RHI; unset QSG_RHI")
         super().prefer(renderer)
 
     def make(self, import_paths: Sequence[str]) -> Renderer:
-        """Return what draws a scene; the first call chooses for all.
+        """Return a renderer for a scene; the first call makes the choice.
 
         Args:
             import_paths: Folders with QML modules that the expected files use.
 
         Raises:
-            UnsupportedError: OpenGL was asked for, and Qt cannot use it here.
+            UnsupportedError: The user chose OpenGL, and Qt cannot use it here.
         """
         software = self.choose(import_paths) == "software"
         return SoftwareRenderer() if software else OpenGLRenderer()
 
     def _graphics_device(self) -> str:
-        """Return what draws RViz's 3D view, e.g. ``llvmpipe (LLVM 15.0.6, 256 bits)``."""
+        """Return the name of RViz's graphics device, e.g. ``llvmpipe (LLVM 15.0.6, 256 bits)``."""
         capabilities = ogre().Root.getSingleton().getRenderSystem().getCapabilities()
         return str(capabilities.getDeviceName()) or "an unnamed OpenGL"
 
@@ -388,5 +388,5 @@ class OverlayRendererChoice(RendererChoice):
             self.renderer, self.reason = "software", str(error)
 
 
-#: That of this process.
+#: The renderer choice of this process.
 choice = OverlayRendererChoice()

@@ -1,4 +1,4 @@
-"""What RViz needs, and what to do where it is missing; needs nothing of it itself, not even Qt."""
+"""Checks for the packages that RViz overlays need; importable without any of them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rosglass.errors import UnsupportedError
 
 __all__ = ["PACKAGES", "require_bindings"]
 
-#: The packages of Debian 12 that interfaces over RViz need, besides rosglass.
+#: Packages of Debian 12 that RViz overlays need, in addition to rosglass.
 PACKAGES = (
     "rviz python3-rviz python3-ogre-1.12 python3-pyqt5 python3-pyside2.qtcore "
     "python3-pyside2.qtgui python3-pyside2.qtwidgets python3-pyside2.qtqml "
@@ -27,15 +27,15 @@ _MODULES = (
     "shiboken2",
     *(f"PySide2.Qt{name}" for name in ("Core", "Gui", "Widgets", "Qml", "Quick", "OpenGL")),
 )
-#: Where Debian's own Python has the bindings.
+#: Folder of Debian's Python packages.
 _SYSTEM = Path("/usr/lib/python3/dist-packages")
 
 
 def require_bindings() -> None:
-    """Make sure that this Python has the bindings of RViz, Ogre and Qt 5.
+    """Check that this Python has the bindings of RViz, Ogre and Qt 5.
 
     Raises:
-        UnsupportedError: It has not; the message says what to install, and what to run.
+        UnsupportedError: Some are missing; the message says what to install and how to run.
     """
     missing = [name for name in _MODULES if not _has(name)]
     if missing:
@@ -43,7 +43,7 @@ def require_bindings() -> None:
 
 
 def _has(name: str) -> bool:
-    """Return whether a module is there, without loading the package that it is in."""
+    """Return whether a module exists, without importing its package."""
     path: list[str] | None = None
     found = ""
     for part in name.split("."):
@@ -82,12 +82,12 @@ def _advice(missing: list[str]) -> str:
 
 
 def _without_parts(missing: list[str]) -> list[str]:
-    """Return the modules whose package is there, and the packages that are not."""
+    """Return missing packages, and missing modules of existing packages."""
     packages = {name.partition(".")[0] for name in missing}
     absent = {package for package in packages if not _has(package)}
     return sorted(absent | {name for name in missing if name.partition(".")[0] not in absent})
 
 
 def _is_system_python() -> bool:
-    """Return whether this Python has what Debian's packages bring."""
+    """Return whether this Python uses Debian's Python packages."""
     return any(Path(entry) == _SYSTEM for entry in sys.path)

@@ -1,8 +1,8 @@
-"""RViz's own node, made with roscpp before RViz makes one, and the overlays' node beside it.
+"""RViz's roscpp node, initialized before RViz would do it, and the overlays' own node.
 
-RViz asks roscpp for a node of a random name, whose Ctrl-C handler takes the place of Python's.
-Where roscpp is initialized already, RViz leaves it as it is. roscpp has no Python bindings: its C++
-functions are called by their names in the library (Itanium C++ ABI, libstdc++'s ``std::string``;
+RViz would initialize roscpp with a random node name and a Ctrl-C handler that replaces Python's; it
+does not if roscpp is initialized already. roscpp has no Python bindings, so this module calls its
+C++ functions by their mangled names (Itanium C++ ABI, libstdc++'s ``std::string``;
 https://docs.ros.org/en/noetic/api/roscpp/html/init_8h.html).
 """
 
@@ -62,21 +62,23 @@ def _string(text: str) -> _String:
 
 
 def is_initialized() -> bool:
-    """Return whether this process has a roscpp node."""
+    """Return whether roscpp is initialized in this process."""
     return bool(cpp_function("libroscpp", "_ZN3ros13isInitializedEv", ctypes.c_bool)())
 
 
 def is_running() -> bool:
-    """Return whether the node has not been shut down, as by another one of its name."""
+    """Return whether the roscpp node is running; e.g. another node of its name shuts it down."""
     return bool(cpp_function("libroscpp", "_ZN3ros2okEv", ctypes.c_bool)())
 
 
 def initialize(name: str, arguments: Sequence[str]) -> None:
-    """Set up RViz's node; the master gets no request yet.
+    """Initialize RViz's node, without a request to the master.
+
+    roscpp ends the process if an argument is invalid.
 
     Args:
-        name: Its base name; must be valid, for roscpp would end the process.
-        arguments: ``old:=new``, ``__ns:=...`` and the like; must be valid as well.
+        name: Base name of the node.
+        arguments: Remapping arguments such as ``old:=new`` and ``__ns:=...``.
     """
     words = [b"rviz", *(argument.encode() for argument in arguments)]
     argv = (ctypes.c_char_p * (len(words) + 1))(*words)
@@ -92,7 +94,7 @@ def node_name() -> str:
 
 
 def set_log_level(level: int) -> None:
-    """Set the level of RViz's log to one of Python's logging."""
+    """Set RViz's log level to a level of Python's logging."""
     cpp_function("librosconsole", "_ZN3ros7console10initializeEv")()
     set_level = cpp_function("librosconsole", _SET_LEVEL)
     cpp_level = next((ours for theirs, ours in _LEVELS if level <= theirs), _FATAL)
@@ -101,7 +103,7 @@ def set_log_level(level: int) -> None:
 
 
 def shut_down() -> None:
-    """End RViz's node: it unregisters from the master."""
+    """Shut RViz's node down, which unregisters it from the master."""
     cpp_function("libroscpp", "_ZN3ros8shutdownEv")()
 
 
@@ -109,13 +111,13 @@ _log = logging.getLogger("rosglass.rviz")
 
 
 def name_node(name: str, options: Ros1Options) -> None:
-    """Initialize RViz's node, unless the program has a roscpp node.
+    """Initialize RViz's node, unless the program has initialized roscpp.
 
     Args:
-        name: Its name; empty for ``rviz`` with what makes it unique.
-        options: Its master, and other options.
+        name: Its name; empty for ``rviz`` with a unique suffix.
+        options: Its master and remappings.
     """
-    # Plugins of RViz may ask for it, too.
+    # RViz's plugins may read it, too.
     os.environ["ROS_MASTER_URI"] = options.master
     if not is_initialized():
         set_log_level(_log.getEffectiveLevel())
@@ -123,7 +125,7 @@ def name_node(name: str, options: Ros1Options) -> None:
 
 
 def shared_arguments(options: Ros1Options) -> list[str]:
-    """Return the arguments for both nodes, without the name."""
+    """Return the remapping arguments of both nodes, without the name."""
     remappings = options.arguments
     words = [f"{old}:={new}" for old, new in remappings.rules]
     words += [f"_{key}:={value}" for key, value in remappings.parameters.items()]
@@ -135,10 +137,10 @@ def shared_arguments(options: Ros1Options) -> list[str]:
 def connect_beside_rviz(
     url: str | None, name: str, namespace: str, arguments: Sequence[str] = ()
 ) -> Node:
-    """Return the node of overlays, as :func:`rosglass.connect` does.
+    """Return the overlays' node; like :func:`rosglass.connect`.
 
     Raises:
-        InvalidNameError: It has the name of RViz's own.
+        InvalidNameError: The name is that of RViz's own node.
     """
     from rosglass.connection import connect  # noqa: PLC0415 - not before someone connects
 

@@ -1,7 +1,7 @@
-"""The object ``rviz`` that QML over RViz finds, one for each overlay, and the objects below it.
+"""The object ``rviz`` in QML, one for each overlay, and the objects that it returns.
 
-They know the 3D view by :class:`rosglass.rviz.access.Access` alone:
-docs/architecture.md, section 6, says what another 3D view has to implement.
+They use the 3D view only through :class:`rosglass.rviz.access.Access`; docs/architecture.md,
+section 6, says what another 3D view has to implement.
 """
 # ruff: noqa: N802 N815 - the names of slots, properties and signals are QML's
 
@@ -48,13 +48,13 @@ if TYPE_CHECKING:
 
 __all__ = ["ACCESS", "RvizObject"]
 
-#: In `Session.shared`: the Access of the session's 3D view.
+#: Key in `Session.shared` of the 3D view's `Access`.
 ACCESS = "3D view"
-#: What the addresses of icons begin with, after ``image://``.
+#: Name of the image provider of icons, after ``image://``.
 _ICONS = "rviz_tool_icons"
-#: Pixels of an icon that is asked for without a size, and at most.
+#: Default and maximum size of an icon in pixels.
 _ICON_SIZE, _MAX_ICON_SIZE = 48, 1024
-#: Metres below which the camera counts as standing still.
+#: Minimum movement of the camera in metres that `moved` reports.
 _MIN_MOVE_M = 1e-4
 _FRAME = "the name of a frame, or '' for none"
 
@@ -70,12 +70,12 @@ def _vector(place: Point) -> QtGui.QVector3D:
 
 
 class QmlTool(Face):
-    """One tool. Its members stay readable once it is removed."""
+    """A tool of RViz; its members stay readable after removal."""
 
     CALLED = "tool"
 
     isSelectedChanged = Signal()
-    #: Of name and description.
+    #: `name` or `description` has changed.
     changed = Signal()
     existsChanged = Signal()
 
@@ -104,7 +104,7 @@ class QmlToolManager(Face):
     toolsChanged = Signal()
     toolAdded = Signal(QtCore.QObject, arguments=["tool"])
     toolRemoved = Signal(QtCore.QObject, arguments=["tool"])
-    #: Another tool has the mouse.
+    #: Another tool was selected.
     toolChanged = Signal(QtCore.QObject, arguments=["tool"])
 
     def __init__(self, tools: Tools, runtime: Runtime, parent: QtCore.QObject) -> None:
@@ -117,12 +117,12 @@ class QmlToolManager(Face):
 
     @property
     def current(self) -> QmlTool | None:
-        """The tool that has the mouse."""
+        """The selected tool."""
         return self.faces.of(self.model.current)  # type: ignore[no-any-return]
 
-    #: In the order of their buttons.
+    #: All tools, in the order of their buttons.
     tools = Property(LIST, lambda self: self.faces.all(), notify=toolsChanged)
-    #: The tool that has the mouse; set by a tool, its index, or the id of a class.
+    #: The selected tool; may be set to a tool, its index, or a class id.
     currentTool = member(
         "currentTool",
         QJSValue,
@@ -131,12 +131,12 @@ class QmlToolManager(Face):
         takes=anything,
         sets=lambda self, wanted: self._wanted(wanted).select(),
     )
-    #: Ids of the classes that can be added.
+    #: Class ids of the tools that can be added.
     toolClasses = member("toolClasses", LIST, of="model.classes")
 
     @slot(1, classId=anything)
     def addTool(self, class_id: Any = None) -> QmlTool | None:
-        """Add a tool of a class, and return it; without one, show RViz's dialog instead."""
+        """Add and return a tool of a class; without a class, open RViz's dialog instead."""
         if class_id is None:
             self.model.ask_for_new()
             return None
@@ -144,12 +144,12 @@ class QmlToolManager(Face):
 
     @slot(classId=text("the id of a class, e.g. 'rviz/Measure'"))
     def getTool(self, class_id: str) -> QmlTool | None:
-        """Return the first tool of a class; null where there is none."""
+        """Return the first tool of a class; null if there is none."""
         return self.faces.of(self.model.find(class_id))  # type: ignore[no-any-return]
 
     @slot(tool=anything)
     def removeTool(self, tool: Any) -> None:
-        """Remove a tool; takes a tool, its index among the tools, or the id of a class."""
+        """Remove a tool, given as a tool, its index, or a class id."""
         self.model.remove(self._wanted(tool))
 
     removeAll = passing("removeAll")
@@ -181,13 +181,13 @@ class QmlToolManager(Face):
 
 
 class ToolIcons(QtQuick.QQuickImageProvider):  # type: ignore[misc]
-    """Provides ``image://rviz_tool_icons/<classId>``; asked in the GUI thread only.
+    """Image provider of ``image://rviz_tool_icons/<classId>``, for the GUI thread only.
 
-    The largest size there is, scaled to what is asked for, 48 pixels otherwise; a width or height
-    alone keeps the proportions.
+    Scales the largest icon to the requested size, by default 48 pixels; a width or height alone
+    keeps the proportions.
 
     Args:
-        tools: The tools.
+        tools: RViz's tools.
     """
 
     def __init__(self, tools: Tools) -> None:
@@ -195,7 +195,7 @@ class ToolIcons(QtQuick.QQuickImageProvider):  # type: ignore[misc]
         self._tools = tools
 
     def requestPixmap(self, name: str, size: Any, requested: Any) -> Any:
-        """Return an icon; transparent where there is no such tool, or no icon."""
+        """Return a tool's icon; a transparent one if there is no such tool, or no icon."""
         tool = self._tools.find(name)
         picture = Qt5Gui.QPixmap() if tool is None else tool.picture()
         width, height = (requested.width(), requested.height())
@@ -225,11 +225,11 @@ class ToolIcons(QtQuick.QQuickImageProvider):  # type: ignore[misc]
 
 
 class QmlDisplay(Face):
-    """One display. Its name and class stay readable once it is removed."""
+    """A display of RViz; its name and class stay readable after removal."""
 
     CALLED = "display"
 
-    #: Of name, status, and whether it is shown.
+    #: `name`, `status` or `enabled` has changed.
     changed = Signal()
     existsChanged = Signal()
 
@@ -242,14 +242,14 @@ class QmlDisplay(Face):
     enabled = member("enabled", VARIANT, changed, takes=switch())
     #: ``ok``, ``warn`` or ``error``.
     status = member("status", str, changed, of="model.status.level")
-    #: What it says about itself, one line for each.
+    #: The status messages, one per line.
     statusText = member("statusText", str, changed, of="model.status.text")
-    #: All its properties as they are now, nested.
+    #: All its properties with their current values, nested.
     properties = Property(QJSValue, _get_properties, notify=existsChanged)
 
     @slot(path=property_path("Offset/X"))
     def get(self, path: str | list[str]) -> QJSValue:
-        """Return the value of a property, e.g. of ``Offset/X``."""
+        """Return the value of a property, e.g. ``Offset/X``."""
         return self.runtime.value(self.model.get(path))
 
     set = passing("set", path=property_path("Offset/X"), value=anything)
@@ -257,14 +257,14 @@ class QmlDisplay(Face):
 
 
 class QmlView(Face):
-    """The camera, ``rviz.view``; places are in metres, of the fixed frame unless one is given."""
+    """The camera, ``rviz.view``; points are in metres, by default in the fixed frame."""
 
     CALLED = "rviz.view"
 
     modeChanged = Signal()
     trackedFrameChanged = Signal()
     problemChanged = Signal()
-    #: The camera, or what it looks at, is elsewhere.
+    #: `eye` or `focus` has changed.
     moved = Signal()
     animationDurationChanged = Signal()
     trackingGainChanged = Signal()
@@ -285,7 +285,7 @@ class QmlView(Face):
         settings.changed("tracking_gain").connect(self.trackingGainChanged)
         access.before_frame.connect(self._on_frame)
 
-    #: 0 in 3D, 1 in 2D, seen from above.
+    #: 0 for 3D, 1 for 2D: from above.
     mode = member(
         "mode",
         QJSValue,
@@ -303,11 +303,11 @@ class QmlView(Face):
         takes=text(_FRAME),
         sets=lambda self, frame: self.model.track(frame),
     )
-    #: Why the tracked frame cannot be followed now; empty when it can.
+    #: Why the camera cannot follow the tracked frame; empty if it can.
     problem = member("problem", str, problemChanged)
     eye = member("eye", QtGui.QVector3D, moved, gives=_vector)
     focus = member("focus", QtGui.QVector3D, moved, gives=_vector)
-    #: Seconds that a movement takes.
+    #: Duration of a movement in seconds.
     animationDuration = member(
         "animationDuration",
         VARIANT,
@@ -316,7 +316,7 @@ class QmlView(Face):
         takes=anything,
         sets=lambda self, value: self.model.settings.set("animation_duration", value),
     )
-    #: How quickly the camera follows, in 1/s.
+    #: How quickly the camera follows the tracked frame, in 1/s.
     trackingGain = member(
         "trackingGain",
         VARIANT,
@@ -325,7 +325,7 @@ class QmlView(Face):
         takes=anything,
         sets=lambda self, value: self.model.settings.set("tracking_gain", value),
     )
-    #: The kind of RViz's view, e.g. ``rviz/Orbit``.
+    #: Class id of RViz's view, e.g. ``rviz/Orbit``.
     type = member(
         "type",
         VARIANT,
@@ -353,7 +353,7 @@ class QmlView(Face):
 
     @slot(1, mode=_mode, animate=switch("animate"))
     def setMode(self, mode: Any, animate: bool = True) -> None:
-        """Switch between 3D (0) and 2D (1); without animation where `animate` is false."""
+        """Switch between 3D (0) and 2D (1); jump if `animate` is false."""
         self.model.set_mode(mode, animate=animate)
 
     track = passing("track", frame=text(_FRAME))
@@ -377,10 +377,10 @@ class QmlView(Face):
 
 
 def _file_path(use: str = "") -> Callable[[Any], str]:
-    """Return a converter for files, named by a path or a ``file:`` URL.
+    """Return a converter for file paths and ``file:`` URLs.
 
     Args:
-        use: What it is for, where ``package://`` will not do.
+        use: Purpose of the file, for the error; if empty, ``package://`` URLs are accepted as well.
     """
 
     def take(value: Any) -> str:
@@ -396,14 +396,14 @@ def _file_path(use: str = "") -> Callable[[Any], str]:
 
 
 class RvizObject(RegisteredProperties):
-    """RViz, as the QML of one overlay sees it; see "The rviz object" in ``docs/rviz.md``.
+    """The object ``rviz`` in the QML of an overlay; see "The rviz object" in ``docs/rviz.md``.
 
     Args:
         overlay: The overlay.
-        engine: Its engine, which has a session.
+        engine: The overlay's engine, with a session.
     """
 
-    #: Its name in errors.
+    #: Name in error messages.
     CALLED = "rviz"
 
     visibleChanged = Signal()
@@ -415,7 +415,7 @@ class RvizObject(RegisteredProperties):
     displayRemoved = Signal(QtCore.QObject, arguments=["display"])
     statusChanged = Signal()
     frameRateChanged = Signal()
-    #: A config file was loaded: every display, view and tool is another one now.
+    #: A config file was loaded, which replaces all displays, views and tools.
     configLoaded = Signal(str, arguments=["file"])
 
     runtime: Runtime
@@ -429,10 +429,10 @@ class RvizObject(RegisteredProperties):
         self.overlay = overlay
         self._visible = overlay.visible
         self._disconnects: list[Callable[[], Any]] = []
-        #: Held: the engine owns it, and Python would release its half.
+        #: Keeps the Python half of the image provider alive, which the engine owns.
         self._icons: ToolIcons | None = None
         QtQml.QQmlEngine.setObjectOwnership(self, QtQml.QQmlEngine.ObjectOwnership.CppOwnership)
-        # QML may look at it for as long as there is an engine.
+        # QML may use the object as long as the engine exists.
         held = [self, spell_checked(runtime, self)]
         engine.destroyed.connect(lambda *_: held.clear())
         self._follow(overlay.arranged, self._on_arranged)
@@ -455,7 +455,7 @@ class RvizObject(RegisteredProperties):
             disconnect()
         access = self.__dict__.get("access")
         if access is not None:
-            # Without an event loop of its own, a program may keep the engine for long.
+            # A program without an event loop may delete the engine much later.
             access.trackers.remove_all(self.runtime)
 
     @cached_property
@@ -463,7 +463,7 @@ class RvizObject(RegisteredProperties):
         """The 3D view.
 
         Raises:
-            Error: There is none.
+            Error: The overlay's session has none.
         """
         found: Access | None = self.runtime.session.shared.get(ACCESS)
         if found is None:
@@ -472,14 +472,14 @@ class RvizObject(RegisteredProperties):
 
     @cached_property
     def tool_manager(self) -> QmlToolManager:
-        """The object `toolManager` of QML."""
+        """The QML object `toolManager`."""
         self._icons = ToolIcons(self.access.tools)
         self._engine.addImageProvider(_ICONS, self._icons)
         return QmlToolManager(self.access.tools, self.runtime, self._engine)
 
     @cached_property
     def display_faces(self) -> ItemFaces:
-        """The QML objects of the displays."""
+        """The QML objects of all displays."""
         displays = self.access.displays
         faces = ItemFaces(displays, QmlDisplay, self.runtime, self._engine)
         faces.changed.connect(self.displaysChanged)
@@ -490,10 +490,10 @@ class RvizObject(RegisteredProperties):
 
     @cached_property
     def camera(self) -> QmlView:
-        """The object `view` of QML."""
+        """The QML object `view`."""
         return QmlView(self.access, self.runtime, self._engine)
 
-    # The overlay and the window.
+    # Overlay and window.
 
     #: Whether this overlay is shown.
     visible = member("visible", bool, visibleChanged, of="overlay.visible")
@@ -505,7 +505,7 @@ class RvizObject(RegisteredProperties):
         takes=switch(),
         otherwise=False,
     )
-    #: Whether RViz's window has nothing but the 3D view in it.
+    #: Whether RViz's window shows only the 3D view.
     isBare = member(
         "isBare", VARIANT, isBareChanged, of="access.bare", takes=switch(), otherwise=False
     )
@@ -517,18 +517,18 @@ class RvizObject(RegisteredProperties):
         takes=text("the name of a frame, e.g. 'map'"),
         otherwise="",
     )
-    #: Frames that RViz has drawn in the last second.
+    #: Frames that RViz drew in the last second.
     frameRate = member("frameRate", float, frameRateChanged, of="access.frame_rate", otherwise=0.0)
-    #: How RViz is: ``ok``, ``warn`` or ``error``.
+    #: RViz's status: ``ok``, ``warn`` or ``error``.
     status = member("status", str, statusChanged, of="rviz_status.level", otherwise="error")
-    #: What RViz says about itself, one line for each.
+    #: RViz's status messages, one per line.
     statusText = member(
         "statusText", str, statusChanged, of="rviz_status.text", otherwise="there is no RViz"
     )
 
     @property
     def rviz_status(self) -> Any:
-        """RViz's own status; its changes are signalled from now on."""
+        """RViz's own status; reading it enables its change signal."""
         displays = self.access.displays
         if "display_faces" not in self.__dict__:
             self.display_faces  # noqa: B018 - connects the signal
@@ -536,20 +536,20 @@ class RvizObject(RegisteredProperties):
 
     @slot(1, file=_file_path("to save to"), window=switch("window"))
     def screenshot(self, file: str, window: bool = False) -> None:
-        """Save a picture of the 3D view with its overlays; of the whole window if `window`."""
+        """Save a picture of the 3D view with its overlays, or of the whole window if `window`."""
         self.access.picker.screenshot(file, window=window)
 
-    #: Load a ``.rviz`` file, once the function that calls this has returned. What has changed since
-    #: the last one was saved is lost, and so may be this overlay.
+    #: Load a ``.rviz`` file after the calling function has returned. Discards unsaved changes, and
+    #: may remove this overlay.
     loadConfig = passing("loadConfig", 0, "access.load_config", file=_file_path())
-    #: Save RViz's config; without a file, where it was loaded from.
+    #: Save RViz's config, by default to the file it was loaded from.
     saveConfig = passing("saveConfig", 1, "access.save_config", file=_file_path("to save to"))
 
     # Tools, camera, displays.
 
     toolManager = member("toolManager", QtCore.QObject, of="tool_manager")
     view = member("view", QtCore.QObject, of="camera")
-    #: All displays, those in groups included, in the order of the panel.
+    #: All displays, including those in groups, in the order of the panel.
     displays = member(
         "displays",
         LIST,
@@ -558,19 +558,19 @@ class RvizObject(RegisteredProperties):
         gives=lambda faces: faces(),
         otherwise=[],
     )
-    #: Ids of the classes of which displays can be added.
+    #: Class ids of the displays that can be added.
     displayClasses = member("displayClasses", LIST, of="access.displays.classes", otherwise=[])
 
     @slot(name=text("the name of a display, e.g. 'Grid'"))
     def display(self, name: str) -> QmlDisplay | None:
-        """Return the first display of a name; null where there is none."""
+        """Return the first display with the given name; null if there is none."""
         return self.display_faces.of(self.access.displays.find(name))  # type: ignore[no-any-return]
 
     @slot(2, classId=anything, name=text("a text", "name"), enabled=switch("enabled"))
     def addDisplay(
         self, class_id: Any, name: str | None = None, enabled: bool = True
     ) -> QmlDisplay:
-        """Add a display of a class, and return it."""
+        """Add and return a display."""
         faces = self.display_faces
         return faces.of(  # type: ignore[no-any-return]
             self.access.displays.add(class_id, name or "", enabled=enabled)
@@ -578,7 +578,7 @@ class RvizObject(RegisteredProperties):
 
     @slot(display=anything)
     def removeDisplay(self, display: Any) -> None:
-        """Remove a display; takes a display or its name."""
+        """Remove a display, given as a display or its name."""
         displays = self.access.displays
         found = display.model if isinstance(display, QmlDisplay) else None
         if found is None and not isinstance(display, str):
@@ -592,10 +592,10 @@ class RvizObject(RegisteredProperties):
 
     @slot(path=property_path("Grid/Color"))
     def getProperty(self, path: str | list[str]) -> QJSValue:
-        """Return the value of any property, e.g. of ``Global Options/Background Color``."""
+        """Return the value of any property, e.g. ``Global Options/Background Color``."""
         return self.runtime.value(self.access.displays.get(path))
 
-    #: Change any property, as if it were done in the panel.
+    #: Change any property, like the user in the panel.
     setProperty = passing(
         "setProperty", 0, "access.displays.set", path=property_path("Grid/Color"), value=anything
     )
@@ -604,11 +604,11 @@ class RvizObject(RegisteredProperties):
 
     @slot(2, x=anything, y=anything, radius=anything)
     def pick(self, *given: Any) -> dict[str, float] | None:
-        """Return the point of the fixed frame that is seen at a place; null where there is none.
+        """Return the point of the scene at a position of the overlay; null if nothing is there.
 
         Args:
-            given: x, y and a radius, in units of the overlay; or a point with x and y, and a
-                radius. The radius says how far around to look.
+            given: x, y and optionally a search radius, in units of the overlay; or a point with x
+                and y, and optionally a search radius.
         """
         at = [*given, None, None]
         if isinstance(at[0], dict) and {"x", "y"} <= set(at[0]):
@@ -623,11 +623,11 @@ class RvizObject(RegisteredProperties):
 
     @slot(3, x=anything, y=anything, z=anything, frame=anything)
     def createPositionTracker(self, *given: Any) -> QJSValue:
-        """Return an object that says where on the overlay a point is seen.
+        """Return a tracker of a point's position on the overlay.
 
         Args:
-            given: x, y and z in metres, or a point with x, y and z; and the frame that the point
-                moves with, the fixed frame by default.
+            given: x, y and z in metres, or a point with x, y and z; and the frame of the point, by
+                default the fixed frame.
         """
         parts = [*given, None, None, None]
         if not isinstance(parts[0], (dict, list)):
@@ -641,12 +641,12 @@ class RvizObject(RegisteredProperties):
 
     @Slot(QtCore.QObject, str)
     def refuse(self, item: QtCore.QObject, message: str) -> None:
-        """Log an error of an item, with the file that it is used in, not its own."""
+        """Log an error about an item, with the file that uses the item."""
         self._log_for(item, logging.ERROR, message)
 
     @Slot(QtCore.QObject, str)
     def warn(self, item: QtCore.QObject, message: str) -> None:
-        """Log a warning about an item, with the file that it is used in."""
+        """Log a warning about an item, with the file that uses the item."""
         self._log_for(item, logging.WARNING, message)
 
     def _log_for(self, item: QtCore.QObject, level: int, message: str) -> None:

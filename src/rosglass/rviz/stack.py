@@ -1,4 +1,4 @@
-"""All overlays over one RViz, the lowest first."""
+"""The overlays of an RViz, drawn in their stacking order."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 __all__ = ["MemoryCleaner", "Stack"]
 
 
-#: Milliseconds after which an overlay that came has been drawn, and one that went is gone.
+#: Milliseconds after which an added overlay has been drawn, and a removed one deleted.
 _CLEAN_DELAY_MS = 3000
 
 
 class MemoryCleaner(QtCore.QObject):
-    """Gives memory back a little later, once for all that has happened until then."""
+    """Returns memory to the system some seconds after overlays were added or removed."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -37,14 +37,14 @@ class MemoryCleaner(QtCore.QObject):
         self._timer.timeout.connect(self._clean)
 
     def overlay_added(self) -> None:
-        """Release soon what an overlay needed only to be created."""
+        """Schedule returning the memory that was needed only to create an overlay."""
         if not self._timer.isActive():
             self._timer.start()
 
     def overlay_removed(self) -> None:
-        """Release soon what an overlay had: its parts refer to each other.
+        """Schedule a garbage collection: the parts of an overlay refer to each other.
 
-        Left to Python, that takes hundreds of overlays, by which memory is in pieces.
+        Python's own collector would run only hundreds of overlays later, with memory fragmented.
         """
         self._gone = True
         self.overlay_added()
@@ -61,38 +61,38 @@ class MemoryCleaner(QtCore.QObject):
 
 @cache
 def _trim() -> Callable[[int], Any] | None:
-    """Return glibc's function that gives back what `free` keeps; other systems have none."""
+    """Return glibc's function that returns freed memory to the system; None without glibc."""
     found: Callable[[int], Any] | None = getattr(ctypes.CDLL(None), "malloc_trim", None)
     return found
 
 
 class Stack(QtCore.QObject):
-    """Draws the overlays of one RViz, right before each of its frames."""
+    """Holds the overlays of an RViz, and draws them right before each of its frames."""
 
-    #: Overlays came, went, or changed places.
+    #: Overlays were added, removed or reordered.
     changed = Signal()
-    #: What overlays took before a frame in which any was drawn, a `drawing.Work`.
+    #: Overlays were drawn before a frame. Argument: the times that it took, a `layer.Work`.
     drawn = Signal(object)
 
     def __init__(self, window: Window) -> None:
         super().__init__()
         self._window = window
-        #: As they were added, or last raised or lowered: what counts among those of equal `z`.
+        #: In the order in which they were added, raised or lowered, which decides for equal `z`.
         self._entries: list[Drawing] = []
-        #: As they lie above each other, the lowest first.
+        #: In stacking order, lowest first.
         self._arranged: list[Drawing] = []
         self._drawing = False
         self._later: list[Callable[[], None]] = []
         self._cleaner = MemoryCleaner()
         window.before_frame.connect(self._before_frame)
-        #: Who gets the mouse and the keys.
+        #: Routes mouse, touch and keyboard events.
         self.input = Input(window, self)
 
     def add(self, overlay: Overlay) -> None:
         """Show an overlay above those of lower or equal `z`.
 
         Raises:
-            Error: There is one of this name, or it is no overlay.
+            Error: The name is taken, or `overlay` is not an overlay.
         """
         if not (isinstance(overlay, Overlay) and hasattr(overlay, "name")):
             raise Error(_no_overlay(overlay))
@@ -108,7 +108,7 @@ class Stack(QtCore.QObject):
         self._cleaner.overlay_added()
 
     def remove(self, overlay: Overlay) -> None:
-        """Remove and close an overlay; do nothing if it is not there."""
+        """Remove and close an overlay; do nothing if it is not in the stack."""
         for entry in self._entries:
             if entry.overlay is overlay:
                 self._entries.remove(entry)
@@ -121,42 +121,42 @@ class Stack(QtCore.QObject):
                 if self._drawing:
                     self._later.append(lambda: _close(overlay))
                 else:
-                    # It may be handling the very event that had it removed.
+                    # The overlay may be handling the event that removes it.
                     self.input.after_event(lambda: _close(overlay))
                 self._cleaner.overlay_removed()
                 self.changed.emit()
                 return
 
     def find(self, name: str) -> Overlay | None:
-        """Return the overlay of a name."""
+        """Return the overlay with the given name; None if there is none."""
         return next((o for o in self if o.name == name), None)
 
     def __iter__(self) -> Iterator[Overlay]:
-        """Iterate over the overlays, the lowest first."""
+        """Iterate over the overlays, lowest first."""
         return iter([entry.overlay for entry in self._arranged])
 
     def topmost_first(self) -> list[Overlay]:
-        """Return the overlays that are shown, in the order in which they get input."""
+        """Return the visible overlays, topmost first: the order in which they get input."""
         return [o for o in reversed(list(self)) if o.visible and o.opacity > 0]
 
     def clicked(self, overlay: Overlay) -> None:
-        """Raise a popup that is pressed on above all others; does nothing to other overlays."""
+        """Raise a pressed popup above all others; does nothing for other overlays."""
         if overlay.is_popup:
             self.to_front(overlay)
 
     def to_front(self, overlay: Overlay) -> None:
-        """Put an overlay above all others of its kind, popups or not."""
+        """Put an overlay above all other popups, or above all that are not popups."""
         self._move_to_end(overlay, -1, max)
 
     def to_back(self, overlay: Overlay) -> None:
-        """Put an overlay below all others of its kind, popups or not."""
+        """Put an overlay below all other popups, or below all that are not popups."""
         self._move_to_end(overlay, 0, min)
 
     def put_in_order(self, overlays: Sequence[Overlay]) -> None:
-        """Stack overlays of equal `z` in the given order, the lowest first.
+        """Stack overlays of equal `z` in the given order, lowest first.
 
         Args:
-            overlays: Some of those that there are; the others keep their places.
+            overlays: Some of the overlays; the others keep their positions.
         """
         number = {id(overlay): at for at, overlay in enumerate(overlays)}
         places = [at for at, e in enumerate(self._entries) if id(e.overlay) in number]
@@ -170,16 +170,16 @@ class Stack(QtCore.QObject):
         entry = next((e for e in alike if e.overlay is overlay), None)
         if entry is None:
             return
-        # Where it stays when `z` is set to what others have.
+        # Its position among overlays of equal `z`.
         self._entries.remove(entry)
         self._entries.insert(0 if end == 0 else len(self._entries), entry)
         if alike[end] is not entry:
-            # Setting it puts all in order.
+            # Setting `z` reorders the stack.
             overlay.z = outermost(e.overlay.z for e in alike)
 
     @property
     def covered(self) -> float:
-        """Share of the 3D view that RViz blends overlays over; above 1 where several lie."""
+        """Share of the 3D view that RViz blends overlays over; above 1 if overlays overlap."""
         return sum(entry.layer.covered for entry in self._entries if entry.shown)
 
     def close(self) -> None:
@@ -187,7 +187,7 @@ class Stack(QtCore.QObject):
         for overlay in list(self):
             self.remove(overlay)
         if QtCore.QThread.currentThread().loopLevel() == 0:
-            # Nothing of QML is running. Left to the end of Python, it would see its parts go.
+            # No QML is running, so delete it now; at Python's exit, its objects would disappear.
             send_deferred_deletes()
 
     def _arrange(self) -> None:
@@ -201,10 +201,10 @@ class Stack(QtCore.QObject):
         if not is_alive(panel) or not panel.isVisible() or panel.window().isMinimized():
             return
         width, height, ratio = self._window.view_size()
-        # While QML waits for an answer, RViz's timer fires.
+        # RViz's timer fires in the nested event loop of QML that waits for a reply.
         if not width or not height or self._drawing:
             return
-        # What is drawn may have overlays come and go, itself included.
+        # Drawing may add and remove overlays, including the one being drawn.
         self._drawing = True
         try:
             works = [entry.before_frame(width, height, ratio) for entry in list(self._arranged)]
@@ -224,7 +224,7 @@ def _close(overlay: Overlay) -> None:
 
 
 def _no_overlay(given: object) -> str:
-    """Return the error for something that is no overlay."""
+    """Return the error text for a value that is not an overlay."""
     if isinstance(given, Overlay):
         kind = type(given).__name__
         return f"overlay {kind}: its __init__ must call super().__init__(), which gives it a name"

@@ -1,4 +1,4 @@
-"""Where a picture has something on it, in few rectangles: only what is blended costs."""
+"""Covers the non-empty or changed parts of a picture with few rectangles, to save blending."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ __all__ = [
     "update_covered",
 ]
 
-#: Pixels of a tile's edge.
+#: Width and height of a tile in pixels.
 TILE = 8
-#: Rows of pixels that are compared at a time; a multiple of a tile's.
+#: Rows of pixels compared at a time; a multiple of :data:`TILE`.
 _ROWS_AT_A_TIME = 64
 
 
 class Rect(NamedTuple):
-    """A rectangle in pixels, from the upper left corner; right and bottom are outside."""
+    """A rectangle in pixels from the upper left corner; right and bottom are exclusive."""
 
     left: int
     top: int
@@ -38,11 +38,11 @@ class Rect(NamedTuple):
 
     @property
     def area(self) -> int:
-        """How many pixels it has."""
+        """Number of pixels."""
         return (self.right - self.left) * (self.bottom - self.top)
 
     def meets(self, other: Rect) -> bool:
-        """Return whether both have a pixel in common."""
+        """Return whether the rectangles overlap."""
         return (
             self.left < other.right
             and other.left < self.right
@@ -51,7 +51,7 @@ class Rect(NamedTuple):
         )
 
     def around(self, other: Rect) -> Rect:
-        """Return the smallest rectangle with both in it."""
+        """Return the smallest rectangle that contains both."""
         return Rect(
             min(self.left, other.left),
             min(self.top, other.top),
@@ -61,11 +61,11 @@ class Rect(NamedTuple):
 
 
 def covered_tiles(pixels: NDArray[np.uint32]) -> NDArray[np.bool_]:
-    """Return for each tile of a picture whether anything on it can be seen.
+    """Return for each tile of a picture whether it has a visible pixel.
 
     Args:
-        pixels: Shape (height, width), each pixel 0xAARRGGBB with premultiplied colours; a colour
-            without alpha shines, and is seen as well.
+        pixels: Array of shape (height, width), each pixel 0xAARRGGBB with premultiplied colours;
+            a colour with alpha 0 is additive, and visible.
     """
     height, width = pixels.shape
     whole = height // TILE
@@ -83,7 +83,7 @@ def covered_tiles(pixels: NDArray[np.uint32]) -> NDArray[np.bool_]:
 def update_covered(
     covered: NDArray[np.bool_], pixels: NDArray[np.uint32], rects: list[Rect]
 ) -> None:
-    """Update the result of :func:`covered_tiles` where the picture has changed since."""
+    """Update a result of :func:`covered_tiles` for the changed rectangles of the picture."""
     for first, last in {(rect.top // TILE, -(-rect.bottom // TILE)) for rect in rects}:
         covered[first:last] = covered_tiles(pixels[first * TILE : last * TILE])
 
@@ -91,12 +91,12 @@ def update_covered(
 def changed_tiles(
     pixels: NDArray[np.uint32], before: NDArray[np.uint32], within: Iterable[Rect] | None = None
 ) -> NDArray[np.bool_]:
-    """Return for each tile whether two pictures of one size differ in it.
+    """Return for each tile whether two pictures of the same size differ in it.
 
     Args:
-        pixels: One.
-        before: The other.
-        within: Where they may differ, and are compared; None for anywhere.
+        pixels: The new picture.
+        before: The old picture.
+        within: Rectangles to compare; None for the whole pictures.
     """
     height, width = pixels.shape
     tiles = np.zeros((-(-height // TILE), -(-width // TILE)), np.bool_)
@@ -112,7 +112,7 @@ def changed_tiles(
         return tiles
     for top in range(0, height, _ROWS_AT_A_TIME):
         now, then = pixels[top : top + _ROWS_AT_A_TIME], before[top : top + _ROWS_AT_A_TIME]
-        # Most of a picture stays as it is, which is found out faster than what is another.
+        # Checking for equality is faster, and most of a picture does not change.
         if (now != then).any():
             tiles[top // TILE : -(-(top + _ROWS_AT_A_TIME) // TILE)] = covered_tiles(now ^ then)
     return tiles
@@ -121,14 +121,14 @@ def changed_tiles(
 def cover(
     tiles: NDArray[np.bool_], width: int, height: int, *, most: int = 48, worth: int = 0
 ) -> list[Rect]:
-    """Return rectangles that together cover all tiles that are set, and do not overlap.
+    """Return disjoint rectangles that cover all set tiles.
 
     Args:
         tiles: From :func:`covered_tiles` or :func:`changed_tiles`.
-        width: Pixels of the picture; no rectangle reaches over its edges.
-        height: Pixels.
-        most: Rectangles; above that, larger ones are taken that cover more than is needed.
-        worth: Pixels that a rectangle less may cost more.
+        width: Width of the picture in pixels, which limits the rectangles.
+        height: Its height in pixels.
+        most: Maximum number of rectangles; coarser ones are used to keep it.
+        worth: Pixels that may be covered in addition to save one rectangle.
     """
     step = TILE
     while True:
@@ -143,7 +143,7 @@ def cover(
 
 
 def uncovered(tiles: NDArray[np.bool_], rects: list[Rect]) -> int | None:
-    """Return how many tiles of rectangles are not set; None if set ones are in no rectangle."""
+    """Return the number of unset tiles in the rectangles; None if a set tile is outside of all."""
     inside = np.zeros_like(tiles)
     for rect in rects:
         rows = slice(rect.top // TILE, -(-rect.bottom // TILE))
@@ -154,7 +154,7 @@ def uncovered(tiles: NDArray[np.bool_], rects: list[Rect]) -> int | None:
 
 
 def trimmed(pixels: NDArray[np.uint32], rect: Rect) -> Rect:
-    """Return a rectangle without what is empty at its edges, as far as a tile from each."""
+    """Return a rectangle without empty rows and columns at its edges, up to a tile on each side."""
     part = pixels[rect.top : rect.bottom, rect.left : rect.right]
     left, right = _leading(part[:, :TILE], 0), _leading(part[:, : -TILE - 1 : -1], 0)
     top, bottom = _leading(part[:TILE], 1), _leading(part[: -TILE - 1 : -1], 1)
@@ -163,7 +163,7 @@ def trimmed(pixels: NDArray[np.uint32], rect: Rect) -> Rect:
 
 
 def _leading(part: NDArray[np.uint32], axis: int) -> int:
-    """Return how many columns (axis 0) or rows (axis 1) are empty before the first that is not."""
+    """Return the number of leading empty columns (axis 0) or rows (axis 1)."""
     filled = np.asarray(part.any(axis=axis))
     return int(filled.argmax()) if filled.any() else len(filled)
 
@@ -176,7 +176,7 @@ def _halved(tiles: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _runs_below_each_other(tiles: NDArray[np.bool_]) -> list[Rect]:
-    """Return runs of tiles, those that stand alike in rows below each other as one."""
+    """Return the horizontal runs of set tiles, with equal runs in adjacent rows merged."""
     padded = np.pad(tiles, 1)
     edges = padded[:, 1:] != padded[:, :-1]
     done: list[Rect] = []
@@ -192,7 +192,7 @@ def _runs_below_each_other(tiles: NDArray[np.bool_]) -> list[Rect]:
 
 
 def _joined(rects: list[Rect], worth: int) -> list[Rect]:
-    """Join neighbours as long as each rectangle less costs no more than `worth` pixels."""
+    """Merge rectangles while each merge adds at most `worth` pixels per rectangle saved."""
     while True:
         outer = next((o for o in _around_neighbours(rects, worth) if _saves(o, rects, worth)), None)
         if outer is None:
@@ -201,7 +201,7 @@ def _joined(rects: list[Rect], worth: int) -> list[Rect]:
 
 
 def _around_neighbours(rects: list[Rect], worth: int) -> Iterator[Rect]:
-    """Iterate over what is around two that stand close together, the closest first."""
+    """Iterate over the bounding rectangles of close pairs, the closest pair first."""
     left, top, right, bottom = np.array(rects, np.int64).reshape(-1, 4).T
     width = np.maximum.outer(right, right) - np.minimum.outer(left, left)
     height = np.maximum.outer(bottom, bottom) - np.minimum.outer(top, top)
@@ -214,7 +214,7 @@ def _around_neighbours(rects: list[Rect], worth: int) -> Iterator[Rect]:
 
 def _saves(outer: Rect, rects: list[Rect], worth: int) -> bool:
     inside = [rect for rect in rects if rect.meets(outer)]
-    # One that is cut by the edge would be blended twice.
+    # A rectangle that reaches beyond it would be blended twice.
     if any(outer.around(rect) != outer for rect in inside):
         return False
     return outer.area - sum(rect.area for rect in inside) <= worth * (len(inside) - 1)

@@ -1,4 +1,4 @@
-"""RViz's tools: which there are, which one has the mouse, adding and removing them."""
+"""RViz's tools: list, selection, adding and removing."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 
 __all__ = ["Tool", "Tools", "failure"]
 
-#: What stands for what could not be loaded.
+#: RViz's placeholder classes for tools and displays that could not be loaded.
 _FAILED = ("N4rviz10FailedToolE", "N4rviz13FailedDisplayE")
 
 
 class Tool:
-    """One tool; its members stay readable once it is removed. Made by :class:`Tools` only."""
+    """One tool, created by :class:`Tools`; its members stay readable after removal."""
 
     def __init__(self, owner: Tools, handle: Any) -> None:
         self._owner = owner
-        #: RViz's tool; None once it is gone.
+        #: RViz's tool; None after removal.
         self.handle: Any = handle
-        #: The class, e.g. ``rviz/Measure``; several tools may have the same.
+        #: The class id, e.g. ``rviz/Measure``; not unique.
         self.class_id = str(handle.getClassId())
         key = str(handle.getShortcutKey())
         #: The key that selects it, e.g. ``m``; empty for none.
@@ -40,7 +40,7 @@ class Tool:
         self.refresh()
 
     def refresh(self) -> bool:
-        """Read what may change; return whether it has."""
+        """Read name and description from RViz; return whether they have changed."""
         before = (self._name, self._description)
         if self.handle is not None:
             self._name = str(self.handle.getName())
@@ -49,26 +49,26 @@ class Tool:
 
     @property
     def exists(self) -> bool:
-        """Whether RViz still has it."""
+        """Whether RViz has not removed it."""
         return self.handle is not None
 
     @property
     def name(self) -> str:
-        """What its button says; several tools may have the same."""
+        """The text of its button; not unique."""
         return self._name
 
     @property
     def description(self) -> str:
-        """What it is for."""
+        """Description of the tool."""
         return self._description
 
     @property
     def selected(self) -> bool:
-        """Whether it has the mouse."""
+        """Whether it is the selected tool."""
         return self.exists and self._owner.current is self
 
     def select(self) -> None:
-        """Give it the mouse.
+        """Select the tool.
 
         Raises:
             Error: It was removed.
@@ -76,7 +76,7 @@ class Tool:
         self._owner.select(self)
 
     def remove(self) -> None:
-        """Remove it from RViz.
+        """Remove the tool from RViz.
 
         Raises:
             Error: It was removed.
@@ -84,7 +84,7 @@ class Tool:
         self._owner.remove(self)
 
     def picture(self) -> Any:
-        """Return the largest size of its icon, a ``QPixmap``; a null one where there is none."""
+        """Return the largest size of its icon, a ``QPixmap``; a null pixmap if it has no icon."""
         made, icon = QtGui.QPixmap(), self.icon()
         sizes = icon.availableSizes() if icon is not None else []
         if sizes:
@@ -93,20 +93,20 @@ class Tool:
             kept, buffer = core.QByteArray(), core.QBuffer()
             buffer.setBuffer(kept)
             buffer.open(core.QIODevice.WriteOnly)
-            # A pixmap of PyQt5 is none of PySide2.
+            # PySide2 does not accept PyQt5's pixmap.
             largest.save(buffer, "PNG")
             made.loadFromData(bytes(kept.data()), "PNG")
         return made
 
     def icon(self) -> Any:
-        """Return its icon, a ``QIcon`` of PyQt5; None once it is removed."""
+        """Return its icon, a ``QIcon`` of PyQt5; None after removal."""
         return None if self.handle is None else self.handle.getIcon()
 
 
 class Tools(Watched):
-    """The tools of an RViz; what changes of one is its name or its description."""
+    """The tools of an RViz; `changed` reports a new name or description."""
 
-    #: Another tool has the mouse.
+    #: Another tool was selected.
     selected = Signal()
 
     def __init__(self, window: Window) -> None:
@@ -121,12 +121,12 @@ class Tools(Watched):
 
     @property
     def classes(self) -> list[str]:
-        """Ids of the classes that can be added."""
+        """Class ids of the tools that can be added."""
         return list(declared(TOOL))
 
     @property
     def current(self) -> Tool | None:
-        """The tool that has the mouse; None where there is none."""
+        """The selected tool; None if there is none."""
         handle = self._manager.getCurrentTool()
         if handle is None:
             return None
@@ -134,11 +134,11 @@ class Tools(Watched):
         return next((t for t in self._items if t.exists and address(t.handle) == at), None)
 
     def find(self, class_id: str) -> Tool | None:
-        """Return the first tool of a class."""
+        """Return the first tool of a class; None if there is none."""
         return next((tool for tool in self._items if tool.class_id == class_id), None)
 
     def select(self, tool: Tool) -> None:
-        """Give a tool the mouse.
+        """Select a tool.
 
         Raises:
             Error: It was removed.
@@ -150,7 +150,7 @@ class Tools(Watched):
         """Add a tool.
 
         Raises:
-            Error: There is no such class, or it could not be loaded.
+            Error: The class does not exist, or could not be loaded.
         """
         class_id = require_class_id(class_id, TOOL)
         handle = self._manager.addTool(class_id)
@@ -164,13 +164,13 @@ class Tools(Watched):
         return made
 
     def ask_for_new(self) -> None:
-        """Show RViz's dialog for adding a tool, as soon as the event loop is reached."""
+        """Open RViz's dialog for adding a tool, from the event loop."""
         core = pyqt()
         frame, queued = self._window.frame, core.Qt.QueuedConnection
         core.QMetaObject.invokeMethod(frame, "openNewToolDialog", queued)
 
     def remove(self, tool: Tool) -> None:
-        """Remove a tool; RViz selects its first one where it had the mouse.
+        """Remove a tool; if it was selected, RViz selects its first one.
 
         Raises:
             Error: It was removed before.
@@ -180,7 +180,7 @@ class Tools(Watched):
         self.emit_changes()
 
     def remove_all(self) -> None:
-        """Remove every tool: the mouse does nothing in the 3D view until one is added."""
+        """Remove all tools; the mouse does nothing in the 3D view until one is added."""
         self._manager.removeAll()
         self.emit_changes()
 
@@ -206,12 +206,12 @@ class Tools(Watched):
 
 
 def failure(handle: Any, class_id: str, base: str) -> str:
-    """Return why RViz could not load a tool or display; empty if it has.
+    """Return why RViz could not load a tool or display; empty if it could.
 
     Args:
-        handle: A tool or a display.
-        class_id: What was wanted.
-        base: Its kind, as in :mod:`rosglass.rviz.plugins`.
+        handle: RViz's tool or display.
+        class_id: The requested class id.
+        base: Its base class, as in :mod:`rosglass.rviz.plugins`.
     """
     if type_name(handle) not in _FAILED:
         return ""

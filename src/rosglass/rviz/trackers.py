@@ -1,4 +1,4 @@
-"""The robot's frames, and points that are followed on the 3D view."""
+"""The robot's coordinate frames, and trackers of points in the 3D view."""
 # ruff: noqa: N815 - the names of properties and signals are QML's
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ if TYPE_CHECKING:
 __all__ = ["FIXED_FRAME", "Frames", "Tracker", "Trackers"]
 
 
-#: How many frames a message names.
+#: Maximum number of frames that an error message lists.
 _MAX_NAMED_FRAMES = 8
-#: Seconds for which a message holds, and how many are kept.
+#: Lifetime in seconds of a cached error message, and the size of the cache.
 _EXPLANATION_MAX_AGE_S, _MAX_EXPLANATIONS = 1.0, 100
-#: How RViz's properties name the fixed frame.
+#: Name of the fixed frame in RViz's properties.
 FIXED_FRAME = "<Fixed Frame>"
 
 
 class Frames(QtCore.QObject):
-    """The transforms that our own node receives: RViz does not share its own with Python.
+    """The transforms received by the overlays' node, because RViz's own are not accessible.
 
     Args:
-        session: Whose node receives them.
-        window: RViz, which knows the fixed frame.
+        session: The session of that node.
+        window: RViz's window, for the fixed frame.
     """
 
-    #: Frames are received now, or no longer.
+    #: Transforms start or stop being received.
     available_changed = Signal()
 
     def __init__(self, session: Session, window: Window) -> None:
@@ -53,14 +53,14 @@ class Frames(QtCore.QObject):
         self._session, self._window = session, window
         self._link: TfLink | None = None
         self._node: Node | None = None
-        #: Explanations of missing frames, and when each was made.
+        #: Error texts for missing frames, each with its creation time.
         self._explained: dict[tuple[str, str, str], tuple[float, str]] = {}
         session.node_changed.connect(self._follow)
         self._follow()
 
     @property
     def buffer(self) -> TransformBuffer | None:
-        """The transforms; None while there is no node."""
+        """The received transforms; None without a node."""
         return None if self._link is None else self._link.buffer
 
     @property
@@ -69,18 +69,18 @@ class Frames(QtCore.QObject):
         return str(self._window.manager.getFixedFrame())
 
     def steady(self) -> float:
-        """Return the seconds that ages are measured in; see :meth:`Session.steady`."""
+        """Return the current time for measuring ages, in seconds; see :meth:`Session.steady`."""
         return self._session.steady()
 
     def locate(self, frame: str, time: Time | None = None) -> Transform:
-        """Return where a frame is, in RViz's fixed frame.
+        """Return the transform from a frame to RViz's fixed frame.
 
         Args:
-            frame: Its name; empty or :data:`FIXED_FRAME` for the fixed frame itself.
-            time: When; None for the newest.
+            frame: Name of the frame; empty or :data:`FIXED_FRAME` for the fixed frame itself.
+            time: Time of the transform; None for the latest.
 
         Raises:
-            Error: The frame is not known, or nothing connects the two; the message says which.
+            Error: The frame is unknown, or not connected to the fixed frame.
         """
         from rosglass.tf import Transform  # noqa: PLC0415 - only when it is needed
 
@@ -99,7 +99,7 @@ class Frames(QtCore.QObject):
             raise type(error)(self._explanation(frame, fixed, error)) from None
 
     def _explanation(self, frame: str, fixed: str, error: TransformException) -> str:
-        """Return :meth:`_explain`'s text of the last second: it is asked for once per frame."""
+        """Return :meth:`_explain`'s text, cached for a second: each rendered frame needs it."""
         case, now = (frame, fixed, str(error)), time.monotonic()
         made, text = self._explained.get(case, (-math.inf, ""))
         if now - made > _EXPLANATION_MAX_AGE_S:
@@ -110,7 +110,7 @@ class Frames(QtCore.QObject):
         return text
 
     def _explain(self, frame: str, fixed: str, error: TransformException) -> str:
-        """Return what is wrong; it may be the fixed frame, which the caller has not named."""
+        """Return an error text that says which of the two frames is missing."""
         known = [] if self._link is None else sorted(self._link.buffer.tree())
         if not fixed:
             return f"RViz has no fixed frame, in which {frame!r} could be placed; choose one"
@@ -144,32 +144,32 @@ class Frames(QtCore.QObject):
         self.available_changed.emit()
 
 
-#: Units and metres below which a change is none.
+#: Minimum change of a position, in units of the overlay and in metres.
 _MIN_CHANGE = 0.01
-#: Seconds without a newer transform after which a frame that has moved is stale.
+#: Seconds without a new transform after which a non-static frame is stale.
 _STALE_AFTER_S = DEFAULT_TIMEOUT_MS / 1000
 _NAN = (math.nan, math.nan, math.nan)
 
 
 class Tracker(QtCore.QObject):
-    """A point of the scene, followed on the 3D view. Made by :class:`Trackers` only.
+    """A point of the scene and its position in the 3D view; created by :class:`Trackers` only.
 
     Args:
-        owner: Updates it.
+        owner: The trackers that update it.
         point: x, y, z in metres.
-        frame: Whose; empty for the fixed frame.
-        scale: Returns how many units of the widget with the 3D view one unit of `position` is.
-        runtime: Where errors are thrown; without one, they are raised.
+        frame: The frame of the point; empty for the fixed frame.
+        scale: Returns the units of the widget with the 3D view per unit of `position`.
+        runtime: The QML runtime that errors are thrown into; None raises them.
     """
 
-    #: What errors call it.
+    #: Name in error messages.
     CALLED = "tracker"
 
-    #: It is seen elsewhere now.
+    #: The position in the view has changed.
     positionChanged = Signal(QtGui.QVector3D, arguments=["position"])
     pointChanged = Signal()
     frameChanged = Signal()
-    #: Why there is no place for it, or an old one; empty where there is one.
+    #: `problem` has changed: why the position is unknown or old, empty otherwise.
     problemChanged = Signal()
     staleChanged = Signal()
 
@@ -185,7 +185,7 @@ class Tracker(QtCore.QObject):
         self._owner, self._point, self._frame = owner, point, frame
         self._scale, self._runtime = scale, runtime
         self._position, self._problem, self._stale = _NAN, "", False
-        #: The newest transform of its frame, and when it came.
+        #: Stamp of the latest transform in nanoseconds, and its arrival time in seconds.
         self._newest: tuple[int, float] | None = None
 
     @property
@@ -194,7 +194,7 @@ class Tracker(QtCore.QObject):
         return bool(self._frame)
 
     def update(self) -> None:
-        """Update its position and status."""
+        """Update position, problem and staleness."""
         at, problem = _NAN, ""
         stale = bool(self._frame)
         try:
@@ -215,7 +215,7 @@ class Tracker(QtCore.QObject):
             self.staleChanged.emit()
 
     def _is_old(self, stamp: int) -> bool:
-        # What stands still for ever has no time.
+        # Static transforms have no stamp.
         if not stamp:
             return False
         now = self._owner.steady()
@@ -224,10 +224,10 @@ class Tracker(QtCore.QObject):
         return now - self._newest[1] > _STALE_AFTER_S
 
     def move(self, point: Sequence[float] | dict[str, float]) -> None:
-        """Follow another point, in the same frame.
+        """Follow another point of the same frame.
 
         Raises:
-            Error: It is no point.
+            Error: `point` is not a point.
         """
         new = point_of(point)
         if new != self._point:
@@ -239,7 +239,7 @@ class Tracker(QtCore.QObject):
         """Set the frame that the point moves with; empty for the fixed frame.
 
         Raises:
-            Error: It is no name.
+            Error: `frame` is not a string of at most 1000 characters.
         """
         if not isinstance(frame, str) or len(frame) > 1000:
             raise Error(f"expected the name of a frame, e.g. 'base_link', got {shown(frame)}")
@@ -261,26 +261,26 @@ class Tracker(QtCore.QObject):
             return self._point
         return self._runtime.value(dict(zip("xyz", self._point, strict=True)))
 
-    #: x, y and z in metres, of `frame`; may be changed.
+    #: x, y and z in metres, in `frame`.
     point = Property(QJSValue, _get_point, _set_point, notify=pointChanged)
-    #: A frame of the robot that the point moves with; empty for RViz's fixed frame.
+    #: The frame that the point moves with; empty for RViz's fixed frame.
     frame = Property(VARIANT, lambda self: self._frame, _set_frame, notify=frameChanged)
-    #: x and y in units of the overlay, z the distance from the camera in metres; all NaN while it
-    #: is behind the camera.
+    #: x and y in units of the overlay, z the distance from the camera in metres; all NaN while
+    #: the point is behind the camera.
     position = Property(
         QtGui.QVector3D, lambda self: QtGui.QVector3D(*self._position), notify=positionChanged
     )
     problem = Property(str, lambda self: self._problem, notify=problemChanged)
-    #: Whether nothing came of its frame for 3 s; `position` is where it was last then.
+    #: Whether no transform of the frame arrived for 3 s; `position` is then the last known one.
     stale = Property(bool, lambda self: self._stale, notify=staleChanged)
 
 
 class Trackers:
-    """All trackers of an RViz, updated before each of its frames.
+    """All trackers of an RViz, updated before each frame that it draws.
 
     Args:
-        window: RViz.
-        frames: Returns where the robot's frames are; called when a tracker needs one.
+        window: RViz's window.
+        frames: Returns the robot's frames; called when a tracker needs them.
     """
 
     def __init__(self, window: Window, frames: Callable[[], Frames]) -> None:
@@ -297,14 +297,14 @@ class Trackers:
         scale: Callable[[], float] = lambda: 1.0,
         runtime: Runtime | None = None,
     ) -> Tracker:
-        """Follow a point, for as long as the result exists; see :class:`Tracker`.
+        """Return a tracker for a point, which works as long as it exists; see :class:`Tracker`.
 
         Raises:
-            Error: It is no point, or no frame.
+            Error: `point` is not a point, or `frame` is not a string.
         """
         made = Tracker(self, point_of(point), "", scale, runtime)
         if self._camera is not None:
-            # It may not have been used for a while.
+            # It may be out of date: it is not updated while there are no trackers.
             self._camera.update()
         made.use_frame(frame)
         self._trackers.append(made)
@@ -312,24 +312,24 @@ class Trackers:
         return made
 
     def remove(self, tracker: Tracker) -> None:
-        """Remove a tracker; do nothing if it is not there."""
+        """Remove a tracker; do nothing if it was removed before."""
         if tracker in self._trackers:
             self._trackers.remove(tracker)
 
     def remove_all(self, runtime: Runtime) -> None:
-        """Remove the trackers of a QML engine that is about to be destroyed."""
+        """Remove all trackers of a QML engine that is about to be destroyed."""
         self._trackers = [t for t in self._trackers if is_alive(t) and t._runtime is not runtime]
 
     def __len__(self) -> int:
-        """Return how many are followed."""
+        """Return the number of trackers."""
         return len(self._trackers)
 
     def locate(
         self, point: tuple[float, float, float], frame: str, scale: float
     ) -> tuple[tuple[float, float, float], int]:
-        """Return where a point is seen and how far away, and the time of that in nanoseconds.
+        """Return a point's x and y in the view and its distance, and the transform's stamp.
 
-        The time is 0 for what does not move.
+        The stamp is in nanoseconds, 0 for static transforms and the fixed frame.
 
         Raises:
             Error: The frame is unknown.
@@ -346,7 +346,7 @@ class Trackers:
         return (found.x / scale, found.y / scale, found.depth), stamp
 
     def steady(self) -> float:
-        """Return the seconds that ages are measured in; see :meth:`Session.steady`."""
+        """Return the current time for measuring ages, in seconds; see :meth:`Session.steady`."""
         return self._frames().steady()
 
     def _before_frame(self) -> None:

@@ -1,7 +1,7 @@
-"""RViz's camera, moved as hector_rviz_plugins' view controller moves it.
+"""A view controller that moves RViz's camera like hector_rviz_plugins' view controller.
 
-It moves RViz's own views, ``rviz/Orbit`` in 3D and ``rviz/TopDownOrtho`` in 2D, through their
-properties, so that the mouse works as in any RViz.
+It sets the properties of RViz's own views, ``rviz/Orbit`` in 3D and ``rviz/TopDownOrtho`` in 2D,
+so that the mouse works as in any RViz.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ _T = TypeVar("_T", bool, float, str)
 
 
 class _Setting(Generic[_T]):
-    """One setting, an attribute of :class:`ViewSettings`.
+    """Descriptor of one setting of :class:`ViewSettings`.
 
     Args:
-        kind: Of registered properties.
-        name: In the panel and in files.
-        default: Where neither a file nor a program says otherwise.
-        about: What it does, for people.
-        check: Raises an Error for what is not valid, besides what the kind refuses.
-        options: Of the kind.
+        kind: Kind of the registered property.
+        name: Name in the panel and in files.
+        default: Value unless a file or the program sets another.
+        about: Description for the panel.
+        check: Raises an Error for invalid values, in addition to the kind's own check.
+        options: Options of the kind.
     """
 
     def __init__(
@@ -84,10 +84,10 @@ class _Setting(Generic[_T]):
             raise Error(f"{self.name}: {error}") from None
 
     def set(self, settings: ViewSettings, value: object) -> None:
-        """Set it for a program; the error does not name it.
+        """Set the value on behalf of the program.
 
         Raises:
-            Error: It cannot be that.
+            Error: The value is invalid; the message does not name the setting.
         """
         try:
             read = self.of(settings).kind.read(value)
@@ -101,19 +101,19 @@ class _Setting(Generic[_T]):
         self.of(settings).set(read)
 
     def of(self, settings: ViewSettings) -> RegisteredProperty:
-        """Return the property with its value, and the signal that it is another."""
+        """Return the registered property that holds the value."""
         return settings.properties.properties[self.name]
 
 
 class ViewSettings:
-    """Settings of the view controller.
+    """Settings of the view controller, as attributes.
 
-    Attributes are read and set::
+    ::
 
         app.view.settings.animation_duration = 0.5
 
     Raises:
-        Error: One is set to what it cannot be; the error says what it can.
+        Error: A value is invalid; the message says what is valid.
     """
 
     animation_duration = _Setting(
@@ -165,9 +165,9 @@ class ViewSettings:
     )
 
     def __init__(self) -> None:
-        #: As the panel shows them.
+        #: The settings as registered properties, which the panel shows.
         self.properties = RegisteredProperties()
-        #: What has been set by Python or QML, by name.
+        #: Values set by Python or QML, by name.
         self.by_program: dict[str, Any] = {}
         for found in vars(ViewSettings).values():
             if isinstance(found, _Setting):
@@ -180,28 +180,28 @@ class ViewSettings:
                 )
 
     def set(self, attribute: str, value: object) -> None:
-        """Set an attribute; the error does not name it.
+        """Set an attribute.
 
         Raises:
-            Error: It cannot be that.
+            Error: The value is invalid; the message does not name the attribute.
         """
         setting: _Setting[Any] = getattr(ViewSettings, attribute)
         setting.set(self, value)
 
     def changed(self, attribute: str) -> Any:
-        """Return the signal of an attribute's changes."""
+        """Return the signal that is emitted when an attribute changes."""
         setting: _Setting[Any] = getattr(ViewSettings, attribute)
         return setting.of(self).valueChanged
 
     def save(self) -> dict[str, Any]:
-        """Return all values by name, as a file keeps them."""
+        """Return all values by name, as saved in a file."""
         return self.properties.save()
 
     def load(self, saved: dict[str, Any]) -> None:
-        """Restore values from a file; others are what a program has set, or the defaults.
+        """Restore values from a file; missing ones revert to the program's values or the defaults.
 
         Args:
-            saved: Values by name, which may be text; one that does not fit is logged.
+            saved: Values by name, possibly as text; invalid ones are logged.
         """
         for setting in vars(ViewSettings).values():
             if isinstance(setting, _Setting):
@@ -215,9 +215,9 @@ class ViewSettings:
                 found.set(value)
 
 
-#: RViz's class of the view in 3D.
+#: RViz's class of the 3D view.
 ORBIT = "rviz/Orbit"
-#: RViz's class of the view from above, without perspective.
+#: RViz's class of the 2D view: from above, without perspective.
 FLAT = "rviz/TopDownOrtho"
 _TARGET = "Target Frame"
 _INVERTED = "Invert Z Axis"
@@ -232,14 +232,14 @@ _NAMES: dict[str, tuple[str, ...]] = {
     ),
     FLAT: ("X", "Y", "Scale", "Angle"),
 }
-#: Radians, RViz's default for perspective views.
+#: RViz's default vertical field of view, in radians.
 _FIELD_OF_VIEW = math.pi / 4
 
 
 class CurrentView(QtCore.QObject):
-    """The view that RViz shows, whichever it is, as an `Orbit`."""
+    """RViz's current view, of any type, converted from and to an `Orbit`."""
 
-    #: Another view is the current one; whether by :meth:`write`.
+    #: RViz has switched views. Argument: whether :meth:`write` did it.
     changed = Signal(bool)
 
     def __init__(self, window: Window) -> None:
@@ -248,7 +248,7 @@ class CurrentView(QtCore.QObject):
         self._manager: Any = window.manager.getViewManager()
         self._properties: dict[str, Any] = {}
         self._own = False
-        #: What is seen from above has no height: that of what was looked at before.
+        #: Height of the last 3D focus, because the 2D view has none.
         self._height = 0.0
         self._field_of_view = _FIELD_OF_VIEW
         wrapped = as_pyside(self._manager, QtCore.QObject)
@@ -256,20 +256,20 @@ class CurrentView(QtCore.QObject):
 
     @property
     def kind(self) -> str:
-        """Its class, as RViz names it."""
+        """RViz's class id of the view."""
         return str(self._manager.getCurrent().getClassId())
 
     @property
     def state(self) -> tuple[Any, ...]:
-        """The values of its properties: class, target frame, and whatever moves the camera.
+        """The camera's state: class id, target frame, and the properties in :data:`_NAMES`.
 
-        Of :data:`ORBIT`, the focus follows, of :data:`FLAT` its x and y.
+        These begin with the focus: x, y and z of :data:`ORBIT`, x and y of :data:`FLAT`.
         """
         kind = self.kind
         return (kind, self._get(_TARGET), *(self._get(name) for name in _NAMES.get(kind, ())))
 
     def read(self) -> Orbit:
-        """Return what is seen."""
+        """Return where the camera is and what it looks at."""
         kind = self.kind
         if kind not in _NAMES or self._get(_TARGET) != FIXED_FRAME:
             return self._seen(kind)
@@ -282,11 +282,11 @@ class CurrentView(QtCore.QObject):
         return Orbit(Point(x, y, z), distance, sign * yaw, sign * pitch)
 
     def write(self, where: Orbit, kind: str) -> None:
-        """Move the view.
+        """Move the camera.
 
         Args:
-            where: What.
-            kind: :data:`ORBIT`, or :data:`FLAT`, which shows it from above.
+            where: Where to.
+            kind: Class id of the view to use: :data:`ORBIT`, or :data:`FLAT` for a view from above.
         """
         if self.kind != kind:
             self._use(kind)
@@ -303,7 +303,7 @@ class CurrentView(QtCore.QObject):
             self._set_all(ORBIT, *where.focus, where.distance, yaw, pitch)
 
     def close(self) -> None:
-        """Release RViz's properties."""
+        """Release the references to RViz's properties."""
         self._properties.clear()
 
     def _from_above(self, x: float, y: float) -> Orbit:
@@ -312,7 +312,7 @@ class CurrentView(QtCore.QObject):
         return Orbit(Point(x, y, self._height), distance, yaw, STEEPEST)
 
     def _seen(self, kind: str) -> Orbit:
-        """Return what the camera itself says, for views of any kind and of any frame."""
+        """Return the orbit read from the Ogre camera, for views of any type and target frame."""
         camera = Camera(self._window)
         eye = Point(*camera.eye)
         if kind == FLAT:
@@ -324,7 +324,7 @@ class CurrentView(QtCore.QObject):
         way = Point(*ahead) - eye
         view = self._manager.getCurrent()
         names = [str(view.childAt(at).getName()) for at in range(view.numChildren())]
-        # As RViz does when it goes on with another view: as far away as the frame it is in.
+        # Like RViz when it switches views: without a distance, use that of the frame's origin.
         distance = self._get("Distance") if "Distance" in names else math.hypot(*eye)
         part = max(distance, NEAREST) / (math.hypot(*way) or 1.0)
         return Orbit.between(eye, eye.towards(ahead, part))
@@ -338,8 +338,8 @@ class CurrentView(QtCore.QObject):
 
     def _changed(self) -> None:
         self._properties.clear()
-        # RViz's panels get queued calls with addresses of hidden properties, and crash if this view
-        # was replaced by another one before.
+        # Deliver calls that are queued for RViz's panels: they hold addresses of the old view's
+        # properties, and crash once RViz has deleted it.
         for child in self._window.widget.findChildren(QtWidgets.QTreeView):
             if child.metaObject().className() == "rviz::PropertyTreeWidget":
                 Qt5Core.QCoreApplication.sendPostedEvents(child, Qt5Core.QEvent.MetaCall)
@@ -348,7 +348,7 @@ class CurrentView(QtCore.QObject):
         self.changed.emit(self._own)
 
     def _pixels_at_one_metre(self) -> float:
-        """Return how many pixels a metre takes for the camera in 3D, one metre away."""
+        """Return the pixels per metre of the 3D camera at a distance of one metre."""
         return max(self._window.view_size()[1], 1) / (2 * math.tan(self._field_of_view / 2))
 
     def _property(self, name: str) -> Any:
@@ -372,26 +372,26 @@ class CurrentView(QtCore.QObject):
 
 
 def _positive(angle: float) -> float:
-    """Return an angle from 0 to 2 pi, as RViz's own mouse leaves it."""
+    """Return an angle in the range 0 to 2 pi, which RViz uses as well."""
     return math.remainder(angle, math.tau) % math.tau
 
 
-#: What the camera is set to by :meth:`View.reset`.
+#: The camera after :meth:`View.reset`.
 _START = Orbit.between(Point(4.0, 0.0, 3.0), Point(0.0, 0.0, 0.0))
-#: Metres from the fixed frame's origin; RViz's numbers have 32 bits, and its renderer crashes
-#: where they are infinite.
+#: Maximum distance from the fixed frame's origin. RViz uses 32-bit floats, and its renderer
+#: crashes on infinite ones.
 _FARTHEST_M = 1e8
 
 
 class ViewMode(enum.IntEnum):
-    """How the camera looks at the scene; the numbers of ``hector_rviz_plugins/ViewMode``."""
+    """The camera's mode, with the values of ``hector_rviz_plugins/ViewMode``."""
 
     MODE_3D = 0
     MODE_2D = 1
 
 
 class _Movement(NamedTuple):
-    """A movement of the camera, and whether 2D is shown at its end."""
+    """An animated camera movement; `flat` if it ends in the 2D view."""
 
     start: Orbit
     goal: Orbit
@@ -400,39 +400,38 @@ class _Movement(NamedTuple):
 
 
 class View(QtCore.QObject):
-    """Moves the camera: to places, between 2D and 3D, along with a frame.
+    """Moves the camera to points, between 2D and 3D, and along with a frame.
 
-    Places are in metres. A movement ends when the camera is moved otherwise, e.g. by the mouse;
-    tracking ends when the camera is shifted otherwise, and continues when it is only turned or
-    zoomed. Other views (FPS, ThirdPersonFollower) are replaced by ``rviz/Orbit`` at the first
-    movement.
+    Points are in metres. Moving the camera by other means, e.g. with the mouse, ends a movement.
+    Shifting it also ends tracking; turning or zooming it does not. The first movement replaces
+    other view types (FPS, ThirdPersonFollower) with ``rviz/Orbit``.
 
     Args:
-        window: RViz.
-        frames: Where the robot's frames are.
+        window: RViz's window.
+        frames: The robot's frames.
     """
 
-    #: 2D became 3D, or the other way round.
+    #: :attr:`mode` has changed.
     mode_changed = Signal()
-    #: Another frame is tracked, or none.
+    #: :attr:`tracked_frame` has changed.
     tracked_frame_changed = Signal()
-    #: Why the tracked frame cannot be followed now; empty when it can.
+    #: :attr:`problem` has changed. Argument: the new text.
     problem_changed = Signal(str)
 
     def __init__(self, window: Window, frames: Frames) -> None:
         super().__init__()
         self._frames, self._current = frames, CurrentView(window)
-        #: How it is moved.
+        #: The view controller's settings.
         self.settings = ViewSettings()
         self._tracked, self._problem = "", ""
-        #: Where the focus is held, seen from the tracked frame; None: where it is then.
+        #: The camera's focus relative to the tracked frame; None: keep the current one.
         self._offset: Point | None = Point(0.0, 0.0, 0.0)
-        #: Where the tracked frame was last, its yaw as far as the camera has turned with it.
+        #: Last pose of the tracked frame; its yaw is the one that the camera has reached.
         self._base: Place | None = None
         self._movement: _Movement | None = None
-        #: What 3D returns to.
+        #: Pitch to restore when switching back to 3D.
         self._pitch = _START.pitch
-        #: What RViz's properties were after our last change; None where it does not matter.
+        #: RViz's camera state after our last change; None to accept any change.
         self._left_at: tuple[Any, ...] | None = None
         self._fixed = ""
         self._last_mode = self.mode
@@ -445,38 +444,38 @@ class View(QtCore.QObject):
 
     @property
     def mode(self) -> ViewMode:
-        """2D, straight from above and without perspective, or 3D."""
+        """3D, or 2D: straight from above, without perspective."""
         flat = self._current.kind == FLAT if self._movement is None else self._movement.flat
         return ViewMode.MODE_2D if flat else ViewMode.MODE_3D
 
     @property
     def tracked_frame(self) -> str:
-        """The frame that the camera follows; empty when it follows none."""
+        """The frame that the camera follows; empty for none."""
         return self._tracked
 
     @property
     def is_moving(self) -> bool:
-        """Whether the camera is moving."""
+        """Whether an animated movement is in progress."""
         return self._movement is not None
 
     @property
     def problem(self) -> str:
-        """Why the tracked frame cannot be followed now; empty when it can."""
+        """Why the camera cannot follow the tracked frame; empty if it can."""
         return self._problem
 
     @property
     def eye(self) -> Point:
-        """Where the camera is, in the fixed frame; in 2D, above what it shows."""
+        """The camera's position in the fixed frame; in 2D, above the centre of the view."""
         return self.seen.eye
 
     @property
     def focus(self) -> Point:
-        """What the camera looks at, in the fixed frame."""
+        """The point that the camera looks at, in the fixed frame."""
         return self.seen.focus
 
     @property
     def seen(self) -> Orbit:
-        """Where the camera is and what it looks at, read from RViz at once."""
+        """The camera's position and focus, read from RViz."""
         return self._current.read()
 
     def move_eye(
@@ -488,17 +487,17 @@ class View(QtCore.QObject):
         stop_tracking: bool = False,
         switch_to_3d: bool = False,
     ) -> None:
-        """Move the camera; it keeps looking in the same direction.
+        """Move the camera without turning it.
 
         Args:
-            eye: x, y, z in metres; in 2D, z counts for nothing.
-            frame: The frame they are in; empty for the fixed frame.
-            animate: Move there; otherwise jump.
-            stop_tracking: Follow no frame any longer.
-            switch_to_3d: Show it in 3D.
+            eye: New position: x, y, z in metres; z is ignored in 2D.
+            frame: The frame of `eye`; empty for the fixed frame.
+            animate: Whether to move smoothly instead of jumping.
+            stop_tracking: Whether to stop following the tracked frame.
+            switch_to_3d: Whether to switch to 3D.
 
         Raises:
-            Error: They are not three finite numbers or too far away, or the frame is not known.
+            Error: `eye` is not three finite numbers, or too far away, or the frame is unknown.
         """
         place, now = self._in_fixed(eye, frame), self._end_of_movement()
         flat = self.mode is ViewMode.MODE_2D
@@ -519,18 +518,18 @@ class View(QtCore.QObject):
         animate: bool = True,
         stop_tracking: bool = False,
     ) -> None:
-        """Move the camera and what it looks at, in 3D.
+        """Move the camera and the point that it looks at, and switch to 3D.
 
         Args:
-            eye: x, y, z in metres.
-            focus: x, y, z in metres.
+            eye: New position of the camera: x, y, z in metres.
+            focus: Point to look at: x, y, z in metres.
             frame: The frame of both; empty for the fixed frame.
-            animate: Move there; otherwise jump.
-            stop_tracking: Follow no frame any longer.
+            animate: Whether to move smoothly instead of jumping.
+            stop_tracking: Whether to stop following the tracked frame.
 
         Raises:
-            Error: They are not three finite numbers each, too far away or the same place, or the
-                frame is not known.
+            Error: A point is not three finite numbers or is too far away, both are equal, or the
+                frame is unknown.
         """
         start, end = self._in_fixed(eye, frame), self._in_fixed(focus, frame)
         if start == end:
@@ -546,10 +545,10 @@ class View(QtCore.QObject):
 
         Args:
             mode: 0 for 3D, 1 for 2D.
-            animate: Move there; otherwise jump.
+            animate: Whether to move smoothly instead of jumping.
 
         Raises:
-            Error: There is no such mode.
+            Error: `mode` is neither 0 nor 1.
         """
         if isinstance(mode, bool) or mode not in (0, 1):
             raise Error(f"there is no view mode {shown(mode)}: expected 0 (3D) or 1 (2D)")
@@ -563,13 +562,13 @@ class View(QtCore.QObject):
         self._start(now._replace(pitch=pitch), animate, flat=flat)
 
     def track(self, frame: str) -> None:
-        """Follow a frame with the camera, and turn with it.
+        """Follow the position and yaw of a frame with the camera.
 
         Args:
-            frame: Its name; empty to follow none.
+            frame: Name of the frame; empty to stop following.
 
         Raises:
-            Error: The frame is not known.
+            Error: The frame is unknown.
         """
         if not isinstance(frame, str):
             raise Error(f"a frame is named by a text, not by {shown(frame)}")
@@ -583,20 +582,20 @@ class View(QtCore.QObject):
         self.tracked_frame_changed.emit()
 
     def reset(self) -> None:
-        """Show the fixed frame's origin in 3D from (4, 0, 3), and follow nothing."""
+        """Show the fixed frame's origin in 3D from (4, 0, 3), and stop tracking."""
         self._stop()
         self._write(_START, ORBIT)
         self._emit_mode()
 
     def nudge(self, ahead: float, left: float) -> None:
-        """Shift the view in the plane of x and y, as the keys do it; ends movement and tracking.
+        """Shift the view in the xy plane; ends movement and tracking.
 
         Args:
-            ahead: Metres away from the operator.
-            left: Metres to the operator's left.
+            ahead: Metres in the viewing direction.
+            left: Metres to the left of it.
 
         Raises:
-            Error: They are not finite, or lead too far away.
+            Error: A distance is not finite, or the new focus is too far away.
         """
         self._stop()
         now = self._current.read()
@@ -613,7 +612,7 @@ class View(QtCore.QObject):
     # Movements
 
     def _hold(self, goal: Orbit, stop_tracking: bool) -> None:
-        """Hold the focus where it will be, seen from the tracked frame."""
+        """Store the goal's focus relative to the tracked frame."""
         if stop_tracking:
             self.track("")
         elif self._tracked:
@@ -639,7 +638,7 @@ class View(QtCore.QObject):
         self._emit_mode()
 
     def _stop(self) -> None:
-        """Stop movement and tracking."""
+        """End movement and tracking."""
         self._movement = None
         self.track("")
 
@@ -656,7 +655,7 @@ class View(QtCore.QObject):
             elif self._tracked:
                 self._follow(min(self.settings.tracking_gain * passed, 1.0))
         except (AttributeError, RuntimeError, TypeError):
-            # As when another version of RViz names the properties of its views another way.
+            # E.g. another version of RViz that names the views' properties differently.
             _log.exception("RViz's camera cannot be moved")
             self._stop()
         self._emit_mode()
@@ -674,7 +673,7 @@ class View(QtCore.QObject):
             self._write(movement.start.towards(movement.goal, ease(progress)), self._kind())
 
     def _carry(self) -> None:
-        """Carry start and goal of a movement along with the tracked frame."""
+        """Move start and goal of a movement along with the tracked frame."""
         place, movement = self._find_tracked(), self._movement
         if place is None or movement is None:
             return
@@ -701,14 +700,14 @@ class View(QtCore.QObject):
         try:
             place = self._place_of(self._tracked)
         except Error as error:
-            # Reported once: the words of the reason may differ with each frame.
+            # Keep the first text: the error may read differently in each frame.
             self._set_problem(self._problem or str(error))
             return None
         self._set_problem("")
         return place
 
     def _end_if_moved(self) -> None:
-        """End movement or tracking where the camera was moved otherwise since the last frame."""
+        """End movement or tracking if something else moved the camera since the last frame."""
         before, now = self._left_at, self._current.state
         fixed, self._fixed = self._fixed, self._frames.fixed
         self._left_at = now
@@ -718,7 +717,7 @@ class View(QtCore.QObject):
         if fixed == self._fixed and before[:2] == now[:2] and _is_shifted(before, now):
             self.track("")
         elif fixed == self._fixed and before[1] != now[1]:
-            # RViz itself follows a frame now.
+            # RViz itself now follows a frame.
             self.track("")
 
     def _view_changed(self, by_us: bool) -> None:
@@ -774,12 +773,12 @@ class View(QtCore.QObject):
 
     def _write(self, where: Orbit, kind: str) -> None:
         self._current.write(where, kind)
-        # As RViz keeps it, in numbers of 32 bits.
+        # Read it back, because RViz rounds to 32-bit floats.
         self._left_at = self._current.state
 
 
 def _is_shifted(before: tuple[Any, ...], now: tuple[Any, ...]) -> bool:
-    """Return whether the focus has moved between two states of one view."""
+    """Return whether the focus moved between two states of the same view."""
     axes = 2 if now[0] == FLAT else 3
     return before[2 : 2 + axes] != now[2 : 2 + axes]
 
@@ -788,11 +787,11 @@ _MAX_NAME_LENGTH = 1000
 
 
 class Views(QtCore.QObject):
-    """The views of an RViz."""
+    """RViz's view types and saved views."""
 
-    #: Another kind of view is shown.
+    #: :attr:`kind` has changed.
     kind_changed = Signal()
-    #: Views were saved, removed or renamed.
+    #: :attr:`saved` has changed.
     saved_changed = Signal()
 
     def __init__(self, window: Window) -> None:
@@ -805,17 +804,17 @@ class Views(QtCore.QObject):
 
     @property
     def kinds(self) -> list[str]:
-        """Ids of the available types, e.g. ``rviz/Orbit``."""
+        """Class ids of the available view types, e.g. ``rviz/Orbit``."""
         return list(declared(VIEW))
 
     @property
     def kind(self) -> str:
-        """Id of the type that is shown."""
+        """Class id of the current view."""
         return str(self._manager.getCurrent().getClassId())
 
     @kind.setter
     def kind(self, kind: str) -> None:
-        # RViz crashes at one that it does not know.
+        # RViz crashes on an unknown type.
         if kind not in declared(VIEW):
             raise Error(
                 f"there is no kind of view {shown(kind)}{self._hint(kind)}; "
@@ -827,15 +826,15 @@ class Views(QtCore.QObject):
 
     @property
     def saved(self) -> list[str]:
-        """Names of the saved views, as in the Views panel; several may have the same."""
+        """Names of the saved views, in the order of the Views panel; not unique."""
         manager = self._manager
         return [str(manager.getViewAt(at).getName()) for at in range(manager.getNumViews())]
 
     def save(self, name: str) -> None:
-        """Save the view that is shown, in place of one of this name.
+        """Save the current view, replacing a saved view of the same name.
 
         Raises:
-            Error: It is no name.
+            Error: The name is empty, longer than 1000 characters, or not a single line of text.
         """
         if not (isinstance(name, str) and name.strip() and name.isprintable()):
             raise Error(f"expected a name for the view, a text of one line, got {shown(name)}")
@@ -851,10 +850,10 @@ class Views(QtCore.QObject):
         """Show a saved view.
 
         Args:
-            name: Its name, or its place among the saved ones.
+            name: Its name, or its index in :attr:`saved`.
 
         Raises:
-            Error: There is none of this name.
+            Error: No such view is saved.
         """
         self._manager.setCurrentFrom(self._manager.getViewAt(self._index(name)))
         self.emit_changes()
@@ -863,13 +862,13 @@ class Views(QtCore.QObject):
         """Remove a saved view; see :meth:`show`.
 
         Raises:
-            Error: There is none of this name.
+            Error: No such view is saved.
         """
         self._manager.takeAt(self._index(name)).deleteLater()
         self.emit_changes()
 
     def emit_changes(self) -> None:
-        """Emit signals for what has changed since the last call."""
+        """Emit the signals of all changes since the last call."""
         self._scheduled = False
         (kind, saved), self._known = self._known, (self.kind, self.saved)
         if kind != self._known[0]:

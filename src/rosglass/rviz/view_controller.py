@@ -1,5 +1,5 @@
-"""What moves RViz's camera from outside: robots, keys, and its entry in the Displays panel."""
-# ruff: noqa: N802 - the names of what C++ calls are RViz's
+"""Control of RViz's camera by ROS services, by keys, and by its entry in the Displays panel."""
+# ruff: noqa: N802 - C++ calls these methods by their RViz names
 
 from __future__ import annotations
 
@@ -39,26 +39,26 @@ __all__ = ["VIEW_CLASS", "ViewEntry", "ViewKeys", "ViewServices"]
 
 _log = logging.getLogger("rosglass.rviz")
 _E, _Qt = Qt5Core.QEvent, Qt5Core.Qt
-#: How far ahead and to the left each key leads.
+#: Arrow keys -> direction ahead and to the left.
 _ARROWS = {
     _Qt.Key_Up: (1, 0),
     _Qt.Key_Down: (-1, 0),
     _Qt.Key_Left: (0, 1),
     _Qt.Key_Right: (0, -1),
 }
-#: Seconds; a frame that takes longer moves the camera no farther.
+#: Maximum seconds of movement per frame, for slow frames.
 _MAX_STEP_S = 0.2
 
 
 class ViewKeys(QtCore.QObject):
-    """Arrow keys shift the view, twice as fast with Shift; Ctrl+D switches between 2D and 3D.
+    """Keyboard control: arrow keys shift the view, faster with Shift; Ctrl+D toggles 2D and 3D.
 
-    Only while the 3D view has the focus, and no overlay has the keys.
+    Only while the 3D view has the keyboard focus, and no overlay has it.
 
     Args:
-        window: RViz.
-        view: What they move.
-        overlays: Who else may have the keys.
+        window: RViz's window.
+        view: The camera.
+        overlays: The overlays, which may have the keyboard focus.
     """
 
     def __init__(self, window: Window, view: View, overlays: Stack) -> None:
@@ -80,7 +80,7 @@ class ViewKeys(QtCore.QObject):
             self._panel.removeEventFilter(self)
 
     def eventFilter(self, watched: Any, event: Any) -> bool:
-        """Return whether a key moves the camera, and RViz must not get it."""
+        """Return whether a key moves the camera, so that RViz must not get it."""
         del watched
         kind = event.type()
         if kind in (_E.FocusOut, _E.Hide, _E.WindowDeactivate):
@@ -92,7 +92,7 @@ class ViewKeys(QtCore.QObject):
             return False
         if _is_toggle(event):
             if kind == _E.ShortcutOverride:
-                # RViz's Displays panel would take it as its own shortcut otherwise.
+                # Otherwise RViz's Displays panel would handle it as its shortcut.
                 event.accept()
             elif kind == _E.KeyPress and not event.isAutoRepeat():
                 self._toggle()
@@ -136,7 +136,7 @@ class ViewKeys(QtCore.QObject):
         now = time.monotonic()
         passed, self._last_step = min(now - self._last_step, _MAX_STEP_S), now
         if self._is_elsewhere() or not self._settings.keys:
-            # Who has the keys now gets to know when they are released.
+            # The key releases go to the new owner of the keyboard focus.
             self._loading.clear()
             return
         ahead = sum(_ARROWS[key][0] for key in self._loading)
@@ -160,21 +160,21 @@ _PACKAGE = "hector_rviz_plugins"
 
 
 class ViewServices(QtCore.QObject):
-    """The topics and services by which robots follow and move the camera.
+    """The ROS topics and services of the camera.
 
-    Topics ``tracked_frame`` and ``view_mode``, both latched; services ``move_eye``,
-    ``move_eye_and_focus``, ``set_view_mode`` and ``set_tracked_frame``. What cannot be done is an
-    error of the service, with the reason.
+    Latched topics ``tracked_frame`` and ``view_mode``; services ``move_eye``,
+    ``move_eye_and_focus``, ``set_view_mode`` and ``set_tracked_frame``. A failed request is a
+    service error with the reason.
 
     Args:
         view: The camera.
-        session: Whose node offers them; one of ROS 1.
-        node_name: Full name of RViz's own node, which ``~`` stands for.
+        session: The session whose ROS 1 node provides them.
+        node_name: Full name of RViz's own node, for ``~`` in the namespace.
     """
 
-    #: Why topics and services are missing; empty if they are not.
+    #: :attr:`problem` has changed. Argument: the new text.
     problem_changed = Signal(str)
-    #: All that is wanted is there now.
+    #: All topics and services are available.
     opened = Signal()
 
     def __init__(
@@ -192,7 +192,7 @@ class ViewServices(QtCore.QObject):
         self._node: Node | None = None
         self._generation = 0
         self._handles: list[Handle] = []
-        #: What the worker is making now.
+        #: The endpoints that the worker thread is creating.
         self._making: _Made | None = None
         self._publishers: dict[str, Publisher] = {}
         self._closed = False
@@ -205,17 +205,17 @@ class ViewServices(QtCore.QObject):
 
     @property
     def namespace(self) -> str:
-        """The absolute namespace of topics and services; empty if the setting is not valid."""
+        """The absolute namespace of topics and services; empty if the setting is invalid."""
         return self._wanted.namespace
 
     @property
     def problem(self) -> str:
-        """Why topics and services are missing; empty if they are not."""
+        """Why topics and services are missing; empty if they are available."""
         return self._problem
 
     @property
     def is_open(self) -> bool:
-        """Whether there are topics or services."""
+        """Whether topics or services are available."""
         return bool(self._handles)
 
     def close(self) -> None:
@@ -244,7 +244,7 @@ class ViewServices(QtCore.QObject):
             self._open()
 
     def _connection_changed(self) -> None:
-        """Report that the node was shut down by others, with what was made from it."""
+        """Close topics and services if the node was shut down, and report it."""
         if self._node is not None and self._session.state == "failed" and not self._closed:
             self._close_handles()
             self._set_problem(self._session.detail)
@@ -256,7 +256,8 @@ class ViewServices(QtCore.QObject):
         if handles:
             self._session.background(lambda: _close_all(handles))
         if making is not None:
-            # Made by then, and closed before others take its names: jobs keep their order.
+            # Background jobs run in order: the endpoints exist by then, and their names are free
+            # before new endpoints use them.
             self._session.background(lambda: _close_all(making.handles))
 
     def _open(self) -> None:
@@ -289,7 +290,7 @@ class ViewServices(QtCore.QObject):
         self._session.background(lambda: self._make(node, wanted, made), done)
 
     def _make(self, node: Node, wanted: _Wanted, made: _Made) -> _Made:
-        """Make topics and services, on the worker thread."""
+        """Create topics and services; runs in the worker thread."""
         try:
             if wanted.topics:
                 for topic, kind in (
@@ -368,7 +369,7 @@ class ViewServices(QtCore.QObject):
 
 
 class _Wanted(NamedTuple):
-    """The topics and services that the settings ask for."""
+    """The settings for topics and services; `wrong` is the error of an invalid namespace."""
 
     topics: bool
     services: bool
@@ -377,7 +378,7 @@ class _Wanted(NamedTuple):
 
 
 class _Made:
-    """The publishers and servers that the worker has made."""
+    """The publishers and service servers created by the worker thread."""
 
     def __init__(self) -> None:
         self.handles: list[Handle] = []
@@ -385,7 +386,7 @@ class _Made:
 
 
 def _raising_service_errors(answer: Callable[[Message], None]) -> Callable[[Message], None]:
-    """Turn an Error of a callback into a failed response."""
+    """Return a service callback whose Errors become failed responses."""
 
     def call(request: Message) -> None:
         try:
@@ -405,7 +406,7 @@ def _point(point: Any) -> tuple[float, float, float]:
     return point.x, point.y, point.z
 
 
-#: Class id in ``.rviz`` files.
+#: Class id of the view controller's entry in ``.rviz`` files.
 VIEW_CLASS = "rosglass/ViewController"
 _NAME = "View Controller"
 _OK, _WARN = 0, 1
@@ -413,7 +414,7 @@ _OK, _WARN = 0, 1
 
 @cache
 def _class() -> Any:
-    """Return our class of RViz's display, one that cannot be switched off."""
+    """Return a subclass of our display class without a check box."""
     base, core = display_class(), pyqt()
 
     class Display(base):  # type: ignore[misc,valid-type]
@@ -431,7 +432,7 @@ def _class() -> Any:
 
 
 class _Entry:
-    """One entry; a second one, as when it was duplicated, shows the same settings."""
+    """One entry of the view controller; duplicates show the same settings."""
 
     def __init__(self, view: View, now: RegisteredProperties, entries: Entries) -> None:
         self._settings = view.settings
@@ -452,11 +453,11 @@ class _Entry:
 
     @property
     def alive(self) -> bool:
-        """Whether RViz still has it."""
+        """Whether RViz has not deleted the display."""
         return not pyqt("sip").isdeleted(self.display)
 
     def save(self, config: Any) -> None:
-        """Write what a ``.rviz`` file keeps of it to RViz's ``Config``."""
+        """Save the settings to RViz's ``Config``."""
         for name, value in self._settings.save().items():
             config.mapSetValue(name, value)
 
@@ -465,22 +466,21 @@ class _Entry:
         self._settings.load(plain_config(config))
 
     def close(self) -> None:
-        """Stop following the settings."""
+        """Disconnect from the settings."""
         for tree in self._trees:
             tree.close()
 
 
 class ViewEntry(QtCore.QObject):
-    """The view controller's entry in the panel, added by the menu Overlays or by a config file.
+    """The view controller's entry in the panel, added by the Overlays menu or by a config file.
 
-    A file that has no entry, and removing it, leave the settings as a program has made them, or as
-    at first.
+    Without an entry, the settings are the program's or the defaults.
 
     Args:
-        window: RViz.
-        entries: The entries of the overlays.
+        window: RViz's window.
+        entries: The overlays' entries.
         view: The camera.
-        services: What robots reach it by.
+        services: The camera's topics and services.
     """
 
     def __init__(
@@ -490,7 +490,7 @@ class ViewEntry(QtCore.QObject):
         self._window, self._entries, self._view, self._services = window, entries, view, services
         self._shown: list[_Entry] = []
         self._loading = self._loaded = False
-        #: What no file keeps.
+        #: State of the camera, shown in the panel but not saved.
         self._shown_state = RegisteredProperties()
         about = "What the camera follows and turns with; empty for nothing."
         self._frame = self._shown_state.register("frame", "Tracked Frame", description=about)
@@ -518,7 +518,7 @@ class ViewEntry(QtCore.QObject):
 
     @property
     def shown(self) -> bool:
-        """Whether there is an entry; one that is set to False is removed."""
+        """Whether the panel has an entry; setting it adds or removes one."""
         return bool(self._shown)
 
     @shown.setter
@@ -531,7 +531,7 @@ class ViewEntry(QtCore.QObject):
         self._action.setChecked(shown)
 
     def close(self) -> None:
-        """Take the entry out of the panel; safe to call twice."""
+        """Remove the entry from the panel; safe to call twice."""
         shown, self._shown = self._shown, []
         for entry in shown:
             entry.close()
@@ -549,7 +549,7 @@ class ViewEntry(QtCore.QObject):
 
     @Slot()
     def _check_deleted(self) -> None:
-        """Notice what RViz has deleted, for which Python gets no signal."""
+        """Detect entries that RViz has deleted, for which Python gets no signal."""
         gone = [entry for entry in self._shown if not entry.alive]
         for entry in gone:
             self._shown.remove(entry)
@@ -567,7 +567,7 @@ class ViewEntry(QtCore.QObject):
 
     @Slot()
     def _reset_without_entry(self) -> None:
-        """Reset the settings if there is no entry once a file is loaded."""
+        """Reset the settings if there is no entry, but not before a file is loaded completely."""
         if self._loading and not self._loaded:
             return
         self._loading = self._loaded = False

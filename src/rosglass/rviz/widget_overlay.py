@@ -1,4 +1,4 @@
-"""An interface made of Qt's widgets, drawn over RViz's 3D view."""
+"""Qt widgets as overlays on RViz's 3D view."""
 
 from __future__ import annotations
 
@@ -31,34 +31,35 @@ if TYPE_CHECKING:
 __all__ = ["Canvas", "StyleSheet", "WidgetOverlay", "make_widget", "read_style_sheet"]
 
 
-#: Rectangles that are painted one by one; of more, what is around them is.
+#: Maximum number of rectangles painted individually; more are replaced by their bounding box.
 _MAX_RECTS = 12
 
 
 class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
-    """A view of a scene that is not on the screen, though Qt takes it for visible.
+    """A graphics view that Qt considers visible, but does not show on the screen.
 
-    Only a visible view learns which part of an item has changed: the scene's own signal names the
-    whole item, here the widget that fills everything.
+    Only a visible view is notified which part of an item has changed; the scene's own signal
+    reports the whole item, here the root widget.
 
     Args:
         scene: The scene.
         root: The widget that fills it.
     """
 
-    #: Something looks another way now.
+    #: A part has to be painted again.
     stale = Signal()
 
     def __init__(self, scene: Any, root: Any) -> None:
         super().__init__(scene)
         self._root = root
-        #: The picture: shape (height, width), each pixel 0xAARRGGBB with premultiplied colours.
+        #: The picture: array of shape (height, width), each pixel 0xAARRGGBB with premultiplied
+        #: colours.
         self.pixels: NDArray[np.uint32] = np.zeros((0, 0), np.uint32)
         self._stale = QtGui.QRegion()
         self._painting = False
         self.setAttribute(QtCore.Qt.WA_DontShowOnScreen)
         self.setAttribute(QtCore.Qt.WA_ShowWithoutActivating)
-        # A program may end with its last window.
+        # Qt must not keep the program running for this window.
         self.setAttribute(QtCore.Qt.WA_QuitOnClose, False)
         for part in (self, self.viewport()):
             part.setAttribute(QtCore.Qt.WA_OpaquePaintEvent)
@@ -72,12 +73,12 @@ class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
         self.setRenderHint(QtGui.QPainter.Antialiasing)
 
     def fit(self, width: int, height: int, ratio: float) -> None:
-        """Set the size, and mark all of it as changed.
+        """Set the size, and mark everything as changed.
 
         Args:
-            width: Pixels.
-            height: Pixels.
-            ratio: Pixels for one unit of the scene.
+            width: Width in pixels.
+            height: Height in pixels.
+            ratio: Pixels per unit of the scene.
         """
         own = self.devicePixelRatioF()
         self.pixels = np.zeros((height, width), np.uint32)
@@ -95,7 +96,7 @@ class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
             self.stale.emit()
 
     def paint(self) -> list[Rect]:
-        """Paint what has changed, and return where that is in :attr:`pixels`."""
+        """Paint the changed parts, and return their rectangles in :attr:`pixels`."""
         everything, own = QtGui.QRegion(self.viewport().rect()), self.devicePixelRatioF()
         stale, self._stale = self._stale & everything, QtGui.QRegion()
         if stale.isEmpty():
@@ -104,7 +105,7 @@ class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
             stale = everything
         elif stale.rectCount() > _MAX_RECTS:
             stale = QtGui.QRegion(stale.boundingRect())
-        # Qt rounds what is exposed of widgets, and would leave out a row at the edge.
+        # Qt rounds the exposed part of widgets, and would omit a row at the edge.
         more = math.ceil(self.transform().m11()) + 1
         around = QtGui.QRegion()
         for rect in stale.rects():
@@ -119,7 +120,7 @@ class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
         return rects
 
     def _render(self, region: Any, picture: Any) -> None:
-        # Shadows would be elsewhere if it were drawn elsewhere than where it is.
+        # Draw at the original position, which Qt's shadow effects depend on.
         at = region.boundingRect().topLeft()
         painter = QtGui.QPainter(picture)
         painter.setCompositionMode(QtGui.QPainter.CompositionMode_Source)
@@ -132,7 +133,7 @@ class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
             self._painting = False
 
     def _shadows_are_larger(self) -> bool:
-        """Return whether effects may reach further than Qt knows: it does not scale them down."""
+        """Return whether effects may exceed the regions that Qt reports: it does not scale them."""
         if self.transform().m11() >= 1:
             return False
         return self._root.findChild(QtWidgets.QGraphicsEffect) is not None
@@ -149,7 +150,7 @@ class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
 
 @lru_cache(maxsize=1)
 def _scratch(shape: tuple[int, int], ratio: float) -> Any:
-    """Return the image of a size that all canvases paint into first."""
+    """Return the intermediate image that all canvases of a size share."""
     picture = QtGui.QImage(shape[1], shape[0], QtGui.QImage.Format_ARGB32_Premultiplied)
     picture.setDevicePixelRatio(ratio)
     return picture
@@ -158,19 +159,19 @@ def _scratch(shape: tuple[int, int], ratio: float) -> Any:
 _log = logging.getLogger("rosglass.rviz")
 _URL = re.compile(r"""url\(\s*(["']?)([^"')]+)\1\s*\)""")
 _MAX_BYTES = 1 << 20
-#: Milliseconds after a change of the file: editors write in several steps.
+#: Milliseconds to wait after a change of the file, because editors write in several steps.
 _DEBOUNCE_MS = 80
 
 
 def read_style_sheet(source: str) -> tuple[str, Path | None]:
-    """Return a style sheet and its file; None where it is the text itself.
+    """Return a style sheet and its file; None as the file for a literal style sheet.
 
     Args:
-        source: Path of a ``.qss`` file, ``package://package/file.qss``, or the style sheet itself.
-            Relative ``url()`` in a file are taken from the file's folder.
+        source: Path of a ``.qss`` file, ``package://package/file.qss``, or a literal style sheet.
+            In a file, relative ``url()`` are relative to its folder.
 
     Raises:
-        Error: The file is missing, too large, or no text; its braces do not match.
+        Error: The file is missing, too large or not UTF-8, or the braces do not match.
     """
     if "{" in source or not source.strip():
         _check(source, "style sheet")
@@ -198,7 +199,7 @@ def _absolute(match: re.Match[str], folder: Path) -> str:
 
 
 def _check(text: str, what: str) -> None:
-    """Raise errors for what Qt would only print."""
+    """Raise an Error for unbalanced braces, which Qt would only print."""
     bare = re.sub(r"/\*.*?\*/", lambda m: "\n" * m[0].count("\n"), text, flags=re.DOTALL)
     depth = 0
     for number, line in enumerate(bare.split("\n"), 1):
@@ -211,12 +212,12 @@ def _check(text: str, what: str) -> None:
 
 
 class StyleSheet(QtCore.QObject):  # type: ignore[misc]
-    """A style sheet in use, read anew when its file changes.
+    """The style sheet of an overlay, reloaded when its file changes.
 
     Args:
-        name: Of the overlay, for messages.
-        use: Called with the text.
-        failed: Called with what is wrong.
+        name: Name of the overlay, for log messages.
+        use: Called with the text of the style sheet.
+        failed: Called with the error text.
     """
 
     def __init__(
@@ -224,7 +225,7 @@ class StyleSheet(QtCore.QObject):  # type: ignore[misc]
     ) -> None:
         super().__init__()
         self._name, self._use, self._failed = name, use, failed
-        #: As it was given.
+        #: The path, URL or literal style sheet, as given.
         self.source = ""
         #: Whether the file is watched.
         self.watch = False
@@ -240,7 +241,7 @@ class StyleSheet(QtCore.QObject):  # type: ignore[misc]
 
         Args:
             source: See :func:`read_style_sheet`.
-            watch: Whether to read the file anew when it changes.
+            watch: Whether to reload the file when it changes.
             strict: Whether to raise errors instead of reporting them.
 
         Raises:
@@ -250,7 +251,7 @@ class StyleSheet(QtCore.QObject):  # type: ignore[misc]
         self._stop_watching()
         self._read(strict=strict)
         if watch and self._path is not None:
-            # Editors replace the file, which changes its folder.
+            # Many editors replace the file, which changes its folder.
             self._watcher = QtCore.QFileSystemWatcher([str(self._path), str(self._path.parent)])
             self._watcher.fileChanged.connect(self._read_later)
             self._watcher.directoryChanged.connect(self._read_later)
@@ -284,30 +285,30 @@ class StyleSheet(QtCore.QObject):  # type: ignore[misc]
 
 
 _E = QtCore.QEvent
-#: A widget with this dynamic property, or below one, leaves the wheel to what is below.
+#: Dynamic property of widgets that, with their children, leave wheel events to lower overlays.
 IGNORE_WHEEL = "IgnoreWheelEvents"
 _OTHERS = frozenset({_E.Wheel, _E.ContextMenu, _E.ToolTip, _E.DragLeave})
-#: Classes of Qt that get context menu events, and have no menu.
+#: Qt classes that handle context menu events without a menu.
 _WITHOUT_MENU = (QtWidgets.QWidget, QtWidgets.QAbstractScrollArea, QtWidgets.QMainWindow)
 _INPUT_METHOD = frozenset({_E.InputMethod, _E.InputMethodQuery})
 
 
 class WidgetOverlay(Overlay):
-    """A widget over RViz's 3D view, as large as the view; see-through where nothing is in it.
+    """A widget that covers RViz's 3D view, with a transparent background.
 
-    Give the widget, or a function that makes it, or derive from this class and fill an empty one in
-    :meth:`setup`. Labels, frames and what is empty leave the mouse to RViz.
+    Pass the widget or a function that creates it, or derive from this class and fill an empty
+    widget in :meth:`setup`. Labels, frames and empty areas leave the mouse to RViz.
 
     Args:
-        widget: The widget, without a parent, or what returns it.
-        name: Its name; that of the widget's class by default.
-        style_sheet: A ``.qss`` file, ``package://package/file.qss``, or a style sheet itself.
-        watch: Whether to read the file anew when it changes.
-        options: Of :class:`Overlay`.
+        widget: The widget, without a parent, or a function that returns it.
+        name: Its name; by default that of the widget's class.
+        style_sheet: A ``.qss`` file, ``package://package/file.qss``, or a literal style sheet.
+        watch: Whether to reload the style sheet when its file changes.
+        options: Options of :class:`Overlay`.
 
     Raises:
-        Error: It is no widget, it has a parent or another overlay, or the style sheet cannot be
-            read.
+        Error: `widget` is not a widget, has a parent or is shown by another overlay, or the style
+            sheet cannot be read.
     """
 
     def __init__(
@@ -319,7 +320,7 @@ class WidgetOverlay(Overlay):
         super().__init__(name or own, **options)
         #: The widget that fills the view.
         self.root: Any = made
-        # Errors of a widget are reported as the problem of this overlay.
+        # Lets errors in the widget's code become the problem of this overlay.
         made.rosglass_overlay = weakref.ref(self)
         made.setAttribute(QtCore.Qt.WA_TranslucentBackground)
         self._buttons = QtCore.Qt.NoButton
@@ -331,12 +332,12 @@ class WidgetOverlay(Overlay):
         self._view = _HiddenView(self._scene)
         self._canvas = Canvas(self._scene, made)
         self._canvas.stale.connect(self.changed)
-        # Not the scene's `changed`: once that is connected, Qt takes all of an item for stale.
+        # Not the scene's `changed`: once that is connected, Qt repaints whole items.
         self._canvas.stale.connect(self._update_popups)
         self._proxy = self._scene.addWidget(made)
-        # Otherwise all of it is painted whatever has changed.
+        # Otherwise Qt always paints the whole widget.
         self._proxy.setFlag(QtWidgets.QGraphicsItem.ItemUsesExtendedStyleOption)
-        # Widgets of a window that is not active neither look nor act as if they had the keys.
+        # Widgets of an inactive window neither show nor handle the keyboard focus.
         QtCore.QCoreApplication.sendEvent(self._scene, QtCore.QEvent(_E.WindowActivate))
         self._style = StyleSheet(self.name, self._use_style, self._style_failed)
         if widget is None:
@@ -346,13 +347,14 @@ class WidgetOverlay(Overlay):
             self._style.use(style_sheet, watch=watch, strict=True)
 
     def setup(self, root: Any) -> None:
-        """Put widgets into an empty one, e.g. with a layout; for classes derived from this one."""
+        """Fill the empty root widget, e.g. with a layout; for derived classes."""
 
     @property
     def style_sheet(self) -> str:
-        """What it looks like: a ``.qss`` file, a ``package://`` URL, or the style sheet itself.
+        """The style sheet: a ``.qss`` file, a ``package://`` URL, or a literal style sheet.
 
-        A sheet that cannot be read is logged, becomes the :attr:`problem`, and changes nothing.
+        If it cannot be read, the error is logged and becomes the :attr:`problem`, and the old style
+        sheet stays.
         """
         return self._style.source
 
@@ -371,7 +373,7 @@ class WidgetOverlay(Overlay):
     # Drawing
 
     def resize(self, width: int, height: int, ratio: float) -> None:
-        """Fit the widget to the 3D view."""
+        """Set the size of the widget."""
         units = QtCore.QRectF(0, 0, width / ratio, height / ratio)
         with guarded(self, "changing its size"):
             self._scene.setSceneRect(units)
@@ -380,7 +382,7 @@ class WidgetOverlay(Overlay):
         self._canvas.fit(width, height, ratio)
 
     def draw(self) -> NDArray[np.uint32] | None:
-        """Paint what has changed."""
+        """Paint the changed parts."""
         if not is_alive(self._scene):
             return None
         with guarded(self, "painting"):
@@ -390,11 +392,11 @@ class WidgetOverlay(Overlay):
     # Input
 
     def attach(self, window: Window) -> None:
-        """Be shown over an RViz."""
+        """Connect to RViz's window."""
         self._panel = window.panel
 
     def deliver(self, event: Any) -> bool:
-        """Give the event to the widget it is for."""
+        """Send an event to the widget under the mouse or with the keyboard focus."""
         kind = event.type()
         if not is_alive(self._scene):
             return False
@@ -418,15 +420,16 @@ class WidgetOverlay(Overlay):
         if not is_alive(self._scene):
             return taken
         if kind in PRESS:
-            # Qt takes one that no widget wants for accepted. One beside a popup closes that.
+            # Qt marks presses as accepted even if no widget uses them. A press outside of a popup
+            # closes it.
             taken = opened or self._scene.mouseGrabberItem() is not None
-            # The event that opens a menu is the next one.
+            # A context menu opens with the event after the press.
             opens_menu = event.button() == QtCore.Qt.RightButton
             taken = taken or (opens_menu and _has(self._widget_at(at), _has_menu))
         if kind in MOUSE:
             self._buttons = event.buttons() if taken or kind not in PRESS else self._buttons
         if kind == _E.MouseMove and event.buttons() == QtCore.Qt.NoButton:
-            # Qt closes what has popped up when the mouse leaves the scene.
+            # Accept moves while a popup is open: Qt closes it when the mouse leaves the scene.
             taken = opened or _has(self._widget_at(at), _handles_hover)
         return taken
 
@@ -454,17 +457,17 @@ class WidgetOverlay(Overlay):
         return bool(made.isAccepted())
 
     def _focus_widget(self) -> Any:
-        """Return the widget that gets the keys; None where none does."""
+        """Return the widget with the keyboard focus; None if there is none."""
         shown = _as_widget(self._scene.focusItem())
         return None if shown is None else shown.widget().focusWidget() or shown.widget()
 
     def _remember_focus(self, opened: bool) -> None:
-        """Remember the focus before a popup opens: Qt does not restore it."""
+        """Remember the focus widget before a popup opens, because Qt does not restore it."""
         if not opened:
             self._focus_before = self._focus_widget() or self._focus_before
 
     def _align_with_focus(self, receiver: Any) -> None:
-        """Place what a widget opens by a key, e.g. a menu, beside it."""
+        """Align the view with the screen at a widget, so that menus opened by key appear there."""
         if receiver is not None and is_alive(self._panel):
             shown = receiver.window().graphicsProxyWidget()
             middle = receiver.mapTo(receiver.window(), receiver.rect().center())
@@ -473,7 +476,7 @@ class WidgetOverlay(Overlay):
             self._view.move(seen - at.toPoint())
 
     def leave(self) -> None:
-        """End hovering, and cancel what is pressed."""
+        """End hovering, and cancel presses."""
         if not is_alive(self._scene):
             return
         viewport = self._view.viewport()
@@ -488,21 +491,21 @@ class WidgetOverlay(Overlay):
         QtCore.QCoreApplication.sendEvent(viewport, QtCore.QEvent(_E.Leave))
 
     def set_focus(self, focus: bool) -> None:
-        """Give the focus to the widget that had it last, or take it away."""
+        """Give the keyboard focus to the widget that had it last, or take it away."""
         self._focused = focus
         if is_alive(self._scene):
             event = QtGui.QFocusEvent(_E.FocusIn if focus else _E.FocusOut)
             QtCore.QCoreApplication.sendEvent(self._scene, event)
 
     def cursor(self) -> Any:
-        """Return the shape that the widget under the mouse wants; None for none in particular."""
+        """Return the cursor of the widget under the mouse; None for the default one."""
         widget = None if self._at is None else self._widget_at(self._at)
         if widget is None or widget.cursor().shape() == QtCore.Qt.ArrowCursor:
             return None
         return widget.cursor()
 
     def _popups(self) -> list[Any]:
-        """Return the lists of combo boxes and the menus that are open."""
+        """Return the open menus and combo box lists."""
         windows = QtWidgets.QApplication.topLevelWidgets()
         opened = [w for w in windows if w.windowType() == QtCore.Qt.Popup and w.isVisible()]
         embedded = [w for w in opened if w.graphicsProxyWidget() is not None]
@@ -520,14 +523,14 @@ class WidgetOverlay(Overlay):
                 self._focus_before.setFocus(QtCore.Qt.PopupFocusReason)
 
     def _fit(self, popups: list[Any]) -> None:
-        # Qt has made them fit to the screen.
+        # Qt has fitted them to the screen instead.
         room = self._scene.sceneRect()
         for popup in popups:
             shown, opener = popup.graphicsProxyWidget(), popup.parentWidget()
             box = shown.mapRectToScene(shown.rect())
             fit = QtCore.QRectF(box.topLeft(), box.size().boundedTo(room.size()))
             if fit.left() < 0 and opener in popups:
-                # On the other side of the menu that it belongs to.
+                # Move a submenu to the other side of its menu.
                 menu = opener.graphicsProxyWidget()
                 fit.moveLeft(menu.mapRectToScene(menu.rect()).right())
             fit.moveLeft(max(0.0, min(fit.left(), room.width() - fit.width())))
@@ -545,7 +548,7 @@ class WidgetOverlay(Overlay):
         return top.childAt(item.mapFromScene(at).toPoint()) or top
 
     def close(self) -> None:
-        """Delete the widgets."""
+        """Delete the widgets; safe to call twice."""
         self._style.close()
         if is_alive(self._scene):
             self._canvas.stale.disconnect(self.changed)
@@ -558,7 +561,7 @@ class WidgetOverlay(Overlay):
 
 
 class _HiddenView(QtWidgets.QGraphicsView):  # type: ignore[misc]
-    """Turns the events of widgets into those of a scene; never shown."""
+    """A hidden graphics view that converts widget events to scene events."""
 
     def __init__(self, scene: Any) -> None:
         super().__init__(scene)
@@ -569,17 +572,17 @@ class _HiddenView(QtWidgets.QGraphicsView):  # type: ignore[misc]
         self.viewport().setMouseTracking(True)
 
     def fit(self, units: Any) -> None:
-        """Take the size of the scene."""
+        """Set the size to that of the scene."""
         size = units.size().toSize()
         self.resize(size)
-        # Qt does not lay out what is hidden.
+        # Qt does not lay out hidden widgets.
         self.viewport().resize(size)
 
     def send(self, event: Any) -> bool:
         """Send an event to the scene; return whether it is accepted."""
         event.setAccepted(False)
         if event.type() in DRAG or event.type() == _E.DragLeave:
-            # The application would give it to what is dragged over, which this is not.
+            # QApplication sends drag events to the widget under the cursor, not to the hidden view.
             self.viewportEvent(event)
         else:
             QtCore.QCoreApplication.sendEvent(self.viewport(), event)
@@ -600,14 +603,14 @@ class _HiddenView(QtWidgets.QGraphicsView):  # type: ignore[misc]
 
 
 def make_widget(widget: Any, name: str) -> Any:
-    """Return a widget that was given, or is made now.
+    """Return the widget of an overlay.
 
     Args:
-        widget: It, what returns it, or None for an empty one.
-        name: For messages.
+        widget: The widget, a function that returns it, or None for an empty one.
+        name: Name of the overlay, for errors.
 
     Raises:
-        Error: It is no widget, part of another one, or shown by another overlay.
+        Error: It is not a widget, has a parent, or is shown by another overlay.
     """
     if widget is None:
         return QtWidgets.QWidget()
@@ -629,7 +632,7 @@ def make_widget(widget: Any, name: str) -> Any:
 
 
 def _show_children(root: Any) -> None:
-    """Show widgets put into a root that is shown already, unless they were hidden on purpose."""
+    """Show the children of a visible widget, except for explicitly hidden ones."""
     shown_on_purpose = QtCore.Qt.WA_WState_ExplicitShowHide
     for child in root.children():
         if (
@@ -641,15 +644,15 @@ def _show_children(root: Any) -> None:
 
 
 def _as_widget(item: Any) -> Any:
-    """Return an item of the scene as what shows a widget; None when it shows none."""
+    """Return a scene item as a QGraphicsProxyWidget; None if it is not one."""
     found = None if item is None else item.toGraphicsObject()
     return found if isinstance(found, QtWidgets.QGraphicsProxyWidget) else None
 
 
 def _focus_clicked(widget: Any) -> None:
-    """Focus a widget that accepts focus by a click.
+    """Focus a widget, or its first parent, that accepts focus by a click.
 
-    Qt does so itself only for events that come from the window system.
+    Qt does this only for events from the window system.
     """
     while widget is not None:
         if widget.isEnabled() and widget.focusPolicy() & QtCore.Qt.ClickFocus:
@@ -659,7 +662,7 @@ def _focus_clicked(widget: Any) -> None:
 
 
 def _has(widget: Any, quality: Callable[[Any], bool]) -> bool:
-    """Return whether a predicate holds for a widget or one of its parents."""
+    """Return whether a predicate is true for a widget or one of its parents."""
     while widget is not None:
         if quality(widget):
             return True
@@ -668,7 +671,7 @@ def _has(widget: Any, quality: Callable[[Any], bool]) -> bool:
 
 
 def _has_menu(widget: Any) -> bool:
-    """Return whether a widget opens a menu by the mouse's right button."""
+    """Return whether the right mouse button opens a menu of a widget."""
     policy = widget.contextMenuPolicy()
     if policy == QtCore.Qt.ActionsContextMenu:
         return bool(widget.actions())

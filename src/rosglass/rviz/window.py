@@ -1,4 +1,4 @@
-"""RViz's window."""
+"""RViz's main window and its config files."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ _KEY = "F10"
 
 
 class BareView(QtCore.QObject):
-    """Hides menu bar, tool bars, docked panels and status bar, and brings them back.
+    """Hides menu bar, tool bars, docked panels and status bar, and shows them again.
 
-    The status bar stays while it says what is wrong (:meth:`warn`). Full screen of RViz itself
-    leaves the docked panels.
+    The status bar stays visible while it shows a problem (:meth:`warn`). RViz's own full screen
+    mode does not hide docked panels.
 
     Args:
         window: RViz's main window.
@@ -45,7 +45,7 @@ class BareView(QtCore.QObject):
         self._window = window
         self._on = self._warning = False
         self._hidden: list[Any] = []
-        #: Also of the window itself: actions of a menu that is hidden have no keys.
+        #: Also added to the window, because shortcuts of a hidden menu do not work.
         self._action = QtWidgets.QAction("&Bare 3D view", window)
         self._action.setShortcut(_KEY)
         self._action.setCheckable(True)
@@ -54,7 +54,7 @@ class BareView(QtCore.QObject):
 
     @property
     def action(self) -> Any:
-        """The menu action."""
+        """The action for the menu."""
         return self._action
 
     @property
@@ -67,19 +67,19 @@ class BareView(QtCore.QObject):
         self._action.setChecked(on)
 
     def warn(self, warning: bool) -> None:
-        """Show or hide the status bar, whatever else is hidden."""
+        """Keep the status bar visible, or let it be hidden again."""
         self._warning = warning
         hidden = self._on or self._window.isFullScreen()
         self._window.statusBar().setVisible(warning or not hidden)
 
     def hide_again(self) -> None:
-        """Hide what RViz has shown again, now and after the current event."""
+        """Hide parts that RViz has shown again, now and after the current event."""
         self._hide()
         QtCore.QTimer.singleShot(0, self._hide)
 
     @contextmanager
     def showing_everything(self) -> Iterator[None]:
-        """Show everything for a moment: RViz saves what is shown."""
+        """Show everything temporarily, because RViz's config includes what is visible."""
         on = self.on
         self.on = False
         try:
@@ -95,7 +95,7 @@ class BareView(QtCore.QObject):
             self._hide()
         else:
             hidden, self._hidden = self._hidden, []
-            # RViz itself brings its bars back at the end of full screen.
+            # RViz itself shows its bars again at the end of full screen.
             bars = (QtWidgets.QMenuBar, QtWidgets.QToolBar, QtWidgets.QStatusBar)
             full = self._window.isFullScreen()
             for part in hidden:
@@ -118,44 +118,43 @@ class BareView(QtCore.QObject):
     def _parts(self) -> list[Any]:
         window = self._window
         docks = [d for d in window.findChildren(QtWidgets.QDockWidget) if not d.isFloating()]
-        # The only buttons beside the 3D view are those that fold the docks.
+        # The only tool buttons in the central widget hide the docked panels.
         folds = window.centralWidget().findChildren(QtWidgets.QToolButton)
         bars = window.findChildren(QtWidgets.QToolBar)
         return [window.menuBar(), window.statusBar(), *bars, *docks, *folds]
 
 
-#: What RViz says right before it makes the displays of a config file.
+#: RViz's status message right before it creates the displays of a config file.
 _LOADING = "Creating displays"
-#: Milliseconds that a window manager may take to make a window as large as the screen.
+#: Milliseconds that a window manager may take to resize a window to the screen.
 _RESIZE_DELAY_MS = 300
 _PATHS = "ROS_PACKAGE_PATH"
-#: Where a config file has the displays.
+#: Key of the displays in a config file.
 _CONTENT = "Visualization Manager"
 
 
 class Window(QtCore.QObject):
-    """RViz's window, made in this process; once, for its renderer cannot be started again.
+    """RViz's main window in this process; once, because RViz's renderer cannot be restarted.
 
-    RViz registers with the ROS master while it is made, and waits for it without end: find out
-    before whether it answers.
+    Creating it waits for the ROS master without a timeout, so check first that the master answers.
 
     Args:
-        config: The ``.rviz`` file; empty for RViz's default one.
-        splash: Show RViz's splash screen while it starts.
+        config: The ``.rviz`` file; empty for RViz's default config.
+        splash: Whether to show RViz's splash screen.
 
     Raises:
-        Error: The file is missing or is no config of RViz.
+        Error: The file is missing or is not an RViz config.
     """
 
-    #: RViz is about to draw.
+    #: RViz is about to draw a frame.
     before_frame = Signal()
-    #: RViz is about to throw all its displays away, and to make those of a config file.
+    #: RViz is about to replace all its displays by those of a config file.
     config_loading = Signal()
-    #: A config file was loaded: every display, view and tool is another one now. Its path.
+    #: A config file was loaded, which replaces all displays, views and tools. Argument: its path.
     config_loaded = Signal(str)
-    #: RViz is in full screen now, or no longer.
+    #: RViz enters or leaves full screen. Argument: whether it enters.
     fullscreen_changed = Signal(bool)
-    #: The window was closed, or is being destroyed: the last moment to release what is RViz's.
+    #: The window was closed or is about to be destroyed: release all RViz objects.
     closing = Signal()
 
     def __init__(self, config: str | os.PathLike[str] = "", *, splash: bool = False) -> None:
@@ -163,7 +162,7 @@ class Window(QtCore.QObject):
         file = str(config_file(config)) if config else ""
         self._closing = False
         bindings = rviz()
-        #: RViz's ``VisualizationFrame``, as its own bindings know it.
+        #: RViz's ``VisualizationFrame``, an object of its bindings.
         self.frame: Any = bindings.VisualizationFrame()
         if not splash:
             self.frame.setSplashPath("")
@@ -171,7 +170,7 @@ class Window(QtCore.QObject):
             self.frame.initialize(file)
         #: RViz's ``VisualizationManager``.
         self.manager: Any = self.frame.getManager()
-        #: The window, as PySide2 knows it.
+        #: The same window, an object of PySide2.
         self.widget = as_pyside(self.frame, QtWidgets.QMainWindow)
         #: The widget with the 3D view.
         self.panel = self._find_panel(QtWidgets.QWidget)
@@ -181,7 +180,7 @@ class Window(QtCore.QObject):
         self._normal: Any = None
         self._config = file
         self._menus: dict[str, Any] = {}
-        #: Whether there is nothing but the 3D view in the window.
+        #: Shows only the 3D view in the window.
         self.bare = BareView(self.widget)
         self.menu("&Panels").addAction(self.bare.action)
         self._close_watch = _CloseWatch(self.bare, self._emit_closing)
@@ -201,34 +200,34 @@ class Window(QtCore.QObject):
 
     @property
     def ids(self) -> list[int]:
-        """The X server's numbers of the window and of the 3D view in it."""
+        """X window ids of the window and of the 3D view."""
         return [int(widget.winId()) for widget in (self.widget, self.panel)]
 
     def view_size(self) -> tuple[int, int, float]:
-        """Return width and height of the 3D view in pixels of the screen, and its pixel ratio."""
+        """Return width and height of the 3D view in physical pixels, and its pixel ratio."""
         ratio = self.panel.devicePixelRatioF()
-        # Halves are rounded up, as Qt does when it makes the window.
+        # Round halves up, like Qt.
         width, height = self.panel.width() * ratio, self.panel.height() * ratio
         return math.floor(width + 0.5), math.floor(height + 0.5), ratio
 
     @property
     def config(self) -> str:
-        """Path of the config file that is loaded; empty for RViz's default one."""
+        """Path of the loaded config file; empty for RViz's default config."""
         return self._config
 
     @property
     def modified(self) -> bool:
-        """Whether something has changed that the config file does not know."""
+        """Whether there are unsaved changes."""
         return bool(self.widget.isWindowModified())
 
     def load_config(self, config: str | os.PathLike[str]) -> None:
-        """Load a config file; what has changed since the last one was saved is lost.
+        """Load a config file, discarding unsaved changes.
 
         Args:
             config: A path, or ``package://name/path``.
 
         Raises:
-            Error: The file is missing or is no config of RViz.
+            Error: The file is missing or is not an RViz config.
         """
         file = str(config_file(config))
         self.widget.setWindowModified(False)
@@ -238,10 +237,10 @@ class Window(QtCore.QObject):
         """Save displays, views, tools and panels.
 
         Args:
-            config: Where to; empty for the file that is loaded.
+            config: The file to write; empty for the loaded file.
 
         Raises:
-            Error: There is no such folder, or writing failed.
+            Error: The folder does not exist, or writing failed.
         """
         file = str(Path(config).absolute() if config else self._config)
         folder = Path(file).parent
@@ -266,10 +265,10 @@ class Window(QtCore.QObject):
             )
 
     def menu(self, title: str) -> Any:
-        """Return the menu of a title in RViz's menu bar, made when there is none yet.
+        """Return a menu of RViz's menu bar by its title, created if there is none.
 
         Args:
-            title: As it is shown; ``&`` marks the key that opens it.
+            title: The title; ``&`` marks the shortcut key.
         """
         bar = self.widget.menuBar()
         menus = {_plain(menu.title()): menu for menu in bar.findChildren(QtWidgets.QMenu)}
@@ -281,7 +280,7 @@ class Window(QtCore.QObject):
                 bar.addMenu(found)
             else:
                 bar.insertMenu(help_menu.menuAction(), found)
-        # PySide2 deletes the menu once Python holds no reference to it.
+        # PySide2 deletes the menu when Python has no reference to it.
         self._menus[_plain(title)] = found
         return found
 
@@ -291,7 +290,7 @@ class Window(QtCore.QObject):
         self.widget.hide()
 
     def destroy(self) -> None:
-        """Delete RViz, right before the program ends; nothing of it may be used any more."""
+        """Delete RViz; none of its objects may be used afterwards."""
         sip = pyqt("sip")
         if not sip.isdeleted(self.frame):
             sip.delete(self.frame)
@@ -312,7 +311,7 @@ class Window(QtCore.QObject):
         self.fullscreen_changed.emit(fullscreen)
 
     def _fill_screen(self) -> None:
-        """Take the size of the screen, where no window manager does."""
+        """Resize the window to the screen if no window manager has done so."""
         place = self.widget.windowHandle().screen().geometry()
         if self.fullscreen and self.widget.size() != place.size():
             self._filled = True
@@ -321,7 +320,7 @@ class Window(QtCore.QObject):
     def _on_status(self, status: str) -> None:
         if status == _LOADING:
             self._loading = True
-            # RViz does not say that it has failed.
+            # RViz does not report failure to load a config.
             self._loaded.ask()
             self.config_loading.emit()
 
@@ -338,7 +337,7 @@ class Window(QtCore.QObject):
 
 @contextlib.contextmanager
 def _with_stand_in_package() -> Iterator[None]:
-    """Provide a stand-in for a package that RViz looks for and does not need."""
+    """Provide a stand-in for the package media_export, which RViz searches for without need."""
     before = os.environ.get(_PATHS)
     stand_in = str(Path(__file__).with_name("media_export"))
     os.environ[_PATHS] = os.pathsep.join(filter(None, [before, stand_in]))
@@ -356,11 +355,11 @@ def _plain(title: str) -> str:
 
 
 class _CloseWatch(QtCore.QObject):
-    """Calls back when a window was closed, unless the user has cancelled that.
+    """Event filter that calls a function when RViz's window was closed.
 
     Args:
-        bare: What is hidden must be seen when RViz saves its config.
-        closed: Called after RViz has accepted.
+        bare: The hidden parts, which RViz must see when it saves its config.
+        closed: Called when RViz has accepted the close event; the user may cancel it.
     """
 
     def __init__(self, bare: BareView, closed: Callable[[], None]) -> None:
@@ -368,7 +367,7 @@ class _CloseWatch(QtCore.QObject):
         self._bare, self._closed, self._asking = bare, closed, False
 
     def eventFilter(self, watched: QtCore.QObject, event: QtCore.QEvent) -> bool:  # noqa: N802
-        """Send the close event once more: RViz decides, and may ask the user."""
+        """Send a close event to RViz with all parts shown; RViz may ask the user, and cancel it."""
         if event.type() != QtCore.QEvent.Type.Close or self._asking:
             return False
         self._asking = True
@@ -381,13 +380,13 @@ class _CloseWatch(QtCore.QObject):
 
 
 def config_file(place: str | os.PathLike[str]) -> Path:
-    """Return the path of a config file of RViz.
+    """Return the path of an RViz config file, after checking it.
 
     Args:
         place: A path, or ``package://name/path``.
 
     Raises:
-        Error: There is no such file, it cannot be read, or it is something else.
+        Error: The file does not exist, cannot be read, or is not an RViz config.
     """
     path = locate(place)
     if not path.is_file():
@@ -398,7 +397,7 @@ def config_file(place: str | os.PathLike[str]) -> Path:
             f"{path} is an interface, not a config file of RViz: rosglass rviz --overlay {path}"
         )
     try:
-        # RViz writes aliases out, and recurses.
+        # RViz expands aliases, and recurses into nested values.
         check_yaml(path.read_text(encoding="utf-8", errors="replace"))
     except (OSError, yaml.YAMLError) as error:
         raise Error(f"{path}: RViz cannot read it: {error}") from None

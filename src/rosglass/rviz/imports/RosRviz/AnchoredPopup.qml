@@ -1,21 +1,21 @@
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 
-// A popup that stays where a point of RViz's scene is seen; movable by its edge, and by a MoveArea.
+// A popup that follows a point of RViz's scene; the user can move it by its edge.
 Popup {
     id: popup
 
-    // x, y and z in metres, of `frame`; without one, the popup is where `x` and `y` put it.
+    // x, y and z in metres, in `frame`; null positions the popup by `x` and `y`.
     property var point: null
-    // A frame of the robot that the point moves with; empty for RViz's fixed frame.
+    // The frame of the point; empty for RViz's fixed frame.
     property string frame: ""
-    // Which point of the popup is at its place: shares of its width and height.
+    // The point of the popup that is at its position, in shares of its width and height.
     property point anchor: Qt.point(0.5, 0.5)
-    // Whether the user may move it; it then follows the point no longer.
+    // Whether the user may move it; it then stops following the point.
     property bool movable: false
-    // Why the point cannot be followed, or is old; empty where it can.
+    // Why the point cannot be followed or its position is old; empty otherwise.
     readonly property string problem: refused || (tracker ? tracker.problem : "")
-    // Whether nothing came of its frame for 3 s: it is half transparent then.
+    // Whether no transform of the frame arrived for 3 s; the popup is then half transparent.
     readonly property bool stale: tracker !== null && tracker.stale
 
     property var tracker: null
@@ -50,14 +50,14 @@ Popup {
         var seen = at !== null && at.x >= 0 && at.y >= 0 && at.x <= parent.width && at.y <= parent.height
         var hidden = !seen && !modal && (tracker !== null || refused !== "")
         opacity = hidden ? 0 : stale ? 0.5 : 1
-        // What is not seen must not take the mouse either.
+        // A hidden popup must not accept the mouse.
         if (contentItem && contentItem.parent)
             contentItem.parent.enabled = !hidden
         if (seen) {
             x = Math.max(0, Math.min(at.x - anchor.x * width, parent.width - width))
             y = Math.max(0, Math.min(at.y - anchor.y * height, parent.height - height))
         } else if (!hidden && (tracker || refused)) {
-            // All else is blocked until it is answered.
+            // A modal popup blocks all input, so it must stay visible.
             x = (parent.width - width) / 2
             y = (parent.height - height) / 2
         }

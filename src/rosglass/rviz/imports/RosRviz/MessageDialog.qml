@@ -1,14 +1,14 @@
 import QtQuick 2.15
 import QtQuick.Controls 2.15
 
-// A text with buttons, in the middle of the view; `accepted` and `rejected` tell the answer.
+// A text with buttons, in the middle of the view; emits `accepted` or `rejected`.
 Dialog {
     property alias text: label.text
 
     parent: Overlay.overlay
     anchors.centerIn: parent
     modal: true
-    // Above what pops up later: no label may hide the question.
+    // Above popups that open later, which must not hide the question.
     z: 1
     focus: true
     standardButtons: Dialog.Ok
