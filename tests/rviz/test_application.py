@@ -50,7 +50,7 @@ def test_config_files_that_cannot_be_written(app: Any, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("frame", ["", "/map", " map"])
 def test_names_that_no_frame_has(app: Any, frame: str) -> None:
-    with pytest.raises(Error, match="is no name of a frame"):
+    with pytest.raises(Error, match="expected the name of a frame"):
         app.fixed_frame = frame
 
 
@@ -158,7 +158,7 @@ def test_what_raises_in_a_slot_of_rviz_is_logged(app: Any, caplog: Any) -> None:
 
 
 def test_a_second_rviz_is_refused(app: Any) -> None:
-    with pytest.raises(Error, match="cannot be started again"):
+    with pytest.raises(Error, match="cannot be restarted"):
         type(app)()
 
 

@@ -202,7 +202,7 @@ def test_ends_when_the_node_of_overlays_is_killed(
     api = call_node(master, "lookupNode", "/test", "/overlay")
     call_node(api, "shutdown", "/rosnode", "user request")
     assert program.process.wait(PATIENCE) == 1, program.output
-    assert "RViz ends with the overlays' node: closed by /rosnode" in program.output
+    assert "the overlays' node was shut down: closed by /rosnode" in program.output
 
 
 def test_tells_when_the_master_is_gone_and_when_another_one_came(
@@ -213,12 +213,12 @@ def test_tells_when_the_master_is_gone_and_when_another_one_came(
     overlay = interface(tmp_path, "console.warn('up')")
     program = start("--overlay", overlay, ROS_MASTER_URI=master.uri)
     program.wait_for(f"start one: roscore -p {master.port}")
-    for message in ("up", "started anew"):
+    for message in ("up", "was restarted"):
         with master:
             program.wait_for(message)
             # The watch has asked the first one by then, too.
             time.sleep(2.5)
-        program.wait_for("nothing new is found")
+        program.wait_for("new topics are not found")
     assert program.end() == 130
 
 
@@ -239,7 +239,7 @@ BROKEN = "a: [1,\n b: }"
         (["{folder}/none.rviz"], "none.rviz does not exist"),
         (["{folder}"], "is a folder"),
         (["{folder}/broken.rviz"], "broken.rviz: RViz cannot read it"),
-        (["{folder}/Bad.qml"], "not a config file of RViz: rosglass rviz --overlay"),
+        (["{folder}/Bad.qml"], "not an RViz config: use rosglass rviz --overlay"),
         (["a.rviz", "b.rviz"], "one file, got a.rviz, b.rviz"),
         (["{folder}/brokn.rviz"], "(.rviz); did you mean broken.rviz?"),
         (["--overlay", "{folder}/None.qml"], "None.qml: there is no such file"),
@@ -248,7 +248,7 @@ BROKEN = "a: [1,\n b: }"
         (["--overlay", "{folder}/Bad.qml"], "Bad.qml:2:"),
         (["--url", "zenoh://robot"], "expected its master, ros1://..., got zenoh://robot"),
         (["--name", "a-b"], "node name 'a-b' contains '-'"),
-        (["--fixed-frame", "/map"], "'/map' is no name of a frame"),
+        (["--fixed-frame", "/map"], "expected the name of a frame, e.g. 'map', got '/map'"),
         (["-I", "{folder}/none"], "no such folder to import QML modules from"),
         (["__foo:=x"], "__foo is unknown"),
     ],
@@ -300,10 +300,10 @@ def on_window(command: str) -> Callable[[VirtualScreen], None]:
     return do
 
 
-BROKEN_SCREEN = "the connection to the X server (DISPLAY {display}) is broken: RViz ends"
+BROKEN_SCREEN = "the connection to the X server (DISPLAY {display}) is broken: RViz exits"
 NO_WINDOW = (
-    "RViz's window was destroyed by another program (xdotool windowclose, xkill), or by this one, "
-    "as setWindowFlags() does: RViz ends"
+    "RViz's window was destroyed by another program (xdotool windowclose, xkill), or by this one "
+    "(e.g. in setWindowFlags()): RViz exits"
 )
 
 

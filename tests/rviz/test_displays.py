@@ -302,9 +302,9 @@ def test_own_classes_come_back(
             return self.pixels
 
     register(Gauge, "tests/Gauge")
-    with pytest.raises(Error, match="'tests/Gauge' is that of"):
+    with pytest.raises(Error, match="'tests/Gauge' is used by"):
         register(type("Other", (Gauge,), {}), "tests/Gauge")
-    with pytest.raises(Error, match="no class derived"):
+    with pytest.raises(Error, match="not a class derived"):
         register(dict)
     assert class_id_of(Gauge) == "tests/Gauge"
     gauge = Gauge("Power")

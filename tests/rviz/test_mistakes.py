@@ -12,7 +12,7 @@ MISTAKES = {
     "rviz.pick({x: 1, y: 2}, 'r')": "radius: expected a number",
     "rviz.addDisplay()": "rviz.addDisplay(classId[, name[, enabled]]): classId must be given",
     "rviz.addDisplay('rviz/Measure')": "rviz/Measure is a tool: use addTool",
-    "rviz.addDisplay('rosglass/QmlOverlay')": "is an overlay: the menu Overlays, --overlay",
+    "rviz.addDisplay('rosglass/QmlOverlay')": "is an overlay: add it by the Overlays menu",
     "rviz.display('Grid').set('Alpha')": "display.set(path, value): value must be given",
     "rviz.display('Grid').enabled = 'no'": "display.enabled: expected true or false, got 'no'",
     "rviz.display('Grid').name = 5": "display.name: expected a name, a text of one line, got 5",
@@ -69,7 +69,7 @@ def test_mistakes_with_tools_say_what_to_do(tools: Any, qml: Any) -> None:
     here.refuses(
         {
             "rviz.toolManager.addTool('rviz/Measur')": "did you mean rviz/Measure?",
-            "rviz.toolManager.addTool('; rm -rf /')": "expected the id of a class",
+            "rviz.toolManager.addTool('; rm -rf /')": "expected a class id",
             "rviz.toolManager.removeTool(7)": "there are 3",
             "rviz.toolManager.removeTool('rviz/Measure')": "rviz/Select",
             "rviz.toolManager.currentTool = null": "expected a tool",

@@ -161,11 +161,11 @@ def test_bad_popups_are_refused(app: Any) -> None:
     from rosglass import Error
     from rosglass.rviz.popup import Button, Popup, message
 
-    with pytest.raises(Error, match="is no QWidget"):
+    with pytest.raises(Error, match="is not a QWidget"):
         Popup(lambda: None, "None")
     with pytest.raises(Error, match="needs a button"):
         message("Title", "text", buttons=Button(0))
-    with pytest.raises(Error, match="no place"):
+    with pytest.raises(Error, match="not a position"):
         app.add(Popup(label(), "Here")).move(float("nan"), 0)
 
 

@@ -67,7 +67,7 @@ def test_registering_again_returns_the_same(owner: Any) -> None:
     assert owner.registerFloatProperty("Speed", 0.5, "now in km/h", {"max": 1}) is speed
     # What is out of the new range is the default.
     assert (speed.get(), speed.description, changes) == (0.0, "now in km/h", [1.5, 0.0])
-    with pytest.raises(Error, match="Speed: there is one of this name already, of kind float"):
+    with pytest.raises(Error, match="Speed: a property of this name exists, of kind float"):
         owner.registerStringProperty("Speed")
     owner.begin_load()
     assert owner.registerStringProperty("Speed", "fast").get() == "fast"
@@ -85,7 +85,7 @@ def test_parents(owner: Any) -> None:
     vector = owner.registerVectorProperty("Vector")
     with pytest.raises(Error, match="is a vector, which holds no others"):
         owner.registerBoolProperty(vector, "Inner")
-    with pytest.raises(Error, match="by this name"):
+    with pytest.raises(Error, match="files store the parent's own value "):
         owner.registerBoolProperty(inner, "Value")
 
 

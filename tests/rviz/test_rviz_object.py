@@ -204,12 +204,12 @@ def test_properties_of_displays(app: Any, displays: Any, qml: Any) -> None:
             "root.grid.get('Colour')": "did you mean Color",
             "root.grid.set('Color', 'no colour')": "expected a colour",
             "root.grid.set('Plane', 'YX')": "one of XY, XZ, YZ",
-            "root.grid.set('Plane Cell Count', 1.5)": "a whole number",
+            "root.grid.set('Plane Cell Count', 1.5)": "a 32-bit integer",
             # Ogre would end the process.
             "root.grid.set('Offset/X', NaN)": "a finite number",
             "root.grid.set('Offset', [0, Infinity, 0])": "a finite number",
             "root.grid.set('Cell Size', 1e300)": "a finite number",
-            "root.grid.set('Alpha', 7)": "has made it 1.0",
+            "root.grid.set('Alpha', 7)": "has set 1.0",
             "rviz.setProperty('Global Options', 7)": "has no value of its own",
         }
     )
@@ -381,8 +381,8 @@ def test_the_view(app: Any, qml: Any, wait: Any) -> None:
     here.refuses(
         {
             # RViz itself crashes at those.
-            "rviz.view.type = 'rviz/Nope'": "there is no kind of view",
-            "rviz.view.showView('Above')": "none is saved yet",
+            "rviz.view.type = 'rviz/Nope'": "there is no view type",
+            "rviz.view.showView('Above')": "no views are saved",
             "rviz.view.moveEye(5)": "expected x, y and z",
             "rviz.view.moveEye([1, 2, 3], {animated: 1})": "there is no option 'animated'",
             "rviz.view.setMode(7)": "0 (3D)",

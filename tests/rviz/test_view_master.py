@@ -80,7 +80,7 @@ def test_rviz_says_what_to_do(app: Any, wait: Any) -> None:
     watch.on_answer(ConnectionLostError("http://robot:11311 does not answer"))
     shown = app.window.widget.statusBar().findChild(QtWidgets.QLabel, "masterProblem")
     assert shown.text() == watch.advice
-    assert "start roscore and RViz anew" in watch.advice
+    assert "restart roscore and RViz" in watch.advice
     assert "does not answer" in shown.toolTip()
     watch.on_answer(usual + 1)
     assert "restart RViz" in shown.text()

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 POINT = "expected x, y and z in metres, e.g. Qt.vector3d(1, 2, 0), got "
 MODE = "expected rviz.view.MODE_3D (0) or MODE_2D (1), got "
 FRAME = "expected the name of a frame, or '' for none, got "
-VIEW = "expected a kind of view, e.g. 'rviz/Orbit', got "
+VIEW = "expected a view type, e.g. 'rviz/Orbit', got "
 NAME = "expected a name for the view, a text of one line, got "
 WRONG = {
     "mode = 7": "rviz.view.mode: there is no view mode 7: expected 0 (3D) or 1 (2D)",
@@ -30,8 +30,8 @@ WRONG = {
     "animationDuration = true": "animationDuration: expected a number from 0 to 60, got true",
     "trackingGain = NaN": "rviz.view.trackingGain: expected a number from 0 to 1000, got NaN",
     "trackingGain = []": "rviz.view.trackingGain: expected a number from 0 to 1000, got []",
-    "type = 'orbit'": "there is no kind of view 'orbit'; did you mean rviz/Orbit?; there are",
-    "type = 'rviz/Orbi'": "there is no kind of view 'rviz/Orbi'; did you mean rviz/Orbit",
+    "type = 'orbit'": "there is no view type 'orbit'; did you mean rviz/Orbit?; there are",
+    "type = 'rviz/Orbi'": "there is no view type 'rviz/Orbi'; did you mean rviz/Orbit",
     "type = 5": f"rviz.view.type: {VIEW}5",
     "eye = Qt.vector3d(1, 2, 3)": "read-only",
     "moveEye()": "rviz.view.moveEye(eye[, options]): eye must be given",
@@ -52,8 +52,8 @@ WRONG = {
     "track(null)": f"rviz.view.track: {FRAME}null",
     "track(['map'])": f"rviz.view.track: {FRAME}['map']",
     "saveView('')": f"rviz.view.saveView: {NAME}''",
-    "showView('x')": "rviz.view.showView: there is no saved view 'x'; none is saved yet",
-    "removeView(null)": "rviz.view.removeView: there is no saved view null; none is saved yet",
+    "showView('x')": "rviz.view.showView: there is no saved view 'x'; no views are saved",
+    "removeView(null)": "rviz.view.removeView: there is no saved view null; no views are saved",
     "removeView()": "rviz.view.removeView(name): name must be given",
     "misspelled = 1": "rviz.view has no member 'misspelled'",
 }

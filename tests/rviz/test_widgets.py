@@ -179,10 +179,10 @@ def test_what_is_no_widget_is_refused(app: Any) -> None:
     from rosglass.rviz import WidgetOverlay
     from rosglass.rviz.qt5 import QtWidgets
 
-    with pytest.raises(Error, match="is no QWidget"):
+    with pytest.raises(Error, match="is not a QWidget"):
         WidgetOverlay(lambda: 5, "Five")
     outer = QtWidgets.QWidget()
-    with pytest.raises(Error, match="give it no parent"):
+    with pytest.raises(Error, match="pass one without a parent"):
         WidgetOverlay(QtWidgets.QLabel(outer), "Inner")
     with pytest.raises(Error, match="No such file"):
         WidgetOverlay(QtWidgets.QLabel, style_sheet="none.qss".upper())
@@ -202,9 +202,9 @@ def test_what_is_no_overlay_is_refused(app: Any) -> None:
 
     with pytest.raises(Error, match=r"overlay Nameless: its __init__ must call super\(\)"):
         app.add(Nameless())
-    with pytest.raises(Error, match=r"got the class; make one of it: Nameless\(\)"):
+    with pytest.raises(Error, match=r"got the class; create an instance: Nameless\(\)"):
         app.add(Nameless)
-    with pytest.raises(Error, match=r"got 'panel'; WidgetOverlay\(widget\) makes one"):
+    with pytest.raises(Error, match=r"got 'panel'; use WidgetOverlay\(widget\)"):
         app.add("panel")
     for option in ("z", "scale", "opacity"):
         with pytest.raises(Error, match=f"overlay Top: {option} .*'high'"):

@@ -157,7 +157,7 @@ class Access(QtCore.QObject):
             Error: The folder does not exist, or no config file is loaded and none is given.
         """
         if not (file or self.window.config):
-            raise Error("no config file is loaded; say where to save it")
+            raise Error("no config file is loaded; give the file to save to")
         self.window.save_config(file)
 
     @property

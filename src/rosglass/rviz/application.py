@@ -125,7 +125,7 @@ class Application(Handle):
         if threading.current_thread() is not threading.main_thread():
             raise Error("RViz must be made in the main thread of the program")
         if Application._made:
-            raise Error("there was an RViz in this process: its renderer cannot be started again")
+            raise Error("this process has created an RViz before; its renderer cannot be restarted")
         if url and not url.startswith("ros1:"):
             raise Error(f"RViz is a program of ROS 1: expected its master, ros1://..., got {url}")
         remappings = Arguments.parse(ros_arguments)
@@ -161,7 +161,7 @@ class Application(Handle):
         if received:
             _raise_signal(received[0])
         if not answers:
-            raise ConnectionLostError(f"the ROS master at {options.master} is not waited for")
+            raise ConnectionLostError(f"waiting for the master at {options.master} was cancelled")
         self.window.bare.on = bare
         self._owns_session = session is None
         #: The session of the overlays.
@@ -357,13 +357,13 @@ class Application(Handle):
             return
         self._timer.stop()
         _log.error(
-            "the node %s was shut down, by rosnode kill or another node of its name: RViz ends",
+            "RViz exits: its node %s was shut down, by rosnode kill or a node of the same name",
             self.node_name,
         )
         self.quit()
 
     def _on_killed(self) -> None:
-        _log.error("RViz ends with the overlays' node: %s", self.session.detail)
+        _log.error("RViz exits, because the overlays' node was shut down: %s", self.session.detail)
         self.quit(1)
 
     def _show_problem(self, problem: str) -> None:
@@ -412,7 +412,7 @@ def _master_url(options: Ros1Options) -> str:
 
 def _check_frame(frame: str) -> None:
     if not frame or frame != frame.strip() or frame.startswith("/"):
-        raise Error(f"fixed_frame: {frame!r} is no name of a frame; expected e.g. 'map'")
+        raise Error(f"fixed_frame: expected the name of a frame, e.g. 'map', got {frame!r}")
 
 
 def _attempt(step: Callable[[], object]) -> None:
@@ -420,7 +420,7 @@ def _attempt(step: Callable[[], object]) -> None:
     try:
         step()
     except Exception:
-        _log.exception("ending RViz: a part of it failed, the rest goes on")
+        _log.exception("closing RViz: a step failed, continuing with the next one")
 
 
 def _raise_signal(number: int) -> None:

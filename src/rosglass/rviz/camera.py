@@ -224,7 +224,7 @@ class Picker:
         if path.suffix.lower().lstrip(".") not in known:
             raise Error(f"{path}: the name must end in one of .{', .'.join(known)}")
         if not path.parent.is_dir():
-            raise Error(f"{path}: there is no folder {path.parent}; make it first")
+            raise Error(f"{path}: there is no folder {path.parent}; create it first")
         image = self._grab_window() if window else self.picture()
         writer = QtGui.QImageWriter(str(path))
         if not writer.write(image):
@@ -253,13 +253,11 @@ class Picker:
 
     def _drawn(self, read: Any) -> Any:
         if self._busy:
-            raise Error("the 3D view is being looked at already; call it again later")
+            raise Error("the 3D view is being captured already; try again later")
         if not self._window.panel.isVisible():
-            raise Error("the 3D view is not shown now")
+            raise Error("the 3D view is not visible")
         if QtGui.QOpenGLContext.currentContext() is not None:
-            raise Error(
-                "this cannot be asked while the interface itself is being drawn; use Qt.callLater()"
-            )
+            raise Error("this cannot be called while an overlay is being drawn; use Qt.callLater()")
         self._busy = True
         try:
             with keep_context():

@@ -231,15 +231,15 @@ class Entry(QtCore.QObject):
             own.register(
                 "path", "Path", description=about, filter="QML files (*.qml);;All files (*)"
             )
-        about = "Overlays of higher numbers are above those of lower."
+        about = "Overlays with higher numbers are on top."
         own.register("int", "Z-Index", description=about)
         low, high = SCALES
-        about = "Pixels of the 3D view for one unit of the overlay."
+        about = "Pixels of the 3D view per unit of the overlay."
         own.register("float", "Scale", default=1.0, min=low, max=high, description=about)
-        about = "From 0, where nothing is seen, to 1."
+        about = "From 0 (invisible) to 1."
         own.register("float", "Opacity", default=1.0, min=0.0, max=1.0, description=about)
         if self.is_qml:
-            about = "Show the file anew when it, or one that it uses, is saved."
+            about = "Reload when the file, or one that it uses, is saved."
             own.register("bool", "Live Reload", description=about)
 
     def _watch_own(self, name: str) -> None:
@@ -267,8 +267,8 @@ class Entry(QtCore.QObject):
                 paths = self._import_paths
                 self.attach(QmlOverlay(self.file, self._session, name, import_paths=paths))
             elif make is None:
-                advice = f"its class {self.class_id} is unknown; rosglass.rviz.register() it"
-                self._failed = f"the program has shown no overlay {name!r} yet, and {advice}"
+                advice = f"its class {self.class_id} is unknown; call rosglass.rviz.register()"
+                self._failed = f"the program has not added an overlay {name!r}, and {advice}"
                 self.status(self._row, _WARN, self._failed)
             else:
                 self.attach(make(name))
@@ -306,7 +306,7 @@ class Entry(QtCore.QObject):
         """
         self.overlay, self._shown_file = overlay, self.file
         if hasattr(overlay, "style_sheet") and "Style Sheet" not in self.own.properties:
-            about = "A .qss file, a package:// URL of one, or a style sheet itself."
+            about = "A .qss file, its package:// URL, or a literal style sheet."
             self.own.register(
                 "string", "Style Sheet", default=overlay.style_sheet, description=about
             )
@@ -401,7 +401,7 @@ class Entry(QtCore.QObject):
         overlay = self.overlay
         if overlay is not None and overlay.properties.properties and self._tree is None:
             _, held = _classes()
-            about = "What the overlay itself has declared to be set by you."
+            about = "Settings that the overlay provides."
             self._holder = owned_by_rviz(held(_CONFIGURATION, None, about, self.display))
             self._tree = PropertyTree(overlay.properties, self._holder, self._choices)
 

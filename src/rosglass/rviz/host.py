@@ -58,7 +58,7 @@ def require_rviz() -> None:
     require_bindings()
     if BINDING != "PySide2":
         raise UnsupportedError(
-            f"RViz uses Qt 5, and this process {BINDING} already: import rosglass.rviz first, or "
+            f"RViz uses Qt 5, but this process has {BINDING}: import rosglass.rviz first, or "
             "set ROSGLASS_QT=pyside2"
         )
     rviz()
@@ -77,7 +77,7 @@ def _advising(name: str) -> Iterator[None]:
         yield
     except ImportError as error:
         raise UnsupportedError(
-            f"{name} is installed but cannot be loaded: {error}; install anew what it comes with: "
+            f"{name} is installed but cannot be loaded: {error}; reinstall its packages: "
             f"sudo apt install --reinstall --no-install-recommends {PACKAGES}"
         ) from None
 
@@ -151,7 +151,7 @@ def _library(name: str) -> ctypes.CDLL:
         file = line.split(maxsplit=5)[-1]
         if Path(file).name.startswith(f"{name}.so"):
             return ctypes.CDLL(file)
-    raise UnsupportedError(f"RViz's bindings come without {name}: they are none of RViz 1")
+    raise UnsupportedError(f"RViz's bindings have not loaded {name}: they are not those of RViz 1")
 
 
 def cpp_function(library: str, symbol: str, result: Any = None) -> Any:
@@ -169,7 +169,7 @@ def cpp_function(library: str, symbol: str, result: Any = None) -> Any:
         found = _library(library)[symbol]
     except AttributeError:
         raise UnsupportedError(
-            f"{library} has no {symbol}: it was built for another C++ library than GNU's"
+            f"{library} has no {symbol}: it was not built with GNU's C++ library"
         ) from None
     found.restype = result
     return found

@@ -250,7 +250,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             return
         for which in (before, overlay):
             if which is not None:
-                with guarded(which, "getting or losing the keys"):
+                with guarded(which, "changing the keyboard focus"):
                     which.set_focus(which is overlay)
 
     def forget(self, overlay: Overlay) -> None:
@@ -331,7 +331,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
 
     @staticmethod
     def _leave(overlay: Overlay) -> None:
-        with guarded(overlay, "hearing that the mouse is gone"):
+        with guarded(overlay, "handling that the mouse has left"):
             overlay.leave()
 
     # Mouse
@@ -411,7 +411,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             self.hover(None)
 
     def _show_cursor(self, overlay: Overlay) -> None:
-        with guarded(overlay, "choosing the mouse's shape"):
+        with guarded(overlay, "choosing the cursor"):
             self._panel.setCursor(overlay.cursor() or QtGui.QCursor(QtCore.Qt.ArrowCursor))
 
     def _left(self, event: Any) -> bool:
@@ -499,7 +499,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
                 self._cancel_input()
         for focus in changes:
             if self._focused is not None:
-                with guarded(self._focused, "getting or losing the keys"):
+                with guarded(self._focused, "changing the keyboard focus"):
                     self._focused.set_focus(focus)
         return False
 

@@ -387,4 +387,4 @@ def _check(pixels: object, size: tuple[int, int, float]) -> None:
         isinstance(pixels, np.ndarray) and pixels.dtype == np.uint32 and pixels.shape == wanted
     ):
         kind = f"{pixels.dtype}{pixels.shape}" if isinstance(pixels, np.ndarray) else type(pixels)
-        raise Error(f"draw() must return an array of uint32 of shape {wanted}, and returned {kind}")
+        raise Error(f"draw() must return an array of uint32 of shape {wanted}, but returned {kind}")

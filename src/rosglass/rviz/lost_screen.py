@@ -35,10 +35,10 @@ _EXIT_CODE = 1
 _EVENT_MASK, _STRUCTURE, _DESTROYED = 1 << 11, 1 << 17, 17
 #: X.h, Xproto.h: BadDrawable, X_GetGeometry.
 _NO_DRAWABLE, _GET_GEOMETRY = 9, 14
-_BROKEN = "the connection to the X server (DISPLAY {display}) is broken: RViz ends"
+_BROKEN = "the connection to the X server (DISPLAY {display}) is broken: RViz exits"
 _WINDOW = (
-    "RViz's window was destroyed by another program (xdotool windowclose, xkill), or by this one, "
-    "as setWindowFlags() does: RViz ends"
+    "RViz's window was destroyed by another program (xdotool windowclose, xkill), or by this one "
+    "(e.g. in setWindowFlags()): RViz exits"
 )
 
 

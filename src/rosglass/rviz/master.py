@@ -174,8 +174,8 @@ class MasterWatch(QtCore.QObject):
         if not self._problem:
             return ""
         if self.replaced:
-            return "The ROS master was started anew: restart RViz, its displays get nothing new"
-        return "No answer from the ROS master: mend the network, or start roscore and RViz anew"
+            return "The ROS master was restarted: restart RViz, its displays find no new topics"
+        return "No answer from the ROS master: check the network, or restart roscore and RViz"
 
     def close(self) -> None:
         """Stop watching."""
@@ -186,11 +186,11 @@ class MasterWatch(QtCore.QObject):
         problem = ""
         self.replaced = not isinstance(answer, Error) and self.number not in (-1, answer)
         if isinstance(answer, Error):
-            problem = f"{answer}; what is received already goes on, nothing new is found"
+            problem = f"{answer}; existing connections stay, but new topics are not found"
         elif self.replaced:
             problem = (
-                f"the ROS master at {self._uri} was started anew and knows nothing of this RViz: "
-                "its displays find no new topics until RViz is started again"
+                f"the ROS master at {self._uri} was restarted, without this RViz's registrations: "
+                "its displays find no new topics until RViz is restarted"
             )
         else:
             self.number = answer

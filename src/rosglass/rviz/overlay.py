@@ -151,7 +151,7 @@ class Overlay(QtCore.QObject):
         """Called before any other method, with the RViz window to draw over."""
 
     def _missing(self, method: str) -> str:
-        return f"overlay {self.name}: its class {type(self).__name__} has to give {method}"
+        return f"overlay {self.name}: its class {type(self).__name__} must implement {method}"
 
     def resize(self, width: int, height: int, ratio: float) -> None:
         """Set the size to draw.
@@ -225,14 +225,14 @@ def register(kind: _T, class_id: str = "", make: Callable[[str], Overlay] | None
         Error: `kind` is not an overlay class, or the class id is taken or invalid.
     """
     if not isinstance(kind, type) or not issubclass(kind, Overlay):
-        raise Error(f"{kind!r:.80} is no class derived from rosglass.rviz.Overlay")
+        raise Error(f"{kind!r:.80} is not a class derived from rosglass.rviz.Overlay")
     name = class_id or _own_id(kind)
     if not _CLASS_ID.match(name):
         raise Error(f"the class id {name!r} is not of the form package/Class")
     taken = next((one for one, taken in _ids.items() if taken == name and one is not kind), None)
     if name in {QML_CLASS, REFERENCE_QML_CLASS} or taken is not None:
         whose = taken.__qualname__ if taken is not None else "QML files"
-        raise Error(f"the class id {name!r} is that of {whose}; give another one")
+        raise Error(f"the class id {name!r} is used by {whose} already; choose another one")
     _makers[name] = make or (lambda overlay_name: kind(name=overlay_name))
     _ids[kind] = name
     return kind

@@ -68,7 +68,7 @@ def require_class_id(class_id: object, base: str) -> str:
             return class_id
     near = similar(class_id, declared(base)) if isinstance(class_id, str) else ""
     example = _EXAMPLES[base]
-    raise Error(f"expected the id of a class, e.g. {example!r}, got {shown(class_id)}{near}")
+    raise Error(f"expected a class id, e.g. {example!r}, got {shown(class_id)}{near}")
 
 
 def _descriptions() -> Iterator[str]:
@@ -140,11 +140,11 @@ class Watched(QtCore.QObject):
 
     def _sync_items(self) -> None:
         """Update the items; drop handles that RViz is about to delete: addresses are reused."""
-        raise NotImplementedError(f"{type(self).__name__} has to give _sync_items()")
+        raise NotImplementedError(f"{type(self).__name__} must implement _sync_items()")
 
     def _sync_rest(self) -> Callable[[], None]:
         """Read other state that may have changed; return a function that emits its signals."""
-        raise NotImplementedError(f"{type(self).__name__} has to give _sync_rest()")
+        raise NotImplementedError(f"{type(self).__name__} must implement _sync_rest()")
 
     def _on_change(self) -> None:
         self._sync_items()

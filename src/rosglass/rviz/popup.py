@@ -114,7 +114,7 @@ class Popup(WidgetOverlay):
             Error: The position is not finite.
         """
         if not (math.isfinite(x) and math.isfinite(y)):
-            raise Error(f"popup {self.name}: ({x:g}, {y:g}) is no place")
+            raise Error(f"popup {self.name}: ({x:g}, {y:g}) is not a position")
         self._stop_following()
         self._move_to_point(x, y)
 

@@ -139,7 +139,7 @@ def write_property(item: Any, value: Any, name: str = "") -> None:
     item.setValue(given)
     now = read_property(item)
     if not _same(now, wanted):
-        raise Error(f"{name}: RViz does not take {shown(value)}, and has made it {shown(now)}")
+        raise Error(f"{name}: RViz did not accept {shown(value)}, and has set {shown(now)}")
 
 
 def describe_properties(item: Any, path: str = "") -> list[dict[str, Any]]:
@@ -199,7 +199,7 @@ def _convert(item: Any, kind: str, value: Any, name: str) -> tuple[Any, Any]:
         number = _number(value, name)
         if isinstance(now, int):
             if number != int(number) or not _INT32[0] <= number <= _INT32[1]:
-                raise Error(f"{name}: expected a whole number of 32 bits, got {shown(value)}")
+                raise Error(f"{name}: expected a 32-bit integer, got {shown(value)}")
             return int(number), int(number)
         return number, number
     choices = _choices(item) if kind == "rviz::EnumProperty" else []
@@ -238,7 +238,7 @@ def _colour(value: Any, name: str) -> tuple[str, str]:
     if not colour.isValid():
         raise Error(f"{name}: expected a colour, e.g. '#ff8800' or 'orange', got {shown(value)}")
     if colour.alpha() != 255:
-        raise Error(f"{name}: RViz keeps no transparency with a colour; set the property Alpha")
+        raise Error(f"{name}: RViz's colours have no transparency; set the property Alpha")
     plain = (colour.red(), colour.green(), colour.blue())
     return "#{:02x}{:02x}{:02x}".format(*plain), "; ".join(map(str, plain))
 
@@ -430,7 +430,7 @@ def log_errors(otherwise: Any = None) -> Callable[[Any], Any]:
             try:
                 return function(*arguments)
             except Exception:
-                _log.exception("RViz goes on without %s", function.__qualname__)
+                _log.exception("%s failed, RViz continues", function.__qualname__)
                 return otherwise
 
         return call

@@ -154,7 +154,7 @@ class _Number(Kind, ABC):
                 raise Error(f"{name}: expected {self.WANTED}, got {shown(value)}")
             setattr(self, name, given)
         if self.min > self.max:
-            raise Error(f"min {self.min} is above max {self.max}; exchange them")
+            raise Error(f"min {self.min} is above max {self.max}; swap them")
         self.step = self._number(options.get("step", 1))
         if self.step is None or self.step <= 0:
             raise Error(f"step {options['step']!r} is not above 0")
@@ -274,7 +274,7 @@ class _Enum(_String):
             )
         self.choices = [super(_Enum, self).read(choice) for choice in choices]
         if len(set(self.choices)) < len(self.choices):
-            raise Error(f"choices: {shown(choices)} has one of them twice")
+            raise Error(f"choices: {shown(choices)} has duplicates")
 
     @property
     def default(self) -> str:

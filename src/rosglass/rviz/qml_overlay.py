@@ -555,11 +555,11 @@ class QmlOverlay(QmlInput, Overlay):
             return
         if isinstance(root, QtQuick.QQuickWindow):
             root.setVisible(False)
-            what = "a window, and RViz's 3D view is the window here: write Item { } in its place"
+            what = "a window; overlays are shown in RViz's window: use Item { } instead"
         else:
-            what = f"a {_kind(root)}: put what it holds into an Item {{ }}"
+            what = f"a {_kind(root)}: put its content into an Item {{ }}"
         self._live.drop(made)
-        raise QmlError(f"{self.file}: the root of an overlay must be an Item, and is {what}")
+        raise QmlError(f"{self.file}: the root of an overlay must be an Item, but is {what}")
 
     def _show(self, root: Any) -> None:
         # Release mouse and focus of the items that are about to be deleted.

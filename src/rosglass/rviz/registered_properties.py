@@ -144,7 +144,7 @@ class RegisteredProperty(QtCore.QObject):
             try:
                 kind.read(self._value)
             except Error as error:
-                _log.warning("property %s: %s; it is %r now", self._name, error, kind.default)
+                _log.warning("property %s: %s; reset to %r", self._name, error, kind.default)
                 self.set(kind.default)
 
     def restore(self, saved: Any) -> None:
@@ -157,9 +157,7 @@ class RegisteredProperty(QtCore.QObject):
         try:
             value = self.kind.restore(own)
         except Error as error:
-            _log.warning(
-                "property %s: the file's value is left out: %s", "/".join(self.path), error
-            )
+            _log.warning("property %s: ignoring the file's value: %s", "/".join(self.path), error)
             return
         self.set(value)
 
@@ -318,8 +316,8 @@ class RegisteredProperties(QtCore.QObject):
         if found is not None and kind != found.kind.NAME:
             if found not in self._older:
                 raise Error(
-                    f"{name}: there is one of this name already, of kind {found.kind.NAME}; "
-                    "give this one another name"
+                    f"{name}: a property of this name exists, of kind {found.kind.NAME}; "
+                    "choose another name"
                 )
             self.unregister(found)
             found = None
@@ -378,7 +376,7 @@ class RegisteredProperties(QtCore.QObject):
             what = f"{parent.path[-1]} is a {parent.kind.NAME}"
             raise Error(f"{name}: {what}, which holds no others; register a container for them")
         if name == "Value" and parent.kind.NAME != "container":
-            raise Error(f"{name}: files keep the parent's own value by this name; take another one")
+            raise Error(f"{name}: files store the parent's own value as Value; choose another name")
         return parent.properties
 
     def all(self) -> Iterator[RegisteredProperty]:

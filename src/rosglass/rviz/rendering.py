@@ -93,7 +93,7 @@ class Offscreen:
             self._surface.create()
             if not (made and self.context.makeCurrent(self._surface)):
                 raise UnsupportedError(
-                    "Qt can make no OpenGL context here; QT_QUICK_BACKEND=software draws without"
+                    "Qt cannot create an OpenGL context here; set QT_QUICK_BACKEND=software"
                 )
             self.context.doneCurrent()
 
@@ -241,7 +241,7 @@ class OpenGLRenderer:
                 QtGui.QOpenGLFramebufferObject.CombinedDepthStencil,
             )
             if not self._buffer.isValid():
-                raise UnsupportedError(f"OpenGL makes no buffer of {width}x{height} pixels here")
+                raise UnsupportedError(f"OpenGL cannot create a buffer of {width}x{height} pixels")
             self._window.setRenderTarget(self._buffer)
         self._shape, self._pixels = (height, width), None
         return ratio

@@ -57,9 +57,7 @@ def _has(name: str) -> bool:
 
 def _advice(missing: list[str]) -> str:
     lacks = ", ".join(_without_parts(missing))
-    lines = [
-        f"RViz is used through the system's own Python; this one, {sys.executable}, lacks {lacks}."
-    ]
+    lines = [f"RViz needs the system's Python; this one, {sys.executable}, lacks {lacks}."]
     installed = (_SYSTEM / "rviz").exists() and any(_SYSTEM.glob("PySide2/QtWidgets*.so"))
     own_python = _is_system_python()
     if own_python or not installed:
@@ -69,14 +67,14 @@ def _advice(missing: list[str]) -> str:
         checkout = (root / "pyproject.toml").exists()
         ready = root / ".venv-system" / "bin" / "rosglass"
         if ready.exists():
-            lines.append(f"Run it so: {ready} rviz ...")
+            lines.append(f"Run: {ready} rviz ...")
         else:
             source = f"-e {root}" if checkout else "rosglass"
             lines += [
-                "Make an environment from the system's Python, once:",
+                "Create an environment from the system's Python, once:",
                 "    /usr/bin/python3 -m venv --system-site-packages ~/rosglass-rviz",
                 f"    ~/rosglass-rviz/bin/pip install {source}",
-                "Run it so: ~/rosglass-rviz/bin/rosglass rviz ...",
+                "Run: ~/rosglass-rviz/bin/rosglass rviz ...",
             ]
     return "\n".join(lines)
 

@@ -147,7 +147,7 @@ def connect_beside_rviz(
     full = f"{namespace.rstrip('/')}/{name}"
     if full == node_name():
         raise InvalidNameError(
-            f"{full} is RViz's own node, which the master would end for a second one of its name; "
+            f"{full} is RViz's own node, which a second node of its name would shut down; "
             "give the overlays' node or RViz another name"
         )
     return connect(url, name, namespace, arguments=arguments)

@@ -142,7 +142,7 @@ class QmlToolManager(Face):
             return None
         return self.faces.of(self.model.add(class_id))  # type: ignore[no-any-return]
 
-    @slot(classId=text("the id of a class, e.g. 'rviz/Measure'"))
+    @slot(classId=text("a class id, e.g. 'rviz/Measure'"))
     def getTool(self, class_id: str) -> QmlTool | None:
         """Return the first tool of a class; null if there is none."""
         return self.faces.of(self.model.find(class_id))  # type: ignore[no-any-return]
@@ -161,7 +161,7 @@ class QmlToolManager(Face):
         if isinstance(wanted, int) and not isinstance(wanted, bool):
             if 0 <= wanted < len(there):
                 return there[wanted]  # type: ignore[no-any-return]
-            known = f"there are {len(there)}, the first one is 0" if there else "there are none"
+            known = f"there are {len(there)}, numbered from 0" if there else "there are none"
             raise Error(f"there is no tool {wanted}; {known}")
         if isinstance(wanted, str):
             found = self.model.find(wanted)
@@ -171,7 +171,7 @@ class QmlToolManager(Face):
             named = [t.class_id for t in there if wanted in (t.name, t.class_id.rpartition("/")[2])]
             hint = f"; did you mean {named[0]!r}?" if named else f"; there are: {known}"
             raise Error(f"there is no tool of the class {shown(wanted)}{hint}")
-        raise Error(f"expected a tool, its place, or the id of a class, got {shown(wanted)}")
+        raise Error(f"expected a tool, its index, or a class id, got {shown(wanted)}")
 
     @Slot()
     def _on_selected(self) -> None:
@@ -331,7 +331,7 @@ class QmlView(Face):
         VARIANT,
         typeChanged,
         of="views.kind",
-        takes=text("a kind of view, e.g. 'rviz/Orbit'"),
+        takes=text("a view type, e.g. 'rviz/Orbit'"),
     )
     viewTypes = member("viewTypes", LIST, of="views.kinds")
     #: Names of the saved views.
@@ -467,7 +467,7 @@ class RvizObject(RegisteredProperties):
         """
         found: Access | None = self.runtime.session.shared.get(ACCESS)
         if found is None:
-            raise Error("there is no RViz: the overlay's session is not that of an Application")
+            raise Error("there is no RViz: the overlay's session belongs to no Application")
         return found
 
     @cached_property

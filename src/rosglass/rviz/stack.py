@@ -229,8 +229,8 @@ def _no_overlay(given: object) -> str:
         kind = type(given).__name__
         return f"overlay {kind}: its __init__ must call super().__init__(), which gives it a name"
     if isinstance(given, type) and issubclass(given, Overlay):
-        return f"expected an overlay, got the class; make one of it: {given.__name__}()"
+        return f"expected an overlay, got the class; create an instance: {given.__name__}()"
     return (
-        f"expected an overlay, got {given!r}; WidgetOverlay(widget) makes one of a widget, and "
-        "app.add_qml(file) one of a QML file"
+        f"expected an overlay, got {given!r}; use WidgetOverlay(widget) for a widget, or "
+        "app.add_qml(file) for a QML file"
     )

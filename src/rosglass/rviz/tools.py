@@ -222,6 +222,6 @@ def failure(handle: Any, class_id: str, base: str) -> str:
         if other != base and class_id in declared(other):
             return f"{class_id} is {what}"
     if class_id in (QML_CLASS, REFERENCE_QML_CLASS):
-        return f"{class_id} is an overlay: the menu Overlays, --overlay and app.add_qml() add them"
+        return f"{class_id} is an overlay: add it by the Overlays menu, --overlay or app.add_qml()"
     hint = similar(class_id, known) or f"; there are: {', '.join(known)}"
     return f"no package has the class {class_id}{hint}"

@@ -113,7 +113,7 @@ class Frames(QtCore.QObject):
         """Return an error text that says which of the two frames is missing."""
         known = [] if self._link is None else sorted(self._link.buffer.tree())
         if not fixed:
-            return f"RViz has no fixed frame, in which {frame!r} could be placed; choose one"
+            return f"RViz has no fixed frame to transform {frame!r} into; choose one"
         if not known:
             return f"there is no frame {frame!r}: nothing is received on /tf and /tf_static"
         there = f"there are {', '.join(known[:_MAX_NAMED_FRAMES])}" + (
@@ -123,9 +123,9 @@ class Frames(QtCore.QObject):
             return f"there is no frame {frame!r}{similar(frame, known) or f'; {there}'}"
         if fixed not in known:
             return (
-                f"{frame!r} has no place, as RViz's fixed frame {fixed!r} does not exist; {there}"
+                f"{frame!r} cannot be shown: RViz's fixed frame {fixed!r} does not exist; {there}"
             )
-        return f"the frame {frame!r} cannot be placed in RViz's fixed frame {fixed!r}: {error}"
+        return f"there is no transform from {frame!r} to RViz's fixed frame {fixed!r}: {error}"
 
     def close(self) -> None:
         """Stop receiving transforms; safe to call twice."""

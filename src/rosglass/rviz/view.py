@@ -120,7 +120,7 @@ class ViewSettings:
         "float",
         "Animation Duration",
         1.0,
-        "Seconds that a movement takes; 0 jumps.",
+        "Duration of a camera movement in seconds; 0 jumps.",
         min=0.0,
         max=60.0,
         step=0.1,
@@ -129,8 +129,8 @@ class ViewSettings:
         "float",
         "Tracking Gain",
         3.0,
-        "How quickly the camera follows the tracked frame, in 1/s: high ones follow at once, "
-        "low ones smoothly.",
+        "How quickly the camera follows the tracked frame, in 1/s: high values follow at once, "
+        "low values smoothly.",
         min=0.0,
         max=1000.0,
         step=0.5,
@@ -140,7 +140,7 @@ class ViewSettings:
         "Keyboard Navigation",
         True,
         "Whether arrow keys shift the view, twice as fast with Shift, and Ctrl+D switches between "
-        "2D and 3D, while the 3D view has the keys.",
+        "2D and 3D, while the 3D view has the keyboard focus.",
     )
     speed = _Setting(
         "float",
@@ -154,13 +154,13 @@ class ViewSettings:
         "bool", "Enable Topics", True, "Whether the mode and the tracked frame are published."
     )
     services = _Setting(
-        "bool", "Enable Services", True, "Whether robots may move the camera by services."
+        "bool", "Enable Services", True, "Whether robots may move the camera through services."
     )
     namespace = _Setting(
         "string",
         "Namespace",
         "~hector_view_controller",
-        "Where topics and services are: a name of ROS, of which ~ stands for RViz's node.",
+        "Namespace of the topics and services: a ROS name, in which ~ stands for RViz's node.",
         lambda name: expand(name, "rviz", "/"),
     )
 
@@ -571,7 +571,7 @@ class View(QtCore.QObject):
             Error: The frame is unknown.
         """
         if not isinstance(frame, str):
-            raise Error(f"a frame is named by a text, not by {shown(frame)}")
+            raise Error(f"expected the name of a frame, got {shown(frame)}")
         if frame:
             self._frames.locate(frame)
         if frame == self._tracked:
@@ -749,7 +749,7 @@ class View(QtCore.QObject):
         if not all(math.isfinite(number) for number in (x, y, z)):
             raise Error(f"expected finite metres, got {shown([x, y, z])}")
         if not isinstance(frame, str):
-            raise Error(f"a frame is named by a text, not by {shown(frame)}")
+            raise Error(f"expected the name of a frame, got {shown(frame)}")
         point = Point(x, y, z)
         if frame:
             point = Point(*self._frames.locate(frame).apply_point(point))
@@ -817,7 +817,7 @@ class Views(QtCore.QObject):
         # RViz crashes on an unknown type.
         if kind not in declared(VIEW):
             raise Error(
-                f"there is no kind of view {shown(kind)}{self._hint(kind)}; "
+                f"there is no view type {shown(kind)}{self._hint(kind)}; "
                 f"there are {', '.join(self.kinds)}"
             )
         if kind != self.kind:
@@ -889,7 +889,7 @@ class Views(QtCore.QObject):
             return saved.index(name)
         if isinstance(name, int) and not isinstance(name, bool) and 0 <= name < len(saved):
             return name
-        there = f"saved are {', '.join(map(repr, saved))}" if saved else "none is saved yet"
+        there = f"saved views: {', '.join(map(repr, saved))}" if saved else "no views are saved"
         raise Error(f"there is no saved view {shown(name)}; {there}")
 
     def _on_change(self) -> None:

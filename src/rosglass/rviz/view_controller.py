@@ -270,7 +270,7 @@ class ViewServices(QtCore.QObject):
             self._set_problem(wanted.wrong)
             return
         if node.wire != "ros1":
-            self._set_problem(f"{node.url}: the services of the camera are of ROS 1")
+            self._set_problem(f"{node.url}: the camera's services need ROS 1")
             return
         made = self._making = _Made()
 
@@ -443,8 +443,8 @@ class _Entry:
         self.display.setName(_NAME)
         self.display.setIcon(camera_icon())
         self.display.setDescription(
-            "How the camera is moved by keys, by interfaces and by robots. "
-            "Without this entry, it is as at first."
+            "Settings for moving the camera by keys, overlays and robots. "
+            "Without this entry, the defaults apply."
         )
         self._trees = [
             PropertyTree(owner, self.display, entries.choices)
@@ -492,16 +492,16 @@ class ViewEntry(QtCore.QObject):
         self._loading = self._loaded = False
         #: State of the camera, shown in the panel but not saved.
         self._shown_state = RegisteredProperties()
-        about = "What the camera follows and turns with; empty for nothing."
+        about = "The frame that the camera follows and turns with; empty for none."
         self._frame = self._shown_state.register("frame", "Tracked Frame", description=about)
-        about = "Whether it is seen straight from above, without perspective."
+        about = "Whether to look straight down, without perspective."
         self._flat = self._shown_state.register("bool", "2D Mode", description=about)
         self._frame.valueChanged.connect(self._track)
         self._flat.valueChanged.connect(self._set_2d)
         menu = window.menu("&Overlays")
         self._action = menu.addAction("&View controller")
         self._action.setCheckable(True)
-        self._action.setToolTip("Settings of the camera, among the displays")
+        self._action.setToolTip("Show the settings of the camera in the Displays panel")
         self._choose = log_errors()(self._on_action)
         self._action.triggered.connect(self._choose)
         window.config_loading.connect(self._on_loading)
@@ -591,7 +591,7 @@ class ViewEntry(QtCore.QObject):
         self._frame.set(view.tracked_frame)
         self._flat.set(view.mode is ViewMode.MODE_2D)
         where = services.namespace if services.is_open else "not connected, or switched off"
-        follows = view.tracked_frame or "nothing is followed"
+        follows = view.tracked_frame or "no frame is followed"
         for entry in self._shown:
             for row, problem, fine in (
                 ("Robots", services.problem, where),

@@ -206,7 +206,7 @@ def _check(text: str, what: str) -> None:
         for letter in line:
             depth += (letter == "{") - (letter == "}")
             if depth not in (0, 1):
-                raise Error(f"{what}:{number}: this {letter!r} has no counterpart")
+                raise Error(f"{what}:{number}: this {letter!r} has no matching brace")
     if depth:
         raise Error(f"{what}: the last '{{' is not closed")
 
@@ -619,13 +619,11 @@ def make_widget(widget: Any, name: str) -> Any:
         made = made()
     if not isinstance(made, QtWidgets.QWidget):
         raise Error(
-            f"overlay {name or widget!r}: {made!r} is no QWidget of PySide2; give a widget, or a "
+            f"overlay {name or widget!r}: {made!r} is not a QWidget of PySide2; pass one, or a "
             "function that returns one"
         )
     if made.parentWidget() is not None:
-        raise Error(
-            f"overlay {name or made!r}: the widget is part of another one; give it no parent"
-        )
+        raise Error(f"overlay {name or made!r}: the widget has a parent; pass one without a parent")
     if made.graphicsProxyWidget() is not None:
         raise Error(f"overlay {name or made!r}: another overlay shows the widget already")
     return made

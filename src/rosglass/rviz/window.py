@@ -391,11 +391,9 @@ def config_file(place: str | os.PathLike[str]) -> Path:
     path = locate(place)
     if not path.is_file():
         wrong = "is a folder" if path.is_dir() else "does not exist"
-        raise Error(f"{path} {wrong}; expected a config file of RViz (.rviz){near(path)}")
+        raise Error(f"{path} {wrong}; expected an RViz config file (.rviz){near(path)}")
     if path.suffix == ".qml":
-        raise Error(
-            f"{path} is an interface, not a config file of RViz: rosglass rviz --overlay {path}"
-        )
+        raise Error(f"{path} is a QML file, not an RViz config: use rosglass rviz --overlay {path}")
     try:
         # RViz expands aliases, and recurses into nested values.
         check_yaml(path.read_text(encoding="utf-8", errors="replace"))
@@ -407,5 +405,5 @@ def config_file(place: str | os.PathLike[str]) -> Path:
     if reader.error():
         raise Error(f"{path}: RViz cannot read it: {reader.errorMessage()}")
     if not config.mapGetChild(_CONTENT).isValid():
-        raise Error(f"{path} is no config file of RViz: it has no {_CONTENT!r}")
+        raise Error(f"{path} is not an RViz config: it has no {_CONTENT!r}")
     return path
