@@ -66,7 +66,7 @@ def test_dragging_an_entry_changes_which_is_above(
     assert order(app) == ["Red", "Blue"]
     panel.drag(("Red",), place(panel, "Blue"))
     # It has been there before; two at once would be none.
-    wait(lambda: [overlay.name for overlay in app.entries._order] == ["Red", "Blue"])
+    wait(lambda: [overlay.name for overlay in app.entries._panel_order] == ["Red", "Blue"])
     panel.drag(("Blue",), place(panel, "Red"))
     wait(lambda: order(app) == ["Blue", "Red"])
     # A number counts more than the place.

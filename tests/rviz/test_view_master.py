@@ -75,8 +75,8 @@ def test_rviz_says_what_to_do(app: Any, wait: Any) -> None:
     from rosglass.rviz.qt5 import QtWidgets
 
     watch = app.master
-    wait(lambda: watch.number != -1)
-    usual = watch.number
+    wait(lambda: watch.pid != -1)
+    usual = watch.pid
     watch.on_answer(ConnectionLostError("http://robot:11311 does not answer"))
     shown = app.window.widget.statusBar().findChild(QtWidgets.QLabel, "masterProblem")
     assert shown.text() == watch.advice

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from rosglass.rviz.orbit import STEEPEST, Orbit, Place, Point, ease, shortest_turn
+from rosglass.rviz.orbit import STEEPEST, FramePose, Orbit, Point, ease, shortest_turn
 
 
 def near(a: Point, b: Point, within: float = 1e-9) -> bool:
@@ -45,7 +45,7 @@ def test_movements_turn_the_short_way_and_end_where_they_should() -> None:
 
 
 def test_it_goes_along_with_a_frame() -> None:
-    before, after = Place(Point(1, 1, 0), 0.0), Place(Point(5, 1, 1), math.pi / 2)
+    before, after = FramePose(Point(1, 1, 0), 0.0), FramePose(Point(5, 1, 1), math.pi / 2)
     orbit = Orbit.between(Point(3, 1, 2), Point(2, 1, 0))
     carried = orbit.carried(before, after)
     assert near(carried.focus, Point(5, 2, 1))

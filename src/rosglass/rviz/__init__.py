@@ -34,7 +34,7 @@ __all__ = [
     "register",
 ]
 
-_HOMES = {
+_MODULES = {
     "Anchor": "popup",
     "Application": "application",
     "Button": "popup",
@@ -50,13 +50,13 @@ _HOMES = {
 
 def __getattr__(name: str) -> object:
     # Imported on first use, because modules without Qt must be importable without RViz.
-    if name not in _HOMES:
+    if name not in _MODULES:
         raise AttributeError(f"module 'rosglass.rviz' has no attribute {name!r}")
     if "rosglass.qt" not in sys.modules and find_spec("rviz") is not None:
         # RViz needs Qt 5. Without RViz, the error should be about RViz, not about Qt 5.
         os.environ.setdefault("ROSGLASS_QT", "pyside2")
     with InterruptsDeferred():
-        value: object = getattr(import_module(f"rosglass.rviz.{_HOMES[name]}"), name)
+        value: object = getattr(import_module(f"rosglass.rviz.{_MODULES[name]}"), name)
     globals()[name] = value
     return value
 

@@ -52,7 +52,7 @@ class Access(QtCore.QObject):
     def __init__(self, window: Window, session: Session) -> None:
         super().__init__()
         self.window, self._session = window, session
-        self._rate, self._frames_drawn, self._since = 0.0, 0, time.monotonic()
+        self._frame_rate, self._frames_drawn, self._measured_since = 0.0, 0, time.monotonic()
         window.before_frame.connect(self._on_frame)
         window.config_loaded.connect(self.config_loaded)
         window.bare.changed.connect(self.bare_changed)
@@ -163,7 +163,7 @@ class Access(QtCore.QObject):
     @property
     def frame_rate(self) -> float:
         """Frames that RViz drew in the last second."""
-        return self._rate
+        return self._frame_rate
 
     def close(self) -> None:
         """Stop observing RViz and the robot; safe to call twice."""
@@ -178,8 +178,8 @@ class Access(QtCore.QObject):
 
     def _measure(self) -> None:
         now = time.monotonic()
-        rate = round(self._frames_drawn / max(now - self._since, 0.001), 1)
-        self._frames_drawn, self._since = 0, now
-        if rate != self._rate:
-            self._rate = rate
+        rate = round(self._frames_drawn / max(now - self._measured_since, 0.001), 1)
+        self._frames_drawn, self._measured_since = 0, now
+        if rate != self._frame_rate:
+            self._frame_rate = rate
             self.frame_rate_changed.emit()

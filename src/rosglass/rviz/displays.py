@@ -8,7 +8,7 @@ from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
 from rosglass.rviz.host import address, as_pyside, class_of
-from rosglass.rviz.plugins import DISPLAY, Watched, declared, require_class_id
+from rosglass.rviz.plugins import DISPLAY, PluginList, declared, require_class_id
 from rosglass.rviz.properties import (
     child_properties,
     describe_properties,
@@ -173,7 +173,7 @@ class Display:
         return self.handle
 
 
-class Displays(Watched):
+class Displays(PluginList):
     """The displays of an RViz, including those in groups.
 
     `changed` reports a new name, a new status, and showing or hiding. A display that the user

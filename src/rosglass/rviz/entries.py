@@ -11,7 +11,13 @@ from rosglass.errors import Error, QmlError
 from rosglass.qml.modules import locate
 from rosglass.qt import QtCore, Signal, Slot, is_alive
 from rosglass.rviz.host import AfterEvent, pyqt, rviz
-from rosglass.rviz.overlay import QML_CLASS, REFERENCE_QML_CLASS, SCALES, class_id_of, maker_of
+from rosglass.rviz.overlay import (
+    QML_CLASS,
+    REFERENCE_QML_CLASS,
+    SCALE_LIMITS,
+    class_id_of,
+    factory_of,
+)
 from rosglass.rviz.properties import (
     Choices,
     PropertyTree,
@@ -99,7 +105,7 @@ def _classes() -> tuple[Any, Any]:
     """Return our subclasses of RViz's display, and of the property that holds registered ones."""
     bindings, core = rviz(), pyqt()
 
-    class Held(bindings.Property):  # type: ignore[name-defined,misc]
+    class PropertyGroup(bindings.Property):  # type: ignore[name-defined,misc]
         def load(self, config: Any) -> None:
             """Do nothing: the entry loads it."""
 
@@ -127,7 +133,7 @@ def _classes() -> tuple[Any, Any]:
             # Unlike other groups, it accepts no dropped displays.
             return bindings.DisplayGroup.getViewFlags(self, column) & ~core.Qt.ItemIsDropEnabled
 
-    return Display, Held
+    return Display, PropertyGroup
 
 
 def display_class() -> Any:
@@ -171,13 +177,13 @@ class Entry(QtCore.QObject):
         #: Called when the entry was switched on or off (also by its group), when its Path has
         #: changed, and when RViz has deleted it. Not a signal, because PySide2 would try to
         #: disconnect deleted entries.
-        self.touched: Callable[[], object] = _nothing
+        self.on_changed: Callable[[], object] = _nothing
         #: Called with the entry when it was renamed.
-        self.renamed: Callable[[Entry], object] = _nothing
+        self.on_renamed: Callable[[Entry], object] = _nothing
         #: Called when data that belongs into the config file has changed unknown to RViz.
-        self.edited: Callable[[], object] = _nothing
+        self.on_edited: Callable[[], object] = _nothing
         self.overlay: Overlay | None = None
-        self._failed, self._shown_file = "", ""
+        self._failed, self._loaded_file = "", ""
         self._registered: dict[str, Any] = {}
         self._config: dict[str, Any] = {}
         self._tree: PropertyTree | None = None
@@ -194,20 +200,20 @@ class Entry(QtCore.QObject):
         self.own = RegisteredProperties(self)
         self._register_properties()
         self._own_tree = PropertyTree(self.own, self.display, choices)
-        self._holder: Any = None
-        renamed = log_errors()(lambda _name: self.renamed(self))
+        self._group: Any = None
+        on_renamed = log_errors()(lambda _name: self.on_renamed(self))
         shown = [
-            (self.display.changed, log_errors()(lambda *_: self.touched())),
-            (self.display.objectNameChanged, renamed),
-            (self.display.destroyed, log_errors()(lambda *_: self.touched())),
+            (self.display.changed, log_errors()(lambda *_: self.on_changed())),
+            (self.display.objectNameChanged, on_renamed),
+            (self.display.destroyed, log_errors()(lambda *_: self.on_changed())),
         ]
         for signal, slot in shown:
             signal.connect(slot)
         #: Connections of the display and of its own properties; kept here because Qt's
         #: connections hold no reference to their Python slots.
-        self._watches: tuple[list[Any], list[Any]] = (shown, [])
+        self._connections: tuple[list[Any], list[Any]] = (shown, [])
         for name in self.own.properties:
-            self._watch_own(name)
+            self._connect_own(name)
 
     @property
     def is_qml(self) -> bool:
@@ -233,7 +239,7 @@ class Entry(QtCore.QObject):
             )
         about = "Overlays with higher numbers are on top."
         own.register("int", "Z-Index", description=about)
-        low, high = SCALES
+        low, high = SCALE_LIMITS
         about = "Pixels of the 3D view per unit of the overlay."
         own.register("float", "Scale", default=1.0, min=low, max=high, description=about)
         about = "From 0 (invisible) to 1."
@@ -242,14 +248,14 @@ class Entry(QtCore.QObject):
             about = "Reload when the file, or one that it uses, is saved."
             own.register("bool", "Live Reload", description=about)
 
-    def _watch_own(self, name: str) -> None:
+    def _connect_own(self, name: str) -> None:
         changed = self.own.properties[name].valueChanged
 
         def slot(value: Any) -> None:
             self._apply(name, value)
 
         changed.connect(slot)
-        self._watches[1].append((changed, slot))
+        self._connections[1].append((changed, slot))
 
     # Overlay.
 
@@ -262,29 +268,29 @@ class Entry(QtCore.QObject):
             if self.is_qml and not self.file:
                 self.status("Qml", _WARN, "Choose a QML file as Path")
                 return
-            make = maker_of(self.class_id)
+            make = factory_of(self.class_id)
             if self.is_qml:
                 paths = self._import_paths
                 self.attach(QmlOverlay(self.file, self._session, name, import_paths=paths))
             elif make is None:
                 advice = f"its class {self.class_id} is unknown; call rosglass.rviz.register()"
                 self._failed = f"the program has not added an overlay {name!r}, and {advice}"
-                self.status(self._row, _WARN, self._failed)
+                self.status(self._status_row, _WARN, self._failed)
             else:
                 self.attach(make(name))
         except Exception as error:
             self._failed = str(error) or repr(error)
-            self.status(self._row, _ERROR, self._failed)
+            self.status(self._status_row, _ERROR, self._failed)
 
     @property
-    def waiting(self) -> bool:
+    def is_waiting(self) -> bool:
         """Whether it has no overlay because of an error or a missing Path."""
         return self.overlay is None and (bool(self._failed) or (self.is_qml and not self.file))
 
     @property
-    def outdated(self) -> bool:
+    def is_outdated(self) -> bool:
         """Whether its overlay shows a file other than Path."""
-        return self.overlay is not None and self.file != self._shown_file
+        return self.overlay is not None and self.file != self._loaded_file
 
     def shows(self, file: Path) -> bool:
         """Return whether Path refers to the given file."""
@@ -296,7 +302,7 @@ class Entry(QtCore.QObject):
     def retry(self) -> None:
         """Try again to create the overlay."""
         self._failed = ""
-        self.touched()
+        self.on_changed()
 
     def attach(self, overlay: Overlay) -> None:
         """Connect an overlay to this entry, and restore its saved values.
@@ -304,13 +310,13 @@ class Entry(QtCore.QObject):
         Args:
             overlay: An overlay without an entry; a QML overlay that is not loaded is loaded.
         """
-        self.overlay, self._shown_file = overlay, self.file
+        self.overlay, self._loaded_file = overlay, self.file
         if hasattr(overlay, "style_sheet") and "Style Sheet" not in self.own.properties:
             about = "A .qss file, its package:// URL, or a literal style sheet."
             self.own.register(
                 "string", "Style Sheet", default=overlay.style_sheet, description=about
             )
-            self._watch_own("Style Sheet")
+            self._connect_own("Style Sheet")
         properties = overlay.properties
         if self._registered:
             properties.load(self._registered)
@@ -349,20 +355,20 @@ class Entry(QtCore.QObject):
         tree, self._tree = self._tree, None
         if tree is not None:
             tree.close()
-            remove_from_tree(self._holder)
+            remove_from_tree(self._group)
         return overlay
 
     def close(self) -> None:
         """Disconnect from the display, which the caller removes; call it after :meth:`detach`."""
         self._own_tree.close()
-        shown, own = self._watches
+        shown, own = self._connections
         # The signals of a deleted display are gone.
         for signal, slot in (*own, *(shown if self.alive else ())):
             # RViz disconnects a display from everything before removing it.
             with suppress(TypeError):
                 signal.disconnect(slot)
-        self._watches = ([], [])
-        self.touched = self.renamed = self.edited = _nothing
+        self._connections = ([], [])
+        self.on_changed = self.on_renamed = self.on_edited = _nothing
         if self.alive:
             self.display.entry = None
 
@@ -375,13 +381,13 @@ class Entry(QtCore.QObject):
                 self.own.properties[name].set(getattr(overlay, attribute))
 
     def _on_config(self) -> None:
-        self.edited()
+        self.on_edited()
 
     def _apply(self, name: str, value: Any) -> None:
         overlay = self.overlay
         if name == "Path":
             self._failed = ""
-            self.touched()
+            self.on_changed()
         elif overlay is not None:
             attribute = _ATTRIBUTES[name]
             if getattr(overlay, attribute, None) != value:
@@ -402,13 +408,13 @@ class Entry(QtCore.QObject):
         if overlay is not None and overlay.properties.properties and self._tree is None:
             _, held = _classes()
             about = "Settings that the overlay provides."
-            self._holder = owned_by_rviz(held(_CONFIGURATION, None, about, self.display))
-            self._tree = PropertyTree(overlay.properties, self._holder, self._choices)
+            self._group = owned_by_rviz(held(_CONFIGURATION, None, about, self.display))
+            self._tree = PropertyTree(overlay.properties, self._group, self._choices)
 
     # Status.
 
     @property
-    def _row(self) -> str:
+    def _status_row(self) -> str:
         return "Qml" if self.is_qml else "Overlay"
 
     def status(self, row: str, level: int, text: str) -> None:
@@ -419,7 +425,7 @@ class Entry(QtCore.QObject):
     def _show_problem(self, problem: str) -> None:
         self.status("Overlay", _OK, "OK")
         if problem or self.is_qml:
-            self.status(self._row, _ERROR if problem else _OK, problem or "OK")
+            self.status(self._status_row, _ERROR if problem else _OK, problem or "OK")
 
     # Files.
 
@@ -447,7 +453,7 @@ class Entry(QtCore.QObject):
         if self.overlay is not None:
             self.overlay.properties.load(self._registered)
             self.overlay.properties.set_config(self._config)
-        self.touched()
+        self.on_changed()
 
 
 def _nothing(*_: Any) -> None:
@@ -490,11 +496,11 @@ class Entries(QtCore.QObject):
         #: Overlays added by the program: they stay when another config file is loaded.
         self._program_overlays: list[Overlay] = []
         #: The overlays in the panel's order at the last synchronization.
-        self._order: list[Overlay] = []
-        self._new = False
+        self._panel_order: list[Overlay] = []
+        self._has_new = False
         self._other_classes: dict[str, Callable[[], Any]] = {}
         self._loading = False
-        self._scheduled = self._settling = self._closed = False
+        self._scheduled = self._synchronizing = self._closed = False
         self._watched: set[int] = set()
         # RViz processes other events in the middle of duplicating displays.
         self._after_event = AfterEvent(self._replace_placeholders)
@@ -517,7 +523,7 @@ class Entries(QtCore.QObject):
         entry.own.properties["Path"].set(file)
         entry.display.setName(name or QtCore.QFileInfo(file).completeBaseName())
         self._window.manager.addDisplay(entry.display, True)
-        self._settle()
+        self._on_scheduled()
         return entry
 
     def register_class(self, class_id: str, make: Callable[[], Any]) -> None:
@@ -549,18 +555,18 @@ class Entries(QtCore.QObject):
     def _schedule(self, *_: Any) -> None:
         if not self._scheduled and not self._closed:
             self._scheduled = True
-            QtCore.QTimer.singleShot(0, self._settle)
+            QtCore.QTimer.singleShot(0, self._on_scheduled)
 
     @Slot()
-    def _settle(self) -> None:
+    def _on_scheduled(self) -> None:
         self._scheduled = False
-        if self._closed or self._settling or self._loading:
+        if self._closed or self._synchronizing or self._loading:
             return
-        self._settling = True
+        self._synchronizing = True
         try:
             log_errors()(self._synchronize)()
         finally:
-            self._settling = False
+            self._synchronizing = False
 
     def _synchronize(self) -> None:
         self._watch_panel()
@@ -571,7 +577,7 @@ class Entries(QtCore.QObject):
                 self._remove_entry(entry)
             elif overlay is not None and overlay not in shown:
                 self.remove(entry)
-            elif entry.outdated:
+            elif entry.is_outdated:
                 self._remove_overlay(entry.detach())
         known = {id(entry.overlay) for entry in self._entries}
         for overlay in list(self._stack):
@@ -588,14 +594,14 @@ class Entries(QtCore.QObject):
             for display in self._displays()
             if isinstance(getattr(display, "entry", None), Entry) and display.entry.overlay
         ]
-        before, self._order = self._order, order
+        before, self._panel_order = self._panel_order, order
         moved = [o for o in before if o in order] != [o for o in order if o in before]
-        if moved or self._new:
+        if moved or self._has_new:
             self._stack.put_in_order(order)
-        if moved and not self._new:
+        if moved and not self._has_new:
             # RViz itself does not mark its config as modified.
             self._window.manager.notifyConfigChanged()
-        self._new = False
+        self._has_new = False
 
     def _add_entry(self, overlay: Overlay) -> None:
         """Connect an overlay of the program to an entry that waits for it, or to a new one."""
@@ -633,7 +639,7 @@ class Entries(QtCore.QObject):
         if overlay not in list(self._stack):
             overlay.name = self._free_name(str(entry.display.getName()), overlay)
             self._stack.add(overlay)
-            self._new = True
+            self._has_new = True
         overlay.visible = enabled
 
     def _rename(self, entry: Entry) -> None:
@@ -650,8 +656,8 @@ class Entries(QtCore.QObject):
     def _make(self, class_id: str) -> Entry:
         entry = Entry(class_id, self._session, self.choices, self._import_paths)
         self._entries.append(entry)
-        entry.touched, entry.renamed = self._schedule, self._rename
-        entry.edited = log_errors()(self._window.manager.notifyConfigChanged)
+        entry.on_changed, entry.on_renamed = self._schedule, self._rename
+        entry.on_edited = log_errors()(self._window.manager.notifyConfigChanged)
         return entry
 
     def _remove_entry(self, entry: Entry) -> None:
@@ -674,7 +680,7 @@ class Entries(QtCore.QObject):
             overlay = entry.overlay
             enabled = entry.alive and bool(entry.display.isEnabled())
             if enabled != (overlay is not None and overlay.visible) and not (
-                enabled and entry.waiting
+                enabled and entry.is_waiting
             ):
                 self._schedule()
                 return
@@ -684,8 +690,8 @@ class Entries(QtCore.QObject):
     @Slot()
     def _on_config_loading(self) -> None:
         """Detach the program's overlays from the displays that RViz is about to delete."""
-        self._loading = self._new = True
-        self._after_event.ask()
+        self._loading = self._has_new = True
+        self._after_event.schedule()
         for entry in list(self._entries):
             if entry.overlay in self._program_overlays:
                 self._entries.remove(entry)
@@ -703,7 +709,7 @@ class Entries(QtCore.QObject):
             address = int(pyqt("sip").unwrapinstance(model))
             if address not in self._watched:
                 self._watched.add(address)
-                model.rowsInserted.connect(log_errors()(lambda *_: self._after_event.ask()))
+                model.rowsInserted.connect(log_errors()(lambda *_: self._after_event.schedule()))
 
     def _replace_placeholders(self) -> None:
         if not self._closed:
@@ -714,7 +720,7 @@ class Entries(QtCore.QObject):
 
     def _replace_all(self) -> None:
         for display in list(self._displays()):
-            if getattr(display, "entry", None) is None and self._is_ours(display):
+            if getattr(display, "entry", None) is None and self._is_replaceable(display):
                 self._unmodified(partial(self._replace, display))
 
     def _displays(self, group: Any = None) -> Iterator[Any]:
@@ -752,13 +758,13 @@ class Entries(QtCore.QObject):
         if not modified:
             self._window.widget.setWindowModified(False)
 
-    def _is_ours(self, display: Any) -> bool:
+    def _is_replaceable(self, display: Any) -> bool:
         class_id = str(display.getClassId())
         programs = (
             class_id_of(type(o)) for o in self._program_overlays if not isinstance(o, QmlOverlay)
         )
         ours = {QML_CLASS, REFERENCE_QML_CLASS, *self._other_classes, *programs}
-        return class_id in ours or maker_of(class_id) is not None
+        return class_id in ours or factory_of(class_id) is not None
 
 
 _FILTER = "QML files (*.qml);;All files (*)"

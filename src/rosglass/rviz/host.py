@@ -239,7 +239,7 @@ class AfterEvent:
         self._call = call
         self._token: QtCore.QObject | None = None
 
-    def ask(self) -> None:
+    def schedule(self) -> None:
         """Schedule the call."""
         if self._token is None:
             # Python must keep its wrapper until C++ has deleted the object.

@@ -79,7 +79,7 @@ def position(event: Any) -> Any:
 
 def scaled(event: Any, factor: float) -> Any:
     """Return a copy of an event with scaled positions; the event itself if it has none."""
-    make = _MAKERS.get(event.type())
+    make = _COPIERS.get(event.type())
     if make is None:
         return event
     made = make(event, factor)
@@ -163,7 +163,7 @@ def _help(event: Any, factor: float) -> Any:
     return QtGui.QHelpEvent(event.type(), at, event.globalPos())
 
 
-_MAKERS: dict[Any, Callable[[Any, float], Any]] = {
+_COPIERS: dict[Any, Callable[[Any, float], Any]] = {
     **dict.fromkeys(MOUSE, _mouse),
     **dict.fromkeys(TOUCH, _touch),
     **dict.fromkeys(DRAG, _drag),
@@ -175,9 +175,9 @@ _MAKERS: dict[Any, Callable[[Any, float], Any]] = {
 
 _NONE = QtCore.Qt.NoButton
 #: Events of RViz's window after which it may miss the release of buttons and fingers.
-_LOSING = frozenset({_E.WindowDeactivate, _E.WindowBlocked, _E.Hide})
+_INPUT_LOSS_EVENTS = frozenset({_E.WindowDeactivate, _E.WindowBlocked, _E.Hide})
 #: Milliseconds between checks whether the mouse has left the view without an event.
-_HOVER_CHECK_MS = 100
+_HOVER_CHECK_PERIOD_MS = 100
 
 
 class Owner(enum.Enum):
@@ -204,13 +204,13 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         super().__init__()
         self._window, self._stack = window, stack
         self._panel = window.panel
-        self._owner: Overlay | Owner | None = None
-        self._touched: Overlay | None = None
+        self._mouse_owner: Overlay | Owner | None = None
+        self._touch_target: Overlay | None = None
         self._hovered: Overlay | None = None
-        self._dragged: Overlay | None = None
+        self._drag_target: Overlay | None = None
         self._focused: Overlay | None = None
         self._depth = 0
-        self._later: list[Callable[[], None]] = []
+        self._deferred: list[Callable[[], None]] = []
         #: Handlers by event type; each returns whether it accepts the event.
         self.routes: dict[Any, Callable[[Any], bool]] = {
             **dict.fromkeys(KEYS | {_E.InputMethod, _E.InputMethodQuery}, self._key),
@@ -220,9 +220,9 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             _E.MouseMove: self._move,
             _E.MouseButtonRelease: self._release,
             _E.Wheel: self._wheel,
-            _E.ContextMenu: self._offer_to_owner,
-            _E.ToolTip: self._offer_to_owner,
-            _E.Leave: self._left,
+            _E.ContextMenu: self._deliver_to_owner,
+            _E.ToolTip: self._deliver_to_owner,
+            _E.Leave: self._on_leave,
             _E.FocusIn: self._focus_event,
             _E.FocusOut: self._focus_event,
         }
@@ -230,10 +230,10 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         self._panel.setAcceptDrops(True)
         self._panel.installEventFilter(self)
         window.widget.installEventFilter(self)
-        stack.changed.connect(self._overlays_changed)
-        self._look_around = QtCore.QTimer()
-        self._look_around.setInterval(_HOVER_CHECK_MS)
-        self._look_around.timeout.connect(self._update_hover)
+        stack.changed.connect(self._on_stack_changed)
+        self._hover_timer = QtCore.QTimer()
+        self._hover_timer.setInterval(_HOVER_CHECK_PERIOD_MS)
+        self._hover_timer.timeout.connect(self._update_hover)
 
     @property
     def focused(self) -> Overlay | None:
@@ -255,31 +255,31 @@ class Input(QtCore.QObject):  # type: ignore[misc]
 
     def forget(self, overlay: Overlay) -> None:
         """Take mouse, touch and keyboard focus away from an overlay."""
-        if self._owner is overlay:
-            self._owner = Owner.NONE
+        if self._mouse_owner is overlay:
+            self._mouse_owner = Owner.NONE
             self._leave(overlay)
-        if self._touched is overlay:
-            self._touched = None
+        if self._touch_target is overlay:
+            self._touch_target = None
             self._leave(overlay)
         if self._hovered is overlay:
             self._hovered = None
             self._leave(overlay)
             self._panel.unsetCursor()
-        if self._dragged is overlay:
-            self._dragged = None
+        if self._drag_target is overlay:
+            self._drag_target = None
         if self._focused is overlay:
             self.focus(None)
 
     def after_event(self, call: Callable[[], None]) -> None:
         """Call a function when no overlay is handling an event."""
         if self._depth:
-            self._later.append(call)
+            self._deferred.append(call)
         else:
             call()
 
     def close(self) -> None:
         """Stop filtering RViz's events."""
-        self._look_around.stop()
+        self._hover_timer.stop()
         for watched in (self._panel, self._window.widget):
             if is_alive(watched):
                 watched.removeEventFilter(self)
@@ -290,12 +290,12 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             return False
         if watched is not self._panel:
             minimized = event.type() == _E.WindowStateChange and watched.isMinimized()
-            if event.type() in _LOSING or minimized:
+            if event.type() in _INPUT_LOSS_EVENTS or minimized:
                 self._cancel_input()
             return False
         route = self.routes.get(event.type())
         # Without visible overlays, RViz gets its events unchanged.
-        if route is None or not (self._owner or self._stack.topmost_first()):
+        if route is None or not (self._mouse_owner or self._stack.topmost_first()):
             return False
         accepted = event.isAccepted()
         self._depth += 1
@@ -304,7 +304,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         finally:
             self._depth -= 1
             if not self._depth:
-                later, self._later = self._later, []
+                later, self._deferred = self._deferred, []
                 for call in later:
                     call()
         if event.type() not in DRAG:
@@ -340,54 +340,54 @@ class Input(QtCore.QObject):  # type: ignore[misc]
         if event.buttons() == event.button():
             # The release of the previous press may have gone to another window.
             self._end_capture()
-        if self._owner is None:
-            overlay, open_to_rviz = self._offer(event)
+        if self._mouse_owner is None:
+            overlay, for_rviz = self._offer(event)
             if overlay is not None and overlay not in self._stack.topmost_first():
-                self._owner = Owner.NONE
+                self._mouse_owner = Owner.NONE
             elif overlay is not None:
-                self._owner = overlay
+                self._mouse_owner = overlay
                 self._stack.clicked(overlay)
                 self.focus(overlay)
             else:
-                self._owner = Owner.RVIZ if open_to_rviz else Owner.NONE
-                if open_to_rviz:
+                self._mouse_owner = Owner.RVIZ if for_rviz else Owner.NONE
+                if for_rviz:
                     self.focus(None)
                     self.hover(None)
-        elif not isinstance(self._owner, Owner):
-            self._deliver(self._owner, event)
-        return self._owner is not Owner.RVIZ
+        elif not isinstance(self._mouse_owner, Owner):
+            self._deliver(self._mouse_owner, event)
+        return self._mouse_owner is not Owner.RVIZ
 
     def _release(self, event: Any) -> bool:
-        owner = self._owner
+        owner = self._mouse_owner
         if owner is None:
             return False
         if not isinstance(owner, Owner):
             self._deliver(owner, event)
         if event.buttons() == _NONE:
-            self._owner = None
+            self._mouse_owner = None
             if owner is not Owner.RVIZ:
-                self._move(_moved(event))
+                self._move(_hover_move(event))
         return owner is not Owner.RVIZ
 
     def _move(self, event: Any) -> bool:
         if event.buttons() == _NONE:
             self._end_capture()
-        elif self._owner is None:
+        elif self._mouse_owner is None:
             return False
-        if self._owner is None:
-            overlay, open_to_rviz = self._offer(event)
+        if self._mouse_owner is None:
+            overlay, for_rviz = self._offer(event)
             self.hover(overlay)
-            if overlay is None and not open_to_rviz:
+            if overlay is None and not for_rviz:
                 self._panel.setCursor(QtCore.Qt.ArrowCursor)
-            return not (overlay is None and open_to_rviz)
-        if not isinstance(self._owner, Owner):
-            self._deliver(self._owner, event)
-            if not isinstance(self._owner, Owner):
-                self._show_cursor(self._owner)
-        return self._owner is not Owner.RVIZ
+            return not (overlay is None and for_rviz)
+        if not isinstance(self._mouse_owner, Owner):
+            self._deliver(self._mouse_owner, event)
+            if not isinstance(self._mouse_owner, Owner):
+                self._show_cursor(self._mouse_owner)
+        return self._mouse_owner is not Owner.RVIZ
 
     def _end_capture(self) -> None:
-        owner, self._owner = self._owner, None
+        owner, self._mouse_owner = self._mouse_owner, None
         if owner is not None and not isinstance(owner, Owner):
             self._leave(owner)
 
@@ -400,41 +400,41 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             self._panel.unsetCursor()
         if overlay is not None:
             self._show_cursor(overlay)
-            self._look_around.start()
+            self._hover_timer.start()
         else:
-            self._look_around.stop()
+            self._hover_timer.stop()
 
     def _update_hover(self) -> None:
         """End hovering if the mouse has left RViz's view, which may get no event for it."""
         over = QtWidgets.QApplication.widgetAt(QtGui.QCursor.pos())
-        if self._owner is None and over is not self._panel:
+        if self._mouse_owner is None and over is not self._panel:
             self.hover(None)
 
     def _show_cursor(self, overlay: Overlay) -> None:
         with guarded(overlay, "choosing the cursor"):
             self._panel.setCursor(overlay.cursor() or QtGui.QCursor(QtCore.Qt.ArrowCursor))
 
-    def _left(self, event: Any) -> bool:
+    def _on_leave(self, event: Any) -> bool:
         del event
-        if self._owner is None:
+        if self._mouse_owner is None:
             self.hover(None)
         return False
 
     def _wheel(self, event: Any) -> bool:
-        if self._owner is None:
-            overlay, open_to_rviz = self._offer(event)
-            return overlay is not None or not open_to_rviz
-        if not isinstance(self._owner, Owner):
-            self._deliver(self._owner, event)
-        return self._owner is not Owner.RVIZ
+        if self._mouse_owner is None:
+            overlay, for_rviz = self._offer(event)
+            return overlay is not None or not for_rviz
+        if not isinstance(self._mouse_owner, Owner):
+            self._deliver(self._mouse_owner, event)
+        return self._mouse_owner is not Owner.RVIZ
 
-    def _offer_to_owner(self, event: Any) -> bool:
+    def _deliver_to_owner(self, event: Any) -> bool:
         """Send an event to the overlay under the mouse, or to the one with the keyboard focus."""
         if event.type() == _E.ContextMenu and event.reason() == QtGui.QContextMenuEvent.Keyboard:
             return self._key(event)
-        if self._owner is Owner.RVIZ:
+        if self._mouse_owner is Owner.RVIZ:
             return False
-        which = self._owner or self._hovered
+        which = self._mouse_owner or self._hovered
         if which is not None and not isinstance(which, Owner):
             self._deliver(which, event)
         return which is not None
@@ -443,23 +443,23 @@ class Input(QtCore.QObject):  # type: ignore[misc]
 
     def _touch(self, event: Any) -> bool:
         if event.type() == _E.TouchBegin:
-            overlay, open_to_rviz = self._offer(event)
-            self._touched = overlay if overlay in self._stack.topmost_first() else None
-            if self._touched is not None:
-                self._stack.clicked(self._touched)
-                self.focus(self._touched)
+            overlay, for_rviz = self._offer(event)
+            self._touch_target = overlay if overlay in self._stack.topmost_first() else None
+            if self._touch_target is not None:
+                self._stack.clicked(self._touch_target)
+                self.focus(self._touch_target)
             # Qt sends mouse events for a touch that is not accepted.
-            return overlay is not None or not open_to_rviz
-        touched = self._touched
+            return overlay is not None or not for_rviz
+        touched = self._touch_target
         if touched is None:
             return False
         if event.type() in (_E.TouchEnd, _E.TouchCancel):
-            self._touched = None
+            self._touch_target = None
         self._deliver(touched, event)
         return True
 
     def _drag(self, event: Any) -> bool:
-        before, over = self._dragged, None
+        before, over = self._drag_target, None
         for overlay in [] if event.type() == _E.DragLeave else self._stack.topmost_first():
             sent = scaled(event, 1 / overlay.scale)
             taken = False
@@ -470,7 +470,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
                 event.setDropAction(sent.dropAction())
             if taken or overlay.is_modal:
                 break
-        self._dragged = None if event.type() == _E.Drop else over
+        self._drag_target = None if event.type() == _E.Drop else over
         if before is not None and before is not over:
             self._deliver(before, QtGui.QDragLeaveEvent())
         # Qt sends DragMove only to a widget that has accepted DragEnter.
@@ -507,17 +507,17 @@ class Input(QtCore.QObject):  # type: ignore[misc]
 
     def _cancel_input(self) -> None:
         """Cancel presses and touches, because their release may never arrive."""
-        if self._owner is not None and not isinstance(self._owner, Owner):
-            owner, self._owner = self._owner, Owner.NONE
+        if self._mouse_owner is not None and not isinstance(self._mouse_owner, Owner):
+            owner, self._mouse_owner = self._mouse_owner, Owner.NONE
             self._leave(owner)
-        touched, self._touched = self._touched, None
+        touched, self._touch_target = self._touch_target, None
         if touched is not None:
             self._leave(touched)
         self.hover(None)
 
-    def _overlays_changed(self) -> None:
+    def _on_stack_changed(self) -> None:
         shown = self._stack.topmost_first()
-        for which in (self._owner, self._touched, self._hovered, self._focused):
+        for which in (self._mouse_owner, self._touch_target, self._hovered, self._focused):
             if which is not None and not isinstance(which, Owner) and which not in shown:
                 self.forget(which)
         modal = next((number for number, o in enumerate(shown) if o.is_modal), None)
@@ -525,7 +525,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             self.focus(shown[modal])
 
 
-def _moved(event: Any) -> Any:
+def _hover_move(event: Any) -> Any:
     """Return a mouse move at the position of a release, to update hovering."""
     made = QtGui.QMouseEvent(
         _E.MouseMove,

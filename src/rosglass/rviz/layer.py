@@ -28,12 +28,12 @@ __all__ = ["HIGHEST_Z", "Drawing", "Layer", "Work"]
 HIGHEST_Z = 650
 _numbers = itertools.count()
 #: Ogre's names of RViz's two windows, one of which is hidden.
-_WINDOWS = ("OgreWindow(0)", "OgreWindow(1)")
+_RENDER_WINDOWS = ("OgreWindow(0)", "OgreWindow(1)")
 _GROUP = "General"
 #: Cost of drawing another panel, in pixels that could be blended in that time.
 _PANEL_COST_PIXELS = 2000
 #: Number of empty tiles that panels may additionally cover before they are rearranged.
-_SLACK = 128
+_MAX_EXTRA_TILES = 128
 #: Draws the texture only; OpenGL's fixed pipeline would add the specular colour that Ogre enables.
 _SHADER = """#version 120
 uniform sampler2D picture;
@@ -58,14 +58,14 @@ class Layer:
         self._texture: Any = None
         self._material: Any = None
         self._pass: Any = None
-        self._unit: Any = None
+        self._texture_unit: Any = None
         self._panels: list[Any] = []
-        self._before: NDArray[np.uint32] | None = None
+        self._previous: NDArray[np.uint32] | None = None
         self._covered = np.zeros((0, 0), np.bool_)
         #: Each panel's rectangle, and its visible part without empty edges.
         self._rects: list[Rect] = []
         self._shown: list[Rect | None] = []
-        self._waste = 0
+        self._extra_tiles = 0
         self._opacity = 1.0
         self._visible = True
         #: Seconds that :meth:`update` last spent on comparing and on uploading.
@@ -81,13 +81,13 @@ class Layer:
         """Show or hide the layer."""
         if visible != self._visible and not self._closed:
             self._visible = visible
-            self._show()
+            self._apply_visibility()
 
     def set_opacity(self, opacity: float) -> None:
         """Set the opacity, from 0 to 1."""
         if opacity != self._opacity:
             self._opacity = opacity
-            self._blend()
+            self._apply_opacity()
 
     @property
     def rectangles(self) -> int:
@@ -97,7 +97,7 @@ class Layer:
     @property
     def covered(self) -> float:
         """Share of the view that the panels cover, and RViz has to blend."""
-        whole = 1 if self._before is None else self._before.size
+        whole = 1 if self._previous is None else self._previous.size
         return sum(rect.area for rect in self._shown if rect) / max(whole, 1)
 
     def update(
@@ -118,20 +118,20 @@ class Layer:
         height, width = pixels.shape
         _use_own_context()
         started = time.perf_counter()
-        if self._before is None or self._before.shape != pixels.shape:
+        if self._previous is None or self._previous.shape != pixels.shape:
             self._make_texture(width, height)
-            self._before = np.empty_like(pixels, order="C")
+            self._previous = np.empty_like(pixels, order="C")
             self._covered = np.zeros((-(-height // TILE), -(-width // TILE)), np.bool_)
             rects = [Rect(0, 0, width, height)]
         else:
-            rects = cover(changed_tiles(pixels, self._before, within), width, height, most=12)
+            rects = cover(changed_tiles(pixels, self._previous, within), width, height, most=12)
         compared = time.perf_counter()
         for rect in rects:
             self._upload(pixels, rect)
         uploaded = time.perf_counter()
         if rects:
-            update_covered(self._covered, self._before, rects)
-            self._place(rects, width, height)
+            update_covered(self._covered, self._previous, rects)
+            self._arrange_panels(rects, width, height)
         self.compared = compared - started + time.perf_counter() - uploaded
         self.uploaded = uploaded - compared
         return rects
@@ -164,46 +164,46 @@ class Layer:
         # Qt's colours are premultiplied with alpha.
         render.setSceneBlending(o.SBF_ONE, o.SBF_ONE_MINUS_SOURCE_ALPHA)
         self._pass = render
-        self._unit = render.createTextureUnitState(name)
-        self._unit.setTextureFiltering(o.TFO_NONE)
-        self._unit.setTextureAddressingMode(o.TextureUnitState.TAM_CLAMP)
-        self._blend()
+        self._texture_unit = render.createTextureUnitState(name)
+        self._texture_unit.setTextureFiltering(o.TFO_NONE)
+        self._texture_unit.setTextureAddressingMode(o.TextureUnitState.TAM_CLAMP)
+        self._apply_opacity()
 
-    def _blend(self) -> None:
-        if self._unit is None:
+    def _apply_opacity(self) -> None:
+        if self._texture_unit is None:
             return
         o, part = ogre(), self._opacity
         # With software OpenGL, multiplying by one would cost a third more.
         how = o.LBX_SOURCE1 if part == 1 else o.LBX_MODULATE
         # Premultiplied colours have to fade like their alpha.
         one, faint = o.ColourValue(1, 1, 1, 1), o.ColourValue(part, part, part, part)
-        self._unit.setColourOperationEx(how, o.LBS_TEXTURE, o.LBS_MANUAL, one, faint)
-        self._unit.setAlphaOperation(how, o.LBS_TEXTURE, o.LBS_MANUAL, 1.0, part)
+        self._texture_unit.setColourOperationEx(how, o.LBS_TEXTURE, o.LBS_MANUAL, one, faint)
+        self._texture_unit.setAlphaOperation(how, o.LBS_TEXTURE, o.LBS_MANUAL, 1.0, part)
         self._pass.setFragmentProgram(fragment_program() if part == 1 else "")
 
     def _upload(self, pixels: NDArray[np.uint32], rect: Rect) -> None:
         o = ogre()
-        assert self._before is not None
+        assert self._previous is not None
         # Ogre's bindings require writable memory.
         part = pixels[rect.top : rect.bottom, rect.left : rect.right]
         part = np.require(part, requirements=["C", "W"])
-        self._before[rect.top : rect.bottom, rect.left : rect.right] = part
+        self._previous[rect.top : rect.bottom, rect.left : rect.right] = part
         height, width = part.shape
         source = o.PixelBox(width, height, 1, o.PF_A8R8G8B8, part.view(np.uint8).reshape(-1))
         self._texture.getBuffer().blitFromMemory(
             source, o.Box(rect.left, rect.top, rect.right, rect.bottom)
         )
 
-    def _place(self, changed: list[Rect], width: int, height: int) -> None:
+    def _arrange_panels(self, changed: list[Rect], width: int, height: int) -> None:
         """Rearrange the panels if they no longer fit the non-empty tiles, and trim changed ones."""
         waste = uncovered(self._covered, self._rects)
-        if waste is None or waste - self._waste > _SLACK:
+        if waste is None or waste - self._extra_tiles > _MAX_EXTRA_TILES:
             changed = self._rects = cover(self._covered, width, height, worth=_PANEL_COST_PIXELS)
-            self._waste = uncovered(self._covered, self._rects) or 0
+            self._extra_tiles = uncovered(self._covered, self._rects) or 0
             self._make_panels()
         for number, rect in enumerate(self._rects):
-            if any(rect.meets(other) for other in changed):
-                self._fit(number, width, height)
+            if any(rect.overlaps(other) for other in changed):
+                self._trim_panel(number, width, height)
 
     def _make_panels(self) -> None:
         """Show one panel per rectangle; create missing ones and hide the others."""
@@ -221,12 +221,12 @@ class Layer:
                 panel.show()
             else:
                 panel.hide()
-        self._show()
+        self._apply_visibility()
 
-    def _fit(self, number: int, width: int, height: int) -> None:
+    def _trim_panel(self, number: int, width: int, height: int) -> None:
         """Trim a panel to the non-empty part of its rectangle."""
-        assert self._before is not None
-        rect, panel = trimmed(self._before, self._rects[number]), self._panels[number]
+        assert self._previous is not None
+        rect, panel = trimmed(self._previous, self._rects[number]), self._panels[number]
         if rect == self._shown[number]:
             return
         self._shown[number] = rect
@@ -236,7 +236,7 @@ class Layer:
         panel.setDimensions(right - left, bottom - top)
         panel.setUV(left, top, right, bottom)
 
-    def _show(self) -> None:
+    def _apply_visibility(self) -> None:
         if self._visible and self._rects:
             self._overlay.show()
         else:
@@ -248,14 +248,14 @@ class Layer:
             self._manager.destroyOverlayElement(panel)
         self._panels.clear()
         self._rects, self._shown = [], []
-        self._waste = 0
+        self._extra_tiles = 0
 
     def _drop_texture(self) -> None:
         if self._texture is not None:
             o = ogre()
             o.MaterialManager.getSingleton().remove(self._material.getName(), _GROUP)
             o.TextureManager.getSingleton().remove(self._texture.getName(), _GROUP)
-            self._texture = self._material = self._pass = self._unit = None
+            self._texture = self._material = self._pass = self._texture_unit = None
 
 
 @cache
@@ -276,7 +276,7 @@ def _use_own_context() -> None:
     root = ogre().Root.getSingleton()
     system = root.getRenderSystem()
     # Ogre switches contexts only when the window changes, so switch to each in turn.
-    for name in _WINDOWS:
+    for name in _RENDER_WINDOWS:
         system._setRenderTarget(root.getRenderTarget(name))
 
 
@@ -312,10 +312,10 @@ class Drawing:
         #: Whether the overlay has to be drawn again.
         self.dirty = True
         self._size = (0, 0, 0.0)
-        self._fits = False
+        self._size_applied = False
         self._failed = False
 
-    def mark(self) -> None:
+    def mark_dirty(self) -> None:
         """Mark the overlay to be drawn before the next frame in which it is visible."""
         self.dirty = True
 
@@ -348,8 +348,8 @@ class Drawing:
 
     def _draw(self, size: tuple[int, int, float]) -> Work:
         overlay, layer = self.overlay, self.layer
-        resized = size != self._size or not self._fits
-        self._size, self._fits, self.dirty = size, False, False
+        resized = size != self._size or not self._size_applied
+        self._size, self._size_applied, self.dirty = size, False, False
         started = time.perf_counter()
         done, drawn = False, 0.0
         pixels: NDArray[np.uint32] | None = None
@@ -357,7 +357,7 @@ class Drawing:
         with guarded(overlay, "drawing"):
             if resized:
                 overlay.resize(*size)
-            self._fits = True
+            self._size_applied = True
             pixels = overlay.draw()
             _check(pixels, size)
             drawn = time.perf_counter() - started

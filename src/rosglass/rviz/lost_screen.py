@@ -29,20 +29,20 @@ _log = logging.getLogger("rosglass.rviz")
 #: Maximum seconds for unregistering, and seconds that the thread calling ``exit()`` is paused.
 _UNREGISTER_TIMEOUT_S, _EXIT_PAUSE_S = 1.5, 4
 #: Seconds that an exiting X server may take from closing windows to closing connections.
-_SERVER_END_S = 0.3
+_SERVER_EXIT_S = 0.3
 _EXIT_CODE = 1
 #: xproto.h: XCB_CW_EVENT_MASK, XCB_EVENT_MASK_STRUCTURE_NOTIFY, XCB_DESTROY_NOTIFY.
-_EVENT_MASK, _STRUCTURE, _DESTROYED = 1 << 11, 1 << 17, 17
+_EVENT_MASK, _STRUCTURE_NOTIFY, _DESTROYED = 1 << 11, 1 << 17, 17
 #: X.h, Xproto.h: BadDrawable, X_GetGeometry.
-_NO_DRAWABLE, _GET_GEOMETRY = 9, 14
-_BROKEN = "the connection to the X server (DISPLAY {display}) is broken: RViz exits"
-_WINDOW = (
+_BAD_DRAWABLE, _GET_GEOMETRY = 9, 14
+_BROKEN_CONNECTION = "the connection to the X server (DISPLAY {display}) is broken: RViz exits"
+_DESTROYED_WINDOW = (
     "RViz's window was destroyed by another program (xdotool windowclose, xkill), or by this one "
     "(e.g. in setWindowFlags()): RViz exits"
 )
 
 
-class _Time(ctypes.Structure):
+class _Timespec(ctypes.Structure):
     """A ``struct timespec``."""
 
     _fields_ = (("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long))
@@ -73,33 +73,36 @@ class _Connection:
         xcb = ctypes.CDLL("libxcb.so.1")
         xcb.xcb_connect.restype = xcb.xcb_poll_for_event.restype = ctypes.c_void_p
         self._xcb, self._libc = xcb, ctypes.CDLL(None)
-        self._given = ctypes.c_void_p(xcb.xcb_connect(None, None))
-        self.file = int(xcb.xcb_get_file_descriptor(self._given))
+        self._ptr = ctypes.c_void_p(xcb.xcb_connect(None, None))
+        self.file = int(xcb.xcb_get_file_descriptor(self._ptr))
 
     @property
     def is_broken(self) -> bool:
         """Whether the X server has closed the connection."""
-        return bool(self._xcb.xcb_connection_has_error(self._given))
+        return bool(self._xcb.xcb_connection_has_error(self._ptr))
 
     def watch(self, window: int) -> None:
         """Select the event for the destruction of a window."""
-        mask = ctypes.c_uint32(_STRUCTURE)
+        mask = ctypes.c_uint32(_STRUCTURE_NOTIFY)
         self._xcb.xcb_change_window_attributes(
-            self._given, ctypes.c_uint32(window), ctypes.c_uint32(_EVENT_MASK), ctypes.byref(mask)
+            self._ptr,
+            ctypes.c_uint32(window),
+            ctypes.c_uint32(_EVENT_MASK),
+            ctypes.byref(mask),
         )
-        self._xcb.xcb_flush(self._given)
+        self._xcb.xcb_flush(self._ptr)
 
     def destroyed(self) -> set[int]:
         """Return the windows destroyed since the last call, without blocking."""
         found = set()
-        while event := self._xcb.xcb_poll_for_event(self._given):
+        while event := self._xcb.xcb_poll_for_event(self._ptr):
             if ctypes.c_uint8.from_address(event).value & 0x7F == _DESTROYED:
                 found.add(ctypes.c_uint32.from_address(event + 8).value)
             self._libc.free(ctypes.c_void_p(event))
         return found
 
     def close(self) -> None:
-        self._xcb.xcb_disconnect(self._given)
+        self._xcb.xcb_disconnect(self._ptr)
 
 
 class LostScreen(Handle):
@@ -120,12 +123,12 @@ class LostScreen(Handle):
         self._reader, self._writer = os.pipe()
         # Any thread may call exit() at any time. It then closes the pipe, which wakes our thread,
         # and sleeps until the process ends. The handlers are C functions: Python may be unusable.
-        self._pause = _Time(_EXIT_PAUSE_S, 0)
+        self._pause = _Timespec(_EXIT_PAUSE_S, 0)
         libc = ctypes.CDLL(None)
         before_exit = libc["__cxa_atexit"]
         before_exit(libc.nanosleep, ctypes.byref(self._pause), None)
         before_exit(libc.close, ctypes.c_void_p(self._writer), None)
-        _KEPT.append(self._pause)
+        _kept_alive.append(self._pause)
         xlib = ctypes.CDLL("libX11.so.6")
         self._set_error, self._set_io_error = xlib.XSetErrorHandler, xlib.XSetIOErrorHandler
         self._set_error.restype = self._set_io_error.restype = ctypes.c_void_p
@@ -176,7 +179,7 @@ class LostScreen(Handle):
     def _on_error(self, display: int, event: Any) -> int:
         error = event.contents
         # Mesa requests the size before each frame: the window was destroyed after the last check.
-        if (error.error_code, error.request_code) == (_NO_DRAWABLE, _GET_GEOMETRY):
+        if (error.error_code, error.request_code) == (_BAD_DRAWABLE, _GET_GEOMETRY):
             self._end()
         return int(self._error_before(display, event))
 
@@ -190,7 +193,7 @@ class LostScreen(Handle):
             ending, self._ending = self._ending, True
         if ending:
             time.sleep(_EXIT_PAUSE_S)
-        text = _BROKEN if broken or self._breaks() else _WINDOW
+        text = _BROKEN_CONNECTION if broken or self._is_server_exiting() else _DESTROYED_WINDOW
         text = text.format(display=os.environ.get("DISPLAY", ""))
         until = time.monotonic() + _UNREGISTER_TIMEOUT_S
         steps = [lambda: _log.error("%s", text), *self._unregister]
@@ -203,9 +206,9 @@ class LostScreen(Handle):
         sys.stderr.flush()
         os._exit(_EXIT_CODE)
 
-    def _breaks(self) -> bool:
+    def _is_server_exiting(self) -> bool:
         """Return whether a window was destroyed because the X server is exiting."""
-        until = time.monotonic() + _SERVER_END_S
+        until = time.monotonic() + _SERVER_EXIT_S
         while time.monotonic() < until:
             with self._lock:
                 self._connection.destroyed()
@@ -216,4 +219,4 @@ class LostScreen(Handle):
 
 
 #: Keeps memory alive that C reads after Python's exit.
-_KEPT: list[_Time] = []
+_kept_alive: list[_Timespec] = []

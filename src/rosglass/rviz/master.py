@@ -26,26 +26,26 @@ _WAIT_PERIOD_S, _WATCH_PERIOD_S, _TIMEOUT_S = 0.25, 2.0, 2.0
 #: Milliseconds of waiting after which a window is shown.
 _WINDOW_DELAY_MS = 700
 #: The default port of roscore.
-_PORT = 11311
+_DEFAULT_PORT = 11311
 
 
-class _Asker:
+class _MasterPoller:
     """Requests a master's process id periodically, in its own thread.
 
     Args:
         uri: The master's URI.
-        every: Seconds between two requests.
-        answered: Called in the GUI thread with the process id or an Error.
+        period: Seconds between two requests.
+        on_reply: Called in the GUI thread with the process id or an Error.
     """
 
-    def __init__(self, uri: str, every: float, answered: Callable[[Any], None]) -> None:
-        self._uri, self._every, self._answered = uri, every, answered
+    def __init__(self, uri: str, period: float, on_reply: Callable[[Any], None]) -> None:
+        self._uri, self._period, self._on_reply = uri, period, on_reply
         self._executor = GuiExecutor()
         self._end = threading.Event()
-        self._thread = threading.Thread(target=self._ask, name="master", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="master", daemon=True)
         self._thread.start()
 
-    def _ask(self) -> None:
+    def _run(self) -> None:
         while not self._end.is_set():
             answer: Any
             try:
@@ -53,11 +53,11 @@ class _Asker:
             except Error as error:
                 answer = error
             self._executor.post(lambda answer=answer: self._deliver(answer))  # type: ignore[misc]
-            self._end.wait(self._every)
+            self._end.wait(self._period)
 
     def _deliver(self, answer: Any) -> None:
         if not self._end.is_set():
-            self._answered(answer)
+            self._on_reply(answer)
 
     def close(self) -> None:
         """Stop the requests; safe to call twice."""
@@ -66,13 +66,13 @@ class _Asker:
         self._executor.close()
 
 
-def wait_for_master(uri: str, timeout: float | None, ended: Callable[[], bool]) -> bool:
+def wait_for_master(uri: str, timeout: float | None, is_cancelled: Callable[[], bool]) -> bool:
     """Wait until a master answers; show a window if it takes long.
 
     Args:
         uri: The master's URI.
         timeout: Seconds to wait; None waits forever.
-        ended: Returns whether to stop waiting because the program ends.
+        is_cancelled: Returns whether to stop waiting because the program ends.
 
     Returns:
         Whether the master answered; False if the program ends or the user cancels.
@@ -101,15 +101,15 @@ def wait_for_master(uri: str, timeout: float | None, ended: Callable[[], bool]) 
             problems.append(problem)
             _log.warning("waiting for the ROS master: %s", problem)
 
-    def look() -> None:
-        if ended():
+    def on_timeout() -> None:
+        if is_cancelled():
             finish(False)
         elif problems and not window and time.monotonic() - started > _WINDOW_DELAY_MS / 1000:
             window.append(_waiting_window(uri, problems[-1], lambda: finish(False)))
 
-    asker = _Asker(uri, _WAIT_PERIOD_S, on_answer)
+    asker = _MasterPoller(uri, _WAIT_PERIOD_S, on_answer)
     timer = QtCore.QTimer()
-    timer.timeout.connect(look)
+    timer.timeout.connect(on_timeout)
     timer.start(50)
     run_event_loop(loop)
     timer.stop()
@@ -125,7 +125,7 @@ def wait_for_master(uri: str, timeout: float | None, ended: Callable[[], bool]) 
 def _advice(uri: str) -> str:
     """Return advice for a master that does not answer."""
     address = urlsplit(uri)
-    port = "" if address.port in (None, _PORT) else f" -p {address.port}"
+    port = "" if address.port in (None, _DEFAULT_PORT) else f" -p {address.port}"
     host = address.hostname or ""
     if host in ("localhost", "::1", socket.gethostname()) or host.startswith("127."):
         return f"start one: roscore{port}"
@@ -158,10 +158,10 @@ class MasterWatch(QtCore.QObject):
         super().__init__()
         self._uri, self._problem = uri, ""
         #: The master's process id; -1 before its first answer.
-        self.number = -1
+        self.pid = -1
         #: Whether another master has replaced it, at which RViz is not registered.
         self.replaced = False
-        self._asker = _Asker(uri, _WATCH_PERIOD_S, self.on_answer)
+        self._poller = _MasterPoller(uri, _WATCH_PERIOD_S, self.on_answer)
 
     @property
     def problem(self) -> str:
@@ -179,12 +179,12 @@ class MasterWatch(QtCore.QObject):
 
     def close(self) -> None:
         """Stop watching."""
-        self._asker.close()
+        self._poller.close()
 
     def on_answer(self, answer: Any) -> None:
         """Handle the master's process id, or the Error of the request."""
         problem = ""
-        self.replaced = not isinstance(answer, Error) and self.number not in (-1, answer)
+        self.replaced = not isinstance(answer, Error) and self.pid not in (-1, answer)
         if isinstance(answer, Error):
             problem = f"{answer}; existing connections stay, but new topics are not found"
         elif self.replaced:
@@ -193,7 +193,7 @@ class MasterWatch(QtCore.QObject):
                 "its displays find no new topics until RViz is restarted"
             )
         else:
-            self.number = answer
+            self.pid = answer
         if problem != self._problem:
             self._problem = problem
             if problem:

@@ -8,12 +8,20 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["NEAREST", "STEEPEST", "Orbit", "Place", "Point", "ease", "shortest_turn"]
+__all__ = [
+    "MIN_DISTANCE_M",
+    "STEEPEST",
+    "FramePose",
+    "Orbit",
+    "Point",
+    "ease",
+    "shortest_turn",
+]
 
 #: RViz's maximum pitch in radians: straight from above, yaw would be undefined.
 STEEPEST = math.pi / 2 - 0.001
 #: Minimum distance between camera and focus, in metres.
-NEAREST = 0.01
+MIN_DISTANCE_M = 0.01
 
 
 class Point(NamedTuple):
@@ -58,7 +66,7 @@ def _numbers(point: object) -> tuple[float, float, float]:
     return x, y, z
 
 
-class Place(NamedTuple):
+class FramePose(NamedTuple):
     """The position and yaw of a frame.
 
     Attributes:
@@ -111,7 +119,7 @@ class Orbit(NamedTuple):
         """
         x, y, z = eye - focus
         flat = math.hypot(x, y)
-        distance = max(math.hypot(flat, z), NEAREST)
+        distance = max(math.hypot(flat, z), MIN_DISTANCE_M)
         pitch = max(-STEEPEST, min(STEEPEST, math.atan2(z, flat)))
         if flat > 1e-6 * distance:
             yaw = math.atan2(y, x)
@@ -129,7 +137,7 @@ class Orbit(NamedTuple):
             self.pitch + (other.pitch - self.pitch) * part,
         )
 
-    def carried(self, before: Place, after: Place) -> Orbit:
+    def carried(self, before: FramePose, after: FramePose) -> Orbit:
         """Return the camera moved along with a frame.
 
         Args:

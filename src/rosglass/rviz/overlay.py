@@ -31,18 +31,18 @@ if TYPE_CHECKING:
 __all__ = [
     "QML_CLASS",
     "REFERENCE_QML_CLASS",
-    "SCALES",
+    "SCALE_LIMITS",
     "Overlay",
     "class_id_of",
+    "factory_of",
     "guarded",
     "log_uncaught_errors",
-    "maker_of",
     "register",
 ]
 
 
 #: Minimum and maximum scale of an overlay.
-SCALES = (0.1, 10.0)
+SCALE_LIMITS = (0.1, 10.0)
 
 
 class Overlay(QtCore.QObject):
@@ -108,7 +108,7 @@ class Overlay(QtCore.QObject):
 
     @scale.setter
     def scale(self, scale: float) -> None:
-        if not (_is_number(scale) and SCALES[0] <= scale <= SCALES[1]):
+        if not (_is_number(scale) and SCALE_LIMITS[0] <= scale <= SCALE_LIMITS[1]):
             raise Error(f"overlay {self.name}: scale {scale!r} is not a number from 0.1 to 10")
         self._scale = scale
         self.arranged.emit()
@@ -208,8 +208,8 @@ QML_CLASS = "rosglass/QmlOverlay"
 #: hector_rviz_overlay's class id of QML overlays.
 REFERENCE_QML_CLASS = "hector_rviz_overlay_controls/QmlOverlay"
 _CLASS_ID = re.compile(r"[A-Za-z_]\w*/[A-Za-z_]\w*\Z", re.ASCII)
-_makers: dict[str, Callable[[str], Overlay]] = {}
-_ids: dict[type[Any], str] = {}
+_factories: dict[str, Callable[[str], Overlay]] = {}
+_class_ids: dict[type[Any], str] = {}
 
 
 def register(kind: _T, class_id: str = "", make: Callable[[str], Overlay] | None = None) -> _T:
@@ -226,29 +226,31 @@ def register(kind: _T, class_id: str = "", make: Callable[[str], Overlay] | None
     """
     if not isinstance(kind, type) or not issubclass(kind, Overlay):
         raise Error(f"{kind!r:.80} is not a class derived from rosglass.rviz.Overlay")
-    name = class_id or _own_id(kind)
+    name = class_id or _default_class_id(kind)
     if not _CLASS_ID.match(name):
         raise Error(f"the class id {name!r} is not of the form package/Class")
-    taken = next((one for one, taken in _ids.items() if taken == name and one is not kind), None)
+    taken = next(
+        (one for one, taken in _class_ids.items() if taken == name and one is not kind), None
+    )
     if name in {QML_CLASS, REFERENCE_QML_CLASS} or taken is not None:
         whose = taken.__qualname__ if taken is not None else "QML files"
         raise Error(f"the class id {name!r} is used by {whose} already; choose another one")
-    _makers[name] = make or (lambda overlay_name: kind(name=overlay_name))
-    _ids[kind] = name
+    _factories[name] = make or (lambda overlay_name: kind(name=overlay_name))
+    _class_ids[kind] = name
     return kind
 
 
 def class_id_of(kind: type[Overlay]) -> str:
     """Return the class id of a class, registered or not."""
-    return _ids.get(kind) or _own_id(kind)
+    return _class_ids.get(kind) or _default_class_id(kind)
 
 
-def maker_of(class_id: str) -> Callable[[str], Overlay] | None:
+def factory_of(class_id: str) -> Callable[[str], Overlay] | None:
     """Return the factory of a class id; None if it is not registered."""
-    return _makers.get(class_id)
+    return _factories.get(class_id)
 
 
-def _own_id(kind: type[Any]) -> str:
+def _default_class_id(kind: type[Any]) -> str:
     package = kind.__module__.partition(".")[0]
     if package == "__main__":
         package = re.sub(r"\W", "_", Path(sys.argv[0] or "program").stem, flags=re.ASCII)
@@ -261,12 +263,12 @@ _OWNER_NAMES = ("self", "overlay", "panel", "popup", "dialog", "root", "widget")
 
 
 @contextlib.contextmanager
-def guarded(overlay: Overlay, doing: str) -> Iterator[None]:
+def guarded(overlay: Overlay, activity: str) -> Iterator[None]:
     """Catch and log the exceptions of an overlay's methods, slots and paint events.
 
     Args:
         overlay: The overlay whose code runs.
-        doing: The action for the log, e.g. ``drawing``.
+        activity: The action for the log, e.g. ``drawing``.
     """
     last = ""
 
@@ -274,9 +276,9 @@ def guarded(overlay: Overlay, doing: str) -> Iterator[None]:
         nonlocal last
         # An open menu runs a nested event loop, so the exception may be another overlay's.
         owner = _owner(trace) or overlay
-        text = f"{_describe(kind, error, trace)} (while {doing})"
+        text = f"{_describe(kind, error, trace)} (while {activity})"
         if text != last:
-            _report(owner, text, (kind, error, trace))
+            _log_problem(owner, text, (kind, error, trace))
         last = text
 
     before = sys.excepthook
@@ -304,7 +306,7 @@ def log_uncaught_errors() -> Callable[[], None]:
     def report(kind: type[BaseException], error: BaseException, trace: Any) -> None:
         owner = _owner(trace)
         if owner is not None:
-            _report(owner, _describe(kind, error, trace), (kind, error, trace))
+            _log_problem(owner, _describe(kind, error, trace), (kind, error, trace))
         if before is not sys.__excepthook__:
             before(kind, error, trace)
         elif owner is None:
@@ -319,7 +321,7 @@ def log_uncaught_errors() -> Callable[[], None]:
     return end
 
 
-def _report(overlay: Overlay, text: str, raised: Any) -> None:
+def _log_problem(overlay: Overlay, text: str, raised: Any) -> None:
     # Frames and timers repeat the same error.
     level = logging.DEBUG if text == overlay.problem else logging.ERROR
     _log.log(level, "overlay %s: %s", overlay.name, text, exc_info=raised)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from rosglass.rviz.window import Window
 
-__all__ = ["DISPLAY", "TOOL", "VIEW", "Plugin", "Watched", "declared", "require_class_id"]
+__all__ = ["DISPLAY", "TOOL", "VIEW", "Plugin", "PluginList", "declared", "require_class_id"]
 
 
 DISPLAY, TOOL, VIEW = "rviz::Display", "rviz::Tool", "rviz::ViewController"
@@ -93,7 +93,7 @@ def _classes(file: str) -> list[ElementTree.Element]:
         return []
 
 
-class Watched(QtCore.QObject):
+class PluginList(QtCore.QObject):
     """Base class of RViz's list of tools and list of displays.
 
     Derived classes implement :meth:`_sync_items`, which updates :attr:`_items`, and

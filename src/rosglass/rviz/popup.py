@@ -69,20 +69,20 @@ class Popup(WidgetOverlay):
         **options: Any,
     ) -> None:
         made = make_widget(content, name)
-        base = _PopupWidget(made, self._put, self._pressed_beside)
-        self._veil = _Veil(base)
+        base = _PopupBackground(made, self._position_content, self._on_press_outside)
+        self._stale_shade = _StaleShade(base)
         #: The widget.
         self.content: Any = made
-        self._anchor, self._place = anchor, (math.nan, math.nan)
-        self._free = True
+        self._anchor, self._position = anchor, (math.nan, math.nan)
+        self._centered = True
         self._tracker: Tracker | None = None
         #: The tracker's problem that the popup shows as its own.
-        self._lost = ""
+        self._tracker_problem = ""
         self._trackers: Trackers | None = None
         self._light_dismiss = light_dismiss
         super().__init__(base, name or type(made).__name__, **options)
         self.is_popup, self.is_modal = True, modal
-        base.takes_presses = modal or light_dismiss
+        base.accepts_presses = modal or light_dismiss
         if modal:
             base.color = QtGui.QColor(modal_color or QtGui.QColor(80, 80, 80, 180))
 
@@ -94,13 +94,13 @@ class Popup(WidgetOverlay):
     @anchor.setter
     def anchor(self, anchor: Anchor) -> None:
         self._anchor = anchor
-        self._put()
+        self._position_content()
 
     @property
     def place(self) -> tuple[float, float]:
         """The anchor's position, in units from the upper left corner of the view."""
-        if not self._free:
-            return self._place
+        if not self._centered:
+            return self._position
         return self.root.width() / 2, self.root.height() / 2
 
     def move(self, x: float, y: float) -> None:
@@ -135,9 +135,9 @@ class Popup(WidgetOverlay):
         self._stop_following()
         self._tracker, self._trackers = tracker, trackers
         tracker.positionChanged.connect(lambda at: self._move_to_point(at.x(), at.y()))
-        tracker.problemChanged.connect(self._show_lost)
-        tracker.staleChanged.connect(self._check_stale)
-        self._show_lost()
+        tracker.problemChanged.connect(self._show_tracker_problem)
+        tracker.staleChanged.connect(self._on_stale_changed)
+        self._show_tracker_problem()
         at: Any = tracker.position
         self._move_to_point(at.x(), at.y())
 
@@ -150,25 +150,28 @@ class Popup(WidgetOverlay):
         tracker, self._tracker = self._tracker, None
         if tracker is not None and self._trackers is not None:
             self._trackers.remove(tracker)
-            self._show_lost()
+            self._show_tracker_problem()
 
-    def _show_lost(self) -> None:
+    def _show_tracker_problem(self) -> None:
         # Keep a problem of another origin.
-        before, self._lost = self._lost, str(self._tracker.problem) if self._tracker else ""
+        before, self._tracker_problem = (
+            self._tracker_problem,
+            str(self._tracker.problem) if self._tracker else "",
+        )
         if self.problem in ("", before):
-            self.tell_problem(self._lost)
+            self.tell_problem(self._tracker_problem)
 
-    def _check_stale(self) -> None:
+    def _on_stale_changed(self) -> None:
         if self._tracker is not None and self._tracker.stale:
             # Unlike other overlays, popups have no entry in the panel to show it.
             _log.warning("popup %s: %s", self.name, self._tracker.problem)
-        self._put()
+        self._position_content()
 
     def _move_to_point(self, x: float, y: float) -> None:
-        self._place, self._free = (x, y), False
-        self._put()
+        self._position, self._centered = (x, y), False
+        self._position_content()
 
-    def _put(self) -> None:
+    def _position_content(self) -> None:
         """Position the content in the view, by its size and the position of its anchor."""
         content = self.content
         if not is_alive(content):
@@ -180,7 +183,9 @@ class Popup(WidgetOverlay):
             # A modal popup blocks all input, so it must stay visible.
             x, y, seen = room.width() / 2, room.height() / 2, True
         content.setVisible(seen)
-        self._veil.setVisible(seen and self._tracker is not None and bool(self._tracker.stale))
+        self._stale_shade.setVisible(
+            seen and self._tracker is not None and bool(self._tracker.stale)
+        )
         if not seen:
             return
         size = content.sizeHint().expandedTo(content.minimumSize()).boundedTo(content.maximumSize())
@@ -188,25 +193,25 @@ class Popup(WidgetOverlay):
         if self._anchor is Anchor.AUTO:
             across = float(x + size.width() > room.width())
             down = float(y + size.height() > room.height())
-        left = _inside(x - across * size.width(), room.width() - size.width())
-        top = _inside(y - down * size.height(), room.height() - size.height())
-        for part in (content, self._veil):
+        left = _clamped(x - across * size.width(), room.width() - size.width())
+        top = _clamped(y - down * size.height(), room.height() - size.height())
+        for part in (content, self._stale_shade):
             part.setGeometry(left, top, size.width(), size.height())
 
-    def _pressed_beside(self) -> None:
+    def _on_press_outside(self) -> None:
         if self._light_dismiss:
             self.visible = False
             self.dismissed.emit()
 
 
-class _PopupWidget(QtWidgets.QWidget):  # type: ignore[misc]
+class _PopupBackground(QtWidgets.QWidget):  # type: ignore[misc]
     """The widget that fills the view around a popup's content."""
 
     def __init__(self, content: Any, put: Callable[[], None], pressed: Callable[[], None]) -> None:
         super().__init__()
-        self._put, self._pressed = put, pressed
+        self._position_content, self._on_press = put, pressed
         self.color: Any = None
-        self.takes_presses = False
+        self.accepts_presses = False
         content.setParent(self)
         # Without its own background, the scene would show through between its widgets.
         content.setAutoFillBackground(True)
@@ -215,10 +220,10 @@ class _PopupWidget(QtWidgets.QWidget):  # type: ignore[misc]
         """Reposition the content when sizes change, and handle presses."""
         kind = event.type()
         if kind in (QtCore.QEvent.Resize, QtCore.QEvent.LayoutRequest, QtCore.QEvent.Show):
-            self._put()
-        if kind == QtCore.QEvent.MouseButtonPress and self.takes_presses:
+            self._position_content()
+        if kind == QtCore.QEvent.MouseButtonPress and self.accepts_presses:
             event.accept()
-            self._pressed()
+            self._on_press()
             return True
         return bool(super().event(event))
 
@@ -228,7 +233,7 @@ class _PopupWidget(QtWidgets.QWidget):  # type: ignore[misc]
             QtGui.QPainter(self).fillRect(event.rect(), self.color)
 
 
-class _Veil(QtWidgets.QWidget):  # type: ignore[misc]
+class _StaleShade(QtWidgets.QWidget):  # type: ignore[misc]
     """A grey shade over a popup whose frame is stale; transparent to the mouse."""
 
     def __init__(self, base: Any) -> None:
@@ -252,8 +257,8 @@ class MoveBar(QtWidgets.QLabel):  # type: ignore[misc]
         super().__init__(text)
         #: The popup to move.
         self.popup: Popup | None = None
-        self._from: Any = None
-        self._start = (0.0, 0.0)
+        self._drag_start: Any = None
+        self._anchor_start = (0.0, 0.0)
         self.setCursor(QtCore.Qt.SizeAllCursor)
 
     def mousePressEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
@@ -267,22 +272,22 @@ class MoveBar(QtWidgets.QLabel):  # type: ignore[misc]
             across = down = 0.0
             self.popup.anchor = Anchor.TOP_LEFT
         box = self.popup.content.geometry()
-        self._start = (box.x() + across * box.width(), box.y() + down * box.height())
-        self._from = event.screenPos()
+        self._anchor_start = (box.x() + across * box.width(), box.y() + down * box.height())
+        self._drag_start = event.screenPos()
 
     def mouseMoveEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
         """Move the popup with the mouse."""
-        if self._from is not None and self.popup is not None:
-            way = (event.screenPos() - self._from) / self.popup.scale
-            self.popup.move(self._start[0] + way.x(), self._start[1] + way.y())
+        if self._drag_start is not None and self.popup is not None:
+            way = (event.screenPos() - self._drag_start) / self.popup.scale
+            self.popup.move(self._anchor_start[0] + way.x(), self._anchor_start[1] + way.y())
 
     def mouseReleaseEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
         """Stop dragging."""
         del event
-        self._from = None
+        self._drag_start = None
 
 
-def _inside(start: float, most: float) -> int:
+def _clamped(start: float, most: float) -> int:
     return round(max(min(start, most), 0))
 
 
@@ -297,7 +302,7 @@ class Button(enum.Flag):
     APPLY = 32
 
 
-_TEXTS = {
+_BUTTON_TEXTS = {
     Button.OK: "OK",
     Button.CANCEL: "Cancel",
     Button.YES: "Yes",
@@ -333,7 +338,7 @@ class Dialog(Popup):
         buttons: Button = Button.OK,
         **options: Any,
     ) -> None:
-        chosen = [button for button in _TEXTS if button in buttons]
+        chosen = [button for button in _BUTTON_TEXTS if button in buttons]
         if not chosen:
             raise Error(f"dialog {title!r} needs a button, e.g. Button.OK")
         inner = make_widget(content, name or title)
@@ -347,7 +352,7 @@ class Dialog(Popup):
         #: The dialog's push buttons.
         self.buttons: dict[Button, Any] = {}
         for button in chosen:
-            made = self.buttons[button] = QtWidgets.QPushButton(_TEXTS[button])
+            made = self.buttons[button] = QtWidgets.QPushButton(_BUTTON_TEXTS[button])
             row.addWidget(made)
         column.addWidget(bar)
         column.addWidget(inner)
@@ -355,9 +360,9 @@ class Dialog(Popup):
         super().__init__(frame, name or title, **options)
         bar.popup = self
         for button, made in self.buttons.items():
-            made.clicked.connect(lambda *_, button=button: self._click(button))
+            made.clicked.connect(lambda *_, button=button: self._on_clicked(button))
 
-    def _click(self, button: Button) -> None:
+    def _on_clicked(self, button: Button) -> None:
         if button is not Button.APPLY:
             self.visible = False
         self.clicked.emit(button)

@@ -43,17 +43,17 @@ __all__ = [
 _MAX_TEXT_LENGTH = 10_000
 _INT32 = (-(2**31), 2**31 - 1)
 #: Properties whose value is a text of numbers with semicolons between them -> their names.
-_PARTS = {"rviz::VectorProperty": "xyz", "rviz::QuaternionProperty": "xyzw"}
-_COLOUR = "rviz::ColorProperty"
+_VECTOR_PARTS = {"rviz::VectorProperty": "xyz", "rviz::QuaternionProperty": "xyzw"}
+_COLOUR_CLASS = "rviz::ColorProperty"
 #: Read-only properties that show a display's status.
-_STATUS = ("rviz::StatusList", "rviz::StatusProperty")
+_STATUS_CLASSES = ("rviz::StatusList", "rviz::StatusProperty")
 
 
 def child_properties(item: Any) -> Iterator[Any]:
     """Iterate over a property's children, except for displays and their status."""
     for index in range(item.numChildren()):
         child = item.childAt(index)
-        if class_of(child) not in _STATUS and not is_a(child, "rviz::Display"):
+        if class_of(child) not in _STATUS_CLASSES and not is_a(child, "rviz::Display"):
             yield child
 
 
@@ -69,7 +69,7 @@ def find_property(item: Any, path: str | Sequence[str], whose: str = "") -> Any:
         Error: The property does not exist; the error lists existing ones.
     """
     names = path if isinstance(path, str) else "/".join(map(str, path))
-    found = _below(item, names)
+    found = _find_below(item, names)
     if found is None:
         head = names.partition("/")[0]
         known = [str(child.getName()) for child in child_properties(item)]
@@ -81,14 +81,14 @@ def find_property(item: Any, path: str | Sequence[str], whose: str = "") -> Any:
     return found
 
 
-def _below(item: Any, path: str) -> Any:
+def _find_below(item: Any, path: str) -> Any:
     # Names may contain slashes, e.g. those of topics and links.
     for child in child_properties(item):
         name = str(child.getName())
         if path == name:
             return child
         if path.startswith(f"{name}/"):
-            found = _below(child, path[len(name) + 1 :])
+            found = _find_below(child, path[len(name) + 1 :])
             if found is not None:
                 return found
     return None
@@ -102,11 +102,11 @@ def read_property(item: Any) -> Any:
         quaternions, in RViz's order; None for a property that has only children.
     """
     value, kind = item.getValue(), class_of(item)
-    if kind == _COLOUR:
+    if kind == _COLOUR_CLASS:
         parts = _split(value)
         return "#{:02x}{:02x}{:02x}".format(*map(int, parts)) if len(parts) == 3 else str(value)
-    if kind in _PARTS:
-        return dict(zip(_PARTS[kind], _split(value), strict=False))
+    if kind in _VECTOR_PARTS:
+        return dict(zip(_VECTOR_PARTS[kind], _split(value), strict=False))
     if isinstance(value, bool) or value is None:
         return value
     if isinstance(value, int):
@@ -131,7 +131,7 @@ def write_property(item: Any, value: Any, name: str = "") -> None:
     """
     name = name or str(item.getName())
     kind = class_of(item)
-    if item.getReadOnly() or kind in _STATUS:
+    if item.getReadOnly() or kind in _STATUS_CLASSES:
         raise Error(f"{name} cannot be changed; it is {read_property(item)!r}")
     wanted, given = _convert(item, kind, value, name)
     if item.getValue() == given:
@@ -184,10 +184,10 @@ def _kind(item: Any) -> str:
 
 def _convert(item: Any, kind: str, value: Any, name: str) -> tuple[Any, Any]:
     """Return a value as returned by :func:`read_property`, and as set in RViz."""
-    if kind == _COLOUR:
+    if kind == _COLOUR_CLASS:
         return _colour(value, name)
-    if kind in _PARTS:
-        return _vector(value, _PARTS[kind], name)
+    if kind in _VECTOR_PARTS:
+        return _vector(value, _VECTOR_PARTS[kind], name)
     now = item.getValue()
     if now is None:
         raise Error(f"{name} has no value of its own, only properties below it")
@@ -449,7 +449,7 @@ def _classes() -> tuple[Any, Any]:
     """Return our subclasses of RViz's ``Property`` and ``BoolProperty``."""
     bindings, core = rviz(), pyqt()
 
-    class _Shown:
+    class _NotSaved:
         """Mixin of both; `view` is set right after creation."""
 
         view: PropertyView | None = None
@@ -466,7 +466,7 @@ def _classes() -> tuple[Any, Any]:
             found &= ~(core.Qt.ItemIsEditable | core.Qt.ItemIsUserCheckable)
         return found
 
-    class Item(_Shown, bindings.Property):  # type: ignore[name-defined,misc]
+    class Item(_NotSaved, bindings.Property):  # type: ignore[name-defined,misc]
         @log_errors()
         def getViewData(self, column: int, role: int) -> Any:
             view = self.view
@@ -486,7 +486,7 @@ def _classes() -> tuple[Any, Any]:
             made = make_editor(view.model, parent, view.choices) if view is not None else None
             return bindings.Property.createEditor(self, parent, option) if made is None else made
 
-    class Check(_Shown, bindings.BoolProperty):  # type: ignore[name-defined,misc]
+    class Check(_NotSaved, bindings.BoolProperty):  # type: ignore[name-defined,misc]
         @log_errors(core.Qt.ItemFlags())
         def getViewFlags(self, column: int) -> Any:
             return flags(self, bindings.BoolProperty, column)
@@ -514,7 +514,7 @@ class PropertyView:
         self.item.view = self
         self._parts: dict[str, Any] = {}
         self._busy = False
-        self._show_about()
+        self._show_attributes()
         if hasattr(model.kind, "parts"):
             for part, number in model.kind.parts(model.get()).items():
                 self._parts[part] = owned_by_rviz(item(part, number, "", self.item))
@@ -523,12 +523,12 @@ class PropertyView:
             below.changed.connect(
                 log_errors()(lambda part=part, below=below: self._edited(below, part))
             )
-        self._watches = [
+        self._connections = [
             (model.valueChanged, lambda _value: self._show()),
-            (model.aboutChanged, self._show_about),
+            (model.aboutChanged, self._show_attributes),
         ]
-        self._watches = [(signal, log_errors()(slot)) for signal, slot in self._watches]
-        for signal, slot in self._watches:
+        self._connections = [(signal, log_errors()(slot)) for signal, slot in self._connections]
+        for signal, slot in self._connections:
             signal.connect(slot)
 
     def swatch(self) -> Any:
@@ -539,7 +539,7 @@ class PropertyView:
 
     def close(self) -> None:
         """Disconnect from the registered property."""
-        watches, self._watches = self._watches, []
+        watches, self._connections = self._connections, []
         for signal, slot in watches if is_alive(self.model) else ():
             signal.disconnect(slot)
 
@@ -571,7 +571,7 @@ class PropertyView:
         finally:
             self._busy = False
 
-    def _show_about(self) -> None:
+    def _show_attributes(self) -> None:
         if _is_deleted(self.item):
             return
         model = self.model
@@ -611,14 +611,14 @@ class PropertyTree:
         self._owner, self._above, self._choices = owner, above, choices
         self._views: dict[RegisteredProperty, PropertyView] = {}
         self._watched: dict[RegisteredProperty, Any] = {}
-        self._added, self._gone = (
+        self._added, self._removed = (
             log_errors()(self._on_registered),
             log_errors()(self._on_unregistered),
         )
         owner.registered.connect(self._added)
-        owner.unregistered.connect(self._gone)
+        owner.unregistered.connect(self._removed)
         for found in owner.all():
-            self._enter(found)
+            self._add(found)
 
     def item(self, found: RegisteredProperty) -> Any:
         """Return the item of a property in RViz's tree."""
@@ -628,27 +628,27 @@ class PropertyTree:
         """Disconnect from the owner, and remove its properties from the tree."""
         if is_alive(self._owner):
             self._owner.registered.disconnect(self._added)
-            self._owner.unregistered.disconnect(self._gone)
+            self._owner.unregistered.disconnect(self._removed)
         for found in list(self._owner.properties.values()):
-            self._leave(found)
+            self._remove(found)
 
     def _on_registered(self, found: object) -> None:
         # QML can emit the signal with any argument.
         if isinstance(found, RegisteredProperty) and found not in self._watched:
-            self._enter(found)
+            self._add(found)
 
     def _on_unregistered(self, found: object) -> None:
         if isinstance(found, RegisteredProperty) and found in self._watched:
-            self._leave(found)
+            self._remove(found)
 
-    def _enter(self, found: RegisteredProperty) -> None:
+    def _add(self, found: RegisteredProperty) -> None:
         watch = self._watched[found] = log_errors()(lambda: self._show(found))
         found.aboutChanged.connect(watch)
         self._show(found)
 
-    def _leave(self, found: RegisteredProperty) -> None:
+    def _remove(self, found: RegisteredProperty) -> None:
         for below in found.properties.values():
-            self._leave(below)
+            self._remove(below)
         watch = self._watched.pop(found, None)
         if watch is not None and is_alive(found):
             found.aboutChanged.disconnect(watch)

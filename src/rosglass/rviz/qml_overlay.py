@@ -49,19 +49,19 @@ class _Control(QtQuick.QQuickRenderControl):  # type: ignore[misc]
     """A render control that returns RViz's window, without which items get no keyboard focus."""
 
     panel: Any = None
-    _apart = False
+    _without_window = False
 
     @contextmanager
-    def apart(self) -> Iterator[None]:
+    def without_window(self) -> Iterator[None]:
         """Return no window while rendering, so that the scene is drawn in pixels, not in units."""
-        self._apart = True
+        self._without_window = True
         try:
             yield
         finally:
-            self._apart = False
+            self._without_window = False
 
     def renderWindow(self, offset: Any) -> Any:  # noqa: N802 - Qt's
-        if self._apart or not is_alive(self.panel):
+        if self._without_window or not is_alive(self.panel):
             return None
         window = self.panel.window()
         if offset is not None:
@@ -144,9 +144,9 @@ class Scene(QtCore.QObject):
         """
         return self.renderer.draw()
 
-    def rest(self) -> None:
+    def release_picture(self) -> None:
         """Release the memory of the last picture."""
-        self.renderer.rest()
+        self.renderer.release_picture()
 
     def close(self) -> None:
         """Delete the window after the current event; safe to call twice."""
@@ -161,10 +161,15 @@ class Scene(QtCore.QObject):
 
 
 _E = Qt5Core.QEvent
-_TAKING = ("QQuickTapHandler", "QQuickDragHandler", "QQuickPointHandler", "QQuickPinchHandler")
+_PRESS_HANDLERS = (
+    "QQuickTapHandler",
+    "QQuickDragHandler",
+    "QQuickPointHandler",
+    "QQuickPinchHandler",
+)
 _INPUT_METHOD = frozenset({_E.InputMethod, _E.InputMethodQuery})
-_FOR_SCENE = PRESS | TOUCH | DRAG | KEYS | _INPUT_METHOD
-_FOR_SCENE |= {_E.MouseMove, _E.MouseButtonRelease, _E.Wheel, _E.DragLeave}
+_SCENE_EVENTS = PRESS | TOUCH | DRAG | KEYS | _INPUT_METHOD
+_SCENE_EVENTS |= {_E.MouseMove, _E.MouseButtonRelease, _E.Wheel, _E.DragLeave}
 _TOUCH_ENDS = frozenset({_E.TouchEnd, _E.TouchCancel})
 #: Lifetime in seconds of the cached list of hoverable items.
 _ITEMS_MAX_AGE_S = 0.25
@@ -183,22 +188,22 @@ class QmlInput:
     #: Ratio of the window's event coordinates to units of the overlay.
     _ratio = 1.0
     #: The buttons pressed on an item.
-    _held = Qt5Core.Qt.NoButton
+    _pressed_buttons = Qt5Core.Qt.NoButton
     #: The last touch event sent to an item, if a finger is still down.
     _touch: _Touch | None = None
     _hoverable: Sequence[_VisibleItem] = ()
-    _listed = 0.0
+    _listed_at = 0.0
 
     def deliver(self, event: Any) -> bool:
         """Send an event to the items; return whether one accepts it."""
         window, kind = self._window, event.type()
-        if kind not in _FOR_SCENE or not is_alive(window):
+        if kind not in _SCENE_EVENTS or not is_alive(window):
             return False
         if kind in _INPUT_METHOD:
             return _send(window.focusObject() or window, event)
         at = position(event)
         at = None if at is None else at * self._ratio
-        if kind == _E.TouchBegin and not _takes_touch(window, at):
+        if kind == _E.TouchBegin and not _accepts_touch(window, at):
             return False
         if kind == _E.MouseButtonDblClick:
             # Qt sends the second press of a double click twice: as press and as double click.
@@ -212,14 +217,14 @@ class QmlInput:
         if kind in TOUCH:
             self._touch = None if kind in _TOUCH_ENDS else _Touch.of(sent)
         elif kind == _E.MouseButtonRelease:
-            self._held = event.buttons()
+            self._pressed_buttons = event.buttons()
         taken = _send(window, sent)
         if not is_alive(window):
             return taken
         if kind in PRESS:
-            taken = taken or any(_takes_press(h, event.button()) for h in _handlers(window, at))
+            taken = taken or any(_accepts_press(h, event.button()) for h in _handlers(window, at))
             if taken:
-                self._held = event.buttons()
+                self._pressed_buttons = event.buttons()
         elif kind == _E.MouseMove:
             taken = taken or self._is_hovered(at) or self.cursor() is not None
         elif kind == _E.Wheel and not taken:
@@ -234,18 +239,18 @@ class QmlInput:
         window = self._window
         if not is_alive(window):
             return
-        if self._held or self._touch is not None:
+        if self._pressed_buttons or self._touch is not None:
             self._cancel()
         if not is_alive(window):
             return
         Qt5Core.QCoreApplication.sendEvent(window, Qt5Core.QEvent(_E.Leave))
-        if self._shown_in() is not None:
-            self._shown_in().unsetCursor()
+        if self._panel_window() is not None:
+            self._panel_window().unsetCursor()
 
     def _cancel(self) -> None:
         """Release buttons and fingers so that items see a cancelled press."""
         window, content = self._window, self._window.contentItem()
-        held, self._held = self._held, Qt5Core.Qt.NoButton
+        held, self._pressed_buttons = self._pressed_buttons, Qt5Core.Qt.NoButton
         touch, self._touch = self._touch, None
         # Handlers ignore whether their item is enabled. A TapHandler cancels on a release
         # elsewhere, the others on an event while they themselves are disabled.
@@ -273,19 +278,21 @@ class QmlInput:
 
     def cursor(self) -> Any:
         """Return the cursor that the item under the mouse sets; None for the default one."""
-        shown_in = self._shown_in()
+        shown_in = self._panel_window()
         if shown_in is None or shown_in.cursor().shape() == Qt5Core.Qt.ArrowCursor:
             return None
         return shown_in.cursor()
 
-    def _shown_in(self) -> Any:
+    def _panel_window(self) -> Any:
         return self._panel.window().windowHandle() if is_alive(self._panel) else None
 
     def _is_hovered(self, at: Any) -> bool:
         now = time.monotonic()
-        if now - self._listed > _ITEMS_MAX_AGE_S:
-            self._listed = now
-            self._hoverable = [s for s in _shown(self._window) if s.item.acceptHoverEvents()]
+        if now - self._listed_at > _ITEMS_MAX_AGE_S:
+            self._listed_at = now
+            self._hoverable = [
+                s for s in _visible_items(self._window) if s.item.acceptHoverEvents()
+            ]
         return any(shown.has(at) for shown in self._hoverable)
 
 
@@ -354,7 +361,7 @@ def _as_press(event: Any) -> Any:
     return made
 
 
-def _shown(window: Any) -> Iterator[_VisibleItem]:
+def _visible_items(window: Any) -> Iterator[_VisibleItem]:
     """Iterate over all visible items."""
     waiting = [_VisibleItem(item, ()) for item in window.contentItem().childItems()]
     while waiting:
@@ -379,37 +386,37 @@ def _is_tap(handler: Any) -> bool:
 
 def _handlers(window: Any, at: Any) -> Iterator[Any]:
     """Iterate over the enabled pointer handlers of the items at a position."""
-    for shown in _shown(window):
+    for shown in _visible_items(window):
         children = shown.item.children()
         found = [c for c in children if c.metaObject().className().endswith("Handler")]
         if found and shown.has(at):
             yield from (handler for handler in found if handler.property("enabled"))
 
 
-def _takes_press(handler: Any, button: Any) -> bool:
+def _accepts_press(handler: Any, button: Any) -> bool:
     name = handler.metaObject().className()
     buttons = handler.property("acceptedButtons")
-    return name in _TAKING and bool(int(buttons) & int(button))
+    return name in _PRESS_HANDLERS and bool(int(buttons) & int(button))
 
 
-def _is_for_touch(item: Any) -> bool:
+def _is_touch_item(item: Any) -> bool:
     # acceptTouchEvents() is true for every item until it gets a touch event.
     return item.metaObject().className() in ("QQuickMultiPointTouchArea", "QQuickPinchArea")
 
 
-def _takes_touch(window: Any, at: Any) -> bool:
+def _accepts_touch(window: Any, at: Any) -> bool:
     left = Qt5Core.Qt.LeftButton
     return any(
-        (_is_for_touch(shown.item) or int(shown.item.acceptedMouseButtons()) & int(left))
+        (_is_touch_item(shown.item) or int(shown.item.acceptedMouseButtons()) & int(left))
         and shown.has(at)
-        for shown in _shown(window)
-    ) or any(_takes_press(handler, left) for handler in _handlers(window, at))
+        for shown in _visible_items(window)
+    ) or any(_accepts_press(handler, left) for handler in _handlers(window, at))
 
 
 _log = logging.getLogger("rosglass.rviz")
 _IMPORTS = Path(__file__).with_name("imports")
 #: Key in `Session.shared` of the list of overlays that use the session.
-_USERS = "overlays"
+_OVERLAYS = "overlays"
 #: Milliseconds between drawing and :meth:`QmlOverlay._on_idle`.
 _IDLE_DELAY_MS = 1000
 
@@ -461,18 +468,18 @@ class QmlOverlay(QmlInput, Overlay):
         self.engine.rootContext().setContextProperty("rviz", self.properties)
         self._window = self._scene.window
         self._scene.changed.connect(self.changed)
-        self._shown_over: Window | None = None
+        self._rviz_window: Window | None = None
         self._root: Any = None
-        self._error = self._not_drawn = ""
-        self._look = Qt5Core.QTimer()
-        self._look.setSingleShot(True)
-        self._look.setInterval(_IDLE_DELAY_MS)
-        self._look.timeout.connect(self._on_idle)
+        self._error = self._undrawable = ""
+        self._idle_timer = Qt5Core.QTimer()
+        self._idle_timer.setSingleShot(True)
+        self._idle_timer.setInterval(_IDLE_DELAY_MS)
+        self._idle_timer.timeout.connect(self._on_idle)
         self._errors = ErrorView(self.engine, PANEL)
         self.arranged.connect(self._fit_errors)
         self._closed = self._loading = False
-        self._users: list[QmlOverlay] = session.shared.setdefault(_USERS, [])
-        self._users.append(self)
+        self._session_overlays: list[QmlOverlay] = session.shared.setdefault(_OVERLAYS, [])
+        self._session_overlays.append(self)
         self._live.due.connect(self.reload)
         self._live.script_ended.connect(self._on_script_ended)
 
@@ -557,7 +564,7 @@ class QmlOverlay(QmlInput, Overlay):
             root.setVisible(False)
             what = "a window; overlays are shown in RViz's window: use Item { } instead"
         else:
-            what = f"a {_kind(root)}: put its content into an Item {{ }}"
+            what = f"a {_qml_type_name(root)}: put its content into an Item {{ }}"
         self._live.drop(made)
         raise QmlError(f"{self.file}: the root of an overlay must be an Item, but is {what}")
 
@@ -566,15 +573,15 @@ class QmlOverlay(QmlInput, Overlay):
         self.renewed.emit(self)
         self._root = root
         self._scene.show_item(root)
-        self._not_drawn = ""
+        self._undrawable = ""
         self.tell_problem("")
         # MediaPlayer and ImagePublisher are not items, so look for them in the file.
         self._warn_not_drawn(root, lambda: need_in_file(self.file, self.engine.importPathList()))
 
     def _on_idle(self) -> None:
         """Release the picture, and warn of items created since that the renderer cannot draw."""
-        self._scene.rest()
-        if not self._not_drawn and is_alive(self._window):
+        self._scene.release_picture()
+        if not self._undrawable and is_alive(self._window):
             self._warn_not_drawn(self._window.contentItem())
 
     def _warn_not_drawn(self, item: Any, otherwise: Callable[[], str] = str) -> None:
@@ -582,13 +589,13 @@ class QmlOverlay(QmlInput, Overlay):
             return
         need = need_in_items(item, self.file) or otherwise()
         if need:
-            self._not_drawn = choice.tell_missing(need)
-            _log.warning("overlay %s: %s", self.name, self._not_drawn)
+            self._undrawable = choice.tell_missing(need)
+            _log.warning("overlay %s: %s", self.name, self._undrawable)
             self.tell_problem(self.problem)
 
     def tell_problem(self, problem: str) -> None:
         """Set the problem; if empty, errors of the file remain."""
-        super().tell_problem(problem or self._error or self._not_drawn)
+        super().tell_problem(problem or self._error or self._undrawable)
 
     def _show_error(self, error: str) -> None:
         self._error = error
@@ -619,7 +626,7 @@ class QmlOverlay(QmlInput, Overlay):
         Qt5Core.QTimer.singleShot(0, self._close_rviz)
 
     def _close_rviz(self) -> None:
-        window = self._shown_over
+        window = self._rviz_window
         if window is not None and is_alive(window.widget):
             window.widget.close()
 
@@ -629,7 +636,7 @@ class QmlOverlay(QmlInput, Overlay):
     def attach(self, window: Window) -> None:
         """Connect to RViz's window."""
         self._panel = window.panel
-        self._shown_over = window
+        self._rviz_window = window
         self._scene.show_in(window.panel)
 
     def resize(self, width: int, height: int, ratio: float) -> None:
@@ -642,8 +649,8 @@ class QmlOverlay(QmlInput, Overlay):
         self.session.go_on()
         pixels = self._scene.draw()
         self.read_back = self._scene.renderer.read_back
-        if not self._look.isActive():
-            self._look.start()
+        if not self._idle_timer.isActive():
+            self._idle_timer.start()
         return pixels
 
     def close(self) -> None:
@@ -651,20 +658,20 @@ class QmlOverlay(QmlInput, Overlay):
         if self._closed:
             return
         self._closed = True
-        self._look.stop()
+        self._idle_timer.stop()
         self.properties.close()
         self._scene.changed.disconnect(self.changed)
-        self._users.remove(self)
+        self._session_overlays.remove(self)
         self._errors.hide()
         # QML uses it until the engine is deleted.
         self.properties.setParent(self.engine)
         # Only the last overlay of the session may shut its node down.
-        self._live.close(hold=bool(self._users))
+        self._live.close(hold=bool(self._session_overlays))
         self._scene.close()
         self._root = None
 
 
-def _kind(root: Any) -> str:
+def _qml_type_name(root: Any) -> str:
     """Return the QML type name of an object."""
     kind = root.metaObject()
     while "_QML" in kind.className():

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, cast
 from rosglass.errors import Error
 from rosglass.qml.from_js import plain_from_js
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
-from rosglass.rviz.face import VARIANT, errors_to_js, spell_checked, switch, text, to_python
 from rosglass.rviz.property_values import KINDS, merged, shown, writable
+from rosglass.rviz.qml_members import VARIANT, boolean, errors_to_js, spell_checked, text, to_python
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -105,7 +105,7 @@ class RegisteredProperty(QtCore.QObject):
         return cast("bool", self._about["readOnly"])
 
     def _set_read_only(self, value: Any) -> None:
-        self._change("readOnly", value, switch())
+        self._change("readOnly", value, boolean())
 
     #: Whether users cannot change it; the overlay can.
     readOnly = Property(VARIANT, _get_read_only, _set_read_only, notify=aboutChanged)
@@ -114,7 +114,7 @@ class RegisteredProperty(QtCore.QObject):
         return cast("bool", self._about["hidden"])
 
     def _set_hidden(self, value: Any) -> None:
-        self._change("hidden", value, switch())
+        self._change("hidden", value, boolean())
 
     #: Whether the panel does not show it.
     hidden = Property(VARIANT, _get_hidden, _set_hidden, notify=aboutChanged)
@@ -219,7 +219,7 @@ class RegisteredProperties(QtCore.QObject):
         self.properties: dict[str, RegisteredProperty] = {}
         self._saved: dict[str, Any] = {}
         self._config: dict[str, Any] = {}
-        self._older: set[RegisteredProperty] = set()
+        self._replaceable: set[RegisteredProperty] = set()
 
     # The free-form map.
 
@@ -305,7 +305,7 @@ class RegisteredProperties(QtCore.QObject):
         """
         if not isinstance(name, str) or not name.strip():
             raise Error(f"the name must be a text, e.g. 'Speed', got {shown(name)}")
-        about, narrow = self._sorted(kind, name, options)
+        about, narrow = self._split_options(kind, name, options)
         try:
             made = KINDS[kind](**narrow)
             value = made.default if default is None else made.read(default)
@@ -314,7 +314,7 @@ class RegisteredProperties(QtCore.QObject):
         siblings = self._siblings(parent, name)
         found = siblings.get(name)
         if found is not None and kind != found.kind.NAME:
-            if found not in self._older:
+            if found not in self._replaceable:
                 raise Error(
                     f"{name}: a property of this name exists, of kind {found.kind.NAME}; "
                     "choose another name"
@@ -322,7 +322,7 @@ class RegisteredProperties(QtCore.QObject):
             self.unregister(found)
             found = None
         if found is not None:
-            self._older.discard(found)
+            self._replaceable.discard(found)
             found.adopt(made, about)
             return found
         return self._add(RegisteredProperty(self, parent, name, made, value), siblings, about)
@@ -346,7 +346,7 @@ class RegisteredProperties(QtCore.QObject):
         return made
 
     @staticmethod
-    def _sorted(
+    def _split_options(
         kind: str, name: str, options: dict[str, Any]
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Validate options, and split them into those of all kinds and those of this kind."""
@@ -397,7 +397,7 @@ class RegisteredProperties(QtCore.QObject):
 
     def begin_load(self) -> None:
         """Allow existing properties to be registered with another kind, when QML is reloaded."""
-        self._older = set(self.all())
+        self._replaceable = set(self.all())
 
     # Files.
 

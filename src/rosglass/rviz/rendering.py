@@ -163,7 +163,7 @@ def read_depth(x: int, y: int, width: int = 1, height: int = 1) -> NDArray[np.fl
 
 
 #: Property of an OpenGL context in which Qt Quick stores the single scene that it expects.
-_OWNER = "_q_sgrendercontext"
+_SCENE_PROPERTY = "_q_sgrendercontext"
 
 
 class Renderer(Protocol):
@@ -195,7 +195,7 @@ class Renderer(Protocol):
     def draw(self) -> NDArray[np.uint32]:
         """Return the rendered picture; see :meth:`Scene.draw`."""
 
-    def rest(self) -> None:
+    def release_picture(self) -> None:
         """Release the memory of the last picture."""
 
     def stop(self) -> None:
@@ -223,9 +223,9 @@ class OpenGLRenderer:
         self._control, self._window = control, window
         with self._gl.current():
             # Reset it, so that several scenes can share the context.
-            self._gl.context.setProperty(_OWNER, None)
+            self._gl.context.setProperty(_SCENE_PROPERTY, None)
             control.initialize(self._gl.context)
-            self._gl.context.setProperty(_OWNER, None)
+            self._gl.context.setProperty(_SCENE_PROPERTY, None)
 
     def fit(self, width: int, height: int, ratio: float) -> float:
         """Set the size; text and shapes are scaled by the window's pixel ratio.
@@ -252,7 +252,7 @@ class OpenGLRenderer:
         with self._gl.current():
             self._control.polishItems()
             self._control.sync()
-            with self._control.apart():
+            with self._control.without_window():
                 self._control.render()
             started = time.perf_counter()
             # After rendering: QML that waits for a reply in a nested event loop may release it.
@@ -264,7 +264,7 @@ class OpenGLRenderer:
             self.read_back = time.perf_counter() - started
         return self._pixels[::-1]
 
-    def rest(self) -> None:
+    def release_picture(self) -> None:
         """Release the memory of the last picture."""
         self._pixels = None
 
@@ -309,7 +309,7 @@ class SoftwareRenderer:
         """Draw the whole scene into an image."""
         self._control.polishItems()
         self._control.sync()
-        with self._control.apart(), self._in_pixels():
+        with self._control.without_window(), self._in_pixels():
             self._image = self._control.grab()
         height, width = self._shape
         words = np.frombuffer(self._image.constBits(), np.uint32)
@@ -331,7 +331,7 @@ class SoftwareRenderer:
             self._window.resize(self._units)
             self._window.blockSignals(blocked)
 
-    def rest(self) -> None:
+    def release_picture(self) -> None:
         """Release the memory of the last picture."""
         self._image = None
 

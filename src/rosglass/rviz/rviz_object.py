@@ -15,24 +15,24 @@ from rosglass.errors import Error
 from rosglass.qml.log import Caller, log_from_qml, plain_path
 from rosglass.qml.runtime import runtime_of
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, QtQml, Signal, Slot
-from rosglass.rviz.face import (
+from rosglass.rviz.property_values import shown
+from rosglass.rviz.qml_members import (
     LIST,
     VARIANT,
-    Face,
-    ItemFaces,
-    anything,
+    QmlWrapper,
+    QmlWrappers,
+    boolean,
+    forward,
     member,
     options,
-    passing,
     point,
     point_of,
     property_path,
     slot,
     spell_checked,
-    switch,
     text,
+    unchecked,
 )
-from rosglass.rviz.property_values import shown
 from rosglass.rviz.qt5 import QtGui as Qt5Gui
 from rosglass.rviz.qt5 import QtQuick
 from rosglass.rviz.registered_properties import RegisteredProperties
@@ -69,7 +69,7 @@ def _vector(place: Point) -> QtGui.QVector3D:
     return QtGui.QVector3D(*place)
 
 
-class QmlTool(Face):
+class QmlTool(QmlWrapper):
     """A tool of RViz; its members stay readable after removal."""
 
     CALLED = "tool"
@@ -83,20 +83,20 @@ class QmlTool(Face):
         super().__init__(tool, runtime, parent)
         self.existsChanged.connect(self.isSelectedChanged)
 
-    isSelected = member("isSelected", bool, isSelectedChanged, of="model.selected")
+    isSelected = member("isSelected", bool, isSelectedChanged, path="model.selected")
     exists = member("exists", bool, existsChanged)
     name = member("name", str, changed)
     description = member("description", str, changed)
     shortcutKey = member("shortcutKey", str)
     classId = member("classId", str)
     iconSource = member(
-        "iconSource", str, of="model.class_id", gives=f"image://{_ICONS}/{{}}".format
+        "iconSource", str, path="model.class_id", to_qml=f"image://{_ICONS}/{{}}".format
     )
-    select = passing("select")
-    remove = passing("remove")
+    select = forward("select")
+    remove = forward("remove")
 
 
-class QmlToolManager(Face):
+class QmlToolManager(QmlWrapper):
     """RViz's tools, ``rviz.toolManager``."""
 
     CALLED = "rviz.toolManager"
@@ -109,50 +109,50 @@ class QmlToolManager(Face):
 
     def __init__(self, tools: Tools, runtime: Runtime, parent: QtCore.QObject) -> None:
         super().__init__(tools, runtime, parent)
-        self.faces = ItemFaces(tools, QmlTool, runtime, self)
-        self.faces.changed.connect(self.toolsChanged)
-        self.faces.added.connect(self.toolAdded)
-        self.faces.removed.connect(self.toolRemoved)
+        self.wrappers = QmlWrappers(tools, QmlTool, runtime, self)
+        self.wrappers.changed.connect(self.toolsChanged)
+        self.wrappers.added.connect(self.toolAdded)
+        self.wrappers.removed.connect(self.toolRemoved)
         tools.selected.connect(self._on_selected)
 
     @property
     def current(self) -> QmlTool | None:
         """The selected tool."""
-        return self.faces.of(self.model.current)  # type: ignore[no-any-return]
+        return self.wrappers.of(self.model.current)  # type: ignore[no-any-return]
 
     #: All tools, in the order of their buttons.
-    tools = Property(LIST, lambda self: self.faces.all(), notify=toolsChanged)
+    tools = Property(LIST, lambda self: self.wrappers.all(), notify=toolsChanged)
     #: The selected tool; may be set to a tool, its index, or a class id.
     currentTool = member(
         "currentTool",
         QJSValue,
         toolChanged,
-        of="current",
-        takes=anything,
-        sets=lambda self, wanted: self._wanted(wanted).select(),
+        path="current",
+        from_qml=unchecked,
+        setter=lambda self, wanted: self._wanted(wanted).select(),
     )
     #: Class ids of the tools that can be added.
-    toolClasses = member("toolClasses", LIST, of="model.classes")
+    toolClasses = member("toolClasses", LIST, path="model.classes")
 
-    @slot(1, classId=anything)
+    @slot(1, classId=unchecked)
     def addTool(self, class_id: Any = None) -> QmlTool | None:
         """Add and return a tool of a class; without a class, open RViz's dialog instead."""
         if class_id is None:
             self.model.ask_for_new()
             return None
-        return self.faces.of(self.model.add(class_id))  # type: ignore[no-any-return]
+        return self.wrappers.of(self.model.add(class_id))  # type: ignore[no-any-return]
 
     @slot(classId=text("a class id, e.g. 'rviz/Measure'"))
     def getTool(self, class_id: str) -> QmlTool | None:
         """Return the first tool of a class; null if there is none."""
-        return self.faces.of(self.model.find(class_id))  # type: ignore[no-any-return]
+        return self.wrappers.of(self.model.find(class_id))  # type: ignore[no-any-return]
 
-    @slot(tool=anything)
+    @slot(tool=unchecked)
     def removeTool(self, tool: Any) -> None:
         """Remove a tool, given as a tool, its index, or a class id."""
         self.model.remove(self._wanted(tool))
 
-    removeAll = passing("removeAll")
+    removeAll = forward("removeAll")
 
     def _wanted(self, wanted: Any) -> Tool:
         there = self.model.all
@@ -175,8 +175,8 @@ class QmlToolManager(Face):
 
     @Slot()
     def _on_selected(self) -> None:
-        for face in self.faces.known():
-            face.isSelectedChanged.emit()
+        for wrapper in self.wrappers.known():
+            wrapper.isSelectedChanged.emit()
         self.toolChanged.emit(self.current)
 
 
@@ -224,7 +224,7 @@ class ToolIcons(QtQuick.QQuickImageProvider):  # type: ignore[misc]
         return scaled
 
 
-class QmlDisplay(Face):
+class QmlDisplay(QmlWrapper):
     """A display of RViz; its name and class stay readable after removal."""
 
     CALLED = "display"
@@ -237,13 +237,13 @@ class QmlDisplay(Face):
         return self.runtime.value(self.model.properties() if self.model.exists else [])
 
     exists = member("exists", bool, existsChanged)
-    name = member("name", VARIANT, changed, takes=text("a name, a text of one line"))
+    name = member("name", VARIANT, changed, from_qml=text("a name, a text of one line"))
     classId = member("classId", str)
-    enabled = member("enabled", VARIANT, changed, takes=switch())
+    enabled = member("enabled", VARIANT, changed, from_qml=boolean())
     #: ``ok``, ``warn`` or ``error``.
-    status = member("status", str, changed, of="model.status.level")
+    status = member("status", str, changed, path="model.status.level")
     #: The status messages, one per line.
-    statusText = member("statusText", str, changed, of="model.status.text")
+    statusText = member("statusText", str, changed, path="model.status.text")
     #: All its properties with their current values, nested.
     properties = Property(QJSValue, _get_properties, notify=existsChanged)
 
@@ -252,11 +252,11 @@ class QmlDisplay(Face):
         """Return the value of a property, e.g. ``Offset/X``."""
         return self.runtime.value(self.model.get(path))
 
-    set = passing("set", path=property_path("Offset/X"), value=anything)
-    remove = passing("remove")
+    set = forward("set", path=property_path("Offset/X"), value=unchecked)
+    remove = forward("remove")
 
 
-class QmlView(Face):
+class QmlView(QmlWrapper):
     """The camera, ``rviz.view``; points are in metres, by default in the fixed frame."""
 
     CALLED = "rviz.view"
@@ -290,8 +290,8 @@ class QmlView(Face):
         "mode",
         QJSValue,
         modeChanged,
-        takes=_mode,
-        sets=lambda self, mode: self.model.set_mode(mode),
+        from_qml=_mode,
+        setter=lambda self, mode: self.model.set_mode(mode),
     )
     MODE_3D = Property(int, lambda _self: 0, constant=True)
     MODE_2D = Property(int, lambda _self: 1, constant=True)
@@ -300,50 +300,50 @@ class QmlView(Face):
         "trackedFrame",
         VARIANT,
         trackedFrameChanged,
-        takes=text(_FRAME),
-        sets=lambda self, frame: self.model.track(frame),
+        from_qml=text(_FRAME),
+        setter=lambda self, frame: self.model.track(frame),
     )
     #: Why the camera cannot follow the tracked frame; empty if it can.
     problem = member("problem", str, problemChanged)
-    eye = member("eye", QtGui.QVector3D, moved, gives=_vector)
-    focus = member("focus", QtGui.QVector3D, moved, gives=_vector)
+    eye = member("eye", QtGui.QVector3D, moved, to_qml=_vector)
+    focus = member("focus", QtGui.QVector3D, moved, to_qml=_vector)
     #: Duration of a movement in seconds.
     animationDuration = member(
         "animationDuration",
         VARIANT,
         animationDurationChanged,
-        of="model.settings.animation_duration",
-        takes=anything,
-        sets=lambda self, value: self.model.settings.set("animation_duration", value),
+        path="model.settings.animation_duration",
+        from_qml=unchecked,
+        setter=lambda self, value: self.model.settings.set("animation_duration", value),
     )
     #: How quickly the camera follows the tracked frame, in 1/s.
     trackingGain = member(
         "trackingGain",
         VARIANT,
         trackingGainChanged,
-        of="model.settings.tracking_gain",
-        takes=anything,
-        sets=lambda self, value: self.model.settings.set("tracking_gain", value),
+        path="model.settings.tracking_gain",
+        from_qml=unchecked,
+        setter=lambda self, value: self.model.settings.set("tracking_gain", value),
     )
     #: Class id of RViz's view, e.g. ``rviz/Orbit``.
     type = member(
         "type",
         VARIANT,
         typeChanged,
-        of="views.kind",
-        takes=text("a view type, e.g. 'rviz/Orbit'"),
+        path="views.kind",
+        from_qml=text("a view type, e.g. 'rviz/Orbit'"),
     )
-    viewTypes = member("viewTypes", LIST, of="views.kinds")
+    viewTypes = member("viewTypes", LIST, path="views.kinds")
     #: Names of the saved views.
-    savedViews = member("savedViews", LIST, savedViewsChanged, of="views.saved")
+    savedViews = member("savedViews", LIST, savedViewsChanged, path="views.saved")
 
-    moveEye = passing(
+    moveEye = forward(
         "moveEye",
         1,
         eye=point("eye"),
         options=options(frame=str, animate=bool, stopTracking=bool, switchTo3D=bool),
     )
-    moveEyeAndFocus = passing(
+    moveEyeAndFocus = forward(
         "moveEyeAndFocus",
         1,
         eye=point("eye"),
@@ -351,16 +351,16 @@ class QmlView(Face):
         options=options(frame=str, animate=bool, stopTracking=bool),
     )
 
-    @slot(1, mode=_mode, animate=switch("animate"))
+    @slot(1, mode=_mode, animate=boolean("animate"))
     def setMode(self, mode: Any, animate: bool = True) -> None:
         """Switch between 3D (0) and 2D (1); jump if `animate` is false."""
         self.model.set_mode(mode, animate=animate)
 
-    track = passing("track", frame=text(_FRAME))
-    reset = passing("reset")
-    saveView = passing("saveView", 0, "views.save", name=anything)
-    showView = passing("showView", 0, "views.show", name=anything)
-    removeView = passing("removeView", 0, "views.remove", name=anything)
+    track = forward("track", frame=text(_FRAME))
+    reset = forward("reset")
+    saveView = forward("saveView", 0, "views.save", name=unchecked)
+    showView = forward("showView", 0, "views.show", name=unchecked)
+    removeView = forward("removeView", 0, "views.remove", name=unchecked)
 
     def _seen(self) -> tuple[Point, Point]:
         seen = self.model.seen
@@ -478,15 +478,15 @@ class RvizObject(RegisteredProperties):
         return QmlToolManager(self.access.tools, self.runtime, self._engine)
 
     @cached_property
-    def display_faces(self) -> ItemFaces:
+    def display_wrappers(self) -> QmlWrappers:
         """The QML objects of all displays."""
         displays = self.access.displays
-        faces = ItemFaces(displays, QmlDisplay, self.runtime, self._engine)
-        faces.changed.connect(self.displaysChanged)
-        faces.added.connect(self.displayAdded)
-        faces.removed.connect(self.displayRemoved)
+        wrappers = QmlWrappers(displays, QmlDisplay, self.runtime, self._engine)
+        wrappers.changed.connect(self.displaysChanged)
+        wrappers.added.connect(self.displayAdded)
+        wrappers.removed.connect(self.displayRemoved)
         displays.status_changed.connect(self.statusChanged)
-        return faces
+        return wrappers
 
     @cached_property
     def camera(self) -> QmlView:
@@ -496,87 +496,87 @@ class RvizObject(RegisteredProperties):
     # Overlay and window.
 
     #: Whether this overlay is shown.
-    visible = member("visible", bool, visibleChanged, of="overlay.visible")
+    visible = member("visible", bool, visibleChanged, path="overlay.visible")
     isFullscreen = member(
         "isFullscreen",
         VARIANT,
         isFullscreenChanged,
-        of="access.fullscreen",
-        takes=switch(),
-        otherwise=False,
+        path="access.fullscreen",
+        from_qml=boolean(),
+        on_error=False,
     )
     #: Whether RViz's window shows only the 3D view.
     isBare = member(
-        "isBare", VARIANT, isBareChanged, of="access.bare", takes=switch(), otherwise=False
+        "isBare", VARIANT, isBareChanged, path="access.bare", from_qml=boolean(), on_error=False
     )
     fixedFrame = member(
         "fixedFrame",
         VARIANT,
         fixedFrameChanged,
-        of="access.fixed_frame",
-        takes=text("the name of a frame, e.g. 'map'"),
-        otherwise="",
+        path="access.fixed_frame",
+        from_qml=text("the name of a frame, e.g. 'map'"),
+        on_error="",
     )
     #: Frames that RViz drew in the last second.
-    frameRate = member("frameRate", float, frameRateChanged, of="access.frame_rate", otherwise=0.0)
+    frameRate = member("frameRate", float, frameRateChanged, path="access.frame_rate", on_error=0.0)
     #: RViz's status: ``ok``, ``warn`` or ``error``.
-    status = member("status", str, statusChanged, of="rviz_status.level", otherwise="error")
+    status = member("status", str, statusChanged, path="rviz_status.level", on_error="error")
     #: RViz's status messages, one per line.
     statusText = member(
-        "statusText", str, statusChanged, of="rviz_status.text", otherwise="there is no RViz"
+        "statusText", str, statusChanged, path="rviz_status.text", on_error="there is no RViz"
     )
 
     @property
     def rviz_status(self) -> Any:
         """RViz's own status; reading it enables its change signal."""
         displays = self.access.displays
-        if "display_faces" not in self.__dict__:
-            self.display_faces  # noqa: B018 - connects the signal
+        if "display_wrappers" not in self.__dict__:
+            self.display_wrappers  # noqa: B018 - connects the signal
         return displays.status
 
-    @slot(1, file=_file_path("to save to"), window=switch("window"))
+    @slot(1, file=_file_path("to save to"), window=boolean("window"))
     def screenshot(self, file: str, window: bool = False) -> None:
         """Save a picture of the 3D view with its overlays, or of the whole window if `window`."""
         self.access.picker.screenshot(file, window=window)
 
     #: Load a ``.rviz`` file after the calling function has returned. Discards unsaved changes, and
     #: may remove this overlay.
-    loadConfig = passing("loadConfig", 0, "access.load_config", file=_file_path())
+    loadConfig = forward("loadConfig", 0, "access.load_config", file=_file_path())
     #: Save RViz's config, by default to the file it was loaded from.
-    saveConfig = passing("saveConfig", 1, "access.save_config", file=_file_path("to save to"))
+    saveConfig = forward("saveConfig", 1, "access.save_config", file=_file_path("to save to"))
 
     # Tools, camera, displays.
 
-    toolManager = member("toolManager", QtCore.QObject, of="tool_manager")
-    view = member("view", QtCore.QObject, of="camera")
+    toolManager = member("toolManager", QtCore.QObject, path="tool_manager")
+    view = member("view", QtCore.QObject, path="camera")
     #: All displays, including those in groups, in the order of the panel.
     displays = member(
         "displays",
         LIST,
         displaysChanged,
-        of="display_faces.all",
-        gives=lambda faces: faces(),
-        otherwise=[],
+        path="display_wrappers.all",
+        to_qml=lambda wrappers: wrappers(),
+        on_error=[],
     )
     #: Class ids of the displays that can be added.
-    displayClasses = member("displayClasses", LIST, of="access.displays.classes", otherwise=[])
+    displayClasses = member("displayClasses", LIST, path="access.displays.classes", on_error=[])
 
     @slot(name=text("the name of a display, e.g. 'Grid'"))
     def display(self, name: str) -> QmlDisplay | None:
         """Return the first display with the given name; null if there is none."""
-        return self.display_faces.of(self.access.displays.find(name))  # type: ignore[no-any-return]
+        return self.display_wrappers.of(self.access.displays.find(name))  # type: ignore[no-any-return]
 
-    @slot(2, classId=anything, name=text("a text", "name"), enabled=switch("enabled"))
+    @slot(2, classId=unchecked, name=text("a text", "name"), enabled=boolean("enabled"))
     def addDisplay(
         self, class_id: Any, name: str | None = None, enabled: bool = True
     ) -> QmlDisplay:
         """Add and return a display."""
-        faces = self.display_faces
-        return faces.of(  # type: ignore[no-any-return]
+        wrappers = self.display_wrappers
+        return wrappers.of(  # type: ignore[no-any-return]
             self.access.displays.add(class_id, name or "", enabled=enabled)
         )
 
-    @slot(display=anything)
+    @slot(display=unchecked)
     def removeDisplay(self, display: Any) -> None:
         """Remove a display, given as a display or its name."""
         displays = self.access.displays
@@ -596,13 +596,13 @@ class RvizObject(RegisteredProperties):
         return self.runtime.value(self.access.displays.get(path))
 
     #: Change any property, like the user in the panel.
-    setProperty = passing(
-        "setProperty", 0, "access.displays.set", path=property_path("Grid/Color"), value=anything
+    setProperty = forward(
+        "setProperty", 0, "access.displays.set", path=property_path("Grid/Color"), value=unchecked
     )
 
     # Points.
 
-    @slot(2, x=anything, y=anything, radius=anything)
+    @slot(2, x=unchecked, y=unchecked, radius=unchecked)
     def pick(self, *given: Any) -> dict[str, float] | None:
         """Return the point of the scene at a position of the overlay; null if nothing is there.
 
@@ -621,7 +621,7 @@ class RvizObject(RegisteredProperties):
         found = self.access.picker.pick(*(number * self.overlay.scale for number in at[:3]))
         return None if found is None else dict(zip("xyz", found, strict=True))
 
-    @slot(3, x=anything, y=anything, z=anything, frame=anything)
+    @slot(3, x=unchecked, y=unchecked, z=unchecked, frame=unchecked)
     def createPositionTracker(self, *given: Any) -> QJSValue:
         """Return a tracker of a point's position on the overlay.
 

@@ -30,7 +30,7 @@ class MemoryCleaner(QtCore.QObject):
 
     def __init__(self) -> None:
         super().__init__()
-        self._gone = False
+        self._collect_garbage = False
         self._timer = QtCore.QTimer(self)
         self._timer.setSingleShot(True)
         self._timer.setInterval(_CLEAN_DELAY_MS)
@@ -46,21 +46,21 @@ class MemoryCleaner(QtCore.QObject):
 
         Python's own collector would run only hundreds of overlays later, with memory fragmented.
         """
-        self._gone = True
+        self._collect_garbage = True
         self.overlay_added()
 
     @Slot()
     def _clean(self) -> None:
-        gone, self._gone = self._gone, False
+        gone, self._collect_garbage = self._collect_garbage, False
         if gone:
             gc.collect()
-        trim = _trim()
+        trim = _malloc_trim()
         if trim is not None:
             trim(0)
 
 
 @cache
-def _trim() -> Callable[[int], Any] | None:
+def _malloc_trim() -> Callable[[int], Any] | None:
     """Return glibc's function that returns freed memory to the system; None without glibc."""
     found: Callable[[int], Any] | None = getattr(ctypes.CDLL(None), "malloc_trim", None)
     return found
@@ -82,7 +82,7 @@ class Stack(QtCore.QObject):
         #: In stacking order, lowest first.
         self._arranged: list[Drawing] = []
         self._drawing = False
-        self._later: list[Callable[[], None]] = []
+        self._deferred: list[Callable[[], None]] = []
         self._cleaner = MemoryCleaner()
         window.before_frame.connect(self._before_frame)
         #: Routes mouse, touch and keyboard events.
@@ -95,13 +95,13 @@ class Stack(QtCore.QObject):
             Error: The name is taken, or `overlay` is not an overlay.
         """
         if not (isinstance(overlay, Overlay) and hasattr(overlay, "name")):
-            raise Error(_no_overlay(overlay))
+            raise Error(_not_an_overlay(overlay))
         if self.find(overlay.name) is not None:
             raise Error(f"there is an overlay {overlay.name!r} already; give this one another name")
         overlay.attach(self._window)
         entry = Drawing(overlay)
         self._entries.append(entry)
-        overlay.changed.connect(entry.mark)
+        overlay.changed.connect(entry.mark_dirty)
         overlay.arranged.connect(self._arrange)
         overlay.renewed.connect(self.input.forget)
         self._arrange()
@@ -113,13 +113,13 @@ class Stack(QtCore.QObject):
             if entry.overlay is overlay:
                 self._entries.remove(entry)
                 self._arranged.remove(entry)
-                overlay.changed.disconnect(entry.mark)
+                overlay.changed.disconnect(entry.mark_dirty)
                 overlay.arranged.disconnect(self._arrange)
                 overlay.renewed.disconnect(self.input.forget)
                 entry.close()
                 self.input.forget(overlay)
                 if self._drawing:
-                    self._later.append(lambda: _close(overlay))
+                    self._deferred.append(lambda: _close(overlay))
                 else:
                     # The overlay may be handling the event that removes it.
                     self.input.after_event(lambda: _close(overlay))
@@ -210,7 +210,7 @@ class Stack(QtCore.QObject):
             works = [entry.before_frame(width, height, ratio) for entry in list(self._arranged)]
         finally:
             self._drawing = False
-        later, self._later = self._later, []
+        later, self._deferred = self._deferred, []
         for close in later:
             close()
         done = [work for work in works if work is not None]
@@ -223,7 +223,7 @@ def _close(overlay: Overlay) -> None:
         overlay.close()
 
 
-def _no_overlay(given: object) -> str:
+def _not_an_overlay(given: object) -> str:
     """Return the error text for a value that is not an overlay."""
     if isinstance(given, Overlay):
         kind = type(given).__name__

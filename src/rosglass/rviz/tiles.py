@@ -41,7 +41,7 @@ class Rect(NamedTuple):
         """Number of pixels."""
         return (self.right - self.left) * (self.bottom - self.top)
 
-    def meets(self, other: Rect) -> bool:
+    def overlaps(self, other: Rect) -> bool:
         """Return whether the rectangles overlap."""
         return (
             self.left < other.right
@@ -50,7 +50,7 @@ class Rect(NamedTuple):
             and other.top < self.bottom
         )
 
-    def around(self, other: Rect) -> Rect:
+    def union(self, other: Rect) -> Rect:
         """Return the smallest rectangle that contains both."""
         return Rect(
             min(self.left, other.left),
@@ -134,12 +134,12 @@ def cover(
     while True:
         rects = [
             Rect(left * step, top * step, min(right * step, width), min(bottom * step, height))
-            for left, top, right, bottom in _runs_below_each_other(tiles)
+            for left, top, right, bottom in _merged_runs(tiles)
         ]
         if len(rects) <= most:
-            return _joined(rects, worth) if worth else rects
+            return _merged(rects, worth) if worth else rects
         step *= 2
-        tiles = _halved(tiles)
+        tiles = _at_half_resolution(tiles)
 
 
 def uncovered(tiles: NDArray[np.bool_], rects: list[Rect]) -> int | None:
@@ -168,14 +168,14 @@ def _leading(part: NDArray[np.uint32], axis: int) -> int:
     return int(filled.argmax()) if filled.any() else len(filled)
 
 
-def _halved(tiles: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _at_half_resolution(tiles: NDArray[np.bool_]) -> NDArray[np.bool_]:
     rows, columns = tiles.shape
     across = np.logical_or.reduceat(tiles, np.arange(0, columns, 2), axis=1)
     half: NDArray[np.bool_] = np.logical_or.reduceat(across, np.arange(0, rows, 2), axis=0)
     return half
 
 
-def _runs_below_each_other(tiles: NDArray[np.bool_]) -> list[Rect]:
+def _merged_runs(tiles: NDArray[np.bool_]) -> list[Rect]:
     """Return the horizontal runs of set tiles, with equal runs in adjacent rows merged."""
     padded = np.pad(tiles, 1)
     edges = padded[:, 1:] != padded[:, :-1]
@@ -191,16 +191,19 @@ def _runs_below_each_other(tiles: NDArray[np.bool_]) -> list[Rect]:
     return done
 
 
-def _joined(rects: list[Rect], worth: int) -> list[Rect]:
+def _merged(rects: list[Rect], worth: int) -> list[Rect]:
     """Merge rectangles while each merge adds at most `worth` pixels per rectangle saved."""
     while True:
-        outer = next((o for o in _around_neighbours(rects, worth) if _saves(o, rects, worth)), None)
+        outer = next(
+            (o for o in _bounds_of_close_pairs(rects, worth) if _is_worthwhile(o, rects, worth)),
+            None,
+        )
         if outer is None:
             return rects
-        rects = [*(rect for rect in rects if not rect.meets(outer)), outer]
+        rects = [*(rect for rect in rects if not rect.overlaps(outer)), outer]
 
 
-def _around_neighbours(rects: list[Rect], worth: int) -> Iterator[Rect]:
+def _bounds_of_close_pairs(rects: list[Rect], worth: int) -> Iterator[Rect]:
     """Iterate over the bounding rectangles of close pairs, the closest pair first."""
     left, top, right, bottom = np.array(rects, np.int64).reshape(-1, 4).T
     width = np.maximum.outer(right, right) - np.minimum.outer(left, left)
@@ -209,12 +212,12 @@ def _around_neighbours(rects: list[Rect], worth: int) -> Iterator[Rect]:
     between = width * height - np.add.outer(area, area)
     ones, others = np.nonzero(np.triu(between <= 4 * worth, 1))
     for number in np.argsort(between[ones, others], kind="stable"):
-        yield rects[ones[number]].around(rects[others[number]])
+        yield rects[ones[number]].union(rects[others[number]])
 
 
-def _saves(outer: Rect, rects: list[Rect], worth: int) -> bool:
-    inside = [rect for rect in rects if rect.meets(outer)]
+def _is_worthwhile(outer: Rect, rects: list[Rect], worth: int) -> bool:
+    inside = [rect for rect in rects if rect.overlaps(outer)]
     # A rectangle that reaches beyond it would be blended twice.
-    if any(outer.around(rect) != outer for rect in inside):
+    if any(outer.union(rect) != outer for rect in inside):
         return False
     return outer.area - sum(rect.area for rect in inside) <= worth * (len(inside) - 1)

@@ -9,7 +9,7 @@ from rosglass.errors import Error
 from rosglass.qt import Signal
 from rosglass.rviz.host import address, pyqt, type_name
 from rosglass.rviz.overlay import QML_CLASS, REFERENCE_QML_CLASS
-from rosglass.rviz.plugins import DISPLAY, TOOL, Watched, declared, require_class_id
+from rosglass.rviz.plugins import DISPLAY, TOOL, PluginList, declared, require_class_id
 from rosglass.rviz.qt5 import QtGui
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ class Tool:
         return None if self.handle is None else self.handle.getIcon()
 
 
-class Tools(Watched):
+class Tools(PluginList):
     """The tools of an RViz; `changed` reports a new name or description."""
 
     #: Another tool was selected.

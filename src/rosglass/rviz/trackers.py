@@ -13,8 +13,8 @@ from rosglass.qml.element import DEFAULT_TIMEOUT_MS
 from rosglass.qml.tf_buffer import TfLink
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, Signal, is_alive
 from rosglass.rviz.camera import Camera
-from rosglass.rviz.face import VARIANT, errors_to_js, point_of, to_python
 from rosglass.rviz.property_values import shown
+from rosglass.rviz.qml_members import VARIANT, errors_to_js, point_of, to_python
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -51,17 +51,17 @@ class Frames(QtCore.QObject):
     def __init__(self, session: Session, window: Window) -> None:
         super().__init__()
         self._session, self._window = session, window
-        self._link: TfLink | None = None
+        self._tf_link: TfLink | None = None
         self._node: Node | None = None
         #: Error texts for missing frames, each with its creation time.
-        self._explained: dict[tuple[str, str, str], tuple[float, str]] = {}
-        session.node_changed.connect(self._follow)
-        self._follow()
+        self._explanations: dict[tuple[str, str, str], tuple[float, str]] = {}
+        session.node_changed.connect(self._on_node_changed)
+        self._on_node_changed()
 
     @property
     def buffer(self) -> TransformBuffer | None:
         """The received transforms; None without a node."""
-        return None if self._link is None else self._link.buffer
+        return None if self._tf_link is None else self._tf_link.buffer
 
     @property
     def fixed(self) -> str:
@@ -87,31 +87,31 @@ class Frames(QtCore.QObject):
         frame, fixed = frame.lstrip("/"), self.fixed.lstrip("/")
         if frame in ("", FIXED_FRAME, fixed):
             return Transform(frame_id=fixed, child_frame_id=fixed)
-        if self._link is None:
+        if self._tf_link is None:
             raise LookupException(
                 f"the frame {frame!r} is not known yet: there is no connection to the robot"
             )
-        if self._link.problem:
-            raise Error(f"the frame {frame!r} is not known: {self._link.problem}")
+        if self._tf_link.problem:
+            raise Error(f"the frame {frame!r} is not known: {self._tf_link.problem}")
         try:
-            return self._link.buffer.lookup_transform(fixed, frame, time)
+            return self._tf_link.buffer.lookup_transform(fixed, frame, time)
         except TransformException as error:
             raise type(error)(self._explanation(frame, fixed, error)) from None
 
     def _explanation(self, frame: str, fixed: str, error: TransformException) -> str:
         """Return :meth:`_explain`'s text, cached for a second: each rendered frame needs it."""
         case, now = (frame, fixed, str(error)), time.monotonic()
-        made, text = self._explained.get(case, (-math.inf, ""))
+        made, text = self._explanations.get(case, (-math.inf, ""))
         if now - made > _EXPLANATION_MAX_AGE_S:
             text = self._explain(frame, fixed, error)
-            if len(self._explained) > _MAX_EXPLANATIONS:
-                self._explained.clear()
-            self._explained[case] = (now, text)
+            if len(self._explanations) > _MAX_EXPLANATIONS:
+                self._explanations.clear()
+            self._explanations[case] = (now, text)
         return text
 
     def _explain(self, frame: str, fixed: str, error: TransformException) -> str:
         """Return an error text that says which of the two frames is missing."""
-        known = [] if self._link is None else sorted(self._link.buffer.tree())
+        known = [] if self._tf_link is None else sorted(self._tf_link.buffer.tree())
         if not fixed:
             return f"RViz has no fixed frame to transform {frame!r} into; choose one"
         if not known:
@@ -129,18 +129,18 @@ class Frames(QtCore.QObject):
 
     def close(self) -> None:
         """Stop receiving transforms; safe to call twice."""
-        link, self._link, self._node = self._link, None, None
+        link, self._tf_link, self._node = self._tf_link, None, None
         if link is not None:
             link.leave(self)
 
-    def _follow(self) -> None:
+    def _on_node_changed(self) -> None:
         node = self._session.node
         if node is self._node:
             return
         self.close()
         self._node = node
         if node is not None:
-            self._link = TfLink.join(self._session, node, "/", self)
+            self._tf_link = TfLink.join(self._session, node, "/", self)
         self.available_changed.emit()
 
 
@@ -186,7 +186,7 @@ class Tracker(QtCore.QObject):
         self._scale, self._runtime = scale, runtime
         self._position, self._problem, self._stale = _NAN, "", False
         #: Stamp of the latest transform in nanoseconds, and its arrival time in seconds.
-        self._newest: tuple[int, float] | None = None
+        self._latest: tuple[int, float] | None = None
 
     @property
     def follows_frame(self) -> bool:
@@ -205,7 +205,7 @@ class Tracker(QtCore.QObject):
         except Error as error:
             problem = str(error)
         before, self._stale = self._stale, stale
-        if _differ(at, self._position):
+        if _has_moved(at, self._position):
             self._position = at
             self.positionChanged.emit(QtGui.QVector3D(*at))
         if problem != self._problem:
@@ -219,9 +219,9 @@ class Tracker(QtCore.QObject):
         if not stamp:
             return False
         now = self._owner.steady()
-        if self._newest is None or self._newest[0] != stamp:
-            self._newest = stamp, now
-        return now - self._newest[1] > _STALE_AFTER_S
+        if self._latest is None or self._latest[0] != stamp:
+            self._latest = stamp, now
+        return now - self._latest[1] > _STALE_AFTER_S
 
     def move(self, point: Sequence[float] | dict[str, float]) -> None:
         """Follow another point of the same frame.
@@ -244,7 +244,7 @@ class Tracker(QtCore.QObject):
         if not isinstance(frame, str) or len(frame) > 1000:
             raise Error(f"expected the name of a frame, e.g. 'base_link', got {shown(frame)}")
         if frame != self._frame:
-            self._frame, self._newest = frame, None
+            self._frame, self._latest = frame, None
             self.frameChanged.emit()
             self.update()
 
@@ -362,7 +362,7 @@ class Trackers:
         self._scales = {t: s for t, s in self._scales.items() if t in self._trackers}
 
 
-def _differ(new: Sequence[float], old: Sequence[float]) -> bool:
+def _has_moved(new: Sequence[float], old: Sequence[float]) -> bool:
     if math.isnan(new[0]) or math.isnan(old[0]):
         return math.isnan(new[0]) != math.isnan(old[0])
     return any(abs(a - b) > _MIN_CHANGE for a, b in zip(new, old, strict=True))

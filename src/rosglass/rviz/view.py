@@ -18,7 +18,15 @@ from rosglass.qt import QtCore, Signal
 from rosglass.ros1.names import expand
 from rosglass.rviz.camera import Camera
 from rosglass.rviz.host import Hook, as_pyside
-from rosglass.rviz.orbit import NEAREST, STEEPEST, Orbit, Place, Point, ease, shortest_turn
+from rosglass.rviz.orbit import (
+    MIN_DISTANCE_M,
+    STEEPEST,
+    FramePose,
+    Orbit,
+    Point,
+    ease,
+    shortest_turn,
+)
 from rosglass.rviz.plugins import VIEW, declared
 from rosglass.rviz.property_values import shown
 from rosglass.rviz.qt5 import QtCore as Qt5Core
@@ -219,21 +227,21 @@ class ViewSettings:
 ORBIT = "rviz/Orbit"
 #: RViz's class of the 2D view: from above, without perspective.
 FLAT = "rviz/TopDownOrtho"
-_TARGET = "Target Frame"
-_INVERTED = "Invert Z Axis"
-_NAMES: dict[str, tuple[str, ...]] = {
+_TARGET_FRAME = "Target Frame"
+_INVERT_Z_AXIS = "Invert Z Axis"
+_PROPERTY_NAMES: dict[str, tuple[str, ...]] = {
     ORBIT: (
         *(f"Focal Point/{axis}" for axis in "XYZ"),
         "Distance",
         "Yaw",
         "Pitch",
-        _INVERTED,
+        _INVERT_Z_AXIS,
         "Field of View",
     ),
     FLAT: ("X", "Y", "Scale", "Angle"),
 }
 #: RViz's default vertical field of view, in radians.
-_FIELD_OF_VIEW = math.pi / 4
+_DEFAULT_FIELD_OF_VIEW_RAD = math.pi / 4
 
 
 class CurrentView(QtCore.QObject):
@@ -247,12 +255,14 @@ class CurrentView(QtCore.QObject):
         self._window = window
         self._manager: Any = window.manager.getViewManager()
         self._properties: dict[str, Any] = {}
-        self._own = False
+        self._switching = False
         #: Height of the last 3D focus, because the 2D view has none.
         self._height = 0.0
-        self._field_of_view = _FIELD_OF_VIEW
+        self._field_of_view = _DEFAULT_FIELD_OF_VIEW_RAD
         wrapped = as_pyside(self._manager, QtCore.QObject)
-        Qt5Core.QObject.connect(wrapped, Qt5Core.SIGNAL("currentChanged()"), self._changed)
+        Qt5Core.QObject.connect(
+            wrapped, Qt5Core.SIGNAL("currentChanged()"), self._on_current_changed
+        )
 
     @property
     def kind(self) -> str:
@@ -261,22 +271,26 @@ class CurrentView(QtCore.QObject):
 
     @property
     def state(self) -> tuple[Any, ...]:
-        """The camera's state: class id, target frame, and the properties in :data:`_NAMES`.
+        """The camera's state: class id, target frame and the view's :data:`_PROPERTY_NAMES`.
 
         These begin with the focus: x, y and z of :data:`ORBIT`, x and y of :data:`FLAT`.
         """
         kind = self.kind
-        return (kind, self._get(_TARGET), *(self._get(name) for name in _NAMES.get(kind, ())))
+        return (
+            kind,
+            self._get(_TARGET_FRAME),
+            *(self._get(name) for name in _PROPERTY_NAMES.get(kind, ())),
+        )
 
     def read(self) -> Orbit:
         """Return where the camera is and what it looks at."""
         kind = self.kind
-        if kind not in _NAMES or self._get(_TARGET) != FIXED_FRAME:
-            return self._seen(kind)
+        if kind not in _PROPERTY_NAMES or self._get(_TARGET_FRAME) != FIXED_FRAME:
+            return self._read_camera(kind)
         if kind == FLAT:
-            return self._from_above(self._get("X"), self._get("Y"))
+            return self._orbit_from_above(self._get("X"), self._get("Y"))
         x, y, z, distance, yaw, pitch, inverted, self._field_of_view = (
-            self._get(name) for name in _NAMES[ORBIT]
+            self._get(name) for name in _PROPERTY_NAMES[ORBIT]
         )
         sign = -1 if inverted else 1
         return Orbit(Point(x, y, z), distance, sign * yaw, sign * pitch)
@@ -289,34 +303,34 @@ class CurrentView(QtCore.QObject):
             kind: Class id of the view to use: :data:`ORBIT`, or :data:`FLAT` for a view from above.
         """
         if self.kind != kind:
-            self._use(kind)
-        if self._get(_TARGET) != FIXED_FRAME:
-            self._set(_TARGET, FIXED_FRAME)
+            self._switch_view(kind)
+        if self._get(_TARGET_FRAME) != FIXED_FRAME:
+            self._set(_TARGET_FRAME, FIXED_FRAME)
         if kind == FLAT:
             self._height = where.focus.z
             scale = self._pixels_at_one_metre() / where.distance
-            angle = _positive(where.yaw + math.pi / 2)
+            angle = _normalized(where.yaw + math.pi / 2)
             self._set_all(FLAT, where.focus.x, where.focus.y, scale, angle)
         else:
-            sign = -1 if self._get(_INVERTED) else 1
-            yaw, pitch = _positive(sign * where.yaw), sign * where.pitch
+            sign = -1 if self._get(_INVERT_Z_AXIS) else 1
+            yaw, pitch = _normalized(sign * where.yaw), sign * where.pitch
             self._set_all(ORBIT, *where.focus, where.distance, yaw, pitch)
 
     def close(self) -> None:
         """Release the references to RViz's properties."""
         self._properties.clear()
 
-    def _from_above(self, x: float, y: float) -> Orbit:
+    def _orbit_from_above(self, x: float, y: float) -> Orbit:
         distance = self._pixels_at_one_metre() / max(self._get("Scale"), 1e-9)
         yaw = self._get("Angle") - math.pi / 2
         return Orbit(Point(x, y, self._height), distance, yaw, STEEPEST)
 
-    def _seen(self, kind: str) -> Orbit:
+    def _read_camera(self, kind: str) -> Orbit:
         """Return the orbit read from the Ogre camera, for views of any type and target frame."""
         camera = Camera(self._window)
         eye = Point(*camera.eye)
         if kind == FLAT:
-            return self._from_above(eye.x, eye.y)
+            return self._orbit_from_above(eye.x, eye.y)
         width, height, ratio = self._window.view_size()
         ahead = camera.unproject(width / ratio / 2, height / ratio / 2, 0.9)
         if ahead is None:
@@ -326,26 +340,26 @@ class CurrentView(QtCore.QObject):
         names = [str(view.childAt(at).getName()) for at in range(view.numChildren())]
         # Like RViz when it switches views: without a distance, use that of the frame's origin.
         distance = self._get("Distance") if "Distance" in names else math.hypot(*eye)
-        part = max(distance, NEAREST) / (math.hypot(*way) or 1.0)
+        part = max(distance, MIN_DISTANCE_M) / (math.hypot(*way) or 1.0)
         return Orbit.between(eye, eye.towards(ahead, part))
 
-    def _use(self, kind: str) -> None:
-        self._own = True
+    def _switch_view(self, kind: str) -> None:
+        self._switching = True
         try:
             self._manager.setCurrentViewControllerType(kind)
         finally:
-            self._own = False
+            self._switching = False
 
-    def _changed(self) -> None:
+    def _on_current_changed(self) -> None:
         self._properties.clear()
         # Deliver calls that are queued for RViz's panels: they hold addresses of the old view's
         # properties, and crash once RViz has deleted it.
         for child in self._window.widget.findChildren(QtWidgets.QTreeView):
             if child.metaObject().className() == "rviz::PropertyTreeWidget":
                 Qt5Core.QCoreApplication.sendPostedEvents(child, Qt5Core.QEvent.MetaCall)
-        if not self._own:
+        if not self._switching:
             self._height = 0.0
-        self.changed.emit(self._own)
+        self.changed.emit(self._switching)
 
     def _pixels_at_one_metre(self) -> float:
         """Return the pixels per metre of the 3D camera at a distance of one metre."""
@@ -367,20 +381,20 @@ class CurrentView(QtCore.QObject):
         self._property(name).setValue(value)
 
     def _set_all(self, kind: str, *values: float) -> None:
-        for name, value in zip(_NAMES[kind], values, strict=False):
+        for name, value in zip(_PROPERTY_NAMES[kind], values, strict=False):
             self._set(name, value)
 
 
-def _positive(angle: float) -> float:
+def _normalized(angle: float) -> float:
     """Return an angle in the range 0 to 2 pi, which RViz uses as well."""
     return math.remainder(angle, math.tau) % math.tau
 
 
 #: The camera after :meth:`View.reset`.
-_START = Orbit.between(Point(4.0, 0.0, 3.0), Point(0.0, 0.0, 0.0))
+_RESET_ORBIT = Orbit.between(Point(4.0, 0.0, 3.0), Point(0.0, 0.0, 0.0))
 #: Maximum distance from the fixed frame's origin. RViz uses 32-bit floats, and its renderer
 #: crashes on infinite ones.
-_FARTHEST_M = 1e8
+_MAX_DISTANCE_M = 1e8
 
 
 class ViewMode(enum.IntEnum):
@@ -395,7 +409,7 @@ class _Movement(NamedTuple):
 
     start: Orbit
     goal: Orbit
-    began: float
+    started: float
     flat: bool
 
 
@@ -427,20 +441,20 @@ class View(QtCore.QObject):
         #: The camera's focus relative to the tracked frame; None: keep the current one.
         self._offset: Point | None = Point(0.0, 0.0, 0.0)
         #: Last pose of the tracked frame; its yaw is the one that the camera has reached.
-        self._base: Place | None = None
+        self._frame_pose: FramePose | None = None
         self._movement: _Movement | None = None
         #: Pitch to restore when switching back to 3D.
-        self._pitch = _START.pitch
+        self._pitch_3d = _RESET_ORBIT.pitch
         #: RViz's camera state after our last change; None to accept any change.
-        self._left_at: tuple[Any, ...] | None = None
-        self._fixed = ""
+        self._expected_state: tuple[Any, ...] | None = None
+        self._fixed_frame = ""
         self._last_mode = self.mode
         self._last_frame = time.monotonic()
         self._closed = False
         window.before_frame.connect(self._step)
-        window.config_loading.connect(self._stop)
+        window.config_loading.connect(self._end_motion)
         window.closing.connect(self.close)
-        self._current.changed.connect(self._view_changed)
+        self._current.changed.connect(self._on_view_changed)
 
     @property
     def mode(self) -> ViewMode:
@@ -499,14 +513,14 @@ class View(QtCore.QObject):
         Raises:
             Error: `eye` is not three finite numbers, or too far away, or the frame is unknown.
         """
-        place, now = self._in_fixed(eye, frame), self._end_of_movement()
+        place, now = self._in_fixed(eye, frame), self._final_orbit()
         flat = self.mode is ViewMode.MODE_2D
         if flat and switch_to_3d:
-            flat, now = False, now._replace(pitch=self._pitch)
+            flat, now = False, now._replace(pitch=self._pitch_3d)
         elif flat:
             place = Point(place.x, place.y, now.eye.z)
         goal = now._replace(focus=now.focus + (place - now.eye))
-        self._hold(goal, stop_tracking)
+        self._store_offset(goal, stop_tracking)
         self._start(goal, animate, flat=flat)
 
     def move_eye_and_focus(
@@ -536,8 +550,8 @@ class View(QtCore.QObject):
             raise Error(
                 f"eye and focus are both at {shown(list(start))}; the camera must look somewhere"
             )
-        goal = Orbit.between(start, end, self._end_of_movement().yaw)
-        self._hold(goal, stop_tracking)
+        goal = Orbit.between(start, end, self._final_orbit().yaw)
+        self._store_offset(goal, stop_tracking)
         self._start(goal, animate, flat=False)
 
     def set_mode(self, mode: ViewMode | int, *, animate: bool = True) -> None:
@@ -555,10 +569,10 @@ class View(QtCore.QObject):
         wanted = ViewMode(mode)
         if wanted is self.mode:
             return
-        now, flat = self._end_of_movement(), wanted is ViewMode.MODE_2D
+        now, flat = self._final_orbit(), wanted is ViewMode.MODE_2D
         if flat:
-            self._pitch = now.pitch
-        pitch = STEEPEST if flat else self._pitch
+            self._pitch_3d = now.pitch
+        pitch = STEEPEST if flat else self._pitch_3d
         self._start(now._replace(pitch=pitch), animate, flat=flat)
 
     def track(self, frame: str) -> None:
@@ -576,15 +590,15 @@ class View(QtCore.QObject):
             self._frames.locate(frame)
         if frame == self._tracked:
             return
-        self._tracked, self._base = frame, None
+        self._tracked, self._frame_pose = frame, None
         self._offset = Point(0.0, 0.0, 0.0)
         self._set_problem("")
         self.tracked_frame_changed.emit()
 
     def reset(self) -> None:
         """Show the fixed frame's origin in 3D from (4, 0, 3), and stop tracking."""
-        self._stop()
-        self._write(_START, ORBIT)
+        self._end_motion()
+        self._write(_RESET_ORBIT, ORBIT)
         self._emit_mode()
 
     def nudge(self, ahead: float, left: float) -> None:
@@ -597,11 +611,11 @@ class View(QtCore.QObject):
         Raises:
             Error: A distance is not finite, or the new focus is too far away.
         """
-        self._stop()
+        self._end_motion()
         now = self._current.read()
         x, y, _ = now.focus + Point(-ahead, -left, 0.0).turned(now.yaw)
         focus = self._in_fixed((x, y, now.focus.z), "")
-        self._write(now._replace(focus=focus), self._kind())
+        self._write(now._replace(focus=focus), self._view_class())
 
     def close(self) -> None:
         """Stop moving the camera; safe to call twice."""
@@ -611,33 +625,33 @@ class View(QtCore.QObject):
 
     # Movements
 
-    def _hold(self, goal: Orbit, stop_tracking: bool) -> None:
+    def _store_offset(self, goal: Orbit, stop_tracking: bool) -> None:
         """Store the goal's focus relative to the tracked frame."""
         if stop_tracking:
             self.track("")
         elif self._tracked:
             try:
-                self._offset = self._place_of(self._tracked).seen(goal.focus)
+                self._offset = self._pose_of(self._tracked).seen(goal.focus)
             except Error:
                 self._offset = None
 
     def _start(self, goal: Orbit, animate: bool, *, flat: bool) -> None:
-        start, self._base = self._current.read(), None
+        start, self._frame_pose = self._current.read(), None
         if not animate or not self.settings.animation_duration:
-            self._arrive(goal, flat=flat)
+            self._finish(goal, flat=flat)
             return
         if not (flat and self._current.kind == FLAT):
             self._write(start, ORBIT)
         self._movement = _Movement(start, goal, time.monotonic(), flat)
-        self._left_at, self._fixed = self._current.state, self._frames.fixed
+        self._expected_state, self._fixed_frame = self._current.state, self._frames.fixed
         self._emit_mode()
 
-    def _arrive(self, goal: Orbit, *, flat: bool) -> None:
+    def _finish(self, goal: Orbit, *, flat: bool) -> None:
         self._movement = None
         self._write(goal, FLAT if flat else ORBIT)
         self._emit_mode()
 
-    def _stop(self) -> None:
+    def _end_motion(self) -> None:
         """End movement and tracking."""
         self._movement = None
         self.track("")
@@ -646,7 +660,7 @@ class View(QtCore.QObject):
         now = time.monotonic()
         passed, self._last_frame = now - self._last_frame, now
         if self._closed or (self._movement is None and not self._tracked):
-            self._left_at = None
+            self._expected_state = None
             return
         try:
             self._end_if_moved()
@@ -657,48 +671,48 @@ class View(QtCore.QObject):
         except (AttributeError, RuntimeError, TypeError):
             # E.g. another version of RViz that names the views' properties differently.
             _log.exception("RViz's camera cannot be moved")
-            self._stop()
+            self._end_motion()
         self._emit_mode()
 
     def _advance(self, now: float) -> None:
         if self._tracked:
-            self._carry()
+            self._carry_movement()
         movement = self._movement
         assert movement is not None
         duration = self.settings.animation_duration
-        progress = (now - movement.began) / duration if duration else 1.0
+        progress = (now - movement.started) / duration if duration else 1.0
         if progress >= 1:
-            self._arrive(movement.goal, flat=movement.flat)
+            self._finish(movement.goal, flat=movement.flat)
         else:
-            self._write(movement.start.towards(movement.goal, ease(progress)), self._kind())
+            self._write(movement.start.towards(movement.goal, ease(progress)), self._view_class())
 
-    def _carry(self) -> None:
+    def _carry_movement(self) -> None:
         """Move start and goal of a movement along with the tracked frame."""
-        place, movement = self._find_tracked(), self._movement
+        place, movement = self._tracked_pose(), self._movement
         if place is None or movement is None:
             return
-        before, self._base = self._base or place, place
+        before, self._frame_pose = self._frame_pose or place, place
         start, goal = movement.start.carried(before, place), movement.goal.carried(before, place)
         self._movement = movement._replace(start=start, goal=goal)
 
     def _follow(self, part: float) -> None:
-        place = self._find_tracked()
+        place = self._tracked_pose()
         if place is None:
             return
         now = self._current.read()
         if self._offset is None:
             self._offset = place.seen(now.focus)
-        yaw = place.yaw if self._base is None else self._base.yaw
+        yaw = place.yaw if self._frame_pose is None else self._frame_pose.yaw
         turn = shortest_turn(yaw, place.yaw) * part
-        self._base = Place(place.point, yaw + turn)
+        self._frame_pose = FramePose(place.point, yaw + turn)
         focus = now.focus.towards(place.outside(self._offset), part)
         moved = now._replace(focus=focus, yaw=now.yaw + turn)
         if not moved.is_near(now):
-            self._write(moved, self._kind())
+            self._write(moved, self._view_class())
 
-    def _find_tracked(self) -> Place | None:
+    def _tracked_pose(self) -> FramePose | None:
         try:
-            place = self._place_of(self._tracked)
+            place = self._pose_of(self._tracked)
         except Error as error:
             # Keep the first text: the error may read differently in each frame.
             self._set_problem(self._problem or str(error))
@@ -708,22 +722,22 @@ class View(QtCore.QObject):
 
     def _end_if_moved(self) -> None:
         """End movement or tracking if something else moved the camera since the last frame."""
-        before, now = self._left_at, self._current.state
-        fixed, self._fixed = self._fixed, self._frames.fixed
-        self._left_at = now
-        if before is None or (before == now and fixed == self._fixed):
+        before, now = self._expected_state, self._current.state
+        fixed, self._fixed_frame = self._fixed_frame, self._frames.fixed
+        self._expected_state = now
+        if before is None or (before == now and fixed == self._fixed_frame):
             return
         self._movement = None
-        if fixed == self._fixed and before[:2] == now[:2] and _is_shifted(before, now):
+        if fixed == self._fixed_frame and before[:2] == now[:2] and _is_shifted(before, now):
             self.track("")
-        elif fixed == self._fixed and before[1] != now[1]:
+        elif fixed == self._fixed_frame and before[1] != now[1]:
             # RViz itself now follows a frame.
             self.track("")
 
-    def _view_changed(self, by_us: bool) -> None:
+    def _on_view_changed(self, by_us: bool) -> None:
         if by_us or self._closed:
             return
-        self._movement = self._left_at = None
+        self._movement = self._expected_state = None
         if self._current.kind not in (ORBIT, FLAT):
             self.track("")
         self._emit_mode()
@@ -753,28 +767,27 @@ class View(QtCore.QObject):
         point = Point(x, y, z)
         if frame:
             point = Point(*self._frames.locate(frame).apply_point(point))
-        if max(abs(number) for number in point) > _FARTHEST_M:
-            raise Error(
-                f"{shown([x, y, z])} is more than {_FARTHEST_M:g} m from the fixed frame's origin"
-            )
+        if max(abs(number) for number in point) > _MAX_DISTANCE_M:
+            limit = f"{_MAX_DISTANCE_M:g} m"
+            raise Error(f"{shown([x, y, z])} is more than {limit} from the fixed frame's origin")
         return point
 
-    def _place_of(self, frame: str) -> Place:
+    def _pose_of(self, frame: str) -> FramePose:
         transform = self._frames.locate(frame)
         x, y, z, w = transform.rotation
         yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-        return Place(Point(*transform.translation), yaw)
+        return FramePose(Point(*transform.translation), yaw)
 
-    def _end_of_movement(self) -> Orbit:
+    def _final_orbit(self) -> Orbit:
         return self._current.read() if self._movement is None else self._movement.goal
 
-    def _kind(self) -> str:
+    def _view_class(self) -> str:
         return FLAT if self._current.kind == FLAT else ORBIT
 
     def _write(self, where: Orbit, kind: str) -> None:
         self._current.write(where, kind)
         # Read it back, because RViz rounds to 32-bit floats.
-        self._left_at = self._current.state
+        self._expected_state = self._current.state
 
 
 def _is_shifted(before: tuple[Any, ...], now: tuple[Any, ...]) -> bool:

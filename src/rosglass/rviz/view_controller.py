@@ -66,8 +66,8 @@ class ViewKeys(QtCore.QObject):
         self._window, self._view, self._overlays = window, view, overlays
         self._panel = window.panel
         self._settings = view.settings
-        self._loading: set[int] = set()
-        self._twice = False
+        self._pressed: set[int] = set()
+        self._fast = False
         self._last_step = 0.0
         self._panel.installEventFilter(self)
         window.before_frame.connect(self._step)
@@ -75,7 +75,7 @@ class ViewKeys(QtCore.QObject):
 
     def close(self) -> None:
         """Stop handling keys; safe to call twice."""
-        self._loading.clear()
+        self._pressed.clear()
         if is_alive(self._panel):
             self._panel.removeEventFilter(self)
 
@@ -84,18 +84,18 @@ class ViewKeys(QtCore.QObject):
         del watched
         kind = event.type()
         if kind in (_E.FocusOut, _E.Hide, _E.WindowDeactivate):
-            self._loading.clear()
+            self._pressed.clear()
         if kind not in (_E.KeyPress, _E.KeyRelease, _E.ShortcutOverride) or not self._settings.keys:
             return False
-        if self._is_elsewhere():
-            self._loading.clear()
+        if self._focus_is_elsewhere():
+            self._pressed.clear()
             return False
         if _is_toggle(event):
             if kind == _E.ShortcutOverride:
                 # Otherwise RViz's Displays panel would handle it as its shortcut.
                 event.accept()
             elif kind == _E.KeyPress and not event.isAutoRepeat():
-                self._toggle()
+                self._toggle_mode()
             return True
         return self._arrow(event)
 
@@ -105,50 +105,50 @@ class ViewKeys(QtCore.QObject):
             return False
         pressed = kind == _E.KeyPress
         if key == _Qt.Key_Shift:
-            self._twice = pressed
+            self._fast = pressed
             return False
         if key not in _ARROWS:
             return False
         if not pressed:
-            ours = key in self._loading
+            ours = key in self._pressed
             if not event.isAutoRepeat():
-                self._loading.discard(key)
+                self._pressed.discard(key)
             return ours
         if event.modifiers() & ~(_Qt.ShiftModifier | _Qt.KeypadModifier):
             return False
-        self._twice = bool(event.modifiers() & _Qt.ShiftModifier)
-        if not self._loading:
+        self._fast = bool(event.modifiers() & _Qt.ShiftModifier)
+        if not self._pressed:
             self._last_step = time.monotonic()
-        self._loading.add(key)
+        self._pressed.add(key)
         return True
 
-    def _is_elsewhere(self) -> bool:
+    def _focus_is_elsewhere(self) -> bool:
         shown = self._overlays.topmost_first()
         return self._overlays.input.focused is not None or any(o.is_modal for o in shown)
 
-    def _toggle(self) -> None:
+    def _toggle_mode(self) -> None:
         flat = self._view.mode is ViewMode.MODE_2D
         self._view.set_mode(ViewMode.MODE_3D if flat else ViewMode.MODE_2D)
 
     def _step(self) -> None:
-        if not self._loading:
+        if not self._pressed:
             return
         now = time.monotonic()
         passed, self._last_step = min(now - self._last_step, _MAX_STEP_S), now
-        if self._is_elsewhere() or not self._settings.keys:
+        if self._focus_is_elsewhere() or not self._settings.keys:
             # The key releases go to the new owner of the keyboard focus.
-            self._loading.clear()
+            self._pressed.clear()
             return
-        ahead = sum(_ARROWS[key][0] for key in self._loading)
-        left = sum(_ARROWS[key][1] for key in self._loading)
+        ahead = sum(_ARROWS[key][0] for key in self._pressed)
+        left = sum(_ARROWS[key][1] for key in self._pressed)
         length = math.hypot(ahead, left)
         if not length or not passed:
             return
-        metres = self._settings.speed * (2 if self._twice else 1) * passed / length
+        metres = self._settings.speed * (2 if self._fast else 1) * passed / length
         try:
             self._view.nudge(ahead * metres, left * metres)
         except Error as error:
-            self._loading.clear()
+            self._pressed.clear()
             _log.warning("%s", error)
 
 
@@ -186,14 +186,14 @@ class ViewServices(QtCore.QObject):
         super().__init__()
         self._view, self._session = view, session
         self._settings = view.settings
-        self._rviz = split(node_name)
-        self._wanted = self._read_settings()
+        self._rviz_name = split(node_name)
+        self._applied = self._read_settings()
         self._problem = ""
         self._node: Node | None = None
         self._generation = 0
         self._handles: list[Handle] = []
         #: The endpoints that the worker thread is creating.
-        self._making: _Made | None = None
+        self._pending: _Endpoints | None = None
         self._publishers: dict[str, Publisher] = {}
         self._closed = False
         session.node_changed.connect(self._node_changed)
@@ -206,7 +206,7 @@ class ViewServices(QtCore.QObject):
     @property
     def namespace(self) -> str:
         """The absolute namespace of topics and services; empty if the setting is invalid."""
-        return self._wanted.namespace
+        return self._applied.namespace
 
     @property
     def problem(self) -> str:
@@ -224,18 +224,18 @@ class ViewServices(QtCore.QObject):
             self._closed = True
             self._close_handles()
 
-    def _read_settings(self) -> _Wanted:
-        settings, (above, name) = self._settings, self._rviz
+    def _read_settings(self) -> _EndpointSettings:
+        settings, (above, name) = self._settings, self._rviz_name
         try:
             namespace = expand(settings.namespace, name, above).rstrip("/")
         except Error as error:
-            return _Wanted(settings.topics, settings.services, "", str(error))
-        return _Wanted(settings.topics, settings.services, namespace, "")
+            return _EndpointSettings(settings.topics, settings.services, "", str(error))
+        return _EndpointSettings(settings.topics, settings.services, namespace, "")
 
     def _on_edited(self) -> None:
         wanted = self._read_settings()
-        if wanted != self._wanted and not self._closed:
-            self._wanted = wanted
+        if wanted != self._applied and not self._closed:
+            self._applied = wanted
             self._open()
 
     def _node_changed(self) -> None:
@@ -252,7 +252,7 @@ class ViewServices(QtCore.QObject):
     def _close_handles(self) -> None:
         self._generation += 1
         handles, self._handles, self._publishers = self._handles, [], {}
-        making, self._making = self._making, None
+        making, self._pending = self._pending, None
         if handles:
             self._session.background(lambda: _close_all(handles))
         if making is not None:
@@ -262,7 +262,7 @@ class ViewServices(QtCore.QObject):
 
     def _open(self) -> None:
         self._close_handles()
-        node, generation, wanted = self._node, self._generation, self._wanted
+        node, generation, wanted = self._node, self._generation, self._applied
         if node is None or not (wanted.topics or wanted.services):
             self._set_problem("")
             return
@@ -272,12 +272,12 @@ class ViewServices(QtCore.QObject):
         if node.wire != "ros1":
             self._set_problem(f"{node.url}: the camera's services need ROS 1")
             return
-        made = self._making = _Made()
+        made = self._pending = _Endpoints()
 
-        def done(result: _Made | Error) -> None:
+        def done(result: _Endpoints | Error) -> None:
             if generation != self._generation:
                 return
-            self._making = None
+            self._pending = None
             if isinstance(result, Error):
                 self._set_problem(str(result))
             else:
@@ -289,7 +289,7 @@ class ViewServices(QtCore.QObject):
 
         self._session.background(lambda: self._make(node, wanted, made), done)
 
-    def _make(self, node: Node, wanted: _Wanted, made: _Made) -> _Made:
+    def _make(self, node: Node, wanted: _EndpointSettings, made: _Endpoints) -> _Endpoints:
         """Create topics and services; runs in the worker thread."""
         try:
             if wanted.topics:
@@ -368,7 +368,7 @@ class ViewServices(QtCore.QObject):
             self.problem_changed.emit(problem)
 
 
-class _Wanted(NamedTuple):
+class _EndpointSettings(NamedTuple):
     """The settings for topics and services; `wrong` is the error of an invalid namespace."""
 
     topics: bool
@@ -377,7 +377,7 @@ class _Wanted(NamedTuple):
     wrong: str
 
 
-class _Made:
+class _Endpoints:
     """The publishers and service servers created by the worker thread."""
 
     def __init__(self) -> None:
@@ -431,7 +431,7 @@ def _class() -> Any:
     return Display
 
 
-class _Entry:
+class _PanelEntry:
     """One entry of the view controller; duplicates show the same settings."""
 
     def __init__(self, view: View, now: RegisteredProperties, entries: Entries) -> None:
@@ -488,7 +488,7 @@ class ViewEntry(QtCore.QObject):
     ) -> None:
         super().__init__()
         self._window, self._entries, self._view, self._services = window, entries, view, services
-        self._shown: list[_Entry] = []
+        self._shown: list[_PanelEntry] = []
         self._loading = self._loaded = False
         #: State of the camera, shown in the panel but not saved.
         self._shown_state = RegisteredProperties()
@@ -537,8 +537,8 @@ class ViewEntry(QtCore.QObject):
             entry.close()
             remove_from_tree(entry.display)
 
-    def _make(self) -> _Entry:
-        entry = _Entry(self._view, self._shown_state, self._entries)
+    def _make(self) -> _PanelEntry:
+        entry = _PanelEntry(self._view, self._shown_state, self._entries)
         self._shown.append(entry)
         self._action.setChecked(True)
         self._update()

@@ -110,7 +110,7 @@ class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
         around = QtGui.QRegion()
         for rect in stale.rects():
             around += rect.adjusted(-more, -more, more, more)
-        picture = _scratch(self.pixels.shape, own)
+        picture = _shared_image(self.pixels.shape, own)
         self._render(around & everything, picture)
         words = np.frombuffer(picture.constBits(), np.uint32).reshape(self.pixels.shape)
         rects = [self._in_pixels(rect, own) for rect in stale.rects()]
@@ -149,7 +149,7 @@ class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
 
 
 @lru_cache(maxsize=1)
-def _scratch(shape: tuple[int, int], ratio: float) -> Any:
+def _shared_image(shape: tuple[int, int], ratio: float) -> Any:
     """Return the intermediate image that all canvases of a size share."""
     picture = QtGui.QImage(shape[1], shape[0], QtGui.QImage.Format_ARGB32_Premultiplied)
     picture.setDevicePixelRatio(ratio)
@@ -231,10 +231,10 @@ class StyleSheet(QtCore.QObject):  # type: ignore[misc]
         self.watch = False
         self._path: Path | None = None
         self._watcher: Any = None
-        self._pause = QtCore.QTimer()
-        self._pause.setSingleShot(True)
-        self._pause.setInterval(_DEBOUNCE_MS)
-        self._pause.timeout.connect(self._read)
+        self._debounce_timer = QtCore.QTimer()
+        self._debounce_timer.setSingleShot(True)
+        self._debounce_timer.setInterval(_DEBOUNCE_MS)
+        self._debounce_timer.timeout.connect(self._read)
 
     def use(self, source: str, *, watch: bool = False, strict: bool = False) -> None:
         """Use another style sheet.
@@ -258,7 +258,7 @@ class StyleSheet(QtCore.QObject):  # type: ignore[misc]
 
     def _read_later(self, path: str) -> None:
         del path
-        self._pause.start()
+        self._debounce_timer.start()
 
     def _read(self, *, strict: bool = False) -> None:
         try:
@@ -280,16 +280,16 @@ class StyleSheet(QtCore.QObject):  # type: ignore[misc]
 
     def close(self) -> None:
         """Stop watching the file."""
-        self._pause.stop()
+        self._debounce_timer.stop()
         self._stop_watching()
 
 
 _E = QtCore.QEvent
 #: Dynamic property of widgets that, with their children, leave wheel events to lower overlays.
 IGNORE_WHEEL = "IgnoreWheelEvents"
-_OTHERS = frozenset({_E.Wheel, _E.ContextMenu, _E.ToolTip, _E.DragLeave})
+_OTHER_EVENTS = frozenset({_E.Wheel, _E.ContextMenu, _E.ToolTip, _E.DragLeave})
 #: Qt classes that handle context menu events without a menu.
-_WITHOUT_MENU = (QtWidgets.QWidget, QtWidgets.QAbstractScrollArea, QtWidgets.QMainWindow)
+_CLASSES_WITHOUT_MENU = (QtWidgets.QWidget, QtWidgets.QAbstractScrollArea, QtWidgets.QMainWindow)
 _INPUT_METHOD = frozenset({_E.InputMethod, _E.InputMethodQuery})
 
 
@@ -324,9 +324,9 @@ class WidgetOverlay(Overlay):
         made.rosglass_overlay = weakref.ref(self)
         made.setAttribute(QtCore.Qt.WA_TranslucentBackground)
         self._buttons = QtCore.Qt.NoButton
-        self._at: Any = None
+        self._mouse_position: Any = None
         self._focus_before: Any = None
-        self._opened = self._focused = False
+        self._popups_open = self._focused = False
         self._panel: Any = None
         self._scene = QtWidgets.QGraphicsScene()
         self._view = _HiddenView(self._scene)
@@ -402,13 +402,13 @@ class WidgetOverlay(Overlay):
             return False
         if kind in KEYS or kind in _INPUT_METHOD:
             return self._deliver_key(event)
-        if kind not in MOUSE and kind not in DRAG and kind not in _OTHERS:
+        if kind not in MOUSE and kind not in DRAG and kind not in _OTHER_EVENTS:
             return False
         if kind == _E.ContextMenu and event.reason() == QtGui.QContextMenuEvent.Keyboard:
             return self._open_menu_by_key(event)
         at = position(event)
         if at is not None:
-            self._at = at
+            self._mouse_position = at
             self._view.align_with_screen(event, at)
         if kind == _E.Wheel and _has(self._widget_at(at), _ignores_wheel):
             return False
@@ -487,7 +487,7 @@ class WidgetOverlay(Overlay):
                 QtCore.QCoreApplication.sendEvent(viewport, release_outside(button, held))
         if not is_alive(self._scene):
             return
-        self._at = None
+        self._mouse_position = None
         QtCore.QCoreApplication.sendEvent(viewport, QtCore.QEvent(_E.Leave))
 
     def set_focus(self, focus: bool) -> None:
@@ -499,7 +499,7 @@ class WidgetOverlay(Overlay):
 
     def cursor(self) -> Any:
         """Return the cursor of the widget under the mouse; None for the default one."""
-        widget = None if self._at is None else self._widget_at(self._at)
+        widget = None if self._mouse_position is None else self._widget_at(self._mouse_position)
         if widget is None or widget.cursor().shape() == QtCore.Qt.ArrowCursor:
             return None
         return widget.cursor()
@@ -514,7 +514,7 @@ class WidgetOverlay(Overlay):
     def _update_popups(self, *_: Any) -> None:
         """Keep popups inside the 3D view, and restore the focus when the last one closes."""
         popups = self._popups()
-        opened, self._opened = self._opened, bool(popups)
+        opened, self._popups_open = self._popups_open, bool(popups)
         if popups:
             self._fit(popups)
         elif opened and self._focused and is_alive(self._focus_before):
@@ -659,10 +659,10 @@ def _focus_clicked(widget: Any) -> None:
         widget = widget.parentWidget()
 
 
-def _has(widget: Any, quality: Callable[[Any], bool]) -> bool:
+def _has(widget: Any, predicate: Callable[[Any], bool]) -> bool:
     """Return whether a predicate is true for a widget or one of its parents."""
     while widget is not None:
-        if quality(widget):
+        if predicate(widget):
             return True
         widget = widget.parentWidget()
     return False
@@ -674,7 +674,7 @@ def _has_menu(widget: Any) -> bool:
     if policy == QtCore.Qt.ActionsContextMenu:
         return bool(widget.actions())
     if policy == QtCore.Qt.DefaultContextMenu:
-        classes = (c for c in type(widget).__mro__ if c not in _WITHOUT_MENU)
+        classes = (c for c in type(widget).__mro__ if c not in _CLASSES_WITHOUT_MENU)
         return any("contextMenuEvent" in vars(c) for c in classes)
     return bool(policy == QtCore.Qt.CustomContextMenu)
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["BareView", "Window", "config_file"]
 
 
-_KEY = "F10"
+_BARE_VIEW_KEY = "F10"
 
 
 class BareView(QtCore.QObject):
@@ -47,7 +47,7 @@ class BareView(QtCore.QObject):
         self._hidden: list[Any] = []
         #: Also added to the window, because shortcuts of a hidden menu do not work.
         self._action = QtWidgets.QAction("&Bare 3D view", window)
-        self._action.setShortcut(_KEY)
+        self._action.setShortcut(_BARE_VIEW_KEY)
         self._action.setCheckable(True)
         self._action.toggled.connect(self._set)
         window.addAction(self._action)
@@ -125,12 +125,12 @@ class BareView(QtCore.QObject):
 
 
 #: RViz's status message right before it creates the displays of a config file.
-_LOADING = "Creating displays"
+_LOADING_STATUS = "Creating displays"
 #: Milliseconds that a window manager may take to resize a window to the screen.
 _RESIZE_DELAY_MS = 300
-_PATHS = "ROS_PACKAGE_PATH"
+_PACKAGE_PATH = "ROS_PACKAGE_PATH"
 #: Key of the displays in a config file.
-_CONTENT = "Visualization Manager"
+_DISPLAYS_KEY = "Visualization Manager"
 
 
 class Window(QtCore.QObject):
@@ -175,9 +175,9 @@ class Window(QtCore.QObject):
         #: The widget with the 3D view.
         self.panel = self._find_panel(QtWidgets.QWidget)
         self._wrapped = as_pyside(self.manager, QtCore.QObject)
-        self._loading = self._filled = False
-        self._loaded = AfterEvent(self._end_loading)
-        self._normal: Any = None
+        self._loading = self._resized_to_screen = False
+        self._after_loading = AfterEvent(self._end_loading)
+        self._normal_geometry: Any = None
         self._config = file
         self._menus: dict[str, Any] = {}
         #: Shows only the 3D view in the window.
@@ -270,9 +270,9 @@ class Window(QtCore.QObject):
         Args:
             title: The title; ``&`` marks the shortcut key.
         """
-        bar = self.widget.menuBar()
-        menus = {_plain(menu.title()): menu for menu in bar.findChildren(QtWidgets.QMenu)}
-        found = self._menus.get(_plain(title)) or menus.get(_plain(title))
+        bar, name = self.widget.menuBar(), _without_shortcut(title)
+        menus = {_without_shortcut(m.title()): m for m in bar.findChildren(QtWidgets.QMenu)}
+        found = self._menus.get(name) or menus.get(name)
         if found is None:
             found = QtWidgets.QMenu(title, bar)
             help_menu = menus.get("Help")
@@ -281,7 +281,7 @@ class Window(QtCore.QObject):
             else:
                 bar.insertMenu(help_menu.menuAction(), found)
         # PySide2 deletes the menu when Python has no reference to it.
-        self._menus[_plain(title)] = found
+        self._menus[name] = found
         return found
 
     def close(self) -> None:
@@ -302,11 +302,11 @@ class Window(QtCore.QObject):
 
     def _on_fullscreen(self, fullscreen: bool) -> None:
         if fullscreen:
-            self._normal = self.widget.geometry()
+            self._normal_geometry = self.widget.geometry()
             QtCore.QTimer.singleShot(_RESIZE_DELAY_MS, self._fill_screen)
-        elif self._filled:
-            self._filled = False
-            self.widget.setGeometry(self._normal)
+        elif self._resized_to_screen:
+            self._resized_to_screen = False
+            self.widget.setGeometry(self._normal_geometry)
         self.bare.hide_again()
         self.fullscreen_changed.emit(fullscreen)
 
@@ -314,14 +314,14 @@ class Window(QtCore.QObject):
         """Resize the window to the screen if no window manager has done so."""
         place = self.widget.windowHandle().screen().geometry()
         if self.fullscreen and self.widget.size() != place.size():
-            self._filled = True
+            self._resized_to_screen = True
             self.widget.setGeometry(place)
 
     def _on_status(self, status: str) -> None:
-        if status == _LOADING:
+        if status == _LOADING_STATUS:
             self._loading = True
             # RViz does not report failure to load a config.
-            self._loaded.ask()
+            self._after_loading.schedule()
             self.config_loading.emit()
 
     def _end_loading(self) -> None:
@@ -338,19 +338,19 @@ class Window(QtCore.QObject):
 @contextlib.contextmanager
 def _with_stand_in_package() -> Iterator[None]:
     """Provide a stand-in for the package media_export, which RViz searches for without need."""
-    before = os.environ.get(_PATHS)
+    before = os.environ.get(_PACKAGE_PATH)
     stand_in = str(Path(__file__).with_name("media_export"))
-    os.environ[_PATHS] = os.pathsep.join(filter(None, [before, stand_in]))
+    os.environ[_PACKAGE_PATH] = os.pathsep.join(filter(None, [before, stand_in]))
     try:
         yield
     finally:
         if before is None:
-            del os.environ[_PATHS]
+            del os.environ[_PACKAGE_PATH]
         else:
-            os.environ[_PATHS] = before
+            os.environ[_PACKAGE_PATH] = before
 
 
-def _plain(title: str) -> str:
+def _without_shortcut(title: str) -> str:
     return title.replace("&", "")
 
 
@@ -404,6 +404,6 @@ def config_file(place: str | os.PathLike[str]) -> Path:
     reader.readFile(config, str(path))
     if reader.error():
         raise Error(f"{path}: RViz cannot read it: {reader.errorMessage()}")
-    if not config.mapGetChild(_CONTENT).isValid():
-        raise Error(f"{path} is not an RViz config: it has no {_CONTENT!r}")
+    if not config.mapGetChild(_DISPLAYS_KEY).isValid():
+        raise Error(f"{path} is not an RViz config: it has no {_DISPLAYS_KEY!r}")
     return path

@@ -25,26 +25,26 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from rosglass.qml.runtime import Runtime
-    from rosglass.rviz.plugins import Watched
+    from rosglass.rviz.plugins import PluginList
 
 __all__ = [
     "LIST",
     "VARIANT",
-    "Face",
-    "ItemFaces",
-    "anything",
+    "QmlWrapper",
+    "QmlWrappers",
+    "boolean",
     "errors_to_js",
+    "forward",
     "member",
     "options",
-    "passing",
     "point",
     "point_of",
     "property_path",
     "slot",
     "spell_checked",
-    "switch",
     "text",
     "to_python",
+    "unchecked",
 ]
 
 #: Type of a property that accepts any value in Qt, and validates it in Python.
@@ -54,7 +54,7 @@ LIST: Any = "QVariantList"
 _OWNERSHIP: Any = QtQml.QQmlEngine.ObjectOwnership
 
 
-class Face(QtCore.QObject):
+class QmlWrapper(QtCore.QObject):
     """The QML object that wraps a Python object, its `model`.
 
     Args:
@@ -80,7 +80,7 @@ class Face(QtCore.QObject):
         self._held = None
 
 
-class ItemFaces(QtCore.QObject):
+class QmlWrappers(QtCore.QObject):
     """The QML objects of all tools or all displays, created on demand.
 
     Args:
@@ -96,11 +96,11 @@ class ItemFaces(QtCore.QObject):
     removed = Signal(QtCore.QObject)
 
     def __init__(
-        self, items: Watched, kind: type[Face], runtime: Runtime, parent: QtCore.QObject
+        self, items: PluginList, kind: type[QmlWrapper], runtime: Runtime, parent: QtCore.QObject
     ) -> None:
         super().__init__(parent)
         self._items, self._kind, self._runtime = items, kind, runtime
-        self._faces: dict[Any, Any] = {}
+        self._wrappers: dict[Any, Any] = {}
         items.added.connect(self._on_added)
         items.removed.connect(self._on_removed)
         items.changed.connect(self._on_changed)
@@ -109,9 +109,9 @@ class ItemFaces(QtCore.QObject):
         """Return the QML object of an item; None for None."""
         if item is None:
             return None
-        if item not in self._faces:
-            self._faces[item] = self._kind(item, self._runtime, self)
-        return self._faces[item]
+        if item not in self._wrappers:
+            self._wrappers[item] = self._kind(item, self._runtime, self)
+        return self._wrappers[item]
 
     def all(self) -> list[Any]:
         """Return the QML objects of all items, in RViz's order."""
@@ -119,7 +119,7 @@ class ItemFaces(QtCore.QObject):
 
     def known(self) -> list[Any]:
         """Return the QML objects created so far."""
-        return list(self._faces.values())
+        return list(self._wrappers.values())
 
     @Slot(object)
     def _on_added(self, item: Any) -> None:
@@ -128,18 +128,18 @@ class ItemFaces(QtCore.QObject):
 
     @Slot(object)
     def _on_removed(self, item: Any) -> None:
-        face = self.of(item)
-        del self._faces[item]
-        face.release()
+        wrapper = self.of(item)
+        del self._wrappers[item]
+        wrapper.release()
         self.changed.emit()
-        face.existsChanged.emit()
-        face.changed.emit()
-        self.removed.emit(face)
+        wrapper.existsChanged.emit()
+        wrapper.changed.emit()
+        self.removed.emit(wrapper)
 
     @Slot(object)
     def _on_changed(self, item: Any) -> None:
-        if item in self._faces:
-            self._faces[item].changed.emit()
+        if item in self._wrappers:
+            self._wrappers[item].changed.emit()
 
 
 # Declarations, for classes with the attributes `CALLED` and `runtime`.
@@ -150,27 +150,27 @@ def member(
     kind: Any,
     notify: Any = None,
     *,
-    of: str = "",
-    takes: Callable[[Any], Any] | None = None,
-    sets: Callable[[Any, Any], object] | None = None,
-    gives: Callable[[Any], Any] | None = None,
-    otherwise: Any = None,
+    path: str = "",
+    from_qml: Callable[[Any], Any] | None = None,
+    setter: Callable[[Any, Any], object] | None = None,
+    to_qml: Callable[[Any], Any] | None = None,
+    on_error: Any = None,
 ) -> Any:
     """Return a QML property that reads and writes a Python attribute.
 
     Args:
         name: Its name in QML.
-        kind: Its type in Qt; :data:`VARIANT` if `takes` validates values.
+        kind: Its type in Qt; :data:`VARIANT` if `from_qml` validates values.
         notify: Its change signal; None for a constant property.
-        of: Path of the attribute, relative to the QML object; by default ``model.`` and the name
+        path: Path of the attribute, relative to the QML object; by default ``model.`` and the name
             in snake case.
-        takes: Converter of new values; None for a read-only property.
-        sets: Called with the QML object and the new value, instead of setting the attribute.
-        gives: Converter of the attribute's value, applied before the one to `kind`.
-        otherwise: Its value if reading the attribute raises an Error, which is thrown into
+        from_qml: Converter of new values; None for a read-only property.
+        setter: Called with the QML object and the new value, instead of setting the attribute.
+        to_qml: Converter of the attribute's value, applied before the one to `kind`.
+        on_error: Its value if reading the attribute raises an Error, which is thrown into
             JavaScript.
     """
-    path = of or f"model.{_snake(name)}"
+    path = path or f"model.{_snake_case(name)}"
     get, (owner, _, attribute) = attrgetter(path), path.rpartition(".")
 
     def read(self: Any) -> Any:
@@ -178,28 +178,28 @@ def member(
             value = get(self)
         except Error as error:
             self.runtime.throw(f"{self.CALLED}.{name}: {error}")
-            return otherwise
-        value = value if gives is None else gives(value)
+            return on_error
+        value = value if to_qml is None else to_qml(value)
         return _to_js(self.runtime, value) if kind is QJSValue else value
 
     def write(self: Any, value: Any) -> None:
-        assert takes is not None
+        assert from_qml is not None
         try:
-            wanted = takes(to_python(value))
-            if sets is None:
+            wanted = from_qml(to_python(value))
+            if setter is None:
                 setattr(attrgetter(owner)(self), attribute, wanted)
             else:
-                sets(self, wanted)
+                setter(self, wanted)
         except Error as error:
             self.runtime.throw(f"{self.CALLED}.{name}: {error}")
 
     more: dict[str, Any] = {"constant": True} if notify is None else {"notify": notify}
-    if takes is not None:
+    if from_qml is not None:
         more["fset"] = write
     return Property(kind, read, **more)
 
 
-def slot(optional: int = 0, /, **takes: Callable[[Any], Any]) -> Callable[[Any], Any]:
+def slot(optional: int = 0, /, **converters: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Return a decorator that makes a method callable from QML, and throws its Errors there.
 
     QML gets null for None, an object for a QObject, and undefined from a method that is annotated
@@ -207,9 +207,9 @@ def slot(optional: int = 0, /, **takes: Callable[[Any], Any]) -> Callable[[Any],
 
     Args:
         optional: Number of optional parameters, at the end.
-        takes: Converter of each argument, by the parameter's name in QML.
+        converters: Converter of each argument, by the parameter's name in QML.
     """
-    names = list(takes)
+    names = list(converters)
     least = len(names) - optional
     rest = "".join(
         f"[, {name}" if at else f"[{name}" for at, name in enumerate(names) if at >= least
@@ -232,8 +232,10 @@ def slot(optional: int = 0, /, **takes: Callable[[Any], Any]) -> Callable[[Any],
                 while len(values) > least and values[-1] is None:
                     values.pop()
                 given = [
-                    None if value is None and at >= least else take(value)
-                    for at, (take, value) in enumerate(zip(takes.values(), values, strict=False))
+                    None if value is None and at >= least else convert(value)
+                    for at, (convert, value) in enumerate(
+                        zip(converters.values(), values, strict=False)
+                    )
                 ]
                 answer = function(self, *given)
             except Error as error:
@@ -249,7 +251,9 @@ def slot(optional: int = 0, /, **takes: Callable[[Any], Any]) -> Callable[[Any],
     return decorate
 
 
-def passing(name: str, optional: int = 0, to: str = "", /, **takes: Callable[[Any], Any]) -> Any:
+def forward(
+    name: str, optional: int = 0, to: str = "", /, **converters: Callable[[Any], Any]
+) -> Any:
     """Return a slot that passes its arguments to a method, and returns nothing.
 
     Args:
@@ -257,9 +261,9 @@ def passing(name: str, optional: int = 0, to: str = "", /, **takes: Callable[[An
         optional: See :func:`slot`.
         to: Path of the method, relative to the QML object; by default ``model.`` and the name in
             snake case.
-        takes: See :func:`slot`; :func:`options` become keyword arguments of the method.
+        converters: See :func:`slot`; :func:`options` become keyword arguments of the method.
     """
-    get = attrgetter(to or f"model.{_snake(name)}")
+    get = attrgetter(to or f"model.{_snake_case(name)}")
 
     def call(self: Any, *arguments: Any) -> None:
         named: dict[str, Any] = {}
@@ -268,10 +272,10 @@ def passing(name: str, optional: int = 0, to: str = "", /, **takes: Callable[[An
         get(self)(*arguments, **named)
 
     call.__name__ = name
-    return slot(optional, **takes)(call)
+    return slot(optional, **converters)(call)
 
 
-def _snake(name: str) -> str:
+def _snake_case(name: str) -> str:
     """Return a QML name in snake case."""
     return re.sub(r"(?<=[a-z])(?=[A-Z0-9])", "_", name).lower()
 
@@ -326,7 +330,7 @@ def to_python(value: Any) -> Any:
     return found
 
 
-def anything(value: Any) -> Any:
+def unchecked(value: Any) -> Any:
     """Return a value unchanged: the called method validates it."""
     return value
 
@@ -352,7 +356,7 @@ def text(wanted: str = "a text", parameter: str = "") -> Callable[[Any], str]:
     return _of_kind(str, wanted, parameter)
 
 
-def switch(parameter: str = "") -> Callable[[Any], bool]:
+def boolean(parameter: str = "") -> Callable[[Any], bool]:
     """Return a converter for booleans; see :func:`text`."""
     return _of_kind(bool, "true or false", parameter)
 
@@ -404,7 +408,7 @@ class _Keywords(dict[str, Any]):
 
 
 def options(**kinds: type) -> Callable[[Any], dict[str, Any]]:
-    """Return a converter for an object with options, which :func:`passing` turns into keywords.
+    """Return a converter for an object with options, which :func:`forward` turns into keywords.
 
     Args:
         kinds: The type of each option, `str` or `bool`.
@@ -418,8 +422,8 @@ def options(**kinds: type) -> Callable[[Any], dict[str, Any]]:
         for name, given in value.items():
             if name not in kinds:
                 raise Error(f"there is no option {shown(name)}; there are {known}")
-            kind = text if kinds[name] is str else switch
-            found[_snake(name)] = kind(parameter=name)(given)
+            kind = text if kinds[name] is str else boolean
+            found[_snake_case(name)] = kind(parameter=name)(given)
         return found
 
     return take
@@ -428,17 +432,17 @@ def options(**kinds: type) -> Callable[[Any], dict[str, Any]]:
 # Misspelled members.
 
 #: Members that JavaScript itself looks up in any object.
-_ASKED = {"toJSON", "then"}
+_LOOKED_UP_BY_JS = {"toJSON", "then"}
 #: Inserts a proxy at the end of the prototype chain, for names found nowhere else.
 _PROXY = """(function (guard, item) {
     const last = Object.getPrototypeOf(item)
     return new Proxy(last, {get: guard.read, set: guard.write})
 })"""
-_SET = "Object.setPrototypeOf"
+_SET_PROTOTYPE_OF = "Object.setPrototypeOf"
 _MAX_WARNINGS = 1000
 
 
-class _Guard(QtCore.QObject):
+class _MissingMembers(QtCore.QObject):
     """Handler of the proxy that reports missing members; does not appear in JavaScript's stack.
 
     Args:
@@ -460,7 +464,7 @@ class _Guard(QtCore.QObject):
             return QJSValue()
         value: QJSValue = engine.newQObject(item)
         if self._last is None:
-            self._set = engine.evaluate(_SET)
+            self._set = engine.evaluate(_SET_PROTOTYPE_OF)
             self._last = engine.evaluate(_PROXY).call([engine.newQObject(self), value])
         self._set.call([value, self._last])
         return value
@@ -473,7 +477,7 @@ class _Guard(QtCore.QObject):
             return QJSValue()
         asked = name.toString()
         found = last.property(asked)
-        if found.isUndefined() and asked not in _ASKED:
+        if found.isUndefined() and asked not in _LOOKED_UP_BY_JS:
             self._warn(asked, item)
         return found
 
@@ -501,7 +505,7 @@ def spell_checked(runtime: Runtime, item: QtCore.QObject) -> QJSValue:
         item: A QObject that JavaScript has no wrapper of yet. Unless JavaScript owns it, keep the
             result: otherwise JavaScript may create a new, unchecked wrapper.
     """
-    guard = runtime.findChild(_Guard) or _Guard(runtime)
+    guard = runtime.findChild(_MissingMembers) or _MissingMembers(runtime)
     return guard.wrap(item)
 
 
