@@ -30,10 +30,6 @@ class Access(QtCore.QObject):
     """The interface to RViz, ``Application.rviz``; use it in the GUI thread only.
 
     Its parts are created on first use.
-
-    Args:
-        window: RViz's window.
-        session: The session whose node receives transforms.
     """
 
     #: RViz is about to draw.

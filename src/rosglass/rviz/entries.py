@@ -465,13 +465,6 @@ class Entries(QtCore.QObject):
 
     RViz creates a placeholder for each display of a config file whose class it cannot load, and
     keeps the display's config in it. Entries replace the placeholders of overlays.
-
-    Args:
-        window: RViz's window.
-        stack: The overlays.
-        session: The session of QML overlays.
-        frames: The robot's frames.
-        import_paths: Additional folders with QML modules.
     """
 
     #: The panel was searched for placeholders, and those found were replaced.
@@ -771,12 +764,7 @@ _FILTER = "QML files (*.qml);;All files (*)"
 
 
 class OverlayMenu(QtCore.QObject):
-    """The Overlays menu; opening it fills its lists.
-
-    Args:
-        window: RViz's window.
-        entries: The overlays' entries.
-    """
+    """The Overlays menu; opening it fills its lists."""
 
     def __init__(self, window: Window, entries: Entries) -> None:
         super().__init__()

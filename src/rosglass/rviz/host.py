@@ -130,12 +130,7 @@ def as_pyside(item: Any, kind: type[_T]) -> _T:
 
 
 def as_pyqt(item: QtCore.QObject, kind: Any) -> Any:
-    """Return the PyQt5 wrapper of a PySide2 object, e.g. for RViz's bindings.
-
-    Args:
-        item: The object.
-        kind: PyQt5's class for it.
-    """
+    """Return the PyQt5 wrapper of a PySide2 object, e.g. for RViz's bindings."""
     shiboken = importlib.import_module("shiboken2")
     return pyqt("sip").wrapinstance(int(shiboken.getCppPointer(item)[0]), kind)
 

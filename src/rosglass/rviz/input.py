@@ -194,10 +194,6 @@ class Input(QtCore.QObject):  # type: ignore[misc]
     It offers an event to the overlays from the top, popups first. The overlay that accepts a press
     grabs the mouse until all buttons are released, and gets the keyboard focus. RViz gets events
     that no overlay accepts, unless a modal popup is shown.
-
-    Args:
-        window: RViz's window.
-        stack: The overlays.
     """
 
     def __init__(self, window: Window, stack: Stack) -> None:

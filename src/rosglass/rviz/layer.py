@@ -46,9 +46,6 @@ class Layer:
 
     For the GUI thread only, between two frames of RViz. Ogre owns its resources;
     :meth:`close` releases them.
-
-    Args:
-        name: Name in Ogre's log messages.
     """
 
     def __init__(self, name: str) -> None:
@@ -299,11 +296,7 @@ class Work(NamedTuple):
 
 
 class Drawing:
-    """Draws an overlay into its layer.
-
-    Args:
-        overlay: The overlay to draw.
-    """
+    """Draws an overlay into its layer."""
 
     def __init__(self, overlay: Overlay) -> None:
         self.overlay = overlay

@@ -145,11 +145,7 @@ def _waiting_window(uri: str, problem: str, cancel: Callable[[], None]) -> Any:
 
 
 class MasterWatch(QtCore.QObject):
-    """Detects the loss and the restart of a running RViz's master.
-
-    Args:
-        uri: The master's URI.
-    """
+    """Detects the loss and the restart of a running RViz's master."""
 
     #: :attr:`problem` has changed. Argument: the new text.
     problem_changed = Signal(str)

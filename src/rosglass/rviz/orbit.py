@@ -42,11 +42,7 @@ class Point(NamedTuple):
         return Point(self.x - x, self.y - y, self.z - z)
 
     def turned(self, yaw: float) -> Point:
-        """Return the vector rotated around z.
-
-        Args:
-            yaw: Angle in radians.
-        """
+        """Return the vector rotated around z by an angle in radians."""
         c, s = math.cos(yaw), math.sin(yaw)
         return Point(c * self.x - s * self.y, s * self.x + c * self.y, self.z)
 
@@ -138,12 +134,7 @@ class Orbit(NamedTuple):
         )
 
     def carried(self, before: FramePose, after: FramePose) -> Orbit:
-        """Return the camera moved along with a frame.
-
-        Args:
-            before: The frame's old pose.
-            after: Its new pose.
-        """
+        """Return the camera moved along with a frame, from its old to its new pose."""
         turn = shortest_turn(before.yaw, after.yaw)
         focus = after.point + (self.focus - before.point).turned(turn)
         return self._replace(focus=focus, yaw=self.yaw + turn)

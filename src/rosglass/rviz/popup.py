@@ -247,11 +247,7 @@ class _StaleShade(QtWidgets.QWidget):  # type: ignore[misc]
 
 
 class MoveBar(QtWidgets.QLabel):  # type: ignore[misc]
-    """A bar inside a popup's content, by which the user drags the popup.
-
-    Args:
-        text: The bar's text.
-    """
+    """A bar inside a popup's content, by which the user drags the popup."""
 
     def __init__(self, text: str = "") -> None:
         super().__init__(text)

@@ -143,11 +143,7 @@ def write_property(item: Any, value: Any, name: str = "") -> None:
 
 
 def describe_properties(item: Any, path: str = "") -> list[dict[str, Any]]:
-    """Return the properties below another one as nested dicts.
-
-    Args:
-        item: The other property.
-        path: Its path; empty at the top.
+    """Return the properties below another one as nested dicts; `path` is that of `item`.
 
     Returns:
         A dict for each, with `name`, `path` (for :func:`find_property`), `value`, `kind`,
@@ -320,13 +316,7 @@ class Choices:
 
 
 def make_editor(model: RegisteredProperty, parent: Any, choices: Choices) -> Any:
-    """Return a property's editor widget; None to use RViz's own.
-
-    Args:
-        model: The property.
-        parent: The editor's parent widget.
-        choices: Suggestions for topics and frames.
-    """
+    """Return a property's editor widget, below a parent widget; None to use RViz's own."""
     kind, options = model.kind.NAME, model.kind.options
     if kind == "int":
         return _spin_box(model, parent)
@@ -495,13 +485,7 @@ def _classes() -> tuple[Any, Any]:
 
 
 class PropertyView:
-    """A registered property in RViz's tree, with child items for the parts of a vector.
-
-    Args:
-        model: The registered property.
-        above: Its parent in RViz's tree.
-        choices: Suggestions for the editor; reports invalid edits.
-    """
+    """A registered property in RViz's tree, with child items for the parts of a vector."""
 
     def __init__(self, model: RegisteredProperty, above: Any, choices: Choices) -> None:
         self.model, self.choices = model, choices
@@ -599,13 +583,7 @@ def _plain(value: Any) -> Any:
 
 
 class PropertyTree:
-    """Shows all registered properties of an owner below one of RViz's properties.
-
-    Args:
-        owner: The registered properties.
-        above: Their parent in RViz's tree.
-        choices: See :class:`PropertyView`.
-    """
+    """Shows all registered properties of an owner below one of RViz's properties."""
 
     def __init__(self, owner: RegisteredProperties, above: Any, choices: Choices) -> None:
         self._owner, self._above, self._choices = owner, above, choices

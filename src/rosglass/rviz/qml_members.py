@@ -55,13 +55,7 @@ _OWNERSHIP: Any = QtQml.QQmlEngine.ObjectOwnership
 
 
 class QmlWrapper(QtCore.QObject):
-    """The QML object that wraps a Python object, its `model`.
-
-    Args:
-        model: The Python object.
-        runtime: The QML engine's runtime.
-        parent: Its QObject parent.
-    """
+    """The QML object that wraps a Python object, its `model`."""
 
     #: Name in error messages.
     CALLED: ClassVar[str] = "object"
@@ -81,14 +75,7 @@ class QmlWrapper(QtCore.QObject):
 
 
 class QmlWrappers(QtCore.QObject):
-    """The QML objects of all tools or all displays, created on demand.
-
-    Args:
-        items: The tools or displays.
-        kind: Class of their QML objects, with signals `existsChanged` and `changed`.
-        runtime: The QML engine's runtime.
-        parent: QObject parent of the QML objects.
-    """
+    """The QML objects of all tools or all displays, created on demand by the class `kind`."""
 
     #: The list of items has changed.
     changed = Signal()
@@ -443,11 +430,7 @@ _MAX_WARNINGS = 1000
 
 
 class _MissingMembers(QtCore.QObject):
-    """Handler of the proxy that reports missing members; does not appear in JavaScript's stack.
-
-    Args:
-        runtime: The QML engine's runtime.
-    """
+    """Handler of the proxy that reports missing members; does not appear in JavaScript's stack."""
 
     def __init__(self, runtime: Runtime) -> None:
         super().__init__(runtime)

@@ -77,9 +77,6 @@ class Scene(QtCore.QObject):
 
     The window's size is in units of the interface, so that popups and `Window` know the available
     space. The scene is scaled rather than its picture, so that text is sharp at any scale.
-
-    Args:
-        renderer: Draws the window.
     """
 
     #: The scene has to be drawn again.

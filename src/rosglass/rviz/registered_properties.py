@@ -25,15 +25,7 @@ _log = logging.getLogger("rosglass.rviz")
 
 
 class RegisteredProperty(QtCore.QObject):
-    """One registered property; created by :class:`RegisteredProperties` only.
-
-    Args:
-        owner: The properties that it belongs to.
-        parent: Its parent property; None at the top.
-        name: Its name, unique below the parent.
-        kind: The type of its values.
-        default: Its initial value.
-    """
+    """One registered property; created by :class:`RegisteredProperties` only."""
 
     #: Name in error messages.
     CALLED = "property"
@@ -130,12 +122,7 @@ class RegisteredProperty(QtCore.QObject):
             self.aboutChanged.emit()
 
     def adopt(self, kind: Kind, about: dict[str, Any]) -> None:
-        """Apply a repeated registration; a value that has become invalid is reset to the default.
-
-        Args:
-            kind: The new kind, of the same class.
-            about: `description`, `readOnly` and `hidden`, if given.
-        """
+        """Apply another registration; a value that is invalid now becomes the default."""
         changed = kind.options != self.kind.options
         self.kind = kind
         self._update(**about)

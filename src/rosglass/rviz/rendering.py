@@ -173,12 +173,7 @@ class Renderer(Protocol):
     read_back: float
 
     def start(self, control: Any, window: Any) -> None:
-        """Set the window to draw; call this first.
-
-        Args:
-            control: The window's QQuickRenderControl, a `_Control`.
-            window: The window.
-        """
+        """Set the window to draw, and its `_Control`; call this first."""
 
     def fit(self, width: int, height: int, ratio: float) -> float:
         """Set the size.

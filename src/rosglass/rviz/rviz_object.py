@@ -185,9 +185,6 @@ class ToolIcons(QtQuick.QQuickImageProvider):  # type: ignore[misc]
 
     Scales the largest icon to the requested size, by default 48 pixels; a width or height alone
     keeps the proportions.
-
-    Args:
-        tools: RViz's tools.
     """
 
     def __init__(self, tools: Tools) -> None:
@@ -396,12 +393,7 @@ def _file_path(use: str = "") -> Callable[[Any], str]:
 
 
 class RvizObject(RegisteredProperties):
-    """The object ``rviz`` in the QML of an overlay; see "The rviz object" in ``docs/rviz.md``.
-
-    Args:
-        overlay: The overlay.
-        engine: The overlay's engine, with a session.
-    """
+    """The object ``rviz`` in the QML of an overlay; see "The rviz object" in ``docs/rviz.md``."""
 
     #: Name in error messages.
     CALLED = "rviz"

@@ -206,13 +206,7 @@ class Tools(PluginList):
 
 
 def failure(handle: Any, class_id: str, base: str) -> str:
-    """Return why RViz could not load a tool or display; empty if it could.
-
-    Args:
-        handle: RViz's tool or display.
-        class_id: The requested class id.
-        base: Its base class, as in :mod:`rosglass.rviz.plugins`.
-    """
+    """Return why RViz could not load a tool or display (its base class is `base`), or ``""``."""
     if type_name(handle) not in _FAILED:
         return ""
     known = declared(base)

@@ -38,12 +38,7 @@ FIXED_FRAME = "<Fixed Frame>"
 
 
 class Frames(QtCore.QObject):
-    """The transforms received by the overlays' node, because RViz's own are not accessible.
-
-    Args:
-        session: The session of that node.
-        window: RViz's window, for the fixed frame.
-    """
+    """The transforms received by the overlays' node, because RViz's own are not accessible."""
 
     #: Transforms start or stop being received.
     available_changed = Signal()
@@ -276,12 +271,7 @@ class Tracker(QtCore.QObject):
 
 
 class Trackers:
-    """All trackers of an RViz, updated before each frame that it draws.
-
-    Args:
-        window: RViz's window.
-        frames: Returns the robot's frames; called when a tracker needs them.
-    """
+    """All trackers of an RViz, updated before each frame that it draws."""
 
     def __init__(self, window: Window, frames: Callable[[], Frames]) -> None:
         self._window, self._frames = window, frames

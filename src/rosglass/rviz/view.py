@@ -296,12 +296,7 @@ class CurrentView(QtCore.QObject):
         return Orbit(Point(x, y, z), distance, sign * yaw, sign * pitch)
 
     def write(self, where: Orbit, kind: str) -> None:
-        """Move the camera.
-
-        Args:
-            where: Where to.
-            kind: Class id of the view to use: :data:`ORBIT`, or :data:`FLAT` for a view from above.
-        """
+        """Move the camera, in the view with class id `kind`: :data:`ORBIT` or :data:`FLAT`."""
         if self.kind != kind:
             self._switch_view(kind)
         if self._get(_TARGET_FRAME) != FIXED_FRAME:
@@ -419,10 +414,6 @@ class View(QtCore.QObject):
     Points are in metres. Moving the camera by other means, e.g. with the mouse, ends a movement.
     Shifting it also ends tracking; turning or zooming it does not. The first movement replaces
     other view types (FPS, ThirdPersonFollower) with ``rviz/Orbit``.
-
-    Args:
-        window: RViz's window.
-        frames: The robot's frames.
     """
 
     #: :attr:`mode` has changed.

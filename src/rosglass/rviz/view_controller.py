@@ -54,11 +54,6 @@ class ViewKeys(QtCore.QObject):
     """Keyboard control: arrow keys shift the view, faster with Shift; Ctrl+D toggles 2D and 3D.
 
     Only while the 3D view has the keyboard focus, and no overlay has it.
-
-    Args:
-        window: RViz's window.
-        view: The camera.
-        overlays: The overlays, which may have the keyboard focus.
     """
 
     def __init__(self, window: Window, view: View, overlays: Stack) -> None:
@@ -475,12 +470,6 @@ class ViewEntry(QtCore.QObject):
     """The view controller's entry in the panel, added by the Overlays menu or by a config file.
 
     Without an entry, the settings are the program's or the defaults.
-
-    Args:
-        window: RViz's window.
-        entries: The overlays' entries.
-        view: The camera.
-        services: The camera's topics and services.
     """
 
     def __init__(

@@ -40,10 +40,6 @@ class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
 
     Only a visible view is notified which part of an item has changed; the scene's own signal
     reports the whole item, here the root widget.
-
-    Args:
-        scene: The scene.
-        root: The widget that fills it.
     """
 
     #: A part has to be painted again.

@@ -33,9 +33,6 @@ class BareView(QtCore.QObject):
 
     The status bar stays visible while it shows a problem (:meth:`warn`). RViz's own full screen
     mode does not hide docked panels.
-
-    Args:
-        window: RViz's main window.
     """
 
     changed = Signal()
