@@ -10,14 +10,13 @@ from rosglass.rviz.overlay import guarded
 from rosglass.rviz.qt5 import QtCore, QtGui, QtWidgets
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from rosglass.rviz.overlay import Overlay
     from rosglass.rviz.stack import Stack
     from rosglass.rviz.window import Window
 
 __all__ = [
-    "BUTTONS",
     "DRAG",
     "FAR_OUTSIDE",
     "KEYS",
@@ -25,8 +24,9 @@ __all__ = [
     "PRESS",
     "TOUCH",
     "Input",
+    "mouse_event",
     "position",
-    "release_outside",
+    "releases",
     "scaled",
 ]
 
@@ -44,20 +44,18 @@ KEYS = frozenset({_E.KeyPress, _E.KeyRelease, _E.ShortcutOverride})
 DRAG = frozenset({_E.DragEnter, _E.DragMove, _E.Drop})
 
 #: All mouse buttons that Qt knows.
-BUTTONS = [QtCore.Qt.MouseButton(1 << bit) for bit in range(27)]
+_BUTTONS = [QtCore.Qt.MouseButton(1 << bit) for bit in range(27)]
 #: A position outside of all widgets and items.
 FAR_OUTSIDE = QtCore.QPointF(-1e5, -1e5)
 
 
-def release_outside(button: Any, left: Any) -> Any:
-    """Return a mouse release event outside of all widgets and items.
-
-    Args:
-        button: The released button.
-        left: The buttons that are still pressed.
-    """
+def releases(held: Any) -> Iterator[Any]:
+    """Iterate over mouse events that release all held buttons, outside of all widgets and items."""
     none = QtCore.Qt.NoModifier
-    return QtGui.QMouseEvent(_E.MouseButtonRelease, FAR_OUTSIDE, button, left, none)
+    for button in _BUTTONS:
+        if int(held) & int(button):
+            held &= ~button
+            yield QtGui.QMouseEvent(_E.MouseButtonRelease, FAR_OUTSIDE, button, held, none)
 
 
 def position(event: Any) -> Any:
@@ -89,10 +87,11 @@ def scaled(event: Any, factor: float) -> Any:
     return made
 
 
-def _mouse(event: Any, factor: float) -> Any:
+def mouse_event(event: Any, kind: Any, factor: float = 1.0) -> Any:
+    """Return a copy of a mouse event with another type, and with scaled positions."""
     at = event.localPos() * factor
-    return QtGui.QMouseEvent(
-        event.type(),
+    made = QtGui.QMouseEvent(
+        kind,
         at,
         at,
         event.screenPos(),
@@ -101,6 +100,12 @@ def _mouse(event: Any, factor: float) -> Any:
         event.modifiers(),
         event.source(),
     )
+    made.setTimestamp(event.timestamp())
+    return made
+
+
+def _mouse(event: Any, factor: float) -> Any:
+    return mouse_event(event, event.type(), factor)
 
 
 def _wheel(event: Any, factor: float) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 from rosglass.comm.names import similar
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from rosglass.rviz.window import Window
 
-__all__ = ["DISPLAY", "TOOL", "VIEW", "Plugin", "PluginList", "declared", "require_class_id"]
+__all__ = ["DISPLAY", "TOOL", "VIEW", "PluginList", "declared", "require_class_id"]
 
 
 DISPLAY, TOOL, VIEW = "rviz::Display", "rviz::Tool", "rviz::ViewController"
@@ -30,30 +30,20 @@ _SYSTEM = "/usr/share"
 _MAX_ID_LENGTH = 200
 
 
-class Plugin(NamedTuple):
-    """A plugin class of RViz."""
-
-    #: Class id, e.g. ``rviz/Measure``.
-    class_id: str
-    #: Description from its package.
-    description: str
-
-
 @cache
-def declared(base: str) -> dict[str, Plugin]:
-    """Return the plugin classes of a type by class id; like RViz, searches once per process.
+def declared(base: str) -> tuple[str, ...]:
+    """Return the class ids of all plugins of a type; like RViz, searches once per process.
 
     Args:
         base: Base class: :data:`DISPLAY`, :data:`TOOL` or :data:`VIEW`.
     """
-    found: dict[str, Plugin] = {}
-    for file in _descriptions():
-        for element in _classes(file):
-            name = element.get("name") or element.get("type", "").replace("::", "/")
-            if element.get("base_class_type") == base and name:
-                about = " ".join((element.findtext("description") or "").split())
-                found.setdefault(name, Plugin(name, about))
-    return dict(sorted(found.items()))
+    found = [element for file in _descriptions() for element in _classes(file)]
+    names = {
+        element.get("name") or element.get("type", "").replace("::", "/")
+        for element in found
+        if element.get("base_class_type") == base
+    }
+    return tuple(sorted(names - {""}))
 
 
 def require_class_id(class_id: object, base: str) -> str:

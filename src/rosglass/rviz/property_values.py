@@ -143,11 +143,13 @@ class _Number(Kind, ABC):
 
     DEFAULT: ClassVar[Any] = 0
     OPTIONS = ("min", "max", "step")
+    #: Limits of properties without `min` and `max`.
+    LIMITS: ClassVar[tuple[Any, Any]]
+    PARSE: ClassVar[type[int | float]]
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        low, high = self._limits()
-        self.min, self.max = low, high
+        self.min, self.max = self.LIMITS
         for name, value in options.items():
             given = self._number(value)
             if given is None:
@@ -164,9 +166,6 @@ class _Number(Kind, ABC):
         return min(max(self.DEFAULT, self.min), self.max)
 
     @abstractmethod
-    def _limits(self) -> tuple[Any, Any]: ...
-
-    @abstractmethod
     def _number(self, value: Any) -> Any: ...
 
     def read(self, value: Any) -> Any:
@@ -177,12 +176,15 @@ class _Number(Kind, ABC):
             raise Error(f"{number} is not from {self.min} to {self.max}")
         return number
 
+    def restore(self, saved: Any) -> Any:
+        try:
+            return self.read(self.PARSE(saved) if isinstance(saved, str) else saved)
+        except ValueError:
+            raise self._refusal(saved) from None
+
 
 class _Int(_Number):
-    NAME, WANTED = "int", "a whole number"
-
-    def _limits(self) -> tuple[int, int]:
-        return _INT32
+    NAME, WANTED, LIMITS, PARSE = "int", "a whole number", _INT32, int
 
     def _number(self, value: Any) -> int | None:
         if isinstance(value, float) and value.is_integer():
@@ -191,18 +193,10 @@ class _Int(_Number):
             return None
         return value if _INT32[0] <= value <= _INT32[1] else None
 
-    def restore(self, saved: Any) -> Any:
-        try:
-            return self.read(int(saved) if isinstance(saved, str) else saved)
-        except ValueError:
-            raise self._refusal(saved) from None
-
 
 class _Float(_Number):
     NAME, DEFAULT, WANTED = "float", 0.0, "a finite number"
-
-    def _limits(self) -> tuple[float, float]:
-        return -math.inf, math.inf
+    LIMITS, PARSE = (-math.inf, math.inf), float
 
     def _number(self, value: Any) -> float | None:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -211,12 +205,6 @@ class _Float(_Number):
             return float(value) if math.isfinite(value) else None
         except OverflowError:
             return None
-
-    def restore(self, saved: Any) -> Any:
-        try:
-            return self.read(float(saved) if isinstance(saved, str) else saved)
-        except ValueError:
-            raise self._refusal(saved) from None
 
 
 class _String(Kind):

@@ -14,14 +14,14 @@ from rosglass.qml.modules import interface_file
 from rosglass.qml.renderer_choice import need_in_file, need_in_items
 from rosglass.qt import QtCore, Signal, is_alive
 from rosglass.rviz.input import (
-    BUTTONS,
     DRAG,
     FAR_OUTSIDE,
     KEYS,
     PRESS,
     TOUCH,
+    mouse_event,
     position,
-    release_outside,
+    releases,
     scaled,
 )
 from rosglass.rviz.overlay import Overlay
@@ -204,7 +204,7 @@ class QmlInput:
             return False
         if kind == _E.MouseButtonDblClick:
             # Qt sends the second press of a double click twice: as press and as double click.
-            taken = self._deliver(_as_press(event), at)
+            taken = self._deliver(mouse_event(event, _E.MouseButtonPress), at)
             return self._deliver(event, at) or taken if taken else False
         return self._deliver(event, at)
 
@@ -255,10 +255,9 @@ class QmlInput:
         content.setEnabled(False)
         for handler in filter(is_alive, disabled):
             handler.setProperty("enabled", False)
-        for button in BUTTONS:
-            if int(held) & int(button) and is_alive(window):
-                held &= ~button
-                _send(window, release_outside(button, held))
+        for event in releases(held):
+            if is_alive(window):
+                _send(window, event)
         if touch is not None and is_alive(window):
             for event in touch.ended():
                 _send(window, event)
@@ -341,21 +340,6 @@ def _send(receiver: Any, event: Any) -> bool:
     event.setAccepted(False)
     Qt5Core.QCoreApplication.sendEvent(receiver, event)
     return bool(event.isAccepted())
-
-
-def _as_press(event: Any) -> Any:
-    made = QtGui.QMouseEvent(
-        _E.MouseButtonPress,
-        event.localPos(),
-        event.windowPos(),
-        event.screenPos(),
-        event.button(),
-        event.buttons(),
-        event.modifiers(),
-        event.source(),
-    )
-    made.setTimestamp(event.timestamp())
-    return made
 
 
 def _visible_items(window: Any) -> Iterator[_VisibleItem]:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
 from rosglass.qml.from_js import plain_from_js
@@ -22,6 +22,20 @@ __all__ = ["RegisteredProperties", "RegisteredProperty"]
 
 
 _log = logging.getLogger("rosglass.rviz")
+
+
+def _attribute(name: str, from_qml: Callable[[Any], Any], notify: Any) -> Any:
+    """Return the QML property of an attribute that the panel shows."""
+
+    def read(self: RegisteredProperty) -> Any:
+        return self._about[name]
+
+    def write(self: RegisteredProperty, value: Any) -> None:
+        what = f"property {'/'.join(self.path)}.{name}"
+        with errors_to_js(self._owner.runtime, what, value):
+            self._update(**{name: from_qml(to_python(value))})
+
+    return Property(VARIANT, read, write, notify=notify)
 
 
 class RegisteredProperty(QtCore.QObject):
@@ -85,36 +99,11 @@ class RegisteredProperty(QtCore.QObject):
     #: `vector`, `quaternion` and `container`.
     kindName = Property(str, lambda self: self.kind.NAME, constant=True)
 
-    def _get_description(self) -> str:
-        return cast("str", self._about["description"])
-
-    def _set_description(self, value: Any) -> None:
-        self._change("description", value, text())
-
-    description = Property(VARIANT, _get_description, _set_description, notify=aboutChanged)
-
-    def _get_read_only(self) -> bool:
-        return cast("bool", self._about["readOnly"])
-
-    def _set_read_only(self, value: Any) -> None:
-        self._change("readOnly", value, boolean())
-
+    description = _attribute("description", text(), aboutChanged)
     #: Whether users cannot change it; the overlay can.
-    readOnly = Property(VARIANT, _get_read_only, _set_read_only, notify=aboutChanged)
-
-    def _get_hidden(self) -> bool:
-        return cast("bool", self._about["hidden"])
-
-    def _set_hidden(self, value: Any) -> None:
-        self._change("hidden", value, boolean())
-
+    readOnly = _attribute("readOnly", boolean(), aboutChanged)
     #: Whether the panel does not show it.
-    hidden = Property(VARIANT, _get_hidden, _set_hidden, notify=aboutChanged)
-
-    def _change(self, name: str, value: Any, takes: Callable[[Any], Any]) -> None:
-        what = f"property {'/'.join(self.path)}.{name}"
-        with errors_to_js(self._owner.runtime, what, value):
-            self._update(**{name: takes(to_python(value))})
+    hidden = _attribute("hidden", boolean(), aboutChanged)
 
     def _update(self, **about: Any) -> None:
         if not about.items() <= self._about.items():

@@ -15,7 +15,7 @@ import numpy as np
 from rosglass.errors import Error
 from rosglass.qml.modules import locate
 from rosglass.qt import Signal, is_alive
-from rosglass.rviz.input import BUTTONS, DRAG, KEYS, MOUSE, PRESS, position, release_outside
+from rosglass.rviz.input import DRAG, KEYS, MOUSE, PRESS, position, releases
 from rosglass.rviz.overlay import Overlay, guarded
 from rosglass.rviz.qt5 import QtCore, QtGui, QtWidgets
 from rosglass.rviz.tiles import Rect
@@ -335,7 +335,7 @@ class WidgetOverlay(Overlay):
         self._proxy.setFlag(QtWidgets.QGraphicsItem.ItemUsesExtendedStyleOption)
         # Widgets of an inactive window neither show nor handle the keyboard focus.
         QtCore.QCoreApplication.sendEvent(self._scene, QtCore.QEvent(_E.WindowActivate))
-        self._style = StyleSheet(self.name, self._use_style, self._style_failed)
+        self._style = StyleSheet(self.name, self._use_style, self.tell_problem)
         if widget is None:
             self.setup(made)
             _show_children(made)
@@ -362,9 +362,6 @@ class WidgetOverlay(Overlay):
         if is_alive(self.root):
             self.root.setStyleSheet(text)
             self.tell_problem("")
-
-    def _style_failed(self, problem: str) -> None:
-        self.tell_problem(problem)
 
     # Drawing
 
@@ -477,10 +474,9 @@ class WidgetOverlay(Overlay):
             return
         viewport = self._view.viewport()
         held, self._buttons = self._buttons, QtCore.Qt.NoButton
-        for button in BUTTONS:
-            if int(held) & int(button) and is_alive(self._scene):
-                held &= ~button
-                QtCore.QCoreApplication.sendEvent(viewport, release_outside(button, held))
+        for event in releases(held):
+            if is_alive(self._scene):
+                QtCore.QCoreApplication.sendEvent(viewport, event)
         if not is_alive(self._scene):
             return
         self._mouse_position = None
