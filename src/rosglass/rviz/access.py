@@ -139,7 +139,7 @@ class Access(QtCore.QObject):
 
         def load() -> None:
             try:
-                self.displays.flush_panels()
+                self.window.flush_panels()
                 self.window.load_config(path)
             except Error as error:
                 _log.error("rviz.loadConfig: %s", error)

@@ -249,7 +249,7 @@ class Application(Handle):
         paths = [*self._import_paths, *options.pop("import_paths", ())]
         overlay = QmlOverlay(file, self.session, name, import_paths=paths, **options)
         if not name:
-            overlay.name = self._free_name(overlay.name)
+            overlay.name = self.overlays.free_name(overlay.name)
         try:
             overlay.load()
             self.add(overlay)
@@ -257,12 +257,6 @@ class Application(Handle):
             overlay.close()
             raise
         return overlay
-
-    def _free_name(self, wanted: str) -> str:
-        name, number = wanted, 2
-        while self.overlays.find(name) is not None:
-            name, number = f"{wanted} {number}", number + 1
-        return name
 
     def show(self) -> None:
         """Show RViz's window; :meth:`run` calls this."""

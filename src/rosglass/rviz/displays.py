@@ -17,7 +17,6 @@ from rosglass.rviz.properties import (
     write_property,
 )
 from rosglass.rviz.property_values import shown
-from rosglass.rviz.qt5 import QtWidgets
 from rosglass.rviz.tools import failure
 
 if TYPE_CHECKING:
@@ -292,21 +291,12 @@ class Displays(PluginList):
         self.emit_changes()
 
     def _delete(self, handle: Any) -> None:
-        self.flush_panels()
+        self._window.flush_panels()
         wrapped = as_pyside(handle, QtCore.QObject)
         # Like RViz's panel: delete it later, because other threads may have emitted its signals.
         handle.disconnect()
         handle.getParent().takeChild(handle)
         wrapped.deleteLater()
-
-    def flush_panels(self) -> None:
-        """Deliver the calls that are queued for RViz's panels.
-
-        They hide and show properties, and crash if the display of these is deleted first.
-        """
-        event = int(QtCore.QEvent.Type.MetaCall)
-        for tree in self._window.widget.findChildren(QtWidgets.QTreeView):
-            QtCore.QCoreApplication.sendPostedEvents(tree, event)
 
     def _sync_rest(self) -> Callable[[], None]:
         before, self._status = self._status, self.status

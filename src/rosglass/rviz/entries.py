@@ -630,21 +630,16 @@ class Entries(QtCore.QObject):
         if overlay is None:
             return
         if overlay not in list(self._stack):
-            overlay.name = self._free_name(str(entry.display.getName()), overlay)
+            self._rename(entry)
             self._stack.add(overlay)
             self._has_new = True
         overlay.visible = enabled
 
     def _rename(self, entry: Entry) -> None:
-        if entry.overlay is not None and entry.alive:
-            entry.overlay.name = self._free_name(str(entry.display.getName()), entry.overlay)
-
-    def _free_name(self, wanted: str, overlay: Overlay) -> str:
-        wanted = wanted or type(overlay).__name__
-        name, number = wanted, 2
-        while self._stack.find(name) not in (None, overlay):
-            name, number = f"{wanted} {number}", number + 1
-        return name
+        overlay = entry.overlay
+        if overlay is not None and entry.alive:
+            wanted = str(entry.display.getName()) or type(overlay).__name__
+            overlay.name = self._stack.free_name(wanted, overlay)
 
     def _make(self, class_id: str) -> Entry:
         entry = Entry(class_id, self._session, self.choices, self._import_paths)

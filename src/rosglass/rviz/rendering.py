@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import logging
 import math
@@ -57,7 +56,7 @@ def _gl() -> ctypes.CDLL:
     return library
 
 
-@contextlib.contextmanager
+@contextmanager
 def keep_context() -> Iterator[None]:
     """Restore the current OpenGL context at the end, because Ogre expects its own."""
     library = _gl()
@@ -97,7 +96,7 @@ class Offscreen:
                 )
             self.context.doneCurrent()
 
-    @contextlib.contextmanager
+    @contextmanager
     def current(self) -> Iterator[None]:
         """Make the context current; may be nested.
 

@@ -131,6 +131,13 @@ class Stack(QtCore.QObject):
         """Return the overlay with the given name; None if there is none."""
         return next((o for o in self if o.name == name), None)
 
+    def free_name(self, wanted: str, overlay: Overlay | None = None) -> str:
+        """Return a name that no other overlay has: `wanted`, numbered if it is taken."""
+        name, number = wanted, 2
+        while self.find(name) not in (None, overlay):
+            name, number = f"{wanted} {number}", number + 1
+        return name
+
     def __iter__(self) -> Iterator[Overlay]:
         """Iterate over the overlays, lowest first."""
         return iter([entry.overlay for entry in self._arranged])

@@ -30,7 +30,6 @@ from rosglass.rviz.orbit import (
 from rosglass.rviz.plugins import VIEW, declared
 from rosglass.rviz.property_values import shown
 from rosglass.rviz.qt5 import QtCore as Qt5Core
-from rosglass.rviz.qt5 import QtWidgets
 from rosglass.rviz.registered_properties import RegisteredProperties
 from rosglass.rviz.trackers import FIXED_FRAME
 
@@ -347,11 +346,7 @@ class CurrentView(QtCore.QObject):
 
     def _on_current_changed(self) -> None:
         self._properties.clear()
-        # Deliver calls that are queued for RViz's panels: they hold addresses of the old view's
-        # properties, and crash once RViz has deleted it.
-        for child in self._window.widget.findChildren(QtWidgets.QTreeView):
-            if child.metaObject().className() == "rviz::PropertyTreeWidget":
-                Qt5Core.QCoreApplication.sendPostedEvents(child, Qt5Core.QEvent.MetaCall)
+        self._window.flush_panels()
         if not self._switching:
             self._height = 0.0
         self.changed.emit(self._switching)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import os
 from contextlib import contextmanager
@@ -248,6 +247,14 @@ class Window(QtCore.QObject):
         if not saved:
             raise Error(f"{file}: RViz could not save its config: {self.frame.getErrorMessage()}")
 
+    def flush_panels(self) -> None:
+        """Deliver the calls that are queued for RViz's panels, before properties are deleted.
+
+        They show and hide properties by their addresses, and crash if these are deleted first.
+        """
+        for tree in self.widget.findChildren(QtWidgets.QTreeView):
+            Qt5Core.QCoreApplication.sendPostedEvents(tree, Qt5Core.QEvent.MetaCall)
+
     @property
     def fullscreen(self) -> bool:
         """Whether RViz fills the screen, without its menus and tool bars."""
@@ -332,7 +339,7 @@ class Window(QtCore.QObject):
             self.config_loaded.emit(path)
 
 
-@contextlib.contextmanager
+@contextmanager
 def _with_stand_in_package() -> Iterator[None]:
     """Provide a stand-in for the package media_export, which RViz searches for without need."""
     before = os.environ.get(_PACKAGE_PATH)
