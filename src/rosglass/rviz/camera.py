@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
     from rosglass.rviz.window import Window
 
-__all__ = ["Camera", "Picker", "Seen"]
+__all__ = ["Camera", "Picker", "ProjectedPoint"]
 
 
 #: Ogre's name of RViz's 3D view; number 0 is a hidden window of one pixel.
-_TARGET = "OgreWindow(1)"
+_RENDER_TARGET = "OgreWindow(1)"
 
 
-class Seen(NamedTuple):
+class ProjectedPoint(NamedTuple):
     """A point projected into the 3D view; all values are NaN behind the camera.
 
     Attributes:
@@ -44,7 +44,7 @@ class Seen(NamedTuple):
     depth: float
 
 
-_NOWHERE = Seen(math.nan, math.nan, math.nan)
+_BEHIND_CAMERA = ProjectedPoint(math.nan, math.nan, math.nan)
 
 
 class Camera:
@@ -56,7 +56,7 @@ class Camera:
 
     def __init__(self, window: Window) -> None:
         self._window = window
-        self._whole: NDArray[np.float64] = np.eye(4)
+        self._view_projection: NDArray[np.float64] = np.eye(4)
         self._eye: NDArray[np.float64] = np.zeros(3)
         self._size = (0.0, 0.0)
         self.update()
@@ -69,7 +69,7 @@ class Camera:
 
     def update(self) -> bool:
         """Read the camera from RViz; return whether the projection has changed."""
-        viewport = ogre().Root.getSingleton().getRenderTarget(_TARGET).getViewport(0)
+        viewport = ogre().Root.getSingleton().getRenderTarget(_RENDER_TARGET).getViewport(0)
         camera = viewport.getCamera()
         self._eye = _numbers(camera.getDerivedPosition())
         view = np.eye(4)
@@ -79,11 +79,11 @@ class Camera:
         # RViz rounds its window's width up to an even number, unlike the widget's.
         ratio = self._window.view_size()[2]
         size = (viewport.getActualWidth() / ratio, viewport.getActualHeight() / ratio)
-        same = size == self._size and np.array_equal(whole, self._whole)
-        self._whole, self._size = whole, size
+        same = size == self._size and np.array_equal(whole, self._view_projection)
+        self._view_projection, self._size = whole, size
         return not same
 
-    def project(self, point: Sequence[float]) -> Seen:
+    def project(self, point: Sequence[float]) -> ProjectedPoint:
         """Return a point's position in the view.
 
         Args:
@@ -93,13 +93,13 @@ class Camera:
             Error: `point` is not three numbers.
         """
         at = _point(point)
-        clip = self._whole @ np.append(at, 1.0)
+        clip = self._view_projection @ np.append(at, 1.0)
         if not (np.isfinite(clip).all() and clip[3] > 0):
-            return _NOWHERE
+            return _BEHIND_CAMERA
         width, height = self._size
         x, y = clip[:2] / clip[3]
         depth = float(np.linalg.norm(at - self._eye))
-        return Seen(float((x + 1) / 2 * width), float((1 - y) / 2 * height), depth)
+        return ProjectedPoint(float((x + 1) / 2 * width), float((1 - y) / 2 * height), depth)
 
     def unproject(self, x: float, y: float, depth: float) -> tuple[float, float, float] | None:
         """Return the point of the fixed frame at a position in the view.
@@ -116,7 +116,7 @@ class Camera:
         if not 0 <= depth < 1 or not width or not height:
             return None
         seen = np.array([2 * x / width - 1, 1 - 2 * y / height, 2 * depth - 1, 1.0])
-        found = np.linalg.solve(self._whole, seen)
+        found = np.linalg.solve(self._view_projection, seen)
         if not np.isfinite(found).all() or not found[3]:
             return None
         a, b, c = found[:3] / found[3]
@@ -175,7 +175,7 @@ class Picker:
         around = math.ceil(radius * ratio)
         left, bottom = max(column - around, 0), max(row - around, 0)
         right, top = min(column + around, width - 1), min(row + around, height - 1)
-        depths = self._drawn(
+        depths = self._redraw(
             lambda: read_depth(left, bottom, right - left + 1, top - bottom + 1).astype(float)
         )
         rows, columns = np.nonzero(depths < 1)
@@ -199,7 +199,7 @@ class Picker:
         """
         width, height = self._size()
         pixels = np.zeros((height, width), np.uint32)
-        self._drawn(lambda: read_pixels(width, height, pixels))
+        self._redraw(lambda: read_pixels(width, height, pixels))
         rows = np.ascontiguousarray(pixels[::-1])
         image = QtGui.QImage(rows.data, width, height, 4 * width, QtGui.QImage.Format_RGB32)
         return image.copy()
@@ -249,9 +249,9 @@ class Picker:
 
     @staticmethod
     def _target() -> Any:
-        return ogre().Root.getSingleton().getRenderTarget(_TARGET)
+        return ogre().Root.getSingleton().getRenderTarget(_RENDER_TARGET)
 
-    def _drawn(self, read: Any) -> Any:
+    def _redraw(self, read: Any) -> Any:
         if self._busy:
             raise Error("the 3D view is being captured already; try again later")
         if not self._window.panel.isVisible():

@@ -17,7 +17,7 @@ from rosglass.rviz.properties import (
     write_property,
 )
 from rosglass.rviz.property_values import shown
-from rosglass.rviz.tools import failure
+from rosglass.rviz.tools import loading_error
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -240,10 +240,10 @@ class Displays(PluginList):
             if names.startswith(f"{display.name}/"):
                 rest = names[len(display.name) + 1 :]
                 return find_property(display.require(), rest, display.name)
-        self._require_first(names)
+        self._require_known(names)
         return find_property(self._root, names, "RViz")
 
-    def _require_first(self, path: str) -> None:
+    def _require_known(self, path: str) -> None:
         """Raise an Error if no display or property of RViz has the first name of a path."""
         first, _, below = path.partition("/")
         displays = [display.name for display in self._items]
@@ -270,7 +270,7 @@ class Displays(PluginList):
         class_id = require_class_id(class_id, DISPLAY)
         shown = _plain_name(name) if name else class_id.rpartition("/")[2]
         handle = self._window.manager.createDisplay(class_id, shown, enabled)
-        text = failure(handle, class_id, DISPLAY)
+        text = loading_error(handle, class_id, DISPLAY)
         if text:
             self._delete(handle)
             self.emit_changes()

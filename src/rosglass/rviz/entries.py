@@ -577,7 +577,7 @@ class Entries(QtCore.QObject):
             if id(overlay) not in known and not overlay.is_popup:
                 self._add_entry(overlay)
         for entry in list(self._entries):
-            self._show(entry)
+            self._apply_enabled(entry)
         self._apply_panel_order()
 
     def _apply_panel_order(self) -> None:
@@ -590,7 +590,7 @@ class Entries(QtCore.QObject):
         before, self._panel_order = self._panel_order, order
         moved = [o for o in before if o in order] != [o for o in order if o in before]
         if moved or self._has_new:
-            self._stack.put_in_order(order)
+            self._stack.reorder(order)
         if moved and not self._has_new:
             # RViz itself does not mark its config as modified.
             self._window.manager.notifyConfigChanged()
@@ -605,7 +605,7 @@ class Entries(QtCore.QObject):
         class_id = QML_CLASS if isinstance(overlay, QmlOverlay) else class_id_of(type(overlay))
         for entry in self._entries:
             if entry.overlay is None and self._waits_for(entry, overlay, class_id):
-                self._unmodified(partial(entry.attach, overlay))
+                self._keep_unmodified(partial(entry.attach, overlay))
                 return
         entry = self._make(class_id)
         entry.display.setName(overlay.name)
@@ -621,11 +621,11 @@ class Entries(QtCore.QObject):
             return entry.is_qml and entry.shows(overlay.file)
         return entry.class_id == class_id
 
-    def _show(self, entry: Entry) -> None:
+    def _apply_enabled(self, entry: Entry) -> None:
         """Show or hide the overlay of an entry; create it on first use."""
         enabled = bool(entry.display.isEnabled())
         if entry.overlay is None and enabled:
-            self._unmodified(entry.make_overlay)
+            self._keep_unmodified(entry.make_overlay)
         overlay = entry.overlay
         if overlay is None:
             return
@@ -709,7 +709,7 @@ class Entries(QtCore.QObject):
     def _replace_all(self) -> None:
         for display in list(self._displays()):
             if getattr(display, "entry", None) is None and self._is_replaceable(display):
-                self._unmodified(partial(self._replace, display))
+                self._keep_unmodified(partial(self._replace, display))
 
     def _displays(self, group: Any = None) -> Iterator[Any]:
         """Iterate over the displays in the panel's order, including those in groups."""
@@ -739,7 +739,7 @@ class Entries(QtCore.QObject):
             choice.expect(entry.file)
         placeholder.deleteLater()
 
-    def _unmodified(self, do: Callable[[], None]) -> None:
+    def _keep_unmodified(self, do: Callable[[], None]) -> None:
         """Call a function without marking RViz as modified."""
         modified = self._window.modified
         do()

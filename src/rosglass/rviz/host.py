@@ -35,12 +35,12 @@ __all__ = [
     "class_of",
     "cpp_function",
     "is_a",
+    "mangled_class_of",
     "ogre",
     "ogre_overlay",
     "pyqt",
     "require_rviz",
     "rviz",
-    "type_name",
 ]
 
 
@@ -207,7 +207,7 @@ def is_a(item: Any, kind: str) -> bool:
     return bool(as_pyside(item, QtCore.QObject).inherits(kind))
 
 
-def type_name(item: Any) -> str:
+def mangled_class_of(item: Any) -> str:
     """Return the mangled C++ class name of an RViz object, e.g. ``N4rviz10FailedToolE``.
 
     Unlike :func:`class_of`, it also knows classes without a metaobject.

@@ -347,7 +347,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
                 self._mouse_owner = Owner.NONE
             elif overlay is not None:
                 self._mouse_owner = overlay
-                self._stack.clicked(overlay)
+                self._stack.raise_popup(overlay)
                 self.focus(overlay)
             else:
                 self._mouse_owner = Owner.RVIZ if for_rviz else Owner.NONE
@@ -447,7 +447,7 @@ class Input(QtCore.QObject):  # type: ignore[misc]
             overlay, for_rviz = self._offer(event)
             self._touch_target = overlay if overlay in self._stack.topmost_first() else None
             if self._touch_target is not None:
-                self._stack.clicked(self._touch_target)
+                self._stack.raise_popup(self._touch_target)
                 self.focus(self._touch_target)
             # Qt sends mouse events for a touch that is not accepted.
             return overlay is not None or not for_rviz

@@ -274,8 +274,8 @@ class MoveBar(QtWidgets.QLabel):  # type: ignore[misc]
     def mouseMoveEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
         """Move the popup with the mouse."""
         if self._drag_start is not None and self.popup is not None:
-            way = (event.screenPos() - self._drag_start) / self.popup.scale
-            self.popup.move(self._anchor_start[0] + way.x(), self._anchor_start[1] + way.y())
+            offset = (event.screenPos() - self._drag_start) / self.popup.scale
+            self.popup.move(self._anchor_start[0] + offset.x(), self._anchor_start[1] + offset.y())
 
     def mouseReleaseEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
         """Stop dragging."""

@@ -24,7 +24,7 @@ __all__ = [
     "plain_config",
     "shown",
     "to_config",
-    "writable",
+    "to_storable",
 ]
 
 
@@ -101,7 +101,7 @@ class Kind:
             Error: The value is invalid.
         """
         if value is not None:
-            raise self._refusal(value)
+            raise self._value_error(value)
         return None
 
     def saved(self, value: Any) -> Any:
@@ -116,7 +116,7 @@ class Kind:
         """
         return self.read(saved)
 
-    def _refusal(self, value: Any) -> Error:
+    def _value_error(self, value: Any) -> Error:
         return Error(f"expected {self.WANTED}, got {shown(value)}")
 
 
@@ -129,7 +129,7 @@ class _Bool(Kind):
 
     def read(self, value: Any) -> bool:
         if not isinstance(value, bool):
-            raise self._refusal(value)
+            raise self._value_error(value)
         return value
 
     def restore(self, saved: Any) -> bool:
@@ -171,7 +171,7 @@ class _Number(Kind, ABC):
     def read(self, value: Any) -> Any:
         number = self._number(value)
         if number is None:
-            raise self._refusal(value)
+            raise self._value_error(value)
         if not self.min <= number <= self.max:
             raise Error(f"{number} is not from {self.min} to {self.max}")
         return number
@@ -180,7 +180,7 @@ class _Number(Kind, ABC):
         try:
             return self.read(self.PARSE(saved) if isinstance(saved, str) else saved)
         except ValueError:
-            raise self._refusal(saved) from None
+            raise self._value_error(saved) from None
 
 
 class _Int(_Number):
@@ -212,7 +212,7 @@ class _String(Kind):
 
     def read(self, value: Any) -> str:
         if not isinstance(value, str) or _CONTROL.search(value):
-            raise self._refusal(value)
+            raise self._value_error(value)
         return value
 
     def restore(self, saved: Any) -> str:
@@ -241,7 +241,7 @@ class _Topic(_String):
     def read(self, value: Any) -> str:
         text = super().read(value)
         if not _TOPIC.match(text):
-            raise self._refusal(value)
+            raise self._value_error(value)
         return text
 
 
@@ -287,7 +287,7 @@ class _Color(Kind):
             if colour.isValid():
                 # Normalise it: the same colour in another notation is equal.
                 return QtGui.QColor(colour.name(QtGui.QColor.NameFormat.HexArgb))
-        raise self._refusal(value)
+        raise self._value_error(value)
 
     def saved(self, value: QtGui.QColor) -> str:
         whole = value.alpha() == 255
@@ -316,7 +316,7 @@ class _Parts(Kind, ABC):
 
     def _from(self, named: dict[str, Any]) -> Any:
         if {name.lower() for name in named} != set(self.NAMES) or len(named) != len(self.NAMES):
-            raise self._refusal(named)
+            raise self._value_error(named)
         by_name = {name.lower(): value for name, value in named.items()}
         parts = []
         for name in self.NAMES:
@@ -336,7 +336,7 @@ class _Parts(Kind, ABC):
 
     def restore(self, saved: Any) -> Any:
         if not isinstance(saved, dict):
-            raise self._refusal(saved)
+            raise self._value_error(saved)
         return self._from(saved)
 
 
@@ -357,7 +357,7 @@ class _Vector(_Parts):
         elif isinstance(value, dict):
             found = self._from(value)
         else:
-            raise self._refusal(value)
+            raise self._value_error(value)
         vector: QtGui.QVector3D = found
         return vector
 
@@ -382,7 +382,7 @@ class _Quaternion(_Parts):
             value = self.parts(value)
         # Refuse lists: Qt has w first, ROS has it last.
         if not isinstance(value, dict):
-            raise self._refusal(value)
+            raise self._value_error(value)
         quaternion: QtGui.QQuaternion = self._from(value)
         return quaternion
 
@@ -427,32 +427,32 @@ _WORDS: dict[str, Any] = {
 _WANTED = "null, true, false, a number, a text, a list or a map of these"
 _MAX_DEPTH = 50
 #: Characters that YAML cannot represent, or would not preserve.
-_UNWRITABLE = re.compile(r"[\0-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff\ufeff\u2028\u2029]")
+_UNSTORABLE = re.compile(r"[\0-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff\ufeff\u2028\u2029]")
 
 
-def writable(value: Any, path: str) -> Any:
+def to_storable(value: Any, path: str) -> Any:
     """Return a value with tuples as lists, after checking that a file can store it.
 
     Raises:
         ConversionError: A file cannot store it; the error names the part.
     """
-    return _writable(value, path, 0)
+    return _to_storable(value, path, 0)
 
 
-def _writable(value: Any, path: str, depth: int) -> Any:
+def _to_storable(value: Any, path: str, depth: int) -> Any:
     if depth > _MAX_DEPTH:
         raise ConversionError(path[:60], "more", f"values nested at most {_MAX_DEPTH} deep")
     if isinstance(value, dict):
         for key in value:
-            if not isinstance(key, str) or _UNWRITABLE.search(key):
+            if not isinstance(key, str) or _UNSTORABLE.search(key):
                 raise ConversionError(path, key, "names that are texts without control characters")
         items = value.items()
-        return {key: _writable(inner, f"{path}.{key}", depth + 1) for key, inner in items}
+        return {key: _to_storable(inner, f"{path}.{key}", depth + 1) for key, inner in items}
     if isinstance(value, (list, tuple)):
-        return [_writable(inner, f"{path}[{at}]", depth + 1) for at, inner in enumerate(value)]
+        return [_to_storable(inner, f"{path}[{at}]", depth + 1) for at, inner in enumerate(value)]
     if value is None or isinstance(value, (bool, int, float)):
         return value
-    if isinstance(value, str) and not _UNWRITABLE.search(value):
+    if isinstance(value, str) and not _UNSTORABLE.search(value):
         return value
     raise ConversionError(path, value, _WANTED)
 
@@ -462,7 +462,7 @@ def to_config(config: Any, value: Any, *, plain: bool = False) -> None:
 
     Args:
         config: An empty ``Config``.
-        value: A value from :func:`writable`.
+        value: A value from :func:`to_storable`.
         plain: Whether to write strings unquoted, for readers that know the type.
     """
     if isinstance(value, dict) and value:

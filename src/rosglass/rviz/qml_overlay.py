@@ -99,7 +99,7 @@ class Scene(QtCore.QObject):
         self._control.renderRequested.connect(self.changed)
         renderer.start(self._control, self.window)
 
-    def show_in(self, panel: Any) -> None:
+    def set_panel(self, panel: Any) -> None:
         """Set the widget that shows the scene; its window provides focus, shortcuts and cursor."""
         self._control.panel = panel
 
@@ -259,7 +259,7 @@ class QmlInput:
             if is_alive(window):
                 _send(window, event)
         if touch is not None and is_alive(window):
-            for event in touch.ended():
+            for event in touch.release_events():
                 _send(window, event)
         for handler in filter(is_alive, disabled):
             handler.setProperty("enabled", True)
@@ -322,7 +322,7 @@ class _Touch(NamedTuple):
         device = shiboken.getCppPointer(event.device())[0]
         return cls(device, [QtGui.QTouchEvent.TouchPoint(p) for p in event.touchPoints()])
 
-    def ended(self) -> Iterator[Any]:
+    def release_events(self) -> Iterator[Any]:
         """Iterate over events that release all fingers outside of all items."""
         device = shiboken.wrapInstance(self.device, QtGui.QTouchDevice)
         for point in self.points:
@@ -618,7 +618,7 @@ class QmlOverlay(QmlInput, Overlay):
         """Connect to RViz's window."""
         self._panel = window.panel
         self._rviz_window = window
-        self._scene.show_in(window.panel)
+        self._scene.set_panel(window.panel)
 
     def resize(self, width: int, height: int, ratio: float) -> None:
         """Set the size of the scene."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import Error
 from rosglass.qml.from_js import plain_from_js
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
-from rosglass.rviz.property_values import KINDS, merged, shown, writable
+from rosglass.rviz.property_values import KINDS, merged, shown, to_storable
 from rosglass.rviz.qml_members import VARIANT, boolean, errors_to_js, spell_checked, text, to_python
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def _attribute(name: str, from_qml: Callable[[Any], Any], notify: Any) -> Any:
     """Return the QML property of an attribute that the panel shows."""
 
     def read(self: RegisteredProperty) -> Any:
-        return self._about[name]
+        return self._attributes[name]
 
     def write(self: RegisteredProperty, value: Any) -> None:
         what = f"property {'/'.join(self.path)}.{name}"
@@ -61,11 +61,11 @@ class RegisteredProperty(QtCore.QObject):
         self.container = parent
         self.kind = kind
         #: Its JavaScript object, if there is an engine.
-        self.for_js: QJSValue | None = None
+        self.js_object: QJSValue | None = None
         #: Its children, by name.
         self.properties: dict[str, RegisteredProperty] = {}
         self._value = default
-        self._about: dict[str, Any] = {"description": "", "readOnly": False, "hidden": False}
+        self._attributes: dict[str, Any] = {"description": "", "readOnly": False, "hidden": False}
 
     @property
     def path(self) -> tuple[str, ...]:
@@ -106,8 +106,8 @@ class RegisteredProperty(QtCore.QObject):
     hidden = _attribute("hidden", boolean(), aboutChanged)
 
     def _update(self, **about: Any) -> None:
-        if not about.items() <= self._about.items():
-            self._about.update(about)
+        if not about.items() <= self._attributes.items():
+            self._attributes.update(about)
             self.aboutChanged.emit()
 
     def adopt(self, kind: Kind, about: dict[str, Any]) -> None:
@@ -212,7 +212,7 @@ class RegisteredProperties(QtCore.QObject):
         value = plain_from_js(config) if isinstance(config, QJSValue) else config
         if not isinstance(value, dict):
             raise Error(f"expected a map, e.g. {{speed: 1}}, got {shown(value)}")
-        new = writable(value, "config")
+        new = to_storable(value, "config")
         if new != self._config or repr(new) != repr(self._config):
             self._config = new
             self.configChanged.emit()
@@ -311,7 +311,7 @@ class RegisteredProperties(QtCore.QObject):
     ) -> RegisteredProperty:
         made._update(**about)
         if self.runtime is not None:
-            made.for_js = spell_checked(self.runtime, made)
+            made.js_object = spell_checked(self.runtime, made)
         siblings[made.path[-1]] = made
         saved: Any = self._saved
         for step in made.path:

@@ -146,7 +146,7 @@ class Stack(QtCore.QObject):
         """Return the visible overlays, topmost first: the order in which they get input."""
         return [o for o in reversed(list(self)) if o.visible and o.opacity > 0]
 
-    def clicked(self, overlay: Overlay) -> None:
+    def raise_popup(self, overlay: Overlay) -> None:
         """Raise a pressed popup above all others; does nothing for other overlays."""
         if overlay.is_popup:
             self.to_front(overlay)
@@ -159,7 +159,7 @@ class Stack(QtCore.QObject):
         """Put an overlay below all other popups, or below all that are not popups."""
         self._move_to_end(overlay, 0, min)
 
-    def put_in_order(self, overlays: Sequence[Overlay]) -> None:
+    def reorder(self, overlays: Sequence[Overlay]) -> None:
         """Stack overlays of equal `z` in the given order, lowest first.
 
         Args:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.qt import Signal
-from rosglass.rviz.host import address, pyqt, type_name
+from rosglass.rviz.host import address, mangled_class_of, pyqt
 from rosglass.rviz.overlay import QML_CLASS, REFERENCE_QML_CLASS
 from rosglass.rviz.plugins import DISPLAY, TOOL, PluginList, declared, require_class_id
 from rosglass.rviz.qt5 import QtGui
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from rosglass.rviz.window import Window
 
-__all__ = ["Tool", "Tools", "failure"]
+__all__ = ["Tool", "Tools", "loading_error"]
 
 #: RViz's placeholder classes for tools and displays that could not be loaded.
 _FAILED = ("N4rviz10FailedToolE", "N4rviz13FailedDisplayE")
@@ -154,7 +154,7 @@ class Tools(PluginList):
         """
         class_id = require_class_id(class_id, TOOL)
         handle = self._manager.addTool(class_id)
-        text = failure(handle, class_id, TOOL)
+        text = loading_error(handle, class_id, TOOL)
         made = next(tool for tool in reversed(self._items) if tool.handle is not None)
         if text:
             self._manager.removeTool(self._manager.numTools() - 1)
@@ -205,9 +205,9 @@ class Tools(PluginList):
             gone.handle = None
 
 
-def failure(handle: Any, class_id: str, base: str) -> str:
+def loading_error(handle: Any, class_id: str, base: str) -> str:
     """Return why RViz could not load a tool or display (its base class is `base`), or ``""``."""
-    if type_name(handle) not in _FAILED:
+    if mangled_class_of(handle) not in _FAILED:
         return ""
     known = declared(base)
     if class_id in known:

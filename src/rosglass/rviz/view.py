@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from rosglass.rviz.trackers import Frames
     from rosglass.rviz.window import Window
 
-__all__ = ["FLAT", "ORBIT", "CurrentView", "View", "ViewMode", "ViewSettings", "Views"]
+__all__ = ["ORBIT", "TOP_DOWN", "CurrentView", "View", "ViewMode", "ViewSettings", "Views"]
 
 
 _log = logging.getLogger("rosglass.rviz")
@@ -225,7 +225,7 @@ class ViewSettings:
 #: RViz's class of the 3D view.
 ORBIT = "rviz/Orbit"
 #: RViz's class of the 2D view: from above, without perspective.
-FLAT = "rviz/TopDownOrtho"
+TOP_DOWN = "rviz/TopDownOrtho"
 _TARGET_FRAME = "Target Frame"
 _INVERT_Z_AXIS = "Invert Z Axis"
 _PROPERTY_NAMES: dict[str, tuple[str, ...]] = {
@@ -237,7 +237,7 @@ _PROPERTY_NAMES: dict[str, tuple[str, ...]] = {
         _INVERT_Z_AXIS,
         "Field of View",
     ),
-    FLAT: ("X", "Y", "Scale", "Angle"),
+    TOP_DOWN: ("X", "Y", "Scale", "Angle"),
 }
 #: RViz's default vertical field of view, in radians.
 _DEFAULT_FIELD_OF_VIEW_RAD = math.pi / 4
@@ -272,7 +272,7 @@ class CurrentView(QtCore.QObject):
     def state(self) -> tuple[Any, ...]:
         """The camera's state: class id, target frame and the view's :data:`_PROPERTY_NAMES`.
 
-        These begin with the focus: x, y and z of :data:`ORBIT`, x and y of :data:`FLAT`.
+        These begin with the focus: x, y and z of :data:`ORBIT`, x and y of :data:`TOP_DOWN`.
         """
         kind = self.kind
         return (
@@ -286,7 +286,7 @@ class CurrentView(QtCore.QObject):
         kind = self.kind
         if kind not in _PROPERTY_NAMES or self._get(_TARGET_FRAME) != FIXED_FRAME:
             return self._read_camera(kind)
-        if kind == FLAT:
+        if kind == TOP_DOWN:
             return self._orbit_from_above(self._get("X"), self._get("Y"))
         x, y, z, distance, yaw, pitch, inverted, self._field_of_view = (
             self._get(name) for name in _PROPERTY_NAMES[ORBIT]
@@ -295,16 +295,16 @@ class CurrentView(QtCore.QObject):
         return Orbit(Point(x, y, z), distance, sign * yaw, sign * pitch)
 
     def write(self, where: Orbit, kind: str) -> None:
-        """Move the camera, in the view with class id `kind`: :data:`ORBIT` or :data:`FLAT`."""
+        """Move the camera, in the view with class id `kind`: :data:`ORBIT` or :data:`TOP_DOWN`."""
         if self.kind != kind:
             self._switch_view(kind)
         if self._get(_TARGET_FRAME) != FIXED_FRAME:
             self._set(_TARGET_FRAME, FIXED_FRAME)
-        if kind == FLAT:
+        if kind == TOP_DOWN:
             self._height = where.focus.z
             scale = self._pixels_at_one_metre() / where.distance
             angle = _normalized(where.yaw + math.pi / 2)
-            self._set_all(FLAT, where.focus.x, where.focus.y, scale, angle)
+            self._set_all(TOP_DOWN, where.focus.x, where.focus.y, scale, angle)
         else:
             sign = -1 if self._get(_INVERT_Z_AXIS) else 1
             yaw, pitch = _normalized(sign * where.yaw), sign * where.pitch
@@ -323,7 +323,7 @@ class CurrentView(QtCore.QObject):
         """Return the orbit read from the Ogre camera, for views of any type and target frame."""
         camera = Camera(self._window)
         eye = Point(*camera.eye)
-        if kind == FLAT:
+        if kind == TOP_DOWN:
             return self._orbit_from_above(eye.x, eye.y)
         width, height, ratio = self._window.view_size()
         ahead = camera.unproject(width / ratio / 2, height / ratio / 2, 0.9)
@@ -395,12 +395,12 @@ class ViewMode(enum.IntEnum):
 
 
 class _Movement(NamedTuple):
-    """An animated camera movement; `flat` if it ends in the 2D view."""
+    """An animated camera movement; `in_2d` if it ends in the 2D view."""
 
     start: Orbit
     goal: Orbit
     started: float
-    flat: bool
+    in_2d: bool
 
 
 class View(QtCore.QObject):
@@ -445,8 +445,8 @@ class View(QtCore.QObject):
     @property
     def mode(self) -> ViewMode:
         """3D, or 2D: straight from above, without perspective."""
-        flat = self._current.kind == FLAT if self._movement is None else self._movement.flat
-        return ViewMode.MODE_2D if flat else ViewMode.MODE_3D
+        in_2d = self._current.kind == TOP_DOWN if self._movement is None else self._movement.in_2d
+        return ViewMode.MODE_2D if in_2d else ViewMode.MODE_3D
 
     @property
     def tracked_frame(self) -> str:
@@ -500,14 +500,14 @@ class View(QtCore.QObject):
             Error: `eye` is not three finite numbers, or too far away, or the frame is unknown.
         """
         place, now = self._in_fixed(eye, frame), self._final_orbit()
-        flat = self.mode is ViewMode.MODE_2D
-        if flat and switch_to_3d:
-            flat, now = False, now._replace(pitch=self._pitch_3d)
-        elif flat:
+        in_2d = self.mode is ViewMode.MODE_2D
+        if in_2d and switch_to_3d:
+            in_2d, now = False, now._replace(pitch=self._pitch_3d)
+        elif in_2d:
             place = Point(place.x, place.y, now.eye.z)
         goal = now._replace(focus=now.focus + (place - now.eye))
         self._store_offset(goal, stop_tracking)
-        self._start(goal, animate, flat=flat)
+        self._start(goal, animate, in_2d=in_2d)
 
     def move_eye_and_focus(
         self,
@@ -538,7 +538,7 @@ class View(QtCore.QObject):
             )
         goal = Orbit.between(start, end, self._final_orbit().yaw)
         self._store_offset(goal, stop_tracking)
-        self._start(goal, animate, flat=False)
+        self._start(goal, animate, in_2d=False)
 
     def set_mode(self, mode: ViewMode | int, *, animate: bool = True) -> None:
         """Switch between 2D and 3D.
@@ -555,11 +555,11 @@ class View(QtCore.QObject):
         wanted = ViewMode(mode)
         if wanted is self.mode:
             return
-        now, flat = self._final_orbit(), wanted is ViewMode.MODE_2D
-        if flat:
+        now, in_2d = self._final_orbit(), wanted is ViewMode.MODE_2D
+        if in_2d:
             self._pitch_3d = now.pitch
-        pitch = STEEPEST if flat else self._pitch_3d
-        self._start(now._replace(pitch=pitch), animate, flat=flat)
+        pitch = STEEPEST if in_2d else self._pitch_3d
+        self._start(now._replace(pitch=pitch), animate, in_2d=in_2d)
 
     def track(self, frame: str) -> None:
         """Follow the position and yaw of a frame with the camera.
@@ -621,20 +621,20 @@ class View(QtCore.QObject):
             except Error:
                 self._offset = None
 
-    def _start(self, goal: Orbit, animate: bool, *, flat: bool) -> None:
+    def _start(self, goal: Orbit, animate: bool, *, in_2d: bool) -> None:
         start, self._frame_pose = self._current.read(), None
         if not animate or not self.settings.animation_duration:
-            self._finish(goal, flat=flat)
+            self._finish(goal, in_2d=in_2d)
             return
-        if not (flat and self._current.kind == FLAT):
+        if not (in_2d and self._current.kind == TOP_DOWN):
             self._write(start, ORBIT)
-        self._movement = _Movement(start, goal, time.monotonic(), flat)
+        self._movement = _Movement(start, goal, time.monotonic(), in_2d)
         self._expected_state, self._fixed_frame = self._current.state, self._frames.fixed
         self._emit_mode()
 
-    def _finish(self, goal: Orbit, *, flat: bool) -> None:
+    def _finish(self, goal: Orbit, *, in_2d: bool) -> None:
         self._movement = None
-        self._write(goal, FLAT if flat else ORBIT)
+        self._write(goal, TOP_DOWN if in_2d else ORBIT)
         self._emit_mode()
 
     def _end_motion(self) -> None:
@@ -668,7 +668,7 @@ class View(QtCore.QObject):
         duration = self.settings.animation_duration
         progress = (now - movement.started) / duration if duration else 1.0
         if progress >= 1:
-            self._finish(movement.goal, flat=movement.flat)
+            self._finish(movement.goal, in_2d=movement.in_2d)
         else:
             self._write(movement.start.towards(movement.goal, ease(progress)), self._view_class())
 
@@ -724,7 +724,7 @@ class View(QtCore.QObject):
         if by_us or self._closed:
             return
         self._movement = self._expected_state = None
-        if self._current.kind not in (ORBIT, FLAT):
+        if self._current.kind not in (ORBIT, TOP_DOWN):
             self.track("")
         self._emit_mode()
 
@@ -768,7 +768,7 @@ class View(QtCore.QObject):
         return self._current.read() if self._movement is None else self._movement.goal
 
     def _view_class(self) -> str:
-        return FLAT if self._current.kind == FLAT else ORBIT
+        return TOP_DOWN if self._current.kind == TOP_DOWN else ORBIT
 
     def _write(self, where: Orbit, kind: str) -> None:
         self._current.write(where, kind)
@@ -778,7 +778,7 @@ class View(QtCore.QObject):
 
 def _is_shifted(before: tuple[Any, ...], now: tuple[Any, ...]) -> bool:
     """Return whether the focus moved between two states of the same view."""
-    axes = 2 if now[0] == FLAT else 3
+    axes = 2 if now[0] == TOP_DOWN else 3
     return before[2 : 2 + axes] != now[2 : 2 + axes]
 
 

@@ -122,8 +122,8 @@ class ViewKeys(QtCore.QObject):
         return self._overlays.input.focused is not None or any(o.is_modal for o in shown)
 
     def _toggle_mode(self) -> None:
-        flat = self._view.mode is ViewMode.MODE_2D
-        self._view.set_mode(ViewMode.MODE_3D if flat else ViewMode.MODE_2D)
+        in_2d = self._view.mode is ViewMode.MODE_2D
+        self._view.set_mode(ViewMode.MODE_3D if in_2d else ViewMode.MODE_2D)
 
     def _step(self) -> None:
         if not self._pressed:
@@ -484,9 +484,9 @@ class ViewEntry(QtCore.QObject):
         about = "The frame that the camera follows and turns with; empty for none."
         self._frame = self._shown_state.register("frame", "Tracked Frame", description=about)
         about = "Whether to look straight down, without perspective."
-        self._flat = self._shown_state.register("bool", "2D Mode", description=about)
+        self._in_2d = self._shown_state.register("bool", "2D Mode", description=about)
         self._frame.valueChanged.connect(self._track)
-        self._flat.valueChanged.connect(self._set_2d)
+        self._in_2d.valueChanged.connect(self._set_2d)
         menu = window.menu("&Overlays")
         self._action = menu.addAction("&View controller")
         self._action.setCheckable(True)
@@ -571,14 +571,14 @@ class ViewEntry(QtCore.QObject):
             self._entries.choices.report(f"Tracked Frame: {error}")
             self._frame.set(self._view.tracked_frame)
 
-    def _set_2d(self, flat: bool) -> None:
-        self._view.set_mode(ViewMode.MODE_2D if flat else ViewMode.MODE_3D)
+    def _set_2d(self, in_2d: bool) -> None:
+        self._view.set_mode(ViewMode.MODE_2D if in_2d else ViewMode.MODE_3D)
 
     @Slot()
     def _update(self, *_: Any) -> None:
         services, view = self._services, self._view
         self._frame.set(view.tracked_frame)
-        self._flat.set(view.mode is ViewMode.MODE_2D)
+        self._in_2d.set(view.mode is ViewMode.MODE_2D)
         where = services.namespace if services.is_open else "not connected, or switched off"
         follows = view.tracked_frame or "no frame is followed"
         for entry in self._shown:

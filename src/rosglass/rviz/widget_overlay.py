@@ -403,7 +403,7 @@ class WidgetOverlay(Overlay):
         if at is not None:
             self._mouse_position = at
             self._view.align_with_screen(event, at)
-        if kind == _E.Wheel and _has(self._widget_at(at), _ignores_wheel):
+        if kind == _E.Wheel and _has_parent_with(self._widget_at(at), _ignores_wheel):
             return False
         opened = bool(self._popups())
         if kind in PRESS and not opened:
@@ -418,12 +418,12 @@ class WidgetOverlay(Overlay):
             taken = opened or self._scene.mouseGrabberItem() is not None
             # A context menu opens with the event after the press.
             opens_menu = event.button() == QtCore.Qt.RightButton
-            taken = taken or (opens_menu and _has(self._widget_at(at), _has_menu))
+            taken = taken or (opens_menu and _has_parent_with(self._widget_at(at), _has_menu))
         if kind in MOUSE:
             self._buttons = event.buttons() if taken or kind not in PRESS else self._buttons
         if kind == _E.MouseMove and event.buttons() == QtCore.Qt.NoButton:
             # Accept moves while a popup is open: Qt closes it when the mouse leaves the scene.
-            taken = opened or _has(self._widget_at(at), _handles_hover)
+            taken = opened or _has_parent_with(self._widget_at(at), _handles_hover)
         return taken
 
     def _deliver_key(self, event: Any) -> bool:
@@ -451,7 +451,7 @@ class WidgetOverlay(Overlay):
 
     def _focus_widget(self) -> Any:
         """Return the widget with the keyboard focus; None if there is none."""
-        shown = _as_widget(self._scene.focusItem())
+        shown = _as_proxy(self._scene.focusItem())
         return None if shown is None else shown.widget().focusWidget() or shown.widget()
 
     def _remember_focus(self, opened: bool) -> None:
@@ -533,7 +533,7 @@ class WidgetOverlay(Overlay):
                 )
 
     def _widget_at(self, at: Any) -> Any:
-        item = _as_widget(self._scene.itemAt(at, QtGui.QTransform()))
+        item = _as_proxy(self._scene.itemAt(at, QtGui.QTransform()))
         top = None if item is None else item.widget()
         if top is None:
             return None
@@ -633,7 +633,7 @@ def _show_children(root: Any) -> None:
             child.show()
 
 
-def _as_widget(item: Any) -> Any:
+def _as_proxy(item: Any) -> Any:
     """Return a scene item as a QGraphicsProxyWidget; None if it is not one."""
     found = None if item is None else item.toGraphicsObject()
     return found if isinstance(found, QtWidgets.QGraphicsProxyWidget) else None
@@ -651,7 +651,7 @@ def _focus_clicked(widget: Any) -> None:
         widget = widget.parentWidget()
 
 
-def _has(widget: Any, predicate: Callable[[Any], bool]) -> bool:
+def _has_parent_with(widget: Any, predicate: Callable[[Any], bool]) -> bool:
     """Return whether a predicate is true for a widget or one of its parents."""
     while widget is not None:
         if predicate(widget):

@@ -368,16 +368,16 @@ class _CloseWatch(QtCore.QObject):
 
     def __init__(self, bare: BareView, closed: Callable[[], None]) -> None:
         super().__init__()
-        self._bare, self._closed, self._asking = bare, closed, False
+        self._bare, self._closed, self._handling_close = bare, closed, False
 
     def eventFilter(self, watched: QtCore.QObject, event: QtCore.QEvent) -> bool:  # noqa: N802
         """Send a close event to RViz with all parts shown; RViz may ask the user, and cancel it."""
-        if event.type() != QtCore.QEvent.Type.Close or self._asking:
+        if event.type() != QtCore.QEvent.Type.Close or self._handling_close:
             return False
-        self._asking = True
+        self._handling_close = True
         with self._bare.showing_everything():
             QtCore.QCoreApplication.sendEvent(watched, event)
-        self._asking = False
+        self._handling_close = False
         if event.isAccepted():
             self._closed()
         return True
