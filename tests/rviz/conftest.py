@@ -134,7 +134,7 @@ def wait(app: Application) -> QtWaiting:
 
 @pytest.fixture
 def rviz_notices_changes(app: Application) -> Callable[[], bool]:
-    """Return whether RViz takes what happens for a change of the file: a second after loading."""
+    """Return whether RViz tracks changes of its config, which it does a second after loading."""
     from rosglass.rviz.host import pyqt
 
     def notices() -> bool:
@@ -191,7 +191,7 @@ class Hand:
         self.wait.frames(2)
 
     def let_go(self) -> None:
-        """Release what is held, which later tests would meet."""
+        """Release held buttons and keys, which would affect later tests."""
         for act, what in list(self._held):
             self.do(act, what)
 
@@ -302,7 +302,7 @@ class Panel:
 
     @property
     def tree(self) -> Any:
-        """The view, which is another one after each config."""
+        """The view; loading a config replaces it."""
         from rosglass.rviz.host import pyqt
 
         views = self.app.window.frame.findChildren(pyqt("QtWidgets").QTreeView)
@@ -313,7 +313,7 @@ class Panel:
         return self.tree.model()
 
     def rows(self, *path: str) -> Any:
-        """Return the index of the name of what is at a place."""
+        """Return the index of the name at a path."""
         from rosglass.rviz.host import pyqt
 
         model, at = self.model, pyqt().QModelIndex()
@@ -358,7 +358,7 @@ class Panel:
         next(b for b in above.findChildren(kind) if b.text() == name).click()
 
     def drag(self, path: tuple[str, ...], row: int, into: tuple[str, ...] = ()) -> None:
-        """Drop what is at a place before a row of another, as the view does it."""
+        """Drop the item at a path before a row of another item, like the view."""
         from rosglass.rviz.host import pyqt
 
         data = self.model.mimeData([self.rows(*path)])
@@ -413,7 +413,7 @@ class Qml:
         self.root = overlay.root
 
     def run(self, script: str) -> Any:
-        """Return what a script gives, as Python has it; JavaScript's errors are raised."""
+        """Return the result of a script as a Python value; raise JavaScript's errors."""
         engine = self.overlay.engine
         scope = engine.newQObject(self.root)
         engine.globalObject().setProperty("root", scope)
@@ -481,7 +481,7 @@ def qml(app: Any, wait: Callable[..., None], tmp_path: Path) -> Callable[..., Qm
 
 @pytest.fixture
 def seen(master: str, tmp_path: Path) -> Callable[..., dict[str, Any]]:
-    """Return what a program of its own tells to have seen, on a screen with pixels for units."""
+    """Return the report of a separate program, on a screen of a given pixel ratio."""
 
     def run(program: str, factor: str, renderer: str) -> dict[str, Any]:
         env = {k: v for k, v in os.environ.items() if k not in ("QT_QPA_PLATFORM", "DISPLAY")}

@@ -44,7 +44,7 @@ class Host(QtCore.QObject):
 
     @Slot(str)
     def note(self, text: str) -> None:
-        """Remember what is tried next, for when it is the end; a hang ends the process."""
+        """Record the next attempt, for a report after a crash; a hang ends the process."""
         os.pwrite(self._last, text.encode("utf-8", "replace").ljust(300), 0)
         faulthandler.dump_traceback_later(LIMIT, exit=True)
         if next(self._count) % 300 == 0:

@@ -1,4 +1,4 @@
-"""Show an overlay over an RViz of its own, and print what is seen; for test_screens.py."""
+"""Show an overlay over a separate RViz, and print measured pixels; for test_screens.py."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""FlexBE's action with rospy and actionlib. One behaviour ends, one goes on, one fails."""
+"""FlexBE's action with rospy and actionlib: one behaviour ends, one keeps running, one fails."""
 
 import actionlib
 import rospy

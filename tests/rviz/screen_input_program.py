@@ -1,4 +1,4 @@
-"""Operate overlays over an RViz of its own, and print what came of it; for test_screens.py."""
+"""Operate overlays over a separate RViz, and print the results; for test_screens.py."""
 
 from __future__ import annotations
 

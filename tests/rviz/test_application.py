@@ -110,7 +110,7 @@ def test_menus_in_the_menu_bar(app: Any) -> None:
     assert "Quit" in [a.text().replace("&", "") for a in app.window.menu("File").actions()]
 
 
-def test_the_master_is_told_by_name(app: Any, master: str) -> None:
+def test_the_master_url_has_its_host_name(app: Any, master: str) -> None:
     assert app.session.url == master.replace("http:", "ros1:").rstrip("/")
 
 
@@ -140,7 +140,7 @@ def test_pictures_of_the_window(app: Any, grab: Any, tmp_path: Path) -> None:
         app.screenshot(tmp_path / "a.nothing")
 
 
-def test_what_raises_in_a_slot_of_rviz_is_logged(app: Any, caplog: Any) -> None:
+def test_exceptions_in_slots_of_rviz_are_logged(app: Any, caplog: Any) -> None:
     from rosglass.rviz.host import pyqt
 
     core = pyqt()
@@ -162,7 +162,7 @@ def test_a_second_rviz_is_refused(app: Any) -> None:
         type(app)()
 
 
-def test_a_window_that_is_closed_can_be_told_no(
+def test_closing_the_window_can_be_cancelled(
     app: Any, wait: Any, rviz_notices_changes: Any
 ) -> None:
     from rosglass.qt import QtCore

@@ -1,4 +1,4 @@
-"""RViz goes on, with a message that says what to do, whatever an interface over it does."""
+"""RViz survives faulty overlays, and logs messages that say what to do."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def press(app: Any) -> Callable[[float, float], bool]:
 
 @pytest.fixture
 def messages(caplog: pytest.LogCaptureFixture) -> Iterator[Callable[[], list[str]]]:
-    """Return what Qt and QML have said, as ``file:line: text``."""
+    """Return the log messages of Qt and QML, as ``file:line: text``."""
     from rosglass.qml.log import install_message_handler
     from rosglass.qt import QtCore
 
@@ -95,7 +95,7 @@ def goes_on(app: Any, show: Any, grab: Any, wait: Any) -> Callable[[], None]:
         ("import Ros\nItem {}", r"Ui\.qml:4:1: .*Qt 5 needs one after the module's name"),
     ],
 )
-def test_files_with_errors_are_told_with_place_and_advice(
+def test_errors_in_files_are_reported_with_place_and_advice(
     app: Any, show: Any, goes_on: Any, text: str, message: str
 ) -> None:
     from rosglass.errors import QmlError
@@ -126,7 +126,7 @@ def test_files_that_are_none(app: Any, tmp_path: Path, goes_on: Any) -> None:
     goes_on()
 
 
-def test_what_fails_at_run_time_is_logged_with_its_place(
+def test_run_time_errors_are_logged_with_their_place(
     show: Any, file: Path, messages: Any, press: Any, grab: Any, goes_on: Any, wait: Any
 ) -> None:
     overlay = show(
@@ -380,7 +380,7 @@ def test_overlays_of_ones_own_may_raise_anywhere(
 def test_a_node_finds_its_master_again(
     app: Any, file: Path, tmp_path: Path, wait: Any, goes_on: Any
 ) -> None:
-    """Of the overlays; that RViz itself cannot is told in its status bar."""
+    """The overlays' node reconnects; RViz's cannot, which the status bar shows."""
     from rosglass.qml import Session
     from rosglass.rviz import QmlOverlay
 

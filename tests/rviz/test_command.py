@@ -33,7 +33,7 @@ Item {
 
 
 class Program:
-    """A running ``rosglass rviz``; `output` is what it has written so far."""
+    """A running ``rosglass rviz``; `output` is its output so far."""
 
     def __init__(self, process: subprocess.Popen[str], log: Path) -> None:
         self.process, self._log = process, log
@@ -141,9 +141,7 @@ def test_qml_ends_it_with_an_exit_code(start: Callable[..., Program], tmp_path: 
     assert program.process.wait(PATIENCE) == 7, program.output
 
 
-def test_says_nothing_of_its_own_when_all_is_well(
-    start: Callable[..., Program], tmp_path: Path
-) -> None:
+def test_logs_nothing_without_a_problem(start: Callable[..., Program], tmp_path: Path) -> None:
     # What a binding reads is there until the binding has gone.
     reads = "Item { property var at: rviz.createPositionTracker(0, 0, 0); x: at.position.x }"
     file = interface(tmp_path, "Qt.quit()")
@@ -155,7 +153,7 @@ def test_says_nothing_of_its_own_when_all_is_well(
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("after", [0.3, 0.6, 0.9, 1.3, 2.0])
-def test_ends_when_told_to_at_any_moment(
+def test_ends_on_signals_at_any_time(
     start: Callable[..., Program], number: int, after: float
 ) -> None:
     program = start()
@@ -165,7 +163,7 @@ def test_ends_when_told_to_at_any_moment(
     assert "Traceback" not in program.output or after < 0.5
 
 
-def test_waits_for_a_master_and_says_so(start: Callable[..., Program]) -> None:
+def test_waits_for_a_master_and_reports_it(start: Callable[..., Program]) -> None:
     port = free_port()
     program = start("--url", f"ros1://127.0.0.1:{port}")
     program.wait_for(f"start one: roscore -p {port}")
@@ -205,7 +203,7 @@ def test_ends_when_the_node_of_overlays_is_killed(
     assert "the overlays' node was shut down: closed by /rosnode" in program.output
 
 
-def test_tells_when_the_master_is_gone_and_when_another_one_came(
+def test_reports_loss_and_restart_of_the_master(
     start: Callable[..., Program], tmp_path: Path
 ) -> None:
     master = RosMaster(tmp_path / "ros")
@@ -253,7 +251,7 @@ BROKEN = "a: [1,\n b: }"
         (["__foo:=x"], "__foo is unknown"),
     ],
 )
-def test_bad_input_is_told(
+def test_bad_input_is_reported(
     start: Callable[..., Program], tmp_path: Path, arguments: list[str], message: str
 ) -> None:
     (tmp_path / "broken.rviz").write_text(BROKEN)
@@ -274,7 +272,7 @@ def test_without_a_display(start: Callable[..., Program]) -> None:
 
 
 def nodes(master: str) -> set[str]:
-    """Return what the master knows of."""
+    """Return the master's registrations."""
     from rosglass.wires.tcpros.master import call_node
 
     state = call_node(master, "getSystemState", "/test")
@@ -290,7 +288,7 @@ def close_screen(screen: VirtualScreen) -> None:
 
 
 def on_window(command: str) -> Callable[[VirtualScreen], None]:
-    """Return what does something to RViz's window from outside."""
+    """Return a function that runs an xdotool command on RViz's window."""
 
     def do(screen: VirtualScreen) -> None:
         found = ["search", "--onlyvisible", "--name", "RViz"]
@@ -318,7 +316,7 @@ NO_WINDOW = (
     ],
     ids=["killed screen", "closed screen", "destroyed window", "killed client"],
 )
-def test_ends_when_its_screen_or_window_is_gone(
+def test_ends_when_its_screen_or_window_is_lost(
     start: Callable[..., Program],
     tmp_path: Path,
     master: str,

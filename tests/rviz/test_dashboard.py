@@ -1,4 +1,4 @@
-"""The example's dashboard: nothing that is old is shown as live, and refusals are told."""
+"""The example's dashboard: old values are not shown as live, and refusals are reported."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def live(dashboard: Dashboard) -> bool:
 
 
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGSTOP])
-def test_everything_says_that_the_robot_is_silent(
+def test_all_elements_show_that_the_robot_is_silent(
     dashboard: Dashboard, robot: subprocess.Popen[bytes], wait: Any, end: signal.Signals
 ) -> None:
     wait(dashboard.find("pause").isEnabled)
@@ -139,7 +139,9 @@ def test_the_stop_is_operated_by_keyboard_and_shows_the_focus(
     hand.do("keyup", "Return")
 
 
-def test_what_the_robot_refuses_is_told(dashboard: Dashboard, master: str, wait: Any) -> None:
+def test_requests_refused_by_the_robot_are_reported(
+    dashboard: Dashboard, master: str, wait: Any
+) -> None:
     import rosglass
 
     url = master.replace("http:", "ros1:")

@@ -96,7 +96,7 @@ def test_edits_in_the_panel_reach_the_overlay_and_back(
     assert panel.texts("Dashboard")["Scale"] == 0.5
 
 
-def test_errors_are_told_as_status(
+def test_errors_become_the_status(
     app: Any, file: Path, wait: Callable[..., None], panel: Any, entries: Any
 ) -> None:
     entry = entries.add_qml(str(file.with_name("Missing.qml")))
@@ -265,7 +265,7 @@ def test_displays_that_are_made_without_a_file_hold_nothing_up(
     assert loaded == []
 
 
-def test_what_a_program_has_added_outlives_a_config(
+def test_overlays_of_the_program_outlive_a_config(
     app: Any, file: Path, wait: Callable[..., None], entries: Any, panel: Any, tmp_path: Path
 ) -> None:
     empty, saved = tmp_path / "empty.rviz", tmp_path / "saved.rviz"

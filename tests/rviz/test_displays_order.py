@@ -1,4 +1,4 @@
-"""Overlays in RViz's Displays panel: dragged, styled, and told as changed."""
+"""Overlays in RViz's Displays panel: order, style sheets, and unsaved changes."""
 
 from __future__ import annotations
 
@@ -200,7 +200,7 @@ def test_style_sheets_are_seen_edited_saved_and_restored(
     assert panel.texts("Legend")["Style Sheet"] == lime
 
 
-def test_a_widget_that_comes_after_the_file_has_what_was_saved(
+def test_a_widget_added_after_the_file_gets_its_saved_values(
     app: Any, styled: Any, panel: Any, wait: Any, tmp_path: Path
 ) -> None:
     lime, saved = "#inner { background: lime; }", tmp_path / "saved.rviz"
@@ -219,7 +219,7 @@ def test_a_widget_that_comes_after_the_file_has_what_was_saved(
     assert shown.count("Legend") == 1
 
 
-def test_a_style_sheet_that_is_not_there_is_told(
+def test_a_missing_style_sheet_is_reported(
     app: Any, styled: Any, panel: Any, wait: Any, tmp_path: Path
 ) -> None:
     overlay = styled()
@@ -234,7 +234,7 @@ def test_a_style_sheet_that_is_not_there_is_told(
 # Changes that a file does not know.
 
 
-def test_what_a_file_would_keep_marks_rviz_as_changed(
+def test_saved_values_mark_rviz_as_modified(
     app: Any, squares: Any, panel: Any, wait: Any, tmp_path: Path, rviz_notices_changes: Any
 ) -> None:
     # RViz takes what happens within a second after loading for a part of it.

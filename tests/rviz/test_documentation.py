@@ -93,7 +93,7 @@ def test_the_examples_run(
 
 
 @pytest.mark.parametrize("object_name", TABLES)
-def test_every_member_is_told(object_name: str, run: Any, app: Any) -> None:
+def test_every_member_is_documented(object_name: str, run: Any, app: Any) -> None:
     (overlay,) = app.overlays
     text = f"(function () {{ {NAMES} let all = []; for (const m in {object_name}) all.push(m);"
     text += "return JSON.stringify(all) })()"

@@ -34,7 +34,7 @@ app.primaryScreen().grabWindow(0).save(sys.argv[1])
 
 
 class Robot:
-    """What the robot tells, by topic."""
+    """The robot's messages, by topic."""
 
     TOPICS = (
         ("/emergency_stop/state", "std_msgs/msg/Bool"),
@@ -125,7 +125,7 @@ class Rviz:
         return QtGui.QImage(file)
 
     def evidence(self, robot: Robot) -> Callable[[], str]:
-        """Return what tells of a failure: what the robot has told, and where the picture lies."""
+        """Return the report of a failure: the robot's messages, and the path of the picture."""
 
         def tell() -> str:
             self.picture()

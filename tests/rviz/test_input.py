@@ -77,7 +77,7 @@ def test_double_clicks_arrive(hand: Any, show: Any) -> None:
     assert root.property("log") == "ttT"
 
 
-def test_handlers_get_what_they_wait_for(hand: Any, show: Any, view: Any) -> None:
+def test_pointer_handlers_get_their_events(hand: Any, show: Any, view: Any) -> None:
     root = show(
         """Item { id: root; property bool hovered: hover.hovered; property int wheels: 0
         Rectangle { objectName: "dragged"; x: 50; y: 50; width: 60; height: 60; color: "red"
@@ -97,7 +97,7 @@ def test_handlers_get_what_they_wait_for(hand: Any, show: Any, view: Any) -> Non
     assert not root.property("hovered")
 
 
-def test_wheel_goes_to_what_scrolls(hand: Any, show: Any, view: Any) -> None:
+def test_wheel_goes_to_scrollable_items(hand: Any, show: Any, view: Any) -> None:
     root = show(
         """Item {
         Button { x: 200; width: 100; height: 100 }
@@ -295,7 +295,7 @@ def test_overlay_may_be_removed_while_it_handles_an_event(
     assert view("Yaw") != yaw
 
 
-def test_overlay_that_raises_is_told_and_rviz_goes_on(
+def test_errors_of_an_overlay_are_reported_and_rviz_continues(
     hand: Any, app: Any, view: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     from rosglass.rviz import Overlay

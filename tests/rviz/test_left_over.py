@@ -83,7 +83,7 @@ def _draw_nothing(import_paths: object) -> None:
 
 
 def left(wait: Callable[..., None], before: Counter[str]) -> dict[str, int]:
-    """Return what has come since and stays; timers that have fired are collected later."""
+    """Return the objects created since that stay; fired timers are collected later."""
     until = time.monotonic() + 20
     while True:
         more = {n: c for n, c in (counted(wait) - before).items() if c >= 5}
@@ -111,7 +111,7 @@ def test_overlays_that_go_leave_no_object(
     assert left(wait, before) == {}
 
 
-def test_what_is_left_of_an_overlay_does_not_wait_for_hundreds_of_others(
+def test_memory_of_a_removed_overlay_is_collected_soon(
     app: Any, file: Path, wait: Callable[..., None]
 ) -> None:
     overlay = app.add_qml(file)

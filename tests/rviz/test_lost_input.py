@@ -1,4 +1,4 @@
-"""What is held when nobody may ever tell that it is let go of: a robot would drive on."""
+"""Held buttons whose release may never arrive are cancelled: a robot would drive on."""
 
 from __future__ import annotations
 
@@ -235,7 +235,7 @@ def test_switching_tools_and_typing_leave_the_mouse_where_it_is(
     hand.wait(lambda: tools.getCurrentTool().getName() != "Select")
 
 
-def test_what_was_pressed_once_is_not_cancelled_later(hand: Any, show: Any) -> None:
+def test_released_buttons_are_not_cancelled_later(hand: Any, show: Any) -> None:
     root = show(
         """Item { property int changes: 0
         Button { width: 100; height: 100; onEnabledChanged: parent.changes++ } }"""

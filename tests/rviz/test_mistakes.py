@@ -1,4 +1,4 @@
-"""What the object ``rviz`` says of mistakes: the thing, the place, and what would fit."""
+"""Errors of the object ``rviz`` name the thing, the place, and valid values."""
 
 from __future__ import annotations
 
@@ -39,9 +39,7 @@ MISTAKES = {
 }
 
 
-def test_every_mistake_names_the_thing_and_what_would_fit(
-    tools: Any, displays: Any, qml: Any
-) -> None:
+def test_every_error_names_the_thing_and_valid_values(tools: Any, displays: Any, qml: Any) -> None:
     qml().refuses(MISTAKES)
 
 

@@ -17,7 +17,7 @@ def label(text: str = "popup") -> Any:
 
 
 def there_is_grey(popup: Any) -> bool:
-    """Return whether a popup is covered as those are whose place is old."""
+    """Return whether a popup is greyed out as stale."""
     picture = popup.root.grab().toImage()
     at = popup.content.geometry().topLeft()
     here = picture.pixelColor(at.x() + 10, at.y() + 10)
@@ -139,7 +139,7 @@ def test_popup_follows_a_point(hand: Any, app: Any, view: Any) -> None:
     assert popup.content.isVisible()
 
 
-def test_dialog_is_moved_by_its_title_and_tells_its_button(hand: Any, app: Any) -> None:
+def test_dialog_is_moved_by_its_title_and_reports_its_button(hand: Any, app: Any) -> None:
     from rosglass.rviz.popup import Button, message
 
     dialog = app.add(message("Title", "Really?", buttons=Button.YES | Button.NO))

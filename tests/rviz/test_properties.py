@@ -142,7 +142,7 @@ def shown(app: Any, wait: Callable[..., None], tmp_path: Path) -> Any:
 
 @pytest.fixture
 def edit(app: Any, shown: Any) -> Any:
-    """Open the editor of a property, end it with a key; returns what a function says of it."""
+    """Open a property's editor, close it with a key; return a function's result for it."""
     from rosglass.rviz.host import pyqt
 
     _, view, index = shown

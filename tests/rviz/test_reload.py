@@ -1,4 +1,4 @@
-"""Interfaces over RViz that are shown anew when their files are saved."""
+"""Overlays reload when their files are saved."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def by_backup(file: Path, text: str) -> None:
 
 
 @pytest.mark.parametrize("save", [by_writing, by_renaming, in_pieces, by_backup])
-def test_is_shown_anew_however_an_editor_saves(
+def test_reloads_however_an_editor_saves(
     show: Any, file: Path, wait: Any, grab: Any, save: Callable[..., None]
 ) -> None:
     overlay = show(BLUE_UI, watch=True)
@@ -222,7 +222,7 @@ def test_errors_are_shown_over_the_last_good_interface(
     assert (seen(picture), seen(picture, 20, 24)) == (LIME, GREY)
 
 
-def test_errors_can_be_put_away_for_what_is_below_them(
+def test_errors_can_be_dismissed(
     show: Any, file: Path, wait: Any, grab: Any, mouse: Any, error_panels: Any
 ) -> None:
     overlay = show("Item { MouseArea { anchors.fill: parent } }")
@@ -361,7 +361,7 @@ def test_popups_go_with_the_interface(show: Any, mouse: Any, wait: Any, grab: An
     assert overlay.root.property("clicks") == 1
 
 
-def test_hidden_overlays_are_shown_anew_when_they_are_seen_again(
+def test_hidden_overlays_reload_when_they_are_visible_again(
     show: Any, file: Path, grab: Any, wait: Any
 ) -> None:
     overlay = show(BLUE_UI, watch=True)

@@ -41,7 +41,7 @@ def qml(tmp_path: Path) -> Callable[..., Path]:
 
 @pytest.fixture
 def chosen(screen: str, master: str, tmp_path: Path) -> Callable[..., str]:
-    """Show overlays in an RViz of their own for a moment; returns what is said of the choice."""
+    """Show overlays in a separate RViz; return the log messages about the renderer."""
 
     def run(*arguments: Any, **env: str) -> str:
         picture = tmp_path / "picture.png"
@@ -101,7 +101,7 @@ def test_an_overlay_of_the_config_that_needs_opengl_has_it_for_all(
 
 
 @pytest.mark.parametrize("late", [False, True])
-def test_what_is_not_drawn_is_told_with_its_place_and_what_to_do(
+def test_undrawable_items_are_reported_with_place_and_fix(
     late: bool, qml: Any, chosen: Callable[..., str]
 ) -> None:
     shader = qml("Shader", LATER if late else f"Item {{ {SHADER} }}")
@@ -113,7 +113,7 @@ def test_what_is_not_drawn_is_told_with_its_place_and_what_to_do(
     assert "--renderer opengl" in said
 
 
-def test_films_that_are_not_drawn_are_told(qml: Any, chosen: Callable[..., str]) -> None:
+def test_undrawable_videos_are_reported(qml: Any, chosen: Callable[..., str]) -> None:
     film = "Item { MediaPlayer { id: film } VideoOutput { source: film } }"
     file = qml("Film", film, "import QtMultimedia 5.15")
     said = chosen("--overlay", file, "--renderer", "software")
@@ -122,7 +122,7 @@ def test_films_that_are_not_drawn_are_told(qml: Any, chosen: Callable[..., str])
 
 
 @pytest.mark.parametrize(("wanted", "name"), [("opengl", "OpenGL"), ("software", "Qt's software")])
-def test_what_the_user_asks_for_counts_for_more_than_anything_else(
+def test_the_choice_of_the_user_takes_precedence(
     wanted: str, name: str, qml: Any, chosen: Callable[..., str]
 ) -> None:
     file = qml("Shader", f"Item {{ {SHADER} }}") if wanted == "software" else qml("Plain", PLAIN)
@@ -133,7 +133,7 @@ def test_what_the_user_asks_for_counts_for_more_than_anything_else(
     assert ("is not drawn" in said) == (wanted == "software")
 
 
-def test_a_renderer_cannot_be_another_one_later(
+def test_the_renderer_cannot_be_changed_later(
     app: Any, wait: Callable[..., None], qml: Any
 ) -> None:
     from rosglass.rviz.rendering import choice
@@ -189,7 +189,7 @@ def test_a_graphics_card_is_used(monkeypatch: pytest.MonkeyPatch, app: Any) -> N
         ('Item { Text { text: "http://a/b" } }', "", ""),
     ],
 )
-def test_what_may_come_to_need_opengl_is_found_in_the_files(
+def test_later_need_for_opengl_is_found_in_the_files(
     text: str, imports: str, need: str, qml: Any, app: Any, tmp_path: Path
 ) -> None:
     from rosglass.qml.renderer_choice import need_in_file

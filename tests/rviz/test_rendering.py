@@ -69,7 +69,7 @@ def test_overlays_lie_above_each_other_by_z_and_popups_above_all(
     assert colour(picture, 115, 115) == GREY
 
 
-def test_opacity_is_blended_without_drawing_anew(
+def test_opacity_is_blended_without_redrawing(
     show: Any, grab: Any, drawn: list[Any], frames: Any
 ) -> None:
     overlay = show(f"Item {{ {square(40, 40, '#0080ff')} {square(140, 40, '#800080ff')} }}")
@@ -156,7 +156,7 @@ def test_nothing_is_drawn_when_nothing_changes_and_little_uploaded_when_little_d
     assert app.overlays.covered == pytest.approx((400 * 400 + 16 * 16) / (width * height), rel=0.02)
 
 
-def test_panels_grow_and_shrink_by_pixels_with_what_is_on_them(
+def test_panels_grow_and_shrink_with_their_content(
     app: Any, show: Any, grab: Any, wait: Any
 ) -> None:
     overlay = show(f"Item {{ {square(43, 43, '#0080ff', 8)} }}")
@@ -211,7 +211,7 @@ def test_scaled_overlays_have_as_many_units_less(show: Any, grab: Any, app: Any)
     assert (root.width(), root.height()) == (width * 2, height * 2)
 
 
-def test_picture_of_what_stands_still_is_let_go(show: Any, grab: Any, wait: Any) -> None:
+def test_pictures_of_idle_overlays_are_released(show: Any, grab: Any, wait: Any) -> None:
     from rosglass.rviz.qt5 import QtGui
 
     overlay = show(f"Item {{ {square(40, 40, '#0080ff')} }}")
@@ -291,7 +291,7 @@ def test_minimised_rviz_draws_no_overlay(
     assert len(drawn) > count
 
 
-def test_an_overlay_that_raises_is_told_of_once_and_hurts_no_other(
+def test_errors_of_an_overlay_are_reported_once_and_hurt_no_other(
     app: Any, show: Any, grab: Any, frames: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     from rosglass.rviz import Overlay

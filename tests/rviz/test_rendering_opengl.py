@@ -1,4 +1,4 @@
-"""What test_rendering.py asks for holds with OpenGL, too; what only OpenGL draws is drawn."""
+"""The tests of test_rendering.py with OpenGL, and items that only OpenGL can draw."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Of widgets over RViz's 3D view, what has changed is painted, and nothing else."""
+"""Widget overlays paint only their changed parts."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def lights(
     return show
 
 
-def test_what_has_changed_is_painted_compared_and_nothing_else(
+def test_only_changed_parts_are_painted_and_compared(
     lights: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rosglass.rviz.layer import Layer

@@ -215,7 +215,7 @@ def test_properties_of_displays(app: Any, displays: Any, qml: Any) -> None:
     )
 
 
-def test_the_fixed_frame_is_told(app: Any, qml: Any) -> None:
+def test_the_fixed_frame_is_reported(app: Any, qml: Any) -> None:
     here = qml("Item { property string frame: rviz.fixedFrame }")
     here.run("rviz.fixedFrame = 'odom'")
     assert app.window.manager.getFixedFrame() == "odom"
@@ -454,7 +454,7 @@ def test_overlays_that_come_and_go(app: Any, tools: Any, qml: Any, wait: Any) ->
 # It takes a quarter of a minute by itself; other tests run beside it.
 @pytest.mark.timeout(240)
 def test_nothing_crashes_hangs_or_raises(screen: str, master: str, tmp_path: Path) -> None:
-    """In a process of its own, since a crash is what it looks for."""
+    """Runs in a separate process, because it looks for a crash."""
     program, last = Path(__file__).with_name("fuzz_rviz.py"), tmp_path / "last"
     environment = os.environ | {"DISPLAY": screen, "ROS_MASTER_URI": master, "HOME": str(tmp_path)}
     environment |= {"ROSGLASS_QT": "pyside2", "QT_QPA_PLATFORM": "xcb", "ROS_IP": "127.0.0.1"}
@@ -478,7 +478,7 @@ def test_nothing_crashes_hangs_or_raises(screen: str, master: str, tmp_path: Pat
 
 
 def test_trackers_of_frames(app: Any, qml: Any, wait: Any) -> None:
-    """They move with the robot, and say so while nobody knows where it is."""
+    """Trackers move with the robot, and report an unknown position."""
     from rosglass.tf import Transform
 
     app.rviz.fixed_frame = "map"

@@ -32,7 +32,9 @@ def said(caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
 
 
 @pytest.mark.parametrize("what", OBJECTS)
-def test_each_object_tells(what: str, tools: Any, show: Any, said: Any) -> None:
+def test_each_object_reports_misspelled_members(
+    what: str, tools: Any, show: Any, said: Any
+) -> None:
     called, member = OBJECTS[what]
     wrong = f"{member}s"
     root = show(
@@ -55,7 +57,7 @@ def test_each_object_tells(what: str, tools: Any, show: Any, said: Any) -> None:
     assert line.endswith("it is undefined")
 
 
-def test_an_assignment_that_nobody_catches_is_told_with_its_place(
+def test_an_uncaught_assignment_is_reported_with_its_place(
     show: Any, said: Any, app: Any, wait: Any
 ) -> None:
     from rosglass.qml.log import install_message_handler
@@ -69,7 +71,7 @@ def test_an_assignment_that_nobody_catches_is_told_with_its_place(
     assert said() == ["4: Error: rviz has no member 'misspelled'"]
 
 
-def test_told_once_for_each_place_and_still_after_collecting(
+def test_reported_once_per_place_even_after_collecting(
     app: Any, show: Any, said: Any, wait: Any
 ) -> None:
     root = show(
@@ -87,7 +89,7 @@ def test_told_once_for_each_place_and_still_after_collecting(
     assert "did you mean mode" in root.write()
 
 
-def test_what_javascript_itself_asks_for_is_no_mistake(show: Any, said: Any) -> None:
+def test_members_that_javascript_looks_up_are_not_reported(show: Any, said: Any) -> None:
     root = show(
         """Item { property var made: [JSON.stringify(rviz).length > 0, "" + rviz, rviz == rviz,
             "nothing" in rviz, Object.keys(rviz).length > 5, rviz instanceof Object]

@@ -77,7 +77,7 @@ def test_other_views_make_place_and_nothing_crashes_rviz(
     assert manager.getCurrent().getClassId() == "rviz/FPS"
 
 
-def test_what_cannot_be_done_is_an_error(view: Any) -> None:
+def test_impossible_movements_are_errors(view: Any) -> None:
     from rosglass.errors import Error
 
     before = view.eye
@@ -100,7 +100,7 @@ def test_what_cannot_be_done_is_an_error(view: Any) -> None:
     assert view.tracked_frame == ""
 
 
-def test_who_moves_the_camera_otherwise_ends_our_movement(
+def test_moving_the_camera_otherwise_ends_a_movement(
     app: Any, view: Any, wait: Callable[..., None]
 ) -> None:
     view.settings.animation_duration = 60.0

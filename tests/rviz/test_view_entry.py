@@ -220,7 +220,7 @@ def test_tracked_frame_and_mode_are_shown_and_set(
     assert steered.tracked_frame == ""
 
 
-def test_wrong_settings_say_what_is_right(settings: Any) -> None:
+def test_errors_of_settings_say_what_is_valid(settings: Any) -> None:
     wrong = {
         "animation_duration": (-1, "Animation Duration: expected a number from 0 to 60, got -1"),
         "tracking_gain": (float("nan"), "Tracking Gain: expected a number from 0 to 1000, got NaN"),

@@ -88,7 +88,7 @@ def run(
     engine.globalObject().deleteProperty("root")
 
 
-def test_each_error_says_where_what_and_what_would(run: Any, steered: Any) -> None:
+def test_each_error_names_member_value_and_valid_values(run: Any, steered: Any) -> None:
     before = steered.eye
     answers = {script: run(f"rviz.view.{script}") for script in WRONG}
     assert {key: text for key, text in answers.items() if WRONG[key] not in str(text)} == {}
@@ -96,7 +96,7 @@ def test_each_error_says_where_what_and_what_would(run: Any, steered: Any) -> No
     assert steered.mode == 0
 
 
-def test_frames_that_there_are_are_told(
+def test_errors_list_the_known_frames(
     run: Any, app: Any, steered: Any, wait: Callable[..., None]
 ) -> None:
     from rosglass.tf import Transform
@@ -115,7 +115,7 @@ def test_frames_that_there_are_are_told(
     run("rviz.view.track('')")
 
 
-def test_what_the_operator_sets_is_told(
+def test_changes_by_the_operator_are_signalled(
     run: Any, app: Any, steered: Any, wait: Callable[..., None]
 ) -> None:
     wait.frames(2)

@@ -146,7 +146,9 @@ def test_robots_move_the_camera(
     assert view.mode == 0
 
 
-def test_robots_hear_why_the_camera_is_not_moved(robot: Robot, view: Any, caplog: Any) -> None:
+def test_service_errors_say_why_the_camera_is_not_moved(
+    robot: Robot, view: Any, caplog: Any
+) -> None:
     away = {"header": {"frame_id": "nowhere"}, "eye": {"x": 1.0}}
     assert "nowhere" in robot.call("move_eye", "MoveEye", **away)
     assert "nowhere" in robot.call("move_eye_and_focus", "MoveEyeAndFocus", **away)
@@ -201,7 +203,7 @@ def test_the_camera_follows_a_frame(
     view.settings.tracking_gain = 3.0
 
 
-def test_a_frame_that_is_lost_is_told_once(
+def test_a_lost_frame_is_reported_once(
     app: Any, robot: Robot, view: Any, wait: Callable[..., None]
 ) -> None:
     told: list[str] = []

@@ -16,7 +16,7 @@ UI = """Item {
 }"""
 
 
-def test_a_loop_without_end_is_ended_and_told_in_the_overlay(
+def test_an_endless_loop_is_ended_and_reported_in_the_overlay(
     app: Any,
     wait: Callable[..., None],
     frames: Callable[[int], None],

@@ -123,7 +123,7 @@ def test_nothing_is_painted_when_nothing_changed(app: Any, panel: Any, grab: Any
 
 
 @pytest.mark.parametrize("where", ["paintEvent", "slot"])
-def test_widget_that_raises_is_told(
+def test_errors_of_a_widget_are_reported(
     hand: Any, app: Any, grab: Any, where: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     from rosglass.rviz import WidgetOverlay
@@ -174,7 +174,7 @@ def test_style_sheets(app: Any, panel: Any, wait: Callable[..., None], tmp_path:
     assert "none.qss" in watching.problem
 
 
-def test_what_is_no_widget_is_refused(app: Any) -> None:
+def test_other_objects_than_widgets_are_refused(app: Any) -> None:
     from rosglass import Error
     from rosglass.rviz import WidgetOverlay
     from rosglass.rviz.qt5 import QtWidgets
@@ -192,7 +192,7 @@ def test_what_is_no_widget_is_refused(app: Any) -> None:
     shown.close()
 
 
-def test_what_is_no_overlay_is_refused(app: Any) -> None:
+def test_other_objects_than_overlays_are_refused(app: Any) -> None:
     from rosglass import Error
     from rosglass.rviz import Overlay, WidgetOverlay
 
@@ -211,7 +211,7 @@ def test_what_is_no_overlay_is_refused(app: Any) -> None:
             Overlay("Top", **{option: "high"})
 
 
-def test_slots_that_raise_at_any_time_are_told(
+def test_errors_of_slots_are_reported_at_any_time(
     app: Any, wait: Callable[..., None], caplog: pytest.LogCaptureFixture
 ) -> None:
     from rosglass.rviz import WidgetOverlay
