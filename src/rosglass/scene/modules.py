@@ -8,9 +8,23 @@ from typing import Any
 
 from PySide6.QtQml import qmlRegisterType
 
+from rosglass.scene.displays.geometry import (
+    AccelStampedDisplay,
+    PointStampedDisplay,
+    PolygonDisplay,
+    RangeDisplay,
+    TwistStampedDisplay,
+    WrenchStampedDisplay,
+)
 from rosglass.scene.displays.grid import AxesDisplay, GridDisplay
 from rosglass.scene.displays.map import GridCellsDisplay, MapDisplay
 from rosglass.scene.displays.path import PathDisplay
+from rosglass.scene.displays.pose import (
+    OdometryDisplay,
+    PoseArrayDisplay,
+    PoseDisplay,
+    PoseWithCovarianceDisplay,
+)
 from rosglass.scene.displays.tf import TFDisplay
 from rosglass.scene.scene import Scene
 from rosglass.scene.scene_view import SceneView
@@ -19,12 +33,22 @@ __all__ = ["DISPLAYS", "register"]
 
 #: The displays; in QML, each has the name of its class.
 DISPLAYS = (
+    AccelStampedDisplay,
     AxesDisplay,
     GridCellsDisplay,
     GridDisplay,
     MapDisplay,
+    OdometryDisplay,
     PathDisplay,
+    PointStampedDisplay,
+    PolygonDisplay,
+    PoseArrayDisplay,
+    PoseDisplay,
+    PoseWithCovarianceDisplay,
+    RangeDisplay,
     TFDisplay,
+    TwistStampedDisplay,
+    WrenchStampedDisplay,
 )
 Scene.TYPES.update({display.TYPE: display for display in DISPLAYS})
 

@@ -1,0 +1,336 @@
+"""The displays PointStamped, Polygon, Range, WrenchStamped, TwistStamped and AccelStamped."""
+# ruff: noqa: N815 - the names of properties are QML's
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from rosglass.errors import Error
+from rosglass.scene.display import TopicDisplay
+from rosglass.scene.displays.shapes import ArrowShapes
+from rosglass.scene.drawing import CONE, SPHERE, Group, Lines, Mesh, instance_matrix
+from rosglass.scene.settings import Setting, rgb_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rosglass.qml.runtime import Runtime
+    from rosglass.qt import QtCore
+
+__all__ = [
+    "AccelStampedDisplay",
+    "PointStampedDisplay",
+    "PolygonDisplay",
+    "RangeDisplay",
+    "TwistStampedDisplay",
+    "WrenchStampedDisplay",
+]
+
+_MAX_CORNERS = 100_000
+_MAX_HISTORY = 10_000
+
+
+class _Kept(NamedTuple):
+    """A message that is shown.
+
+    Attributes:
+        data: What was read from it.
+        pose: Of its frame in the fixed frame.
+        group: What it draws.
+    """
+
+    data: Any
+    pose: NDArray[np.float64]
+    group: Group
+
+
+class _History(TopicDisplay):
+    """A display of the last messages, each drawn on its own."""
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self._kept: deque[_Kept] = deque()
+        super().__init__(parent, runtime)
+
+    def length(self) -> int:
+        """Return how many messages are shown."""
+        return 1
+
+    def draw(self, data: Any, group: Group) -> None:
+        """Fill a group with what a message shows, in its frame."""
+        raise NotImplementedError
+
+    def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:  # noqa: ARG002
+        """Show a message beside earlier ones."""
+        group = Group()
+        group.pose = pose
+        self._kept.append(_Kept(data, pose, group))
+        self.root.add(group)
+        self.draw(data, group)
+        self._drop_old()
+
+    def _drop_old(self) -> None:
+        while len(self._kept) > min(self.length(), _MAX_HISTORY):
+            self._kept.popleft().group.remove()
+
+    def _restyle(self) -> None:
+        self._drop_old()
+        for kept in self._kept:
+            kept.group.clear()
+            self.draw(kept.data, kept.group)
+
+    def on_fixed_frame(self) -> None:
+        """Begin anew: earlier messages were placed in the former fixed frame."""
+        last = self._last
+        self.reset()
+        self._last = last
+        super().on_fixed_frame()
+
+    def reset(self) -> None:
+        """Drop all messages."""
+        super().reset()
+        self._kept.clear()
+
+
+def _finite(name: str, *numbers: float) -> tuple[float, ...]:
+    if not all(map(math.isfinite, numbers)):
+        raise Error(f"{name}: {numbers} has a number that is not finite")
+    return numbers
+
+
+class PointStampedDisplay(_History):
+    """A ``geometry_msgs/PointStamped``, as a sphere. See its page in ``docs/scene.md``."""
+
+    TYPE = "PointStamped"
+    MESSAGES = ("geometry_msgs/PointStamped",)
+
+    color = Setting("Color", "color", "#cc29cc", "Of the sphere.")
+    alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
+    radius = Setting("Radius", "float", 0.2, "In metres.", min=0.0)
+    historyLength = Setting("History Length", "int", 1, "How many are shown.", min=1, max=100_000)
+
+    def length(self) -> int:
+        """Return how many messages are shown."""
+        return int(self.historyLength)
+
+    def preparer(self) -> Callable[[Any], Any]:
+        """Return the function that reads the point."""
+        return lambda message: _finite("point", *(getattr(message.point, axis) for axis in "xyz"))
+
+    def draw(self, data: Any, group: Group) -> None:
+        """Draw a sphere."""
+        ball = Mesh(SPHERE, (*rgb_of(self.color), self.alpha))
+        ball.owner = self
+        ball.set_instances(instance_matrix(data, scale=2 * self.radius)[np.newaxis])
+        group.add(ball)
+
+
+class PolygonDisplay(_History):
+    """A ``geometry_msgs/PolygonStamped``, as its outline. See its page in ``docs/scene.md``."""
+
+    TYPE = "Polygon"
+    MESSAGES = ("geometry_msgs/PolygonStamped",)
+
+    color = Setting("Color", "color", "#19ff00", "Of the outline.")
+    alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
+
+    def preparer(self) -> Callable[[Any], Any]:
+        """Return the function that reads the corners."""
+        return _read_corners
+
+    def draw(self, data: Any, group: Group) -> None:
+        """Draw the outline."""
+        lines = Lines()
+        lines.owner = self
+        lines.set_strip(data, (*rgb_of(self.color), self.alpha))
+        group.add(lines)
+
+
+def _read_corners(message: Any) -> NDArray[np.float32]:
+    points = message.polygon.points
+    if len(points) > _MAX_CORNERS:
+        raise Error(
+            f"polygon: {len(points)} points are more than the {_MAX_CORNERS} that are drawn"
+        )
+    corners = np.array([(p.x, p.y, p.z) for p in points], np.float32).reshape(-1, 3)
+    if not np.isfinite(corners).all():
+        raise Error("polygon: a point is not finite")
+    return np.concatenate([corners, corners[:1]])
+
+
+class RangeDisplay(_History):
+    """A ``sensor_msgs/Range``, as a cone. See its page in ``docs/scene.md``."""
+
+    TYPE = "Range"
+    MESSAGES = ("sensor_msgs/Range",)
+
+    color = Setting("Color", "color", "#ffffff", "Of the cone.")
+    alpha = Setting("Alpha", "float", 0.5, "Opacity.", min=0.0, max=1.0)
+    bufferLength = Setting("Buffer Length", "int", 1, "How many are shown.", min=1)
+
+    def length(self) -> int:
+        """Return how many messages are shown."""
+        return int(self.bufferLength)
+
+    def preparer(self) -> Callable[[Any], Any]:
+        """Return the function that reads distance and angle."""
+        return _read_range
+
+    def draw(self, data: Any, group: Group) -> None:
+        """Draw a cone from the sensor along x."""
+        distance, angle = data
+        if distance <= 0:
+            return
+        cone = Mesh(CONE, (*rgb_of(self.color), self.alpha))
+        cone.owner = self
+        wide = 2 * distance * math.tan(min(angle, math.radians(170)) / 2)
+        # Its tip is at the sensor: the shape's, which points along z, is turned over.
+        matrix = np.array(
+            [[0.0, 0, -distance, distance], [wide, 0, 0, 0], [0, wide, 0, 0], [0, 0, 0, 1]]
+        )
+        cone.set_instances(matrix[np.newaxis])
+        group.add(cone)
+
+
+def _read_range(message: Any) -> tuple[float, float]:
+    low, high, angle = _finite(
+        "min_range, max_range, field_of_view",
+        message.min_range,
+        message.max_range,
+        message.field_of_view,
+    )
+    value = float(message.range)
+    if low == high:
+        # A sensor of one fixed distance: infinity says whether something is there (REP 117).
+        value = low if value == -math.inf else 0.0
+    inside = math.isfinite(value) and low <= value <= high
+    return (value if inside else 0.0), abs(angle)
+
+
+class _Screw(_History):
+    """A display of a linear and an angular vector, as arrows."""
+
+    #: Their names in the message, and the field that holds both.
+    _FIELDS = ("linear", "angular")
+    _HOLDER = ""
+
+    alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
+    arrowWidth = Setting("Arrow Width", "float", 0.5, "In metres.", min=0.0)
+    historyLength = Setting("History Length", "int", 1, "How many are shown.", min=1, max=100_000)
+    hideSmallValues = Setting(
+        "Hide Small Values", "bool", True, "Whether arrows shorter than their width are hidden."
+    )
+
+    def length(self) -> int:
+        """Return how many messages are shown."""
+        return int(self.historyLength)
+
+    def preparer(self) -> Callable[[Any], Any]:
+        """Return the function that reads both vectors."""
+        holder, fields = self._HOLDER, self._FIELDS
+
+        def read(message: Any) -> Any:
+            both = getattr(message, holder)
+            return [
+                np.array(_finite(name, *(getattr(getattr(both, name), axis) for axis in "xyz")))
+                for name in fields
+            ]
+
+        return read
+
+    def look(self) -> tuple[tuple[Any, float], tuple[Any, float]]:
+        """Return colour and scale of both arrows."""
+        raise NotImplementedError
+
+    def draw(self, data: Any, group: Group) -> None:
+        """Draw two arrows, and a circle around the second."""
+        for number, ((colour, scale), vector) in enumerate(zip(self.look(), data, strict=True)):
+            length = float(np.linalg.norm(vector)) * scale
+            wide = self.arrowWidth
+            if length <= 0 or (self.hideSmallValues and length < wide):
+                continue
+            rgba = (*rgb_of(colour), self.alpha)
+            pose = _along(vector / np.linalg.norm(vector))
+            arrow = ArrowShapes(self)
+            # Proportions of RViz's arrow.
+            arrow.set_arrows(pose, (length, 0.1 * wide), (0.3 * length, 0.2 * wide), rgba)
+            group.add(arrow)
+            if number:
+                group.add(_circle(pose, length, rgba))
+
+
+def _along(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    helper = np.array([0.0, 0.0, 1.0]) if abs(x[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    y = np.cross(helper, x)
+    y /= np.linalg.norm(y)
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 1], pose[:3, 2] = x, y, np.cross(x, y)
+    return pose
+
+
+def _circle(pose: NDArray[np.float64], length: float, rgba: tuple[float, ...]) -> Lines:
+    """Return most of a circle around an arrow, with a head: which way it turns."""
+    angles = np.linspace(0.2, 2 * np.pi - 0.2, 32)
+    at = np.stack([np.full_like(angles, length / 2), np.cos(angles), np.sin(angles)], axis=1)
+    at[:, 1:] *= length / 4
+    way = at[-1] - at[-2]
+    side = np.cross(way, (1, 0, 0))
+    head = [[at[-1], at[-1] - 2 * way + turn * side] for turn in (-1, 1)]
+    lines = Lines(0.05 * length, in_metres=True)
+    whole = np.concatenate([np.stack([at[:-1], at[1:]], axis=1), np.array(head)])
+    lines.set_segments(whole @ pose[:3, :3].T, rgba)
+    return lines
+
+
+class WrenchStampedDisplay(_Screw):
+    """A ``geometry_msgs/WrenchStamped``: force and torque. See its page in ``docs/scene.md``."""
+
+    TYPE = "WrenchStamped"
+    MESSAGES = ("geometry_msgs/WrenchStamped",)
+    _FIELDS, _HOLDER = ("force", "torque"), "wrench"
+
+    forceColor = Setting("Force Color", "color", "#cc3333", "Of the force.")
+    torqueColor = Setting("Torque Color", "color", "#cccc33", "Of the torque.")
+    forceArrowScale = Setting("Force Arrow Scale", "float", 2.0, "Metres per newton.")
+    torqueArrowScale = Setting("Torque Arrow Scale", "float", 2.0, "Metres per newton metre.")
+
+    def look(self) -> tuple[tuple[Any, float], tuple[Any, float]]:
+        """Return colour and scale of both arrows."""
+        return (self.forceColor, self.forceArrowScale), (self.torqueColor, self.torqueArrowScale)
+
+
+class _Motion(_Screw):
+    linearColor = Setting("Linear Color", "color", "#cc3333", "Of the linear part.")
+    angularColor = Setting("Angular Color", "color", "#cccc33", "Of the angular part.")
+    linearArrowScale = Setting("Linear Arrow Scale", "float", 2.0, "Metres per unit.")
+    angularArrowScale = Setting("Angular Arrow Scale", "float", 2.0, "Metres per unit.")
+
+    def look(self) -> tuple[tuple[Any, float], tuple[Any, float]]:
+        """Return colour and scale of both arrows."""
+        return (
+            (self.linearColor, self.linearArrowScale),
+            (self.angularColor, self.angularArrowScale),
+        )
+
+
+class TwistStampedDisplay(_Motion):
+    """A ``geometry_msgs/TwistStamped``: velocities. See its page in ``docs/scene.md``."""
+
+    TYPE = "TwistStamped"
+    MESSAGES = ("geometry_msgs/TwistStamped",)
+    _HOLDER = "twist"
+
+
+class AccelStampedDisplay(_Motion):
+    """A ``geometry_msgs/AccelStamped``: accelerations. See its page in ``docs/scene.md``."""
+
+    TYPE = "AccelStamped"
+    MESSAGES = ("geometry_msgs/AccelStamped",)
+    _HOLDER = "accel"

@@ -1,0 +1,397 @@
+"""The displays Pose, PoseArray, PoseWithCovariance and Odometry, with their covariances."""
+# ruff: noqa: N815 - the names of properties are QML's
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from rosglass.errors import Error
+from rosglass.scene.display import TopicDisplay, matrix_of
+from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, poses_matrices
+from rosglass.scene.drawing import CONE, CYLINDER, SPHERE, Group, Lines, Mesh
+from rosglass.scene.settings import Setting, rgb_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from rosglass.qml.runtime import Runtime
+    from rosglass.qt import QtCore
+
+__all__ = ["OdometryDisplay", "PoseArrayDisplay", "PoseDisplay", "PoseWithCovarianceDisplay"]
+
+_MAX_POSES = 100_000
+#: Odometry messages that are kept where none is to be dropped.
+_MAX_KEPT = 10_000
+#: Turns z, along which cylinders and cones stand, to x and y.
+_STANDING = np.array(
+    [
+        [[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]],
+        [[0.0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0], [0, 0, 0, 1]],
+        np.eye(4),
+    ]
+)
+
+
+class _Shaped(TopicDisplay):
+    """A display of poses as arrows or axes."""
+
+    shape = Setting("Shape", "enum", "Arrow", "How a pose is drawn.", choices=["Arrow", "Axes"])
+    color = Setting("Color", "color", "#ff1900", "Of arrows.")
+    alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
+    shaftLength = Setting("Shaft Length", "float", 1.0, "Of arrows, in metres.", min=0.0)
+    shaftRadius = Setting("Shaft Radius", "float", 0.05, "Of arrows, in metres.", min=0.0)
+    headLength = Setting("Head Length", "float", 0.3, "Of arrows, in metres.", min=0.0)
+    headRadius = Setting("Head Radius", "float", 0.1, "Of arrows, in metres.", min=0.0)
+    axesLength = Setting("Axes Length", "float", 1.0, "In metres.", min=0.0)
+    axesRadius = Setting("Axes Radius", "float", 0.1, "In metres.", min=0.0)
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self._arrows, self._axes = ArrowShapes(self), AxesShapes(self)
+        #: In the fixed frame, the oldest first.
+        self._poses: list[NDArray[np.float64]] = []
+        super().__init__(parent, runtime)
+
+    def preparer(self) -> Callable[[Any], Any]:
+        """Return the function that reads the pose."""
+        return _read_pose
+
+    def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:  # noqa: ARG002
+        """Show a pose."""
+        self._poses = [pose @ data]
+        self._draw()
+
+    def _draw(self) -> None:
+        self.root.add(self._arrows, self._axes)
+        self._restyle()
+
+    def _restyle(self) -> None:
+        poses = np.array(self._poses).reshape(-1, 4, 4)
+        none = poses[:0]
+        self._arrows.set_arrows(
+            poses if self.shape == "Arrow" else none,
+            (self.shaftLength, 2 * self.shaftRadius),
+            (self.headLength, 2 * self.headRadius),
+            (*rgb_of(self.color), self.alpha),
+        )
+        self._axes.set_axes(
+            poses if self.shape == "Axes" else none, self.axesLength, self.axesRadius, self.alpha
+        )
+
+    def reset(self) -> None:
+        """Drop all poses."""
+        super().reset()
+        self._poses = []
+
+
+def _read_pose(message: Any) -> NDArray[np.float64]:
+    return matrix_of(message.pose)
+
+
+class PoseDisplay(_Shaped):
+    """A ``geometry_msgs/PoseStamped``. See its page in ``docs/scene.md``."""
+
+    TYPE = "Pose"
+    MESSAGES = ("geometry_msgs/PoseStamped",)
+
+
+class PoseArrayDisplay(TopicDisplay):
+    """The poses of a ``geometry_msgs/PoseArray``. See its page in ``docs/scene.md``."""
+
+    TYPE = "PoseArray"
+    MESSAGES = ("geometry_msgs/PoseArray",)
+    EAGER = True
+
+    shape = Setting(
+        "Shape", "enum", "Arrow (Flat)", "How poses are drawn.",
+        choices=["Arrow (Flat)", "Arrow (3D)", "Axes"],
+    )  # fmt: skip
+    color = Setting("Color", "color", "#ff1900", "Of arrows.")
+    alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
+    arrowLength = Setting("Arrow Length", "float", 0.3, "Of flat arrows, in metres.", min=0.0)
+    headRadius = Setting("Head Radius", "float", 0.03, "Of arrows, in metres.", min=0.0)
+    headLength = Setting("Head Length", "float", 0.07, "Of arrows, in metres.", min=0.0)
+    shaftRadius = Setting("Shaft Radius", "float", 0.01, "Of arrows, in metres.", min=0.0)
+    shaftLength = Setting("Shaft Length", "float", 0.23, "Of arrows, in metres.", min=0.0)
+    axesLength = Setting("Axes Length", "float", 0.3, "In metres.", min=0.0)
+    axesRadius = Setting("Axes Radius", "float", 0.01, "In metres.", min=0.0)
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self._flat, self._arrows, self._axes = Lines(), ArrowShapes(self), AxesShapes(self)
+        self._flat.owner = self
+        self._poses: NDArray[np.float64] = np.zeros((0, 4, 4))
+        super().__init__(parent, runtime)
+
+    def preparer(self) -> Callable[[Any], Any]:
+        """Return the function that reads poses."""
+        return _read_poses
+
+    def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:  # noqa: ARG002
+        """Show poses."""
+        self._poses = data
+        for part in (self._flat, self._arrows, self._axes):
+            part.pose = pose
+        self.root.add(self._flat, self._arrows, self._axes)
+        self._restyle()
+
+    def _restyle(self) -> None:
+        poses, none = self._poses, self._poses[:0]
+        colour = (*rgb_of(self.color), self.alpha)
+        self._flat.set_segments(
+            _flat_arrows(poses if self.shape == "Arrow (Flat)" else none, self.arrowLength), colour
+        )
+        self._arrows.set_arrows(
+            poses if self.shape == "Arrow (3D)" else none,
+            (self.shaftLength, 2 * self.shaftRadius),
+            (self.headLength, 2 * self.headRadius),
+            colour,
+        )
+        self._axes.set_axes(
+            poses if self.shape == "Axes" else none, self.axesLength, self.axesRadius, self.alpha
+        )
+
+
+def _read_poses(message: Any) -> NDArray[np.float64]:
+    count = len(message.poses)
+    if count > _MAX_POSES:
+        raise Error(f"poses: {count} are more than the {_MAX_POSES} that are drawn")
+    rows = np.empty((count, 7))
+    for at, pose in enumerate(message.poses):
+        p, q = pose.position, pose.orientation
+        rows[at] = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+    bad = ~np.isfinite(rows).all(axis=1)
+    if bad.any():
+        raise Error(f"poses[{int(np.argmax(bad))}] has a number that is not finite")
+    return poses_matrices(rows[:, :3], rows[:, 3:])
+
+
+def _flat_arrows(poses: NDArray[np.float64], length: float) -> NDArray[np.float64]:
+    """Return three lines for each pose, (3 n, 2, 3): a shaft along x, and a head."""
+    tip = np.array([length, 0, 0, 1])
+    sides = [[0, 0, 0, 1], *([0.75 * length, s * 0.2 * length, 0, 1] for s in (-1, 1))]
+    lines = np.array([[start, tip] for start in sides])
+    placed: NDArray[np.float64] = np.einsum("nij,lej->nlei", poses, lines)
+    return placed[..., :3].reshape(-1, 2, 3)
+
+
+class _Covariance(NamedTuple):
+    """A pose with its covariance.
+
+    Attributes:
+        pose: In its frame, 4 x 4.
+        covariance: Of x, y, z (m2) and rotations around x, y, z (rad2), 6 x 6.
+    """
+
+    pose: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+
+
+def _read_covariance(message: Any) -> _Covariance:
+    part = message.pose
+    covariance = np.array(part.covariance, np.float64).reshape(6, 6)
+    if not np.isfinite(covariance).all():
+        covariance = np.zeros((6, 6))
+    return _Covariance(matrix_of(part.pose), covariance)
+
+
+class _WithCovariance(_Shaped):
+    """A display of poses with covariances."""
+
+    covariance = Setting("Covariance", "bool", True, "Whether covariances are shown.")
+    covariancePosition = Setting("Covariance/Position", "bool", True, "Of positions.")
+    positionColor = Setting("Covariance/Position/Color", "color", "#cc33cc", "Of the ellipsoid.")
+    positionAlpha = Setting("Covariance/Position/Alpha", "float", 0.3, "Opacity.", min=0.0, max=1.0)
+    positionScale = Setting(
+        "Covariance/Position/Scale", "float", 1.0, "Standard deviations.", min=0.0
+    )
+    covarianceOrientation = Setting("Covariance/Orientation", "bool", True, "Of orientations.")
+    orientationFrame = Setting(
+        "Covariance/Orientation/Frame", "enum", "Local", "Whose axes rotations are around.",
+        choices=["Local", "Fixed"],
+    )  # fmt: skip
+    orientationColorStyle = Setting(
+        "Covariance/Orientation/Color Style", "enum", "Unique", "One colour, or the axes' colours.",
+        choices=["Unique", "RGB"],
+    )  # fmt: skip
+    orientationColor = Setting("Covariance/Orientation/Color", "color", "#ffff7f", "Of the shapes.")
+    orientationAlpha = Setting(
+        "Covariance/Orientation/Alpha", "float", 0.5, "Opacity.", min=0.0, max=1.0
+    )
+    orientationOffset = Setting(
+        "Covariance/Orientation/Offset", "float", 1.0, "From the pose, in metres.", min=0.0
+    )
+    orientationScale = Setting(
+        "Covariance/Orientation/Scale", "float", 1.0, "Standard deviations.", min=0.0
+    )
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        #: Beside each pose: its covariance.
+        self._covariances: list[NDArray[np.float64]] = []
+        self._ellipsoids, self._discs, self._cones = Mesh(SPHERE), Mesh(CYLINDER), Mesh(CONE)
+        self._uncertain = Group(self._ellipsoids, self._discs, self._cones)
+        super().__init__(parent, runtime)
+
+    def preparer(self) -> Callable[[Any], Any]:
+        """Return the function that reads pose and covariance."""
+        return _read_covariance
+
+    def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:  # noqa: ARG002
+        """Show a pose with its covariance."""
+        self._poses, self._covariances = [pose @ data.pose], [data.covariance]
+        self._draw()
+
+    def _draw(self) -> None:
+        self.root.add(self._uncertain)
+        super()._draw()
+
+    def reset(self) -> None:
+        """Drop all poses."""
+        super().reset()
+        self._covariances = []
+
+    def _restyle(self) -> None:
+        super()._restyle()
+        pairs = list(zip(self._poses, self._covariances, strict=True)) if self.covariance else []
+        ellipsoids = [
+            found
+            for pose, covariance in pairs
+            if self.covariancePosition
+            for found in (_ellipsoid(pose, covariance[:3, :3], self.positionScale),)
+            if found is not None
+        ]
+        self._ellipsoids.set_instances(
+            np.array(ellipsoids).reshape(-1, 4, 4),
+            (*rgb_of(self.positionColor), self.positionAlpha),
+        )
+        discs: list[tuple[int, NDArray[np.float64]]] = []
+        cones: list[NDArray[np.float64]] = []
+        for pose, covariance in pairs if self.covarianceOrientation else ():
+            whole = pose.copy()
+            if self.orientationFrame == "Fixed":
+                whole[:3, :3] = np.eye(3)
+            turns = covariance[3:, 3:]
+            if not turns[:2, :2].any() and turns[2, 2] > 0:
+                cones.append(self._cone(whole, turns[2, 2]))
+            else:
+                discs += self._discs_of(whole, turns)
+        alpha = self.orientationAlpha
+        unique = (*rgb_of(self.orientationColor), alpha)
+        axes = [(1, 0, 0, alpha), (0, 1, 0, alpha), (0, 0, 1, alpha)]
+        rgb = self.orientationColorStyle == "RGB"
+        colours = [axes[axis] if rgb else unique for axis, _ in discs] or [unique]
+        self._discs.set_instances(np.array([m for _, m in discs]).reshape(-1, 4, 4), colours)
+        self._cones.set_instances(np.array(cones).reshape(-1, 4, 4), axes[2] if rgb else unique)
+
+    def _cone(self, pose: NDArray[np.float64], variance: float) -> NDArray[np.float64]:
+        """Return a flat cone in front of a pose: where a robot in the plane may be heading."""
+        reach = self.orientationOffset
+        angle = min(math.sqrt(variance) * self.orientationScale, math.radians(85))
+        wide = 2 * reach * math.tan(angle)
+        # From its tip at the pose to its base at the offset; 1 mm high.
+        local = np.diag([1e-3, wide, -reach, 1.0])
+        local[2, 3] = reach
+        # Wide in y, flat in z: the shape stands along z, with x and y exchanged.
+        placed: NDArray[np.float64] = pose @ _STANDING[0] @ local[[1, 0, 2, 3]][:, [1, 0, 2, 3]]
+        return placed
+
+    def _discs_of(
+        self, pose: NDArray[np.float64], turns: NDArray[np.float64]
+    ) -> list[tuple[int, NDArray[np.float64]]]:
+        """Return a flat ellipse for each axis: where its end at the offset may be."""
+        reach, found = self.orientationOffset, []
+        for axis in range(3):
+            u, v = (axis + 1) % 3, (axis + 2) % 3
+            # The end of axis x moves along y by a rotation around z, along -z by one around y.
+            along = np.array([[turns[v, v], -turns[v, u]], [-turns[u, v], turns[u, u]]])
+            values, vectors = np.linalg.eigh((along + along.T) / 2)
+            size = 2 * np.sqrt(np.maximum(values, 0)) * self.orientationScale * reach
+            if not size.any():
+                continue
+            limit = 2 * reach * math.tan(math.radians(85))
+            local = np.eye(4)
+            local[:2, :2] = vectors * np.clip(size, 1e-4, limit)
+            local[2, 2], local[2, 3] = 1e-3, reach
+            found.append((axis, pose @ _STANDING[axis] @ local))
+        return found
+
+
+def _ellipsoid(
+    pose: NDArray[np.float64], covariance: NDArray[np.float64], scale: float
+) -> NDArray[np.float64] | None:
+    """Return the matrix of the sphere that becomes the ellipsoid of a number of deviations."""
+    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
+    size = 2 * np.sqrt(np.maximum(values, 0)) * scale
+    if not size.any():
+        return None
+    local = np.eye(4)
+    # A flat one, of a robot in the plane, is still seen.
+    local[:3, :3] = vectors * np.maximum(size, 1e-3)
+    placed: NDArray[np.float64] = pose @ local
+    return placed
+
+
+class PoseWithCovarianceDisplay(_WithCovariance):
+    """A ``geometry_msgs/PoseWithCovarianceStamped``. See its page in ``docs/scene.md``."""
+
+    TYPE = "PoseWithCovariance"
+    MESSAGES = ("geometry_msgs/PoseWithCovarianceStamped",)
+
+
+class OdometryDisplay(_WithCovariance):
+    """The way of a ``nav_msgs/Odometry``. See its page in ``docs/scene.md``."""
+
+    TYPE = "Odometry"
+    MESSAGES = ("nav_msgs/Odometry",)
+
+    positionTolerance = Setting(
+        "Position Tolerance", "float", 0.1, "Metres between two poses that are shown.", min=0.0
+    )
+    angleTolerance = Setting(
+        "Angle Tolerance", "float", 0.1, "Radians between two poses that are shown.", min=0.0
+    )
+    keep = Setting("Keep", "int", 100, "How many poses are shown; 0 for all.", min=0)
+
+    #: RViz has the look of a pose below its shape here.
+    SETTINGS: ClassVar[dict[str, Setting]] = {}
+
+    def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:  # noqa: ARG002
+        """Show a pose beside earlier ones, if the robot has moved."""
+        new = pose @ data.pose
+        if self._poses and self._is_near(self._poses[-1], new):
+            return
+        self._poses.append(new)
+        self._covariances.append(data.covariance)
+        most = min(self.keep or _MAX_KEPT, _MAX_KEPT)
+        del self._poses[:-most], self._covariances[:-most]
+        self._draw()
+
+    def _is_near(self, before: NDArray[np.float64], after: NDArray[np.float64]) -> bool:
+        moved = float(np.linalg.norm(after[:3, 3] - before[:3, 3]))
+        cosine = (np.trace(before[:3, :3].T @ after[:3, :3]) - 1) / 2
+        turned = math.acos(min(max(float(cosine), -1.0), 1.0))
+        return bool(moved < self.positionTolerance and turned < self.angleTolerance)
+
+    def on_fixed_frame(self) -> None:
+        """Begin anew: earlier poses were placed in the former fixed frame."""
+        self.reset()
+        super().on_fixed_frame()
+
+
+_BELOW_SHAPE = (
+    *("Color", "Alpha", "Shaft Length", "Shaft Radius", "Head Length", "Head Radius"),
+    *("Axes Length", "Axes Radius"),
+)
+OdometryDisplay.SETTINGS = {
+    f"Shape/{path}" if path in _BELOW_SHAPE else path: setting
+    for path, setting in {**_WithCovariance.SETTINGS, **OdometryDisplay.SETTINGS}.items()
+}
