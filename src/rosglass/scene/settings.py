@@ -13,7 +13,8 @@ from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.qml.properties import Writable
 from rosglass.qt import QtGui
-from rosglass.rviz.property_values import KINDS, shown
+from rosglass.rviz.property_values import KINDS
+from rosglass.scene.rviz_formats import read_color, setting_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -33,6 +34,8 @@ _QT_TYPES: dict[str, type] = {
     "vector": QtGui.QVector3D,
     "quaternion": QtGui.QQuaternion,
 }
+#: Kinds whose values are text.
+_TEXTS = {"enum", "frame", "path", "string", "topic"}
 
 
 def rgb_of(colour: QtGui.QColor) -> tuple[float, float, float]:
@@ -88,12 +91,9 @@ class Setting(Writable[Any]):
             Error: The setting cannot hold it.
         """
         if self.kind.NAME == "color" and isinstance(saved, str) and ";" in saved:
-            numbers = [part.strip() for part in saved.split(";")]
-            if len(numbers) != 3 or not all(n.isdigit() and int(n) < 256 for n in numbers):
-                raise Error(f"expected a colour, e.g. '255; 128; 0', got {shown(saved)}")
-            return QtGui.QColor(*map(int, numbers))
-        if self.kind.NAME == "enum" and not isinstance(saved, str):
-            saved = str(saved)  # a channel that YAML takes for a number
+            return QtGui.QColor.fromRgbF(*read_color(saved, self.path))
+        if self.kind.NAME in _TEXTS and isinstance(saved, (bool, int, float)):
+            saved = setting_text(saved)  # a name that YAML takes for a number
         return self.kind.restore(saved)
 
     def saved(self, value: Any) -> Any:
