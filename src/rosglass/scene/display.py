@@ -24,10 +24,11 @@ from rosglass.qml.element import TopicElement
 from rosglass.qml.properties import ReadOnly, Writable, report
 from rosglass.qt import Signal, Slot, is_alive
 from rosglass.scene.drawing import Group, instance_matrix
+from rosglass.scene.rviz_formats import TopicSetting, read_topic, write_topic
 from rosglass.scene.settings import Configurable, Setting
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -54,15 +55,17 @@ _log = logging.getLogger("rosglass.scene")
 #: RViz's word for the fixed frame in settings that name a frame.
 FIXED_FRAME = "<Fixed Frame>"
 _LEVELS = ("ok", "warn", "error")
-#: QoS policies by RViz's words; "Best Available", which matches every publisher, is ours.
+#: The policy that matches every publisher; RViz does not have it.
+BEST_AVAILABLE = "Best Available"
+#: QoS policies by RViz's words.
 _RELIABILITY = {
-    "Best Available": Reliability.BEST_AVAILABLE,
+    BEST_AVAILABLE: Reliability.BEST_AVAILABLE,
     "Best Effort": Reliability.BEST_EFFORT,
     "Reliable": Reliability.RELIABLE,
     "System Default": Reliability.SYSTEM_DEFAULT,
 }
 _DURABILITY = {
-    "Best Available": Durability.BEST_AVAILABLE,
+    BEST_AVAILABLE: Durability.BEST_AVAILABLE,
     "Volatile": Durability.VOLATILE,
     "Transient Local": Durability.TRANSIENT_LOCAL,
     "System Default": Durability.SYSTEM_DEFAULT,
@@ -143,6 +146,8 @@ class Display(Configurable, TopicElement):
         self._name = ""
         #: What a ``.rviz`` file had for it.
         self.saved: dict[str, Any] = {}
+        #: The group that it is in; None for none.
+        self.group: Display | None = None
         super().__init__(parent, runtime)
 
     @property
@@ -174,7 +179,7 @@ class Display(Configurable, TopicElement):
         """Start to be shown in a scene; called by the scene."""
         self.scene = scene
         self.root.visible = self.enabled
-        scene.root.add(self.root)
+        (scene.root if self.group is None else self.group.root).add(self.root)
         self._schedule()
         self._restyle()
 
@@ -184,11 +189,20 @@ class Display(Configurable, TopicElement):
         self.root.clear()
         self.scene = None
 
+    @property
+    def shown(self) -> bool:
+        """Whether it and its groups are enabled."""
+        return bool(self.enabled) and (self.group is None or self.group.shown)
+
     def _on_enabled(self) -> None:
         self.root.visible = self.enabled
         if not self.enabled:
             self.clear_status()
         self._restyle()
+        self._schedule()
+
+    def on_group_enabled(self) -> None:
+        """Receive something, or nothing any more, as the group is shown or hidden."""
         self._schedule()
 
     # -- for subclasses --------------------------------------------------------------------------
@@ -369,11 +383,11 @@ class TopicDisplay(Display):
         then="_schedule",
     )  # fmt: skip
     reliability = Setting(
-        "Topic/Reliability Policy", "enum", "Best Available", "What publishers have to offer.",
+        "Topic/Reliability Policy", "enum", BEST_AVAILABLE, "What publishers have to offer.",
         choices=list(_RELIABILITY), then="_schedule",
     )  # fmt: skip
     durability = Setting(
-        "Topic/Durability Policy", "enum", "Best Available", "Whether earlier messages are wanted.",
+        "Topic/Durability Policy", "enum", BEST_AVAILABLE, "Whether earlier messages are wanted.",
         choices=list(_DURABILITY), then="_schedule",
     )  # fmt: skip
 
@@ -388,6 +402,37 @@ class TopicDisplay(Display):
         self._last: _Item | None = None
         self._arrived = 0.0
         super().__init__(parent, runtime)
+
+    # -- files -----------------------------------------------------------------------------------
+
+    def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
+        """Take the settings of a file of either RViz, which write topics differently."""
+        refused = super().load_settings({k: v for k, v in saved.items() if k != "Topic"})
+        try:
+            given = read_topic(saved)
+            self.set("Topic", given.name)
+            if given.depth:
+                self.depth = min(max(given.depth, 1), 1000)
+            self.reliability = given.reliability or self.reliability
+            self.durability = given.durability or self.durability
+        except Error as error:
+            refused.append(str(error))
+        return refused
+
+    def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
+        """Return the settings for a file of one RViz."""
+        kept = super().save_settings({k: v for k, v in (older or {}).items() if k != "Topic"})
+        topic = dict(older or {}).get("Topic")
+        kept.pop("Topic", None)
+        if topic is not None:
+            kept["Topic"] = topic
+        # What is ours alone, no RViz can read.
+        policies = [
+            value if value != BEST_AVAILABLE else None
+            for value in (self.reliability, self.durability)
+        ]
+        write_topic(kept, TopicSetting(self.topic, self.depth, *policies), ros)
+        return kept
 
     # -- the subscription ------------------------------------------------------------------------
 
@@ -408,7 +453,7 @@ class TopicDisplay(Display):
 
     def _wanted(self) -> tuple[Any, ...] | None:
         node = self.node
-        if node is None or not self.enabled or not self._topic or self.scene is None:
+        if node is None or not self.shown or not self._topic or self.scene is None:
             return None
         self._resolved = self._resolve(self._topic)
         if not self._resolved:

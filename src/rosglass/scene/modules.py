@@ -28,6 +28,7 @@ from rosglass.scene.displays.pose import (
 from rosglass.scene.displays.tf import TFDisplay
 from rosglass.scene.scene import Scene
 from rosglass.scene.scene_view import SceneView
+from rosglass.scene.view_config import GroupDisplay
 
 __all__ = ["DISPLAYS", "register"]
 
@@ -50,7 +51,7 @@ DISPLAYS = (
     TwistStampedDisplay,
     WrenchStampedDisplay,
 )
-Scene.TYPES.update({display.TYPE: display for display in DISPLAYS})
+Scene.TYPES.update({display.TYPE: display for display in (*DISPLAYS, GroupDisplay)})
 
 
 @cache

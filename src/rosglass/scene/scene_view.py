@@ -17,13 +17,17 @@ from rosglass.scene.events import Button, Drag, Modifier, Touch, Wheel
 from rosglass.scene.picking import pick
 from rosglass.scene.renderer import Frame, SceneRenderer
 from rosglass.scene.scene import Scene
+from rosglass.scene.view_config import collect_config, load_config
 from rosglass.scene.views import create_view
 
 if TYPE_CHECKING:
+    import os
+
     from rosglass.qml.runtime import Runtime
     from rosglass.scene.camera import Camera
     from rosglass.scene.display import Display
     from rosglass.scene.picking import Hit
+    from rosglass.scene.rviz_config import RvizConfig
     from rosglass.scene.views import ViewController
 
 __all__ = ["NO_GPU", "SceneView"]
@@ -67,7 +71,10 @@ class SceneView(QQuickRhiItem):
         self.scene.changed.connect(self.update)
         self.scene.placed.connect(self._on_placed)
         self.scene.fixedFrameChanged.connect(self.fixedFrameChanged)
+        #: The config that was loaded; None before.
+        self.config: RvizConfig | None = None
         self._view: ViewController = create_view("Orbit")
+        self._view.on_change = self.camera_moved
         self._moved_at = -1.0
         self._still = QtCore.QTimer(self)
         self._still.setSingleShot(True)
@@ -160,12 +167,47 @@ class SceneView(QQuickRhiItem):
             Error: There is no such type.
         """
         made = create_view(name)
-        if type(made) is type(self._view):
-            return
-        made.mimic(self._view)
-        self._view = made
+        if type(made) is not type(self._view):
+            made.mimic(self._view)
+            self.show_view(made)
+
+    def show_view(self, view: ViewController) -> None:
+        """Look through another view."""
+        self._view.on_change = None
+        self._view = view
+        view.on_change = self.camera_moved
+        self._on_placed()
         self.viewChanged.emit()
         self.camera_moved()
+
+    # -- config files ----------------------------------------------------------------------------
+
+    def load_config(self, path: str | os.PathLike[str]) -> list[str]:
+        """Replace what is shown by an RViz config (``.rviz``).
+
+        Returns:
+            What was left out, a line each.
+
+        Raises:
+            Error: It cannot be read; nothing has changed then.
+        """
+        return load_config(self, path)
+
+    def save_config(self, path: str | os.PathLike[str] = "") -> None:
+        """Write what is shown into an RViz config.
+
+        Args:
+            path: The file; by default the one that was loaded.
+
+        Raises:
+            Error: It cannot be written, or none was loaded.
+        """
+        config = collect_config(self)
+        if not (path or config.source):
+            raise Error("no config file is loaded; say where to save it")
+        config.save(path or config.source)
+        config.source = str(path or config.source)
+        self.config = config
 
     def camera(self) -> Camera:
         """Return the camera of the next picture; its pixels are units of this item."""

@@ -180,11 +180,16 @@ class Configurable:
                 refused.append(f"{path}: {error}")
         return refused
 
-    def save_settings(self, older: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    def save_settings(
+        self,
+        older: Mapping[str, Any] | None = None,
+        ros: int = 2,  # noqa: ARG002 - for subclasses
+    ) -> dict[str, Any]:
         """Return the settings as a ``.rviz`` file keeps them.
 
         Args:
             older: What a file had; what is not a setting stays in it as it is.
+            ros: The RViz that the file is for, 1 or 2.
         """
         kept: dict[str, Any] = dict(older or {})
         for path, setting in self.SETTINGS.items():

@@ -115,9 +115,9 @@ class TFDisplay(Display):
                     self._switched[str(name)] = value
         return super().load_settings(saved)
 
-    def save_settings(self, older: Any = None) -> dict[str, Any]:
+    def save_settings(self, older: Any = None, ros: int = 2) -> dict[str, Any]:
         """Return the settings for a file, with the frames that are shown."""
-        kept = super().save_settings(older)
+        kept = super().save_settings(older, ros)
         frames = dict(kept.get("Frames") or {})
         for name in [*self.frames, *self._switched]:
             frames[name] = {"Value": self.is_frame_enabled(name)}

@@ -1,0 +1,186 @@
+"""RViz's config files in a view: what others have published, and what we write."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from rosglass.errors import Error
+from rosglass.scene.rviz_config import RvizConfig
+
+if TYPE_CHECKING:
+    from conftest import SceneBench
+
+FILES = sorted((Path(__file__).parents[1] / "unit/scene/rviz_configs").glob("*.rviz"))
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_published_configs_are_shown_and_come_back(
+    bench: SceneBench, file: Path, tmp_path: Path
+) -> None:
+    view = bench.load()
+    notes = view.load_config(file)
+    before = RvizConfig.load(file)
+    shown = [(one.name, one.enabled) for one in before.walk()]
+    assert [(one.name, one.enabled) for one in view.scene.displays] == shown
+    assert view.scene.fixed_frame == (before.fixed_frame.lstrip("/") or "map")
+    bench.picture()
+    assert view.problem == ""
+    for note in notes:
+        assert note.startswith(("display '", "view ", str(file))), note
+    saved = tmp_path / "saved.rviz"
+    view.save_config(saved)
+    after = RvizConfig.load(saved)
+    assert [(one.class_id, one.name, one.enabled) for one in after.walk()] == [
+        (one.class_id, one.name, one.enabled) for one in before.walk()
+    ]
+    # Nothing that the file had is lost: neither displays, nor their settings, nor panels.
+    for old, new in zip(before.walk(), after.walk(), strict=True):
+        assert set(old.settings) <= set(new.settings), old.name
+    assert after.panels == before.panels
+    assert after.tools == before.tools
+    # Loaded and saved once more, it is the same file.
+    view.load_config(saved)
+    view.save_config()
+    assert RvizConfig.load(saved) == after
+
+
+def test_settings_come_from_a_file_and_go_into_it(bench: SceneBench, tmp_path: Path) -> None:
+    file = tmp_path / "grid.rviz"
+    file.write_text(
+        """
+Visualization Manager:
+  Class: ""
+  Displays:
+    - Class: rviz_default_plugins/Grid
+      Name: Floor
+      Enabled: true
+      Cell Size: 2.5
+      Color: 255; 0; 255
+      Line Style: {Line Width: 0.05, Value: Billboards}
+      Offset: {X: 1, Y: 2, Z: 3}
+      Something New: 7
+    - Class: rviz_default_plugins/Path
+      Name: Plan
+      Enabled: true
+      Topic: {Value: /plan, Depth: 7, Reliability Policy: Reliable, Durability Policy: Volatile}
+  Global Options: {Fixed Frame: odom, Background Color: 10; 20; 30}
+  Views: {Current: {Class: rviz_default_plugins/TopDownOrtho, Scale: 42}}
+"""
+    )
+    view = bench.load()
+    assert view.load_config(file) == []
+    grid, path = view.scene.displays
+    assert (grid.name, grid.cellSize, grid.lineStyle, grid.lineWidth) == (
+        "Floor",
+        2.5,
+        "Billboards",
+        0.05,
+    )
+    assert (grid.color.name(), grid.offset.z()) == ("#ff00ff", 3)
+    assert (path.topic, path.depth, path.reliability) == ("/plan", 7, "Reliable")
+    assert (view.view, view.fixedFrame) == ("TopDownOrtho", "odom")
+    assert tuple(bench.picture()[0, 0]) == (10, 20, 30)
+    grid.cellSize = 3.0
+    path.topic = "/other"
+    view.save_config()
+    saved = RvizConfig.load(file)
+    floor, plan = (one.settings for one in saved.displays)
+    assert floor["Cell Size"] == 3.0
+    assert floor["Something New"] == 7
+    assert floor["Line Style"] == {"Line Width": 0.05, "Value": "Billboards"}
+    assert plan["Topic"]["Value"] == "/other"
+    assert plan["Topic"]["Depth"] == 7
+    assert saved.current_view is not None
+    assert saved.current_view.settings["Scale"] == 42
+
+
+def test_a_new_view_is_written_for_either_rviz(bench: SceneBench, tmp_path: Path) -> None:
+    from rosglass.scene.view_config import collect_config
+
+    view = bench.load()
+    view.scene.add("Grid")
+    view.scene.add("MarkerArray" if "MarkerArray" in view.scene.TYPES else "Path", topic="/m")
+    with pytest.raises(Error, match="no config file is loaded; say where to save it"):
+        view.save_config()
+    for ros, package in ((1, "rviz"), (2, "rviz_default_plugins")):
+        config = collect_config(view, ros)
+        assert [one.class_id.partition("/")[0] for one in config.displays] == [package] * 2
+        file = tmp_path / f"new{ros}.rviz"
+        config.save(file)
+        assert view.load_config(file) == []
+        assert view.scene.displays[1].topic == "/m"
+        view.config = None
+
+
+def test_groups_hide_what_is_in_them(bench: SceneBench, tmp_path: Path) -> None:
+    file = tmp_path / "groups.rviz"
+    file.write_text(
+        """
+Visualization Manager:
+  Displays:
+    - Class: rviz_common/Group
+      Name: Planner
+      Enabled: false
+      Displays:
+        - {Class: rviz_default_plugins/Axes, Name: Inner, Enabled: true, Length: 2}
+        - {Class: moveit/Trajectory, Name: Arm, Enabled: true, Speed: 3}
+"""
+    )
+    view = bench.load()
+    (note,) = view.load_config(file)
+    assert note == "display 'Arm': rosglass has no moveit/Trajectory; it is kept as it is"
+    group, axes, arm = view.scene.displays
+    assert arm.statusLevel == "warn"
+    assert (axes.enabled, axes.shown) == (True, False)
+
+    def red() -> int:
+        return int((bench.picture() == (255, 0, 0)).all(axis=2).sum())
+
+    assert red() == 0
+    group.enabled = True
+    assert axes.shown
+    assert red() > 50
+    view.save_config()
+    (saved,) = RvizConfig.load(file).displays
+    assert [one.class_id for one in saved.displays] == [
+        "rviz_default_plugins/Axes",
+        "moveit/Trajectory",
+    ]
+    assert saved.displays[1].settings["Speed"] == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [("", "not an RViz config"), ("- a\n- b", "not an RViz config"), ("a: [", "expected")],
+)
+def test_a_file_that_is_none_changes_nothing(
+    bench: SceneBench, tmp_path: Path, text: str, error: str
+) -> None:
+    file = tmp_path / "bad.rviz"
+    file.write_text(text)
+    view = bench.load("AxesDisplay {}")
+    with pytest.raises(Error):
+        view.load_config(file)
+    assert len(view.scene.displays) == 1
+
+
+def test_values_that_do_not_fit_are_named_and_the_rest_is_taken(
+    bench: SceneBench, tmp_path: Path
+) -> None:
+    file = tmp_path / "values.rviz"
+    file.write_text(
+        """
+Visualization Manager:
+  Displays:
+    - {Class: rviz/Grid, Name: A, Enabled: true, Cell Size: wide, Alpha: 0.25, Color: 1; 2}
+"""
+    )
+    view = bench.load()
+    notes: Any = view.load_config(file)
+    assert len(notes) == 2
+    assert "display 'A': Cell Size: expected a finite number, got" in "\n".join(notes)
+    assert "Color: expected a colour, e.g. '255; 128; 0', got '1; 2'" in "\n".join(notes)
+    assert view.scene.displays[0].alpha == 0.25
