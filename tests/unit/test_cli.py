@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -10,9 +11,10 @@ import pytest
 
 import rosglass
 from rosglass.cli import main
-from rosglass.cli.network import ask, interfaces, is_loopback
-from rosglass.cli.program import COMMANDS, _split, build_parser
-from rosglass.cli.values import split_type
+from rosglass.cli.arguments import COMMANDS
+from rosglass.cli.messages import split_type
+from rosglass.cli.network import interfaces, is_loopback, router_problem
+from rosglass.cli.program import _split, build_parser
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -33,6 +35,39 @@ def test_each_command_has_help(command: str, capsys: pytest.CaptureFixture[str])
     with pytest.raises(SystemExit, match="0"):
         main([command, "--help"])
     assert f"usage: rosglass {command}" in capsys.readouterr().out
+
+
+def test_each_subcommand_has_a_function_in_the_module_of_its_command() -> None:
+    modules = {command: f"rosglass.cli.{command.replace('-', '_')}" for command in COMMANDS}
+    done = run_python(
+        f"import importlib, json\nprint(json.dumps({{command: importlib.import_module(name).__all__"
+        f" for command, name in {modules!r}.items()}}))",
+        stdout=subprocess.PIPE,
+    )
+    functions = json.loads(done.stdout)
+    for command in COMMANDS:
+        [commands] = build_parser(command)._subparsers._group_actions
+        parsers = [commands.choices[command]]
+        if parsers[0]._subparsers is not None:
+            [subcommands] = parsers[0]._subparsers._group_actions
+            parsers = list(subcommands.choices.values())
+        handlers = {parser.get_default("handler") for parser in parsers}
+        assert handlers <= set(functions[command]), command
+
+
+def test_help_and_options_load_no_more_than_the_parser(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("ROS_MASTER_URI", raising=False)
+    code = (
+        "import sys\n"
+        "from rosglass.cli.program import build_parser\n"
+        "build_parser('*')\n"
+        "print(sorted(name for name in sys.modules if name.startswith('rosglass.')), end='')"
+    )
+    done = run_python(code, stdout=subprocess.PIPE)
+    loaded = ["arguments", "output", "parser", "program"]
+    assert done.stdout == str(
+        ["rosglass.cli", *(f"rosglass.cli.{name}" for name in loaded), "rosglass.errors"]
+    )
 
 
 @pytest.mark.parametrize("arguments", [[], ["fly"], ["robot", "--no-such-option"]])
@@ -185,7 +220,7 @@ def test_ctrl_c_again_cuts_short_what_ends() -> None:
 
 
 def test_knocking_at_a_router(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert ask("zenoh://127.0.0.1:1", 1.0)[0] == (
+    assert router_problem("zenoh://127.0.0.1:1", 1.0)[0] == (
         "127.0.0.1 is there, but nothing listens on its port 1"
     )
 
@@ -194,7 +229,7 @@ def test_knocking_at_a_router(monkeypatch: pytest.MonkeyPatch) -> None:
             raise error
 
         monkeypatch.setattr("rosglass.cli.network.socket.create_connection", connect)
-        return ask("zenoh://robot", 1.0)
+        return router_problem("zenoh://robot", 1.0)
 
     assert "rosglass router --open" in fails(ConnectionRefusedError())[1]
     assert "firewall pass TCP port 7447" in fails(TimeoutError())[1]

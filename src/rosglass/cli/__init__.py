@@ -1,4 +1,4 @@
-"""The ``rosglass`` command: one module per subcommand, imported only when it is used."""
+"""The ``rosglass`` command: a module per command, imported once the command line is parsed."""
 
 # Nothing is imported before main() can handle Ctrl-C; type checkers accept this name.
 TYPE_CHECKING = False
@@ -17,25 +17,27 @@ def main(argv: "Sequence[str] | None" = None) -> int:
         process at once.
     """
     try:
-        import signal
+        import signal  # noqa: PLC0415
 
         # Modules in C swallow the KeyboardInterrupt that is raised in them, or abort the process.
         # `run` restores it for commands that do not load Qt.
-        if signal.getsignal(signal.SIGINT) is signal.default_int_handler and _is_main_thread():
-            signal.signal(signal.SIGINT, end_at_once)
-            try:
-                from rosglass.cli.program import run
+        replaced = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        try:
+            if replaced:
+                signal.signal(signal.SIGINT, end_at_once)
+        except ValueError:  # only the main thread may
+            replaced = False
+        try:
+            from rosglass.cli.program import run  # noqa: PLC0415 - after Ctrl-C is handled
 
-                return run(argv)
-            finally:
+            return run(argv)
+        finally:
+            if replaced:
                 signal.signal(signal.SIGINT, signal.default_int_handler)
-        from rosglass.cli.program import run
-
-        return run(argv)
     except BaseException as error:
         if isinstance(error, SystemExit) or not is_interrupt(error):
             raise
-        import signal
+        import signal  # noqa: PLC0415
 
         # Pressing it again cuts short whatever still has to end.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
@@ -44,15 +46,9 @@ def main(argv: "Sequence[str] | None" = None) -> int:
 
 def end_at_once(*_: object) -> None:
     """End the process as by Ctrl-C; a signal handler."""
-    import os
+    import os  # noqa: PLC0415
 
     os._exit(130)
-
-
-def _is_main_thread() -> bool:
-    import threading
-
-    return threading.current_thread() is threading.main_thread()
 
 
 def is_interrupt(error: "BaseException | None") -> bool:

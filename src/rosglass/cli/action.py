@@ -5,32 +5,31 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from rosglass.cli.completion import complete
 from rosglass.cli.connecting import (
     End,
-    add_connection_options,
+    await_graph,
     connect,
+    explained_wait,
     find,
+    is_ros1,
     note_invalid_names,
-    settle,
-    telling,
+    spelled,
     wait,
 )
-from rosglass.cli.endpoints import describe
-from rosglass.cli.output import (
-    Style,
-    add_output_options,
+from rosglass.cli.endpoints import describe, print_names
+from rosglass.cli.messages import (
     fields,
-    note,
+    parse_fields,
     print_json,
+    split_type,
     template,
     to_json,
     to_yaml,
 )
-from rosglass.cli.subcommands import Subcommands
-from rosglass.cli.values import parse_fields, split_type
-from rosglass.cli.worlds import is_ros1, spelled
+from rosglass.cli.output import Style, note
+from rosglass.comm import IMMEDIATE, GoalStatus
 from rosglass.comm.names import similar
+from rosglass.errors import Error, ServiceUnavailableError
 
 if TYPE_CHECKING:
     import argparse
@@ -38,69 +37,24 @@ if TYPE_CHECKING:
     from rosglass.comm import ClientGoal, EndpointInfo, Node
     from rosglass.messages import Message
 
-__all__ = ["configure", "run"]
+__all__ = ["info", "list_actions", "send"]
 
 #: Seconds to wait for the end of a cancelled goal.
 _CANCEL_TIMEOUT_S = 5.0
 
 
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare the subcommands for actions."""
-    add = Subcommands(parser).add
-    sub = add("list", "list actions", _list)
-    sub.add_argument("-t", "--types", "--show-types", action="store_true", help="show types")
-    _finish(sub)
-    sub = add("info", "show the servers and clients of an action", _info)
-    complete(sub.add_argument("action"), "actions")
-    _finish(sub)
-    summary = "send a goal and wait for its end; Ctrl-C cancels it"
-    sub = add("send", summary, _send, aliases=("send_goal",))
-    complete(sub.add_argument("action"), "actions")
-    complete(
-        sub.add_argument(
-            "rest", nargs="*", metavar="[TYPE] VALUES", help="goal as YAML: '{order: 5}'"
-        ),
-        "action_types",
-    )
-    sub.add_argument("-f", "--feedback", action="store_true", help="print feedback")
-    _finish(sub)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run the subcommand."""
-    return int(args.handler(args))
-
-
-def _finish(parser: argparse.ArgumentParser) -> None:
-    add_output_options(parser)
-    add_connection_options(parser)
-
-
-def _list(args: argparse.Namespace) -> int:
-    style = Style(args)
+def list_actions(args: argparse.Namespace) -> int:
+    """Print the actions."""
     with connect(args) as node:
-        settle(node)
+        await_graph(node)
         note_invalid_names(node)
         found = node.actions()
-    if args.json:
-        print_json([{"action": name, "types": [spelled(node, t) for t in types]}
-                    for name, types in found.items()])  # fmt: skip
-        return 0
-    for name, types in found.items():
-        print(
-            name
-            + (
-                style(f" [{', '.join(spelled(node, t) for t in types)}]", "dim")
-                if args.types
-                else ""
-            )
-        )
-    if not found:
-        note("there are no actions here; rosglass doctor looks why")
+    print_names(args, node, "action", found)
     return 0
 
 
-def _info(args: argparse.Namespace) -> int:
+def info(args: argparse.Namespace) -> int:
+    """Print the servers and clients of an action."""
     style = Style(args)
     with connect(args) as node:
         name = node.resolve(args.action)
@@ -136,33 +90,33 @@ def _ends(node: Node, name: str) -> tuple[list[EndpointInfo], list[EndpointInfo]
     return node.service_servers(service), node.service_clients(service)
 
 
-def _send(args: argparse.Namespace) -> int:
-    from rosglass.comm import IMMEDIATE, GoalStatus
-    from rosglass.errors import Error, ServiceUnavailableError
-
+def send(args: argparse.Namespace) -> int:
+    """Send a goal, and wait for its end; Ctrl-C cancels it."""
     type_name, text = split_type(args.rest)
     style = Style(args)
 
-    def show(feedback: Message) -> None:
+    def on_feedback(feedback: Message) -> None:
         found = fields(feedback)
         print(to_json({"feedback": found}) if args.json else _block("feedback", found), flush=True)
 
     with connect(args) as node:
         name = node.resolve(args.action)
         with node.create_action_client(name, type_name) as client:
-            with telling(lambda: client.problem):
+            with explained_wait(lambda: client.problem):
                 wait(node, lambda: client.type is not None, args.timeout)
             if client.type is None:
                 raise ServiceUnavailableError(client.problem or f"no node offers {name}")
-            kind = client.type.goal
+            goal_type = client.type.goal
             goal = client.send_goal(
-                parse_fields(text, kind.name, template(kind)),
-                on_feedback=show if args.feedback else None,
+                parse_fields(text, goal_type.name, template(goal_type)),
+                on_feedback=on_feedback if args.feedback else None,
                 executor=IMMEDIATE,
                 timeout=args.timeout,
             )
             printed, end = GoalStatus.PENDING, End()
-            with telling(lambda: client.problem if goal.status is GoalStatus.PENDING else ""):
+            with explained_wait(
+                lambda: client.problem if goal.status is GoalStatus.PENDING else ""
+            ):
                 while not goal.done.done():
                     if goal.status is not printed and not args.json:
                         printed = goal.status

@@ -1,114 +1,66 @@
-"""Tab completion of options, and of names in the graph and the library.
+"""``rosglass completion``: Tab completion of commands, options and names.
 
 The ``argcomplete`` package (PyPI; ROS 2's own tools use it) talks to the shell and the parser; this
-module provides the names.
+module provides the names in the graph and the library.
 """
 
 from __future__ import annotations
 
-import os
-import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+import argcomplete
+from argcomplete.shell_integration import shellcode
+
+import rosglass
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Iterable
 
-    from rosglass.comm import Node
+__all__ = ["complete_names", "offer", "run"]
 
-__all__ = ["SHELLS", "complete", "complete_files", "is_completing", "offer", "script"]
-
-SHELLS = ("bash", "zsh", "fish", "tcsh")
 #: Seconds that completion may take to discover the graph.
 _DISCOVERY_TIMEOUT_S = 1.5
+#: What is completed from the library -> the kind of its types; None for all.
+_TYPES = {"messages": "msg", "service_types": "srv", "action_types": "action", "interfaces": None}
 
 
-def complete(argument: argparse.Action, what: str) -> None:
-    """Enable Tab completion of an argument.
-
-    Args:
-        argument: As returned by ``add_argument``.
-        what: ``topics``, ``services``, ``actions``, ``nodes``, ``messages``, ``interfaces`` (all
-            kinds of types), ``service_types`` or ``action_types``.
-    """
-    argument.completer = _Completer(what)  # type: ignore[attr-defined]
-
-
-def complete_files(argument: argparse.Action, suffix: str) -> None:
-    """Enable Tab completion with folders, and files whose name ends in `suffix`."""
-    if is_completing():
-        from argcomplete.completers import FilesCompleter
-
-        argument.completer = FilesCompleter((suffix,))  # type: ignore[attr-defined]
-
-
-def is_completing() -> bool:
-    """Return whether the shell requests completions, instead of running a command."""
-    return "_ARGCOMPLETE" in os.environ
+def run(args: argparse.Namespace) -> int:
+    """Print the script by which a shell enables completion."""
+    print(shellcode(["rosglass"], shell=args.shell))
+    return 0
 
 
 def offer(parser: argparse.ArgumentParser) -> None:
     """Print the completions for the shell, and end the program."""
-    try:
-        import argcomplete
-    except ModuleNotFoundError:
-        sys.exit(1)  # nothing may be printed into the line that is being typed
     argcomplete.autocomplete(parser)
 
 
-def script(shell: str) -> str:
-    """Return the script by which a shell enables completion."""
-    from argcomplete.shell_integration import shellcode
+def complete_names(what: str, prefix: str, args: argparse.Namespace) -> list[str]:
+    """Return the names that begin with `prefix`; none on any error.
 
-    return str(shellcode(["rosglass"], shell=shell))
-
-
-class _Completer:
-    def __init__(self, what: str) -> None:
-        self._what = what
-
-    def __call__(self, prefix: str, parsed_args: argparse.Namespace, **_: Any) -> Iterable[str]:
-        """Return the matching names; none on any error."""
-        try:
-            return [name for name in self._names(parsed_args) if name.startswith(prefix)]
-        except Exception:  # nothing may be printed into the line that is being typed
-            return []
-
-    def _names(self, args: argparse.Namespace) -> Iterable[str]:
-        kinds = {"messages": "msg", "service_types": "srv", "action_types": "action"}
-        if self._what in kinds or self._what == "interfaces":
-            from rosglass.cli.worlds import names_ros1
-            from rosglass.interfaces import ros1_name
-            from rosglass.messages import default_library
-
-            if names_ros1(args):
-                return [
-                    ros1_name(name) for name in default_library().names(1, kinds.get(self._what))
-                ]
-            return default_library().names(2, kinds.get(self._what))
-        return self._ask(args)
-
-    def _ask(self, args: argparse.Namespace) -> Iterable[str]:
-        import rosglass
-        from rosglass.cli.connecting import wait
-        from rosglass.cli.network import nearby_url
-
-        url = getattr(args, "url", "") or nearby_url() or None
-        with rosglass.connect(url, own_services=False) as node:
-
-            def others() -> list[str]:
-                me = node.resolve(node.name)
-                return [name for name in _look(node, self._what) if name != me]
-
-            wait(node, others, _DISCOVERY_TIMEOUT_S)
-            return others()
+    Args:
+        what: As for :func:`rosglass.cli.parser.complete`.
+        prefix: What is typed so far.
+        args: The options typed so far.
+    """
+    try:
+        return [name for name in _names(what, args) if name.startswith(prefix)]
+    except Exception:  # nothing may be printed into the line that is being typed
+        return []
 
 
-def _look(node: Node, what: str) -> Iterable[str]:
-    if what == "topics":
-        return node.topics()
-    if what == "services":
-        return node.services()
-    if what == "actions":
-        return node.actions()
-    return [found.full for found in node.nodes()]
+def _names(what: str, args: argparse.Namespace) -> list[str]:
+    # Options are completed without these.
+    from rosglass.cli.connecting import names_ros1, other_nodes, wait  # noqa: PLC0415
+    from rosglass.cli.interface import type_names  # noqa: PLC0415
+    from rosglass.cli.network import nearby_url  # noqa: PLC0415 - not for every command
+
+    if what in _TYPES:
+        return type_names(names_ros1(args), _TYPES[what])
+    url = getattr(args, "url", "") or nearby_url() or None
+    with rosglass.connect(url, own_services=False) as node:
+
+        def look() -> list[str]:
+            return other_nodes(node) if what == "nodes" else list(getattr(node, what)())
+
+        return wait(node, look, _DISCOVERY_TIMEOUT_S)

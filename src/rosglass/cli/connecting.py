@@ -1,105 +1,68 @@
-"""Connecting to the robot, as in all commands: options, and waiting for the graph."""
+"""Joining the robot's graph, and waiting for what is in it; the same in all commands."""
 
 from __future__ import annotations
 
-import argparse
+import os
 import signal
 import threading
 import time
 from contextlib import contextmanager, suppress
-from math import isfinite
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import rosglass
+from rosglass.cli.network import refused
 from rosglass.cli.output import note
+from rosglass.cli.parser import TIMEOUT_S
 from rosglass.comm import ConnectionState, anonymous_name
-from rosglass.errors import Error
+from rosglass.comm.names import hidden
+from rosglass.connection import default_url
+from rosglass.errors import ConnectionLostError, Error
+from rosglass.interfaces.names import spelled_ros1
 
 if TYPE_CHECKING:
+    import argparse
     from collections.abc import Callable, Iterable, Iterator
 
     from rosglass.comm import Node, Status
+    from rosglass.ros1.node import Ros1Node
 
 __all__ = [
-    "TIMEOUT",
     "End",
-    "add_connection_options",
-    "add_definitions_option",
+    "as_ros1",
+    "await_graph",
     "await_types",
     "connect",
+    "explained_wait",
     "find",
+    "invalid_names",
+    "is_hidden",
+    "is_ros1",
     "join",
-    "left_out",
-    "natural",
+    "names_ros1",
     "note_invalid_names",
-    "seconds",
-    "settle",
-    "telling",
+    "other_nodes",
+    "spelled",
+    "spelled_for",
     "wait",
 ]
 
 #: Number of names in a hint.
-_EXAMPLES = 3
+_MAX_EXAMPLES = 3
 _T = TypeVar("_T")
-#: Default of --timeout, in seconds.
-TIMEOUT = 10.0
 #: Seconds that an existing entity may take to appear in the graph, or to announce its type.
-_DISCOVERY = 3.0
+_DISCOVERY_S = 3.0
 #: Seconds after which a command reports what it waits for, and probes an address without answer.
 _REPORT_DELAY_S, _PROBE_DELAY_S = 2.0, 0.5
-#: The same once the robot has answered.
-_SOON = 1.0
+#: Seconds between two reports of what a command waits for once the robot has answered.
+_REPORT_PERIOD_S = 1.0
 #: Seconds that programs have to name their nodes: Fast DDS takes 1 to 4; a Zenoh router with 10,000
 #: topics 4 to 13.
 _INTRODUCTION_S = {"dds": 8.0, "zenoh": 18.0}
 #: Seconds without changes after which the graph counts as complete; some are at once.
-_QUIET = {"zenoh": 0.3, "dds": 0.7, "ros1": 0.0, "replay": 0.0}
+_QUIET_S = {"zenoh": 0.3, "dds": 0.7, "ros1": 0.0, "replay": 0.0}
 
 
-def add_connection_options(
-    parser: argparse.ArgumentParser, *, timeout: float | None = TIMEOUT
-) -> None:
-    """Declare the options that select the robot."""
-    group = parser.add_argument_group("connection")
-    group.add_argument(
-        "--url",
-        default="",
-        help="URL of the robot, e.g. zenoh://192.168.1.5:7447, dds://?domain=5 or "
-        "ros1://192.168.1.5:11311; default: ROSGLASS_URL, or ROS's own variables, or the "
-        "Zenoh router or ROS 1 master of this machine",
-    )
-    group.add_argument(
-        "--node-name", default="", metavar="NAME", help="name of this node (default: a unique one)"
-    )
-    add_definitions_option(group)
-    group.add_argument(
-        "--timeout",
-        type=seconds,
-        action=_Given,
-        default=timeout,
-        metavar="SECONDS",
-        help="time to wait for the robot to answer "
-        + (
-            f"(default: {timeout:g})"
-            if timeout is not None
-            else f"(default: {TIMEOUT:g}), and for each message (default: for ever)"
-        ),
-    )
-    parser.set_defaults(ros_arguments=[], looks_nearby=True)
-
-
-def add_definitions_option(parser: argparse._ActionsContainer) -> None:
-    """Declare the option for type definitions in unusual places."""
-    parser.add_argument(
-        "--definitions",
-        action="append",
-        default=[],
-        metavar="FOLDER",
-        help="a package or workspace with definitions that the robot does not send; may "
-        "be repeated",
-    )
-
-
-def connect(args: argparse.Namespace, *, patient: bool = False) -> Node:
+def connect(args: argparse.Namespace, *, wait_for_start: bool = False) -> Node:
     """Join the graph given by the options, and wait for an answer.
 
     Reports on standard error what it waits for, if that takes a while. Over DDS, where there may be
@@ -107,23 +70,22 @@ def connect(args: argparse.Namespace, *, patient: bool = False) -> Node:
 
     Args:
         args: The command's options.
-        patient: Whether to wait even if nothing listens, for a robot that is about to start: for
-            commands that run until they are ended. ``--timeout`` requests it for others.
+        wait_for_start: Whether to wait even if nothing listens, for a robot that is about to
+            start: for commands that run until they are ended. ``--timeout`` requests it for others.
 
     Raises:
         Error: As :func:`rosglass.connect`; ConnectionLostError if there is no answer in time.
     """
-    import rosglass
-
     node = rosglass.connect(
         args.url or None,
         name=args.node_name or anonymous_name(f"rosglass_{args.command}"),
         arguments=args.ros_arguments,
         own_services=False,
     )
-    waits = patient or getattr(args, "timeout_given", False)
+    wait_for_start = wait_for_start or getattr(args, "timeout_given", False)
+    timeout = TIMEOUT_S if args.timeout is None else args.timeout
     try:
-        _wait_for_connection(node, TIMEOUT if args.timeout is None else args.timeout, waits)
+        _wait_for_connection(node, timeout, wait_for_start)
     except BaseException:
         node.close()
         raise
@@ -138,18 +100,16 @@ def join(url: str, name: str, timeout: float) -> Node:
     Raises:
         Error: As for :func:`connect`.
     """
-    import rosglass
-
     node = rosglass.connect(url, name=name, own_services=not url.lower().startswith("ros1:"))
     try:
-        _wait_for_connection(node, timeout, patient=True)
+        _wait_for_connection(node, timeout, wait_for_start=True)
     except BaseException:
         node.close()
         raise
     return node
 
 
-def settle(node: Node, least: float = 0.0) -> None:
+def await_graph(node: Node, least: float = 0.0) -> None:
     """Wait until the graph is complete: no recent changes, and the nodes of every program named.
 
     Prints on standard error if programs do not name their nodes, and stops waiting after a while.
@@ -159,11 +119,11 @@ def settle(node: Node, least: float = 0.0) -> None:
         least: Seconds to wait at least.
     """
     wire = node.url.partition(":")[0]
-    began = moved = time.monotonic()
+    began = changed_at = time.monotonic()
 
-    def touch() -> None:
-        nonlocal moved
-        moved = time.monotonic()
+    def on_change() -> None:
+        nonlocal changed_at
+        changed_at = time.monotonic()
 
     def reason() -> str:
         count = node.unnamed_programs()
@@ -172,18 +132,18 @@ def settle(node: Node, least: float = 0.0) -> None:
         programs = "1 program has not named its" if count == 1 else f"{count} have not named their"
         return f"{programs} nodes yet" if count else ""
 
-    def rest(since: float) -> None:
+    def wait_until_quiet(since: float) -> None:
         """Wait until there are no changes; a graph that always changes is used as it is."""
-        while time.monotonic() < min(max(moved + _QUIET[wire], began + least), since + 5.0):
+        while time.monotonic() < min(max(changed_at + _QUIET_S[wire], began + least), since + 5.0):
             time.sleep(0.05)
 
-    with node.on_graph_change(touch), telling(reason):
-        rest(began)
+    with node.on_graph_change(on_change), explained_wait(reason):
+        wait_until_quiet(began)
         if node.unnamed_programs():
             while node.unnamed_programs() and time.monotonic() < began + _INTRODUCTION_S[wire]:
                 time.sleep(0.05)
-            touch()  # the last received data is being handled
-            rest(moved)
+            on_change()  # the last received data is being handled
+            wait_until_quiet(changed_at)
     if unnamed := reason():
         note(f"{unnamed}; there may be more than is shown")
 
@@ -210,13 +170,13 @@ def find(node: Node, look: Callable[[], _T], timeout: float) -> _T:
 
     Waits less for a missing name than for a robot that has not answered yet.
     """
-    wait(node, look, min(timeout, _DISCOVERY if _QUIET[node.url.partition(":")[0]] else 0.0))
-    settle(node)
+    wait(node, look, min(timeout, _DISCOVERY_S if _QUIET_S[node.url.partition(":")[0]] else 0.0))
+    await_graph(node)
     return look()
 
 
 @contextmanager
-def telling(reason: Callable[[], str]) -> Iterator[None]:
+def explained_wait(reason: Callable[[], str]) -> Iterator[None]:
     """Print on standard error why the block waits, if it takes longer than a second.
 
     Args:
@@ -227,7 +187,7 @@ def telling(reason: Callable[[], str]) -> Iterator[None]:
 
     def report() -> None:
         reported = ""
-        while not done.wait(_SOON):
+        while not done.wait(_REPORT_PERIOD_S):
             text = ""
             with suppress(Error):  # the caller reports errors
                 text = reason()
@@ -244,41 +204,32 @@ def telling(reason: Callable[[], str]) -> Iterator[None]:
         thread.join()
 
 
+def other_nodes(node: Node) -> list[str]:
+    """Return the full names of all nodes except that of this command."""
+    me = node.resolve(node.name)
+    return [name.full for name in node.nodes() if name.full != me]
+
+
 def note_invalid_names(node: Node) -> None:
     """Print how many names are left out because they break ROS's rules, and some of them."""
-    text = left_out(node)
-    if text:
+    if text := invalid_names(node):
         note(text)
 
 
-def left_out(node: Node) -> str:
+def invalid_names(node: Node) -> str:
     """Return how many names break ROS's rules, and some of them; empty if none does."""
     names = node.invalid_names()
     if not names:
         return ""
-    shown = ", ".join(f"{name!r:.80}" for name in names[:_EXAMPLES])
-    more = ", ..." if len(names) > _EXAMPLES else ""
+    shown = ", ".join(f"{name!r:.80}" for name in names[:_MAX_EXAMPLES])
+    more = ", ..." if len(names) > _MAX_EXAMPLES else ""
     return f"left out, for ROS's rules forbid such names: {len(names)}: {shown}{more}"
 
 
 def await_types(node: Node, look: Callable[[], Iterable[object]], timeout: float) -> None:
     """Wait until all types that `look` returns are known; ROS 1's servers have to be asked."""
     if node.wire == "ros1":
-        wait(node, lambda: all(look()), min(timeout, _DISCOVERY))
-
-
-class _Given(argparse.Action):
-    """Stores a value, and records that it was given."""
-
-    def __call__(
-        self,
-        _parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: Any,
-        _option: str | None = None,
-    ) -> None:
-        setattr(namespace, self.dest, values)
-        setattr(namespace, f"{self.dest}_given", True)
+        wait(node, lambda: all(look()), min(timeout, _DISCOVERY_S))
 
 
 class End(threading.Event):
@@ -288,64 +239,43 @@ class End(threading.Event):
     ends any waiting.
 
     Args:
-        patient: Whether pressing Ctrl-C again is ignored; otherwise it cuts short whatever the
+        once: Whether pressing Ctrl-C again is ignored; otherwise it cuts short whatever the
             command does in order to end.
 
     Attributes:
         code: The exit code by the signal that ended the command; 0 for none.
     """
 
-    def __init__(self, *, patient: bool = False) -> None:
+    def __init__(self, *, once: bool = False) -> None:
         super().__init__()
         self.code = 0
-        self._patient = patient
+        self._once = once
         for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._receive)
+            signal.signal(number, self._on_signal)
 
-    def _receive(self, number: int, _: object) -> None:
-        if self.is_set() and not self._patient:
+    def _on_signal(self, number: int, _: object) -> None:
+        if self.is_set() and not self._once:
             raise KeyboardInterrupt
         self.code = 128 + number
         self.set()
 
 
-def seconds(text: str) -> float:
-    """Parse a number of seconds; for options."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not isfinite(value) or not 0 <= value <= 1e9:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds, 0 or more")
-    return value
-
-
-def natural(text: str) -> int:
-    """Parse a count of 1 or more; for options."""
-    if not (text.isascii() and text.isdigit() and 0 < int(text[:10]) < 2**31):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 1 or more")
-    return int(text)
-
-
-def _wait_for_connection(node: Node, timeout: float, patient: bool) -> None:
-    from rosglass.cli.network import refused
-    from rosglass.errors import ConnectionLostError
-
+def _wait_for_connection(node: Node, timeout: float, wait_for_start: bool) -> None:
     connected, deadline = threading.Event(), time.monotonic() + timeout
 
-    def look(status: Status) -> None:
+    def on_status(status: Status) -> None:
         # Over DDS, a graph without nodes looks the same as a wrong address.
         if status.state is ConnectionState.CONNECTED or node.url.startswith("dds:"):
             connected.set()
 
-    with node.on_status_change(look):
-        look(node.status())
+    with node.on_status_change(on_status):
+        on_status(node.status())
         if connected.wait(min(_PROBE_DELAY_S, timeout)):
             return
         refusal = refused(node.url)
         if refusal is not None:
             problem = f"{node.url}: {refusal[0]}; {refusal[1]}"
-            if not patient:
+            if not wait_for_start:
                 raise ConnectionLostError(problem)
             note(f"{problem}. Waiting for it")
         elif connected.wait(min(_REPORT_DELAY_S, timeout)):
@@ -358,3 +288,41 @@ def _wait_for_connection(node: Node, timeout: float, patient: bool) -> None:
         f"{node.url}: {node.status().detail}; no answer within {timeout:g} s. Is the robot "
         "on, and the address right? rosglass doctor looks for the reason"
     )
+
+
+# -- differences of ROS 1 and ROS 2 --------------------------------------------------------------
+
+
+def names_ros1(args: argparse.Namespace) -> bool:
+    """Return whether the options, or else the environment, name a ROS 1 master."""
+    url = getattr(args, "url", "")
+    with suppress(Error):
+        url = url or default_url(os.environ)
+    return str(url).lower().startswith("ros1:")
+
+
+def is_ros1(node: Node) -> bool:
+    """Return whether a node is in a ROS 1 graph."""
+    return node.wire == "ros1"
+
+
+def as_ros1(node: Node) -> Ros1Node | None:
+    """Return a node of a ROS 1 graph with its own class; None for any other node."""
+    found: Any = node
+    return found if is_ros1(node) else None
+
+
+def is_hidden(node: Node, name: str) -> bool:
+    """Return whether lists leave a name out; ROS 1 hides none."""
+    return not is_ros1(node) and hidden(name)
+
+
+def spelled_for(args: argparse.Namespace, text: str) -> str:
+    """Return a text with types' names as the ROS version that the options name spells them."""
+    ros1 = getattr(args, "ros1", hasattr(args, "url") and names_ros1(args))
+    return spelled_ros1(text) if ros1 else text
+
+
+def spelled(node: Node, text: str) -> str:
+    """Return a type's name, or a text that has some, as the node's ROS version spells them."""
+    return spelled_ros1(text) if is_ros1(node) else text

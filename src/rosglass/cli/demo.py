@@ -9,8 +9,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rosglass.cli.robot import DUPLICATE_EXIT
+from rosglass.cli.run import QUIET_MEDIA
+from rosglass.demo.processes import DUPLICATE_EXIT, VirtualScreen, start_robot
 from rosglass.errors import Error
+from rosglass.wires.zenoh.options import ZenohOptions
 
 if TYPE_CHECKING:
     import argparse
@@ -18,40 +20,12 @@ if TYPE_CHECKING:
     from rosglass.demo.app import Cockpit
     from rosglass.demo.processes import Child
 
-__all__ = ["configure", "run"]
+__all__ = ["run"]
 
-_HEADLESS_SECONDS = 20.0
+#: Seconds until the demo ends where there is no display.
+_HEADLESS_DURATION_S = 20.0
+#: Size in pixels of the virtual screen.
 _SIZE = (1340, 800)
-_QUIET = "qt.multimedia.symbolsresolver=false;qt.multimedia.ffmpeg*=false;qt.qpa.theme*=false"
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's options."""
-    parser.add_argument(
-        "--url",
-        default=os.environ.get("ROSGLASS_URL") or "zenoh://127.0.0.1:7447",
-        help="dds://, or a Zenoh router, which is started if none answers (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--no-robot", action="store_true", help="use a robot that is running already"
-    )
-    parser.add_argument(
-        "--seconds",
-        type=float,
-        metavar="N",
-        help="exit after N seconds (default: when the window is closed; without display 20)",
-    )
-    parser.add_argument(
-        "--screenshot",
-        type=Path,
-        metavar="FILE.png",
-        help="save a screenshot before the end (without display: demo.png)",
-    )
-    parser.add_argument(
-        "--headless",
-        action="store_true",
-        help="use a virtual screen and drive automatically, as on a machine without display",
-    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -61,16 +35,16 @@ def run(args: argparse.Namespace) -> int:
     if not args.url.lower().startswith(("dds:", "zenoh:")):
         raise Error(f"--url {args.url}: expected dds:// or zenoh://HOST:PORT")
     # Qt reads this when it is loaded; its media backends report every library they miss.
-    rules = [_QUIET, os.environ.get("QT_LOGGING_RULES", "")]
+    rules = [QUIET_MEDIA, os.environ.get("QT_LOGGING_RULES", "")]
     os.environ["QT_LOGGING_RULES"] = ";".join(filter(None, rules))
     # Checked before anything is started, so that nothing is left running.
-    import rosglass.qt  # noqa: F401
+    import rosglass.qt  # noqa: F401, PLC0415
 
     headless = args.headless or not _has_display()
     seconds = args.seconds
-    screenshot = args.screenshot
+    screenshot = None if args.screenshot is None else Path(args.screenshot)
     if headless:
-        seconds = _HEADLESS_SECONDS if seconds is None else seconds
+        seconds = _HEADLESS_DURATION_S if seconds is None else seconds
         screenshot = screenshot or Path("demo.png")
     if screenshot is not None and not screenshot.resolve().parent.is_dir():
         raise Error(f"--screenshot {screenshot}: there is no such directory")
@@ -79,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
             _use_virtual_screen(stack, seconds)
         url = _find_router(stack, args.url)
         robot = None if args.no_robot else _start_robot(stack, url)
-        from rosglass.demo.app import Cockpit
+        from rosglass.demo.app import Cockpit  # noqa: PLC0415 - while the robot starts
 
         cockpit = Cockpit(url, _SIZE if headless else None)
         stack.callback(cockpit.close)
@@ -156,8 +130,6 @@ def _has_display() -> bool:
 
 
 def _use_virtual_screen(stack: ExitStack, seconds: float | None) -> None:
-    from rosglass.demo.processes import VirtualScreen
-
     screen = VirtualScreen(*_SIZE)
     stack.callback(screen.close)
     os.environ["DISPLAY"] = screen.display
@@ -171,8 +143,7 @@ def _use_virtual_screen(stack: ExitStack, seconds: float | None) -> None:
 
 def _find_router(stack: ExitStack, url: str) -> str:
     """Return the URL to use, after starting a router on this machine if there is no answer."""
-    from rosglass.wires.zenoh.options import ZenohOptions
-    from rosglass.wires.zenoh.router import Router, is_router_reachable
+    from rosglass.wires.zenoh.router import Router, is_router_reachable  # noqa: PLC0415 - an extra
 
     if url.lower().startswith("dds:"):
         return url  # where nodes find each other without one
@@ -191,8 +162,6 @@ def _find_router(stack: ExitStack, url: str) -> str:
 
 
 def _start_robot(stack: ExitStack, url: str) -> Child:
-    from rosglass.demo.processes import start_robot
-
     robot = start_robot(url)
     stack.callback(robot.close)
     print(

@@ -1,30 +1,51 @@
-"""``rosglass doctor``: find what separates this machine from the robot, and how to fix it."""
+"""``rosglass doctor``: find what separates this machine from the robot, and how to fix it.
+
+Most faults of ROS 1 networks are names: each node announces one, and all others must be able to
+connect to it (ROS wiki, "ROS/NetworkSetup").
+"""
 
 from __future__ import annotations
 
 import os
 import platform
 import shlex
+import socket
 import sys
-from dataclasses import asdict, replace
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rosglass.cli.connecting import add_connection_options, left_out, settle, wait
+import rosglass
+from rosglass.cli.connecting import await_graph, invalid_names, other_nodes, wait
 from rosglass.cli.endpoints import DUPLICATES_FIX, duplicates, problems
-from rosglass.cli.finding import Finding
-from rosglass.cli.network import ask, interfaces, is_loopback
-from rosglass.cli.output import Style, add_output_options, print_json
-from rosglass.errors import Error
+from rosglass.cli.messages import print_json
+from rosglass.cli.network import (
+    interfaces,
+    is_loopback,
+    ros1_options,
+    router_problem,
+    start_master,
+)
+from rosglass.cli.output import Style
+from rosglass.comm import ConnectionState, anonymous_name
+from rosglass.connection import default_url, explain_missing
+from rosglass.errors import ConnectionLostError, ConversionError, Error, MasterError
+from rosglass.messages import default_library
+from rosglass.wires.tcpros.address import doubt, parse_uri
+from rosglass.wires.tcpros.master import call_node
 
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Iterator
 
     from rosglass.comm import Node
+    from rosglass.ros1.node import Ros1Node
+    from rosglass.ros1.options import Ros1Options
 
-__all__ = ["configure", "run"]
+__all__ = ["run"]
 
 #: Package -> what it is for, and the extra that installs it.
 _PACKAGES = {
@@ -55,22 +76,29 @@ _VARIABLES = (
     "ROS_PACKAGE_PATH",
 )
 #: Receive buffer in bytes that a camera picture needs.
-_BUFFER = 4 * 2**20
+_BUFFER_BYTES = 4 * 2**20
 _NO_NETWORK = "connect a network, or for this machine alone: sudo ip link set lo up multicast on"
 #: The fix for names that break ROS's rules.
 _RENAME = "rename them where they are made: letters, digits, '_' and '/', no digit first"
-#: Seconds to explore a graph.
-_LOOK = 3.0
+#: Seconds to explore a graph, and a domain of ``--scan``.
+_EXPLORE_S, _SCAN_S = 3.0, 1.5
 
 
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's options."""
-    parser.add_argument(
-        "--scan", action="store_true", help="over DDS, look for robots in the domains 0 to 10"
-    )
-    add_output_options(parser)
-    add_connection_options(parser, timeout=5.0)
-    parser.set_defaults(looks_nearby=False)  # it reports what it finds
+@dataclass(frozen=True)
+class _Finding:
+    """The result of a check.
+
+    Attributes:
+        level: ``ok``, ``note``, ``warning`` or ``error``.
+        area: What was checked.
+        text: The result.
+        fix: How to fix it.
+    """
+
+    level: str
+    area: str
+    text: str
+    fix: str = ""
 
 
 def run(args: argparse.Namespace) -> int:
@@ -83,7 +111,7 @@ def run(args: argparse.Namespace) -> int:
         "error": style("error  ", "red", "bold"),
     }
     found = []
-    for finding in _look(args):
+    for finding in _findings(args):
         found.append(finding)
         if args.json:
             continue
@@ -95,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
     return 1 if any(finding.level == "error" for finding in found) else 0
 
 
-def _look(args: argparse.Namespace) -> Iterator[Finding]:
+def _findings(args: argparse.Namespace) -> Iterator[_Finding]:
     urls, given = _urls(args)
     ros2 = any(not url.lower().startswith("ros1:") for url in urls)
     yield from _programs()
@@ -114,69 +142,65 @@ def _look(args: argparse.Namespace) -> Iterator[Finding]:
             answering.append(url)
         yield from findings
     if not given:
-        yield _address(answering)
+        yield _unset_url(answering)
     if args.scan:
         yield from _scan()
 
 
-def _programs() -> Iterator[Finding]:
-    import rosglass
-
-    yield Finding(
+def _programs() -> Iterator[_Finding]:
+    yield _Finding(
         "ok",
         "rosglass",
         f"{rosglass.__version__} on Python {platform.python_version()} ({sys.executable})",
     )
     for package, (purpose, extra) in _PACKAGES.items():
         try:
-            yield Finding("ok", package, f"{version(package)}, for {purpose}")
+            yield _Finding("ok", package, f"{version(package)}, for {purpose}")
         except PackageNotFoundError:  # noqa: PERF203 - each package is a finding
             fix = f'pip install "rosglass[{extra}]"'
-            yield Finding("note", package, f"not installed; needed for {purpose}", fix)
+            yield _Finding("note", package, f"not installed; needed for {purpose}", fix)
 
 
-def _environment() -> Iterator[Finding]:
+def _environment() -> Iterator[_Finding]:
     shown = [f"{name}={os.environ[name]}" for name in _VARIABLES if os.environ.get(name)]
-    yield Finding("ok", "environment", "; ".join(shown) or "no variables of ROS or rosglass")
+    yield _Finding("ok", "environment", "; ".join(shown) or "no variables of ROS or rosglass")
     for folder in filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):
         if not Path(folder).is_dir():
             fix = "source the workspace anew, or unset AMENT_PREFIX_PATH"
-            yield Finding("warning", "environment", f"AMENT_PREFIX_PATH names {folder}: gone", fix)
+            yield _Finding("warning", "environment", f"AMENT_PREFIX_PATH names {folder}: gone", fix)
 
 
-def _definitions() -> Iterator[Finding]:
-    from rosglass.messages import default_library
-
+def _definitions() -> Iterator[_Finding]:
     counts = [len(default_library().names(ros)) for ros in (1, 2)]
     text = f"{counts[1]} types of ROS 2 and {counts[0]} of ROS 1 are known on this machine"
-    yield Finding("ok", "definitions", text)
+    yield _Finding("ok", "definitions", text)
 
 
-def _kernel() -> Iterator[Finding]:
+def _kernel() -> Iterator[_Finding]:
     limit = Path("/proc/sys/net/core/rmem_max")
     if not limit.exists():
         return
     size = int(limit.read_text())
-    if size < _BUFFER:
-        yield Finding(
+    if size < _BUFFER_BYTES:
+        yield _Finding(
             "warning",
             "network",
             f"receive buffers are limited to {size} bytes: big pictures get lost over DDS",
-            f"sudo sysctl -w net.core.rmem_max={_BUFFER} (and into /etc/sysctl.d to keep it)",
+            f"sudo sysctl -w net.core.rmem_max={_BUFFER_BYTES} (and into /etc/sysctl.d to keep it)",
         )
     else:
-        yield Finding("ok", "network", f"receive buffers up to {size / 2**20:.0f} MiB")
+        yield _Finding("ok", "network", f"receive buffers up to {size / 2**20:.0f} MiB")
 
 
-def _interfaces(ros2: bool) -> Iterator[Finding]:
+def _interfaces(ros2: bool) -> Iterator[_Finding]:
     found = interfaces()
     if found is None:
         return
     names = ", ".join(interface.name for interface in found)
     if not found:
-        yield Finding("error", "network", "no network interface is up", _NO_NETWORK)
+        yield _Finding("error", "network", "no network interface is up", _NO_NETWORK)
     elif ros2 and not any(interface.has_multicast for interface in found):
-        yield Finding(
+        yield _Finding(
             "warning",
             "network",
             f"no network interface that is up ({names}) takes multicast, by which ROS 2's programs "
@@ -185,12 +209,14 @@ def _interfaces(ros2: bool) -> Iterator[Finding]:
             "sudo ip route add 224.0.0.0/4 dev lo",
         )
     elif all(interface.is_loopback for interface in found):
-        yield Finding("note", "network", f"only {names} is up: nothing but this machine is reached")
+        yield _Finding(
+            "note", "network", f"only {names} is up: nothing but this machine is reached"
+        )
     else:
-        yield Finding("ok", "network", f"{names} up")
+        yield _Finding("ok", "network", f"{names} up")
 
 
-def _address(answering: list[str]) -> Finding:
+def _unset_url(answering: list[str]) -> _Finding:
     """Return which URL to set if none is set."""
     if not answering:
         text = "no URL is given, and no robot answers on this machine"
@@ -198,15 +224,13 @@ def _address(answering: list[str]) -> Finding:
             "export ROSGLASS_URL=zenoh://<robot's address> (or dds://, ros1://<its address>), "
             "and see the notes above"
         )
-        return Finding("error", "address", text, fix)
+        return _Finding("error", "address", text, fix)
     text = f"no URL is given; found: {', '.join(answering)}"
-    return Finding("warning", "address", text, f"export ROSGLASS_URL={shlex.quote(answering[0])}")
+    return _Finding("warning", "address", text, f"export ROSGLASS_URL={shlex.quote(answering[0])}")
 
 
 def _urls(args: argparse.Namespace) -> tuple[list[str], bool]:
     """Return the URLs to check, and whether one was given."""
-    from rosglass.connection import default_url
-
     if args.url:
         return [args.url], True
     try:
@@ -215,25 +239,19 @@ def _urls(args: argparse.Namespace) -> tuple[list[str], bool]:
         return ["zenoh://127.0.0.1:7447", "dds://", "ros1://127.0.0.1:11311"], False
 
 
-def _robot(url: str, timeout: float) -> Iterator[Finding]:
-    import rosglass
-    from rosglass.comm import ConnectionState
-    from rosglass.connection import explain_missing
-
+def _robot(url: str, timeout: float) -> Iterator[_Finding]:
     if url.lower().startswith("ros1:"):
-        from rosglass.cli import doctor_ros1
-
-        yield from doctor_ros1.look(url, timeout)
+        yield from _robot_ros1(url, timeout)
         return
     try:
         node = rosglass.connect(url, name=f"rosglass_doctor_{os.getpid()}", own_services=False)
     except ModuleNotFoundError as error:
         text, _, fix = explain_missing(error).partition("; ")
-        yield Finding("error", url, text or str(error), fix)
+        yield _Finding("error", url, text or str(error), fix)
         return
     except Error as error:
         no_network = url.startswith("dds:") and interfaces() == []
-        yield Finding("error", url, str(error), _NO_NETWORK if no_network else "")
+        yield _Finding("error", url, str(error), _NO_NETWORK if no_network else "")
         return
     with node:
         wait(node, lambda: node.status().state is ConnectionState.CONNECTED, timeout)
@@ -241,11 +259,11 @@ def _robot(url: str, timeout: float) -> Iterator[Finding]:
         if status.state is not ConnectionState.CONNECTED:
             # A configuration file may name another router.
             asks = url.startswith("zenoh:") and not os.environ.get("ZENOH_SESSION_CONFIG_URI")
-            text, fix = ask(url, timeout) if asks else ("", "")
-            yield Finding("error", url, text or status.detail, fix or _advice(url))
+            text, fix = router_problem(url, timeout) if asks else ("", "")
+            yield _Finding("error", url, text or status.detail, fix or _advice(url))
             return
-        yield Finding("ok", url, status.detail or "connected")
-        settle(node, _LOOK)
+        yield _Finding("ok", url, status.detail or "connected")
+        await_graph(node, _EXPLORE_S)
         yield from _graph(node)
 
 
@@ -272,45 +290,287 @@ def _advice(url: str) -> str:
     )
 
 
-def _graph(node: Node) -> Iterator[Finding]:
-    me = node.resolve(node.name)
-    others = [name.full for name in node.nodes() if name.full != me]
+def _graph(node: Node) -> Iterator[_Finding]:
+    others = other_nodes(node)
     topics = node.topics()
     if not others and not topics:
-        yield Finding("warning", node.url, "there are no nodes", _advice(node.url))
+        yield _Finding("warning", node.url, "there are no nodes", _advice(node.url))
         return
-    yield Finding(
+    yield _Finding(
         "ok",
         node.url,
         f"{len(others)} nodes, {len(topics)} topics, {len(node.services())} services, "
         f"{len(node.actions())} actions",
     )
-    if text := left_out(node):
-        yield Finding("warning", node.url, text, _RENAME)
+    if text := invalid_names(node):
+        yield _Finding("warning", node.url, text, _RENAME)
     for name, count in node.duplicate_nodes().items():
-        yield Finding("warning", node.url, duplicates(name, count), DUPLICATES_FIX)
+        yield _Finding("warning", node.url, duplicates(name, count), DUPLICATES_FIX)
     for topic in topics:
         ends = [*node.publishers(topic), *node.subscriptions(topic)]
         for problem in problems(ends):
-            yield Finding("warning", topic, problem.text, problem.fix)
+            yield _Finding("warning", topic, problem.text, problem.fix)
 
 
-def _scan() -> Iterator[Finding]:
-    import rosglass
-
+def _scan() -> Iterator[_Finding]:
     for domain in range(11):
         url = f"dds://?domain={domain}"
         try:
             node = rosglass.connect(url, name=f"rosglass_doctor_{os.getpid()}", own_services=False)
         except (Error, ModuleNotFoundError) as error:
-            yield Finding("error", url, str(error))
+            yield _Finding("error", url, str(error))
             return
         with node:
-            me = node.resolve(node.name)
-            settle(node, 1.5)
-            others = [name.full for name in node.nodes() if name.full != me]
+            await_graph(node, _SCAN_S)
+            others = other_nodes(node)
         if others:
             shown = ", ".join(others[:5]) + (" ..." if len(others) > 5 else "")
-            yield Finding("ok", url, f"{len(others)} nodes: {shown}", f"use --url '{url}'")
+            yield _Finding("ok", url, f"{len(others)} nodes: {shown}", f"use --url '{url}'")
         else:
-            yield Finding("note", url, "no nodes")
+            yield _Finding("note", url, "no nodes")
+
+
+# -- ROS 1 ---------------------------------------------------------------------------------------
+
+_CALLER = "/rosglass_doctor"
+#: Nodes that are asked at the same time.
+_MAX_CONCURRENT = 16
+#: Seconds that the master may take to notify of a parameter change.
+_CALL_BACK_TIMEOUT_S = 3.0
+#: The fix for names that break ROS's rules.
+_RENAME_ROS1 = "rename them where they are made: letters, digits, '_' and '/', a letter first"
+_SET_ROS_IP = "set ROS_IP (or ROS_HOSTNAME) {where}, and restart the nodes there"
+
+
+@dataclass(frozen=True)
+class _NodeAddress:
+    """The address that a node announces, and its problem: ``name``, ``gone``, ``silent``."""
+
+    uri: str
+    host: str = ""
+    fault: str = ""
+    text: str = ""
+
+
+def _robot_ros1(url: str, timeout: float) -> Iterator[_Finding]:
+    """Yield the findings in the graph of a ROS 1 master.
+
+    Args:
+        url: As given to :func:`rosglass.connect`.
+        timeout: Seconds that the master, and each node, may take to answer.
+    """
+    try:
+        options = ros1_options(url)
+    except Error as error:
+        yield _Finding("error", url, str(error))
+        return
+    fault = _master(options.master, timeout)
+    if fault is not None:
+        yield fault
+        return
+    node = _join_ros1(url, timeout)
+    if isinstance(node, _Finding):
+        yield node
+        return
+    with node:
+        yield _Finding("ok", url, f"a master answers at {options.master}")
+        own = list(_own_address(node, options))
+        yield from own
+        yield from _call_back(node, options, own)
+        yield from _graph_ros1(node)
+        yield from _nodes_ros1(node, options, timeout)
+        yield from _simulated_time(node)
+
+
+def _join_ros1(url: str, timeout: float) -> Ros1Node | _Finding:
+    try:
+        made: Any = rosglass.connect(
+            url, name=anonymous_name("rosglass_doctor"), own_services=False
+        )
+    except Error as error:
+        return _Finding("error", url, str(error))
+    wait(made, lambda: made.status().state is ConnectionState.CONNECTED, timeout)
+    status = made.status()
+    if status.state is not ConnectionState.CONNECTED:
+        made.close()
+        return _Finding("error", url, status.detail)
+    found: Ros1Node = made
+    return found
+
+
+def _master(uri: str, timeout: float) -> _Finding | None:
+    """Check whether the master answers; None if it does."""
+    host, port = parse_uri(uri, "master")
+    start = start_master(host, port)
+    try:
+        with socket.create_connection((host, port), timeout):
+            pass
+        call_node(uri, "getPid", _CALLER, timeout=timeout)
+    except (ConnectionLostError, MasterError) as error:
+        text = f"something listens at {host}:{port}, but it is no ROS 1 master: {error}"
+        return _Finding("error", uri, text, f"look what it is (sudo ss -ltnp), and {start}")
+    except ConnectionRefusedError:
+        text = f"no master runs: {host} is there, but nothing listens on its port {port}"
+        return _Finding("error", uri, text, start)
+    except (socket.gaierror, UnicodeError):
+        fix = "correct the name, use the address, or add both to /etc/hosts"
+        return _Finding("error", uri, f"no computer is called {host}", fix)
+    except TimeoutError:
+        fix = f"check the address (ping {host}), and let the firewall pass TCP"
+        return _Finding("error", uri, f"{host} does not answer on port {port}", fix)
+    except OSError as error:
+        fix = "connect this machine to the robot's network (ip addr shows where it is)"
+        return _Finding("error", uri, f"{host} cannot be reached: {error.strerror or error}", fix)
+    return None
+
+
+def _own_address(node: Ros1Node, options: Ros1Options) -> Iterator[_Finding]:
+    """Check whether the address that nodes here announce makes sense."""
+    host, _ = parse_uri(options.master, "master")
+    address = node.address
+    problem = doubt(address, options.source, host)
+    if problem:
+        yield _Finding("warning", "own address", problem)
+    else:
+        origin = f"from {options.source}" if options.source else "detected; ROS_IP would set it"
+        yield _Finding("ok", "own address", f"{address} ({origin})")
+
+
+def _call_back(node: Ros1Node, options: Ros1Options, own: list[_Finding]) -> Iterator[_Finding]:
+    """Check that the master can call back: it announces publishers that way."""
+    ready, called = threading.Event(), threading.Event()
+    name, master = f"/{node.name}_was_here", options.master
+
+    def on_value(value: object) -> None:
+        (called if value == 1 else ready).set()
+
+    try:
+        with node.parameter_server.subscribe(name, on_value):
+            ready.wait(_CALL_BACK_TIMEOUT_S)
+            # Another caller has to set it: the node is not notified of its own changes.
+            call_node(master, "setParam", _CALLER, name, 1)
+            try:
+                arrived = called.wait(_CALL_BACK_TIMEOUT_S)
+            finally:
+                call_node(master, "deleteParam", _CALLER, name)
+    except Error as error:
+        yield _Finding(
+            "warning", "own address", f"the master cannot be asked to call back: {error}"
+        )
+        return
+    if arrived:
+        yield _Finding("ok", "own address", "the master reaches this machine under it")
+        return
+    text = (
+        f"the master cannot reach this machine at {node.address}: it cannot announce publishers, "
+        "and the robot's nodes get nothing from here"
+    )
+    doubted = any(finding.level == "warning" for finding in own)
+    fix = "see the warning above" if doubted else "let the firewall here pass TCP from the robot"
+    yield _Finding("error", "own address", text, f"{fix}; ROS_IP says under which address we are")
+
+
+def _graph_ros1(node: Ros1Node) -> Iterator[_Finding]:
+    others = other_nodes(node)
+    if not others:
+        yield _Finding("warning", node.url, "there are no nodes", "start the robot's programs")
+        return
+    text = f"{len(others)} nodes, {len(node.topics())} topics, {len(node.services())} services"
+    yield _Finding("ok", node.url, text)
+    if text := invalid_names(node):
+        yield _Finding("warning", node.url, text, _RENAME_ROS1)
+
+
+def _nodes_ros1(node: Ros1Node, options: Ros1Options, timeout: float) -> Iterator[_Finding]:
+    """Check whether every node can be reached at its announced address."""
+    names = other_nodes(node)
+    with ThreadPoolExecutor(_MAX_CONCURRENT) as pool:
+        asked = {name: pool.submit(_check_node, options.master, name, timeout) for name in names}
+        addresses = {name: future.result() for name, future in asked.items()}
+    unknown: dict[str, list[str]] = {}
+    stale = []
+    for name, address in addresses.items():
+        if address.fault == "name":
+            unknown.setdefault(address.host, []).append(name)
+        elif address.fault == "gone":
+            stale.append(name)
+        elif address.fault:
+            fix = (
+                _SET_ROS_IP.format(where=f"on {address.host}") if address.fault == "silent" else ""
+            )
+            yield _Finding("warning", name, address.text, fix)
+    host, _ = parse_uri(options.master, "master")
+    for unknown_host, found in unknown.items():
+        text = (
+            f"{_several(found)} can be reached under the name {unknown_host} only, "
+            "which this machine cannot resolve: nothing is received from there"
+        )
+        master_address = _address_of(host)
+        fix = (
+            "add it to /etc/hosts here, if that is the master's machine: "
+            f"{master_address} {unknown_host}; or {_SET_ROS_IP.format(where='there')}"
+        )
+        yield _Finding("error", "names", text, fix)
+    if stale:
+        text = f"{_several(stale)} no longer run, but the master still lists them"
+        yield _Finding(
+            "warning", "nodes", text, f"rosglass node cleanup --url {node.url} takes them off"
+        )
+    well = len(addresses) - len(stale) - sum(map(len, unknown.values()))
+    if well == len(addresses) and addresses:
+        yield _Finding("ok", "nodes", "all can be reached")
+
+
+def _check_node(master: str, name: str, timeout: float) -> _NodeAddress:
+    """Check whether a node answers."""
+    try:
+        uri = str(call_node(master, "lookupNode", _CALLER, name, timeout=timeout))
+        host, port = parse_uri(uri, f"what {name} announces")
+    except (MasterError, ConnectionLostError):
+        return _NodeAddress("")  # it has just left
+    except ConversionError as error:
+        return _NodeAddress("", "", "odd", str(error))
+    try:
+        with socket.create_connection((host, port), timeout):
+            pass
+        call_node(uri, "getPid", _CALLER, timeout=timeout)
+    except (socket.gaierror, UnicodeError):
+        return _NodeAddress(uri, host, "name")
+    except ConnectionRefusedError:
+        return _NodeAddress(uri, host, "gone")
+    except OSError as error:
+        text = f"{uri} cannot be reached: {error.strerror or error}"
+        return _NodeAddress(uri, host, "silent", text)
+    except MasterError:
+        return _NodeAddress(uri, host)  # it answers, even if with a refusal
+    except ConnectionLostError as error:
+        return _NodeAddress(uri, host, "hangs", f"it does not answer: {error}")
+    return _NodeAddress(uri, host)
+
+
+def _simulated_time(node: Ros1Node) -> Iterator[_Finding]:
+    """Check for a publisher of /clock if /use_sim_time is set."""
+    try:
+        simulated = node.parameter_server.get("/use_sim_time", False)
+    except Error as error:
+        yield _Finding("warning", "time", f"the parameter server does not answer: {error}")
+        return
+    if simulated and not node.publishers("/clock"):
+        yield _Finding(
+            "warning",
+            "time",
+            "/use_sim_time is true, but /clock has no publisher: time stands still for all nodes",
+            "start the simulation, play with --clock, or: rosglass param set /use_sim_time false",
+        )
+
+
+def _address_of(host: str) -> str:
+    try:
+        return socket.gethostbyname(host)
+    except OSError:
+        return host
+
+
+def _several(names: list[str]) -> str:
+    shown = ", ".join(names[:5])
+    return shown if len(names) <= 5 else f"{shown} and {len(names) - 5} more"

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rosglass.cli.worlds import is_ros1, spelled
+from rosglass.cli.connecting import is_ros1, spelled
+from rosglass.cli.messages import print_json
+from rosglass.cli.output import Style, note
 from rosglass.comm import Durability, EndpointKind
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    import argparse
+    from collections.abc import Mapping, Sequence
 
     from rosglass.comm import EndpointInfo, Node
 
@@ -17,6 +20,7 @@ __all__ = [
     "Problem",
     "describe",
     "duplicates",
+    "print_names",
     "problems",
     "short",
     "sources",
@@ -117,3 +121,25 @@ def short(value: object) -> str:
     if not isinstance(value, dict):
         return str(value)
     return ", ".join(f"{key} {inner}" for key, inner in value.items() if inner is not None)
+
+
+def print_names(
+    args: argparse.Namespace, node: Node, what: str, found: Mapping[str, Sequence[str]]
+) -> None:
+    """Print names in the graph, with their types if requested.
+
+    Args:
+        args: The command's options.
+        node: Node in the graph; may be closed.
+        what: ``service`` or ``action``.
+        found: Name -> types.
+    """
+    style = Style(args)
+    spelling = {name: [spelled(node, one) for one in types] for name, types in found.items()}
+    if args.json:
+        print_json([{what: name, "types": types} for name, types in spelling.items()])
+        return
+    for name, types in spelling.items():
+        print(name + (style(f" [{', '.join(types)}]", "dim") if args.types else ""))
+    if not found:
+        note(f"there are no {what}s here; rosglass doctor looks why")

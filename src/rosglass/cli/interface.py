@@ -2,64 +2,39 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
-from rosglass.cli.completion import complete
-from rosglass.cli.connecting import add_connection_options, add_definitions_option, connect, settle
-from rosglass.cli.output import Style, add_output_options, note, print_json, template
-from rosglass.cli.subcommands import Subcommands
-from rosglass.cli.worlds import names_ros1
+from rosglass.cli.connecting import await_graph, connect, names_ros1
+from rosglass.cli.messages import print_json, template
+from rosglass.cli.output import Style, note
+from rosglass.errors import TypeNotFoundError, UnsupportedError
+from rosglass.interfaces import ros1_name
+from rosglass.messages import default_library, load
 
 if TYPE_CHECKING:
     import argparse
 
     from rosglass.messages import ActionType, MessageType, ServiceType
 
-__all__ = ["configure", "run"]
+__all__ = ["list_types", "show", "type_names"]
 
 
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare the subcommands for types."""
-    add = Subcommands(parser).add
-    sub = add("show", "show the definition of a type, fetched from the robot if necessary", _show)
-    complete(sub.add_argument("type", help="e.g. geometry_msgs/msg/Twist"), "interfaces")
-    sub.add_argument("--no-comments", action="store_true", help="omit comments")
-    sub.add_argument(
-        "--template", action="store_true", help="print a message with all defaults, as YAML"
-    )
-    _finish(sub)
-    sub = add("list", "list the types available on this machine", _list)
-    sub.add_argument("text", nargs="?", default="", help="only names that contain this text")
-    sub.add_argument("--kind", choices=("msg", "srv", "action"), help="only this kind")
-    sub.add_argument("--ros1", action="store_true", help="list ROS 1 types")
-    add_definitions_option(sub)
-    add_output_options(sub)
-    sub.set_defaults(url="")
+def type_names(ros1: bool, kind: str | None = None) -> list[str]:
+    """Return the names of the types available on this machine.
+
+    Args:
+        ros1: Whether to return the types of ROS 1, instead of ROS 2's.
+        kind: Only ``msg``, ``srv`` or ``action``; None for all.
+    """
+    names = default_library().names(1 if ros1 else 2, kind)
+    return [ros1_name(name) for name in names] if ros1 else list(names)
 
 
-def run(args: argparse.Namespace) -> int:
-    """Run the subcommand."""
+def list_types(args: argparse.Namespace) -> int:
+    """Print the types available on this machine."""
     args.ros1 = args.ros1 or names_ros1(args)
-    return int(args.handler(args))
-
-
-def _finish(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--ros1",
-        action="store_true",
-        help="the ROS 1 type; implied by --url ros1://...",
-    )
-    add_output_options(parser)
-    add_connection_options(parser, timeout=5.0)
-
-
-def _list(args: argparse.Namespace) -> int:
-    from rosglass.interfaces import ros1_name
-    from rosglass.messages import default_library
-
-    names = default_library().names(1 if args.ros1 else 2, args.kind)
-    if args.ros1:
-        names = [ros1_name(name) for name in names]
+    names = type_names(args.ros1, args.kind)
     found = [name for name in names if args.text.lower() in name.lower()]
     if args.json:
         print_json(found)
@@ -71,9 +46,9 @@ def _list(args: argparse.Namespace) -> int:
     return 0 if found else 1
 
 
-def _show(args: argparse.Namespace) -> int:
-    from rosglass.interfaces import ros1_name
-
+def show(args: argparse.Namespace) -> int:
+    """Print the definition of a type."""
+    args.ros1 = args.ros1 or names_ros1(args)
     found = _find(args)
     definition = found.definition
     source = definition.source
@@ -114,17 +89,10 @@ def _fields(part: MessageType) -> list[dict[str, str]]:
 
 
 def _find(args: argparse.Namespace) -> MessageType | ServiceType | ActionType:
-    import os
-
-    from rosglass.errors import TypeNotFoundError, UnsupportedError
-    from rosglass.interfaces import ros1_name
-    from rosglass.messages import default_library, load
-
     hint = ""
     if "/" not in args.type:
-        names = default_library().names(1 if args.ros1 else 2)
+        names = type_names(args.ros1)
         close = [name for name in names if name.rpartition("/")[2].lower() == args.type.lower()]
-        close = [ros1_name(name) for name in close] if args.ros1 else close
         example = "std_msgs/Bool" if args.ros1 else "std_msgs/msg/Bool"
         hint = f"Did you mean {' or '.join(close)}?" if close else f"Write e.g. {example}"
         raise TypeNotFoundError(f"{args.type!r} names no package. {hint}")
@@ -138,7 +106,7 @@ def _find(args: argparse.Namespace) -> MessageType | ServiceType | ActionType:
             raise TypeNotFoundError(f"{error}; {where}") from error
     try:
         with connect(args) as node:
-            settle(node)  # the node with the type may not be discovered yet
+            await_graph(node)  # the node with the type may not be discovered yet
             return node.fetch_type(args.type, timeout=args.timeout)
     except (TypeNotFoundError, UnsupportedError) as error:
         raise TypeNotFoundError(f"{args.type}: {error}. {hint}".rstrip(". ")) from error

@@ -1,4 +1,4 @@
-"""Checks of this machine's network, for ``rosglass doctor``."""
+"""Checks of this machine's network, and of the addresses of routers and masters."""
 
 from __future__ import annotations
 
@@ -8,12 +8,30 @@ import struct
 import sys
 from contextlib import suppress
 from importlib.util import find_spec
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 from urllib.parse import urlsplit
 
+from rosglass.connection import default_url
 from rosglass.errors import Error
+from rosglass.wires.tcpros import address
 
-__all__ = ["Interface", "ask", "interfaces", "is_loopback", "nearby_url", "refused", "roscore"]
+if sys.platform == "linux":
+    import fcntl
+
+if TYPE_CHECKING:
+    from rosglass.ros1.options import Ros1Options
+
+__all__ = [
+    "Interface",
+    "interfaces",
+    "is_loopback",
+    "nearby_url",
+    "refused",
+    "ros1_options",
+    "ros1_url",
+    "router_problem",
+    "start_master",
+]
 
 #: Seconds to wait for a refused connection.
 _CONNECT_TIMEOUT_S = 1.0
@@ -35,14 +53,12 @@ def interfaces() -> list[Interface] | None:
     """Return the network interfaces that are up; None if that is unknown (not on Linux)."""
     if sys.platform != "linux":
         return None
-    import fcntl
-
     found = []
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         for _, name in socket.if_nameindex():
             request = struct.pack("16sH14x", name.encode()[:15], 0)
             try:
-                answer = fcntl.ioctl(asking, _GET_FLAGS, request)
+                answer = fcntl.ioctl(probe, _GET_FLAGS, request)
             except OSError:  # it has just disappeared
                 continue
             flags = struct.unpack("16sH14x", answer)[1]
@@ -54,7 +70,7 @@ def interfaces() -> list[Interface] | None:
 def is_loopback(url: str) -> bool:
     """Return whether a URL names this machine, or no host."""
     host = urlsplit(url).hostname or ""
-    return host in ("", "localhost", "::1") or host.startswith("127.")
+    return not host or address.is_loopback(host)
 
 
 def nearby_url() -> str:
@@ -62,8 +78,6 @@ def nearby_url() -> str:
 
     For commands without a setting for the robot's URL; also empty if there is one.
     """
-    from rosglass.connection import default_url
-
     with suppress(Error):
         default_url(os.environ)
         return ""
@@ -78,12 +92,28 @@ def nearby_url() -> str:
     return ""
 
 
-def roscore(host: str, port: int) -> str:
-    """Return how to start a ROS 1 master that does not run."""
-    from rosglass.wires.tcpros.address import is_loopback
+def ros1_options(url: str) -> Ros1Options:
+    """Return the options of a ``ros1://`` URL; raises ArgumentError."""
+    from rosglass.ros1.options import Ros1Options  # noqa: PLC0415 - loads all of ROS 1
 
+    return Ros1Options.parse(url)
+
+
+def ros1_url() -> str:
+    """Return the URL of the ROS 1 master that the environment selects; empty for none."""
+    url = ""
+    with suppress(Error):
+        if default_url(os.environ) == "ros1://":
+            url = "ros1://"
+            # Connecting to it reports what is wrong.
+            url += ros1_options(url).master.removeprefix("http://")
+    return url
+
+
+def start_master(host: str, port: int) -> str:
+    """Return how to start a ROS 1 master that does not run."""
     start = "start it: roscore" + ("" if port == 11311 else f" -p {port}")
-    return start if is_loopback(host) else f"on {host}, {start}; or correct the address"
+    return start if address.is_loopback(host) else f"on {host}, {start}; or correct the address"
 
 
 def refused(url: str) -> tuple[str, str] | None:
@@ -91,11 +121,8 @@ def refused(url: str) -> tuple[str, str] | None:
 
     None as well without any answer: that takes longer to distinguish from a slow network.
     """
-    from rosglass.ros1.options import Ros1Options
-    from rosglass.wires.tcpros.address import parse_uri
-
     if url.startswith("ros1:"):
-        host, port = parse_uri(Ros1Options.parse(url).master, "master")
+        host, port = address.parse_uri(ros1_options(url).master, "master")
     elif url.startswith("zenoh:") and (
         urlsplit(url).hostname or not os.environ.get("ZENOH_SESSION_CONFIG_URI")
     ):
@@ -111,12 +138,12 @@ def refused(url: str) -> tuple[str, str] | None:
     else:
         return None
     if url.startswith("zenoh:"):
-        return ask(url, _CONNECT_TIMEOUT_S)
+        return router_problem(url, _CONNECT_TIMEOUT_S)
     text = f"no master runs: {host} is there, but nothing listens on its port {port}"
-    return text, roscore(host, port)
+    return text, start_master(host, port)
 
 
-def ask(url: str, timeout: float) -> tuple[str, str]:
+def router_problem(url: str, timeout: float) -> tuple[str, str]:
     """Connect to the port of a ``zenoh://`` URL; return the problem and its fix.
 
     For a URL where Zenoh got no answer.

@@ -1,11 +1,11 @@
-"""The output of commands: colours for people, JSON for programs."""
+"""The output of commands: colours, tables, notes, and no control characters from others."""
 
 from __future__ import annotations
 
-import json
 import os
 import select
 import sys
+import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -13,49 +13,24 @@ from rosglass.errors import escape_controls
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
     from typing import TextIO
-
-    from rosglass.messages import MessageType
 
 __all__ = [
     "CLEAR_LINE",
-    "SHOWN",
-    "SHOWN_JSON",
     "EscapingStream",
+    "ProblemReports",
     "Style",
-    "add_output_options",
-    "fields",
     "note",
-    "print_json",
     "require_reader",
     "table",
-    "template",
-    "to_json",
-    "to_yaml",
 ]
 
-#: Number of elements of an array that are shown, unless all are requested.
-SHOWN = 36
-#: The same for programs, which accept more, but no pictures.
-SHOWN_JSON = 10_000
 #: Stands for the ESC of own sequences until a stream writes it: no peer can guess it.
 _ESCAPE = f"\0{os.urandom(8).hex()}\0"
 #: Returns to the beginning of the line and clears it, on a terminal.
 CLEAR_LINE = f"{_ESCAPE}[G{_ESCAPE}[K"
 _CODES = {"bold": 1, "dim": 2, "red": 31, "green": 32, "yellow": 33, "cyan": 36}
-
-
-def add_output_options(parser: argparse.ArgumentParser) -> None:
-    """Declare ``--json`` and ``--color``."""
-    group = parser.add_argument_group("output")
-    group.add_argument("--json", action="store_true", help="print JSON")
-    group.add_argument(
-        "--color",
-        choices=("auto", "always", "never"),
-        default="auto",
-        help="auto: on a terminal, unless NO_COLOR is set (default: %(default)s)",
-    )
 
 
 class EscapingStream:
@@ -105,11 +80,44 @@ def note(text: str) -> None:
     print(f"rosglass: {text}", file=sys.stderr, flush=True)
 
 
-def print_json(value: object) -> None:
-    """Print a value as strict JSON on several lines; bytes become a list of numbers."""
-    from rosglass.messages.message import finite
+class ProblemReports:
+    """Prints problems that last, and when they are over.
 
-    print(json.dumps(finite(value), indent=2, ensure_ascii=False, default=list), flush=True)
+    Args:
+        delay: Seconds that a problem must last before it is printed.
+        over_status: Whether the terminal's last line shows a status, which notes replace.
+    """
+
+    def __init__(self, delay: float, *, over_status: bool) -> None:
+        self._delay = delay
+        self._before = CLEAR_LINE if over_status else ""
+        #: Name -> problem, and since when.
+        self._current: dict[str, tuple[str, float]] = {}
+        self._reported: dict[str, str] = {}
+
+    def update(self, problems: Mapping[str, str], *, last: bool = False) -> None:
+        """Print what has changed.
+
+        Args:
+            problems: What has a problem -> the problem.
+            last: Whether the command ends: new problems are printed at once.
+        """
+        now = time.monotonic()
+        for name, problem in problems.items():
+            before, since = self._current.get(name, ("", now))
+            since = since if before == problem else now
+            self._current[name] = (problem, since)
+            if self._reported.get(name) != problem and (last or now - since >= self._delay):
+                self._reported[name] = problem
+                self.note(f"{name}: {problem}")
+        for name in self._current.keys() - problems.keys():
+            del self._current[name]
+            if self._reported.pop(name, None) is not None and not last:
+                self.note(f"{name}: well again")
+
+    def note(self, text: str) -> None:
+        """Print a note for the user."""
+        print(f"{self._before}rosglass: {text}", file=sys.stderr, flush=True)
 
 
 def require_reader() -> None:
@@ -126,58 +134,6 @@ def require_reader() -> None:
         raise BrokenPipeError
 
 
-def fields(value: Any, limit: int | None = SHOWN) -> Any:
-    """Return a message, or a field of one, as dicts, lists and plain values, long arrays cut.
-
-    Args:
-        value: The message or field.
-        limit: Elements of an array to keep; None for all. A longer one becomes its first elements
-            and a text with their number.
-    """
-    from rosglass.messages.message import plain
-
-    if hasattr(value, "_schema__"):
-        value = value.to_dict()
-    return plain(value) if limit is None else _cut(value, limit)
-
-
-def template(message_type: MessageType) -> str:
-    """Return an empty message of the type as one line of YAML."""
-    import yaml
-
-    text: str = yaml.safe_dump(
-        fields(message_type.create(), 3), default_flow_style=True, sort_keys=False, width=2**31
-    )
-    return text.strip()
-
-
-def to_yaml(value: object) -> str:
-    """Return the result of :func:`fields` as YAML; lists of numbers take one line."""
-    import yaml
-
-    class Dumper(yaml.SafeDumper):
-        def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - PyYAML's signature
-            return True
-
-    def sequence(dumper: Any, items: list[Any]) -> Any:
-        flow = not any(isinstance(item, (dict, list)) for item in items)
-        return dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=flow)
-
-    Dumper.add_representer(list, sequence)
-    dumped: str = yaml.dump(
-        value, Dumper=Dumper, sort_keys=False, default_flow_style=False, allow_unicode=True,
-        width=2**31,
-    )  # fmt: skip
-    return dumped.removesuffix("...\n")
-
-
-def to_json(value: object) -> str:
-    """Return the result of :func:`fields` as strict JSON, in one line."""
-    from rosglass.messages.message import finite
-
-    return json.dumps(finite(value), ensure_ascii=False, allow_nan=False)
-
-
 def table(rows: Iterable[Sequence[str]], indent: str = "") -> list[str]:
     """Return rows as lines with aligned columns."""
     found = [list(row) for row in rows]
@@ -186,24 +142,3 @@ def table(rows: Iterable[Sequence[str]], indent: str = "") -> list[str]:
         indent + "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
         for row in found
     ]
-
-
-def _cut(value: Any, limit: int) -> Any:
-    from rosglass.messages.message import plain
-
-    if hasattr(value, "_schema__"):
-        value = value.to_dict()
-    if isinstance(value, dict):
-        return {key: _cut(inner, limit) for key, inner in value.items()}
-    if isinstance(value, str):
-        text: str = plain(value)
-        # A robot's description is a string of 100 kB.
-        return text if len(text) <= 100 * limit else f"{text[: 100 * limit]}... {len(text)} in all"
-    if not hasattr(value, "__len__"):
-        return value
-    count = len(value)
-    few = value[:limit]
-    items = plain(few)
-    if isinstance(few, list):
-        items = [_cut(item, limit) for item in few]
-    return items if count <= limit else [*items, f"... {count} in all"]

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from rosglass.cli.completion import complete
-from rosglass.cli.connecting import add_connection_options, connect, settle, telling
-from rosglass.cli.output import Style, add_output_options, note, print_json, to_yaml
-from rosglass.cli.subcommands import Subcommands
-from rosglass.cli.worlds import names_ros1
+from rosglass.cli.connecting import await_graph, connect, explained_wait, names_ros1
+from rosglass.cli.messages import print_json, to_yaml
+from rosglass.cli.output import Style, note
 from rosglass.comm import ParameterType
 from rosglass.comm.names import similar
 from rosglass.errors import Error
+from rosglass.ros2.parameter_files import dump, parse_value, write
 
 if TYPE_CHECKING:
     import argparse
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
     from rosglass.comm import Node, ParameterClient, ParameterValue
 
-__all__ = ["configure", "run"]
+__all__ = ["run"]
 
 #: The required arguments in ROS 2.
-_NEEDED = {
+_REQUIRED = {
     "list": (),
     "get": ("node", "parameter"),
     "describe": ("node", "parameter"),
@@ -33,51 +33,19 @@ _NEEDED = {
 }
 
 
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare the subcommands for parameters."""
-    parser.epilog = (
-        "In ROS 1, one server has all parameters: a name such as /robot/speed is accepted for NODE "
-        "and PARAMETER, and any namespace for NODE."
-    )
-    add = Subcommands(parser).add
-    sub = add("list", "list the parameters of a node, or of all nodes", _list)
-    _node(sub, nargs="?", help="default: all nodes")
-    _finish(sub, "list")
-    for name, summary, handler in (
-        ("get", "print the value of a parameter", _get),
-        ("describe", "show the descriptor of a parameter", _describe),
-        ("set", "set a parameter", _set),
-        ("delete", "delete a parameter that was set without being declared", _delete),
-    ):
-        sub = add(name, summary, handler)
-        _node(sub)
-        sub.add_argument("parameter", nargs="?", help="ROS 1: may be part of the node argument")
-        if name == "set":
-            sub.add_argument("value", nargs="?", help="as in YAML: 1.5, true, hello, [1, 2]")
-        _finish(sub, name)
-    sub = add("dump", "print all parameters of a node as a parameter file", _dump)
-    _node(sub, nargs="?", help="ROS 1: default: all")
-    sub.add_argument("-o", "--output", metavar="FILE", help="write to a file")
-    _finish(sub, "dump")
-    sub = add("load", "set the parameters of a node from a file", _load)
-    _node(sub, help="ROS 1: optional, also after the file")
-    sub.add_argument("file", metavar="FILE.yaml", nargs="?")
-    _finish(sub, "load")
-
-
 def run(args: argparse.Namespace) -> int:
     """Run the subcommand."""
     if names_ros1(args):
-        from rosglass.cli import param_ros1
+        from rosglass.cli import param_ros1  # noqa: PLC0415 - loads all of ROS 1
 
         with connect(args) as node:
             return param_ros1.run(args.what, node, args)
-    for name in _NEEDED[args.what]:
+    for name in _REQUIRED[args.what]:
         if getattr(args, name) is None:
-            usage = " ".join(needed.upper() for needed in _NEEDED[args.what])
+            usage = " ".join(needed.upper() for needed in _REQUIRED[args.what])
             raise Error(f"{name.upper()} is missing: rosglass param {args.what} {usage}")
-    with connect(args) as node, telling(lambda: _missing(node, args.node)):
-        return int(args.handler(node, args))
+    with connect(args) as node, explained_wait(lambda: _missing(node, args.node)):
+        return _HANDLERS[args.what](node, args)
 
 
 def _missing(node: Node, name: str | None) -> str:
@@ -89,16 +57,6 @@ def _missing(node: Node, name: str | None) -> str:
     if full in known:
         return f"{full} does not serve its parameters"
     return f"there is no node {full}{similar(full, known)}"
-
-
-def _node(parser: argparse.ArgumentParser, **options: Any) -> None:
-    complete(parser.add_argument("node", **options), "nodes")
-
-
-def _finish(parser: argparse.ArgumentParser, what: str) -> None:
-    parser.set_defaults(what=what)
-    add_output_options(parser)
-    add_connection_options(parser)
 
 
 def _list(node: Node, args: argparse.Namespace) -> int:
@@ -124,7 +82,7 @@ def _list(node: Node, args: argparse.Namespace) -> int:
 
 def _nodes(node: Node) -> Iterator[str]:
     """Yield the nodes that serve their parameters."""
-    settle(node)
+    await_graph(node)
     for name in node.nodes():
         if node.service_servers(f"{name.full}/list_parameters"):
             yield name.full
@@ -144,8 +102,6 @@ def _get(node: Node, args: argparse.Namespace) -> int:
 
 
 def _describe(node: Node, args: argparse.Namespace) -> int:
-    from dataclasses import asdict
-
     with node.create_parameter_client(args.node) as client:
         found = client.describe([args.parameter], timeout=args.timeout).get(args.parameter)
         if found is None or not found.type:
@@ -161,8 +117,6 @@ def _describe(node: Node, args: argparse.Namespace) -> int:
 
 
 def _set(node: Node, args: argparse.Namespace) -> int:
-    from rosglass.ros2.parameter_files import parse_value
-
     # Empty quotes are an empty text, as in ros2.
     value = parse_value(args.value, f"the value {args.value!r}") if args.value else ""
     with node.create_parameter_client(args.node) as client:
@@ -219,8 +173,6 @@ def _change(node: Node, args: argparse.Namespace, value: ParameterValue, what: s
 
 
 def _dump(node: Node, args: argparse.Namespace) -> int:
-    from rosglass.ros2.parameter_files import dump, write
-
     with node.create_parameter_client(args.node) as client:
         values = {client.node: client.get(timeout=args.timeout)}
     if args.output:
@@ -246,3 +198,14 @@ def _unknown(client: ParameterClient, args: argparse.Namespace) -> int:
     hint = similar(args.parameter, client.names(timeout=args.timeout))
     note(f"{client.node} has no parameter {args.parameter}{hint}")
     return 1
+
+
+_HANDLERS = {
+    "list": _list,
+    "get": _get,
+    "describe": _describe,
+    "set": _set,
+    "delete": _delete,
+    "dump": _dump,
+    "load": _load,
+}

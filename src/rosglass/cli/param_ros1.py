@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rosglass.cli.output import note, print_json, to_yaml
-from rosglass.cli.worlds import as_ros1
+from rosglass.cli.connecting import as_ros1
+from rosglass.cli.messages import print_json, to_yaml
+from rosglass.cli.output import note
 from rosglass.errors import Error, UnsupportedError
+from rosglass.ros1.rosparam_files import dump, parse_value
 
 if TYPE_CHECKING:
     import argparse
@@ -25,12 +27,12 @@ def run(what: str, node: Node, args: argparse.Namespace) -> int:
         UnsupportedError: ROS 1 lacks the feature.
         ParameterError: A parameter is not set, or a value is not valid for one.
     """
-    if what not in _DOES:
+    if what not in _HANDLERS:
         name = _name(args, args.parameter)
         raise UnsupportedError(
             f"ROS 1 knows nothing of a parameter but its value: rosglass param get {name}"
         )
-    _DOES[what](_server(node), args)
+    _HANDLERS[what](_server(node), args)
     return 0
 
 
@@ -47,14 +49,14 @@ def _name(args: argparse.Namespace, parameter: str | None) -> str:
 
 
 def _list(server: ParameterServer, args: argparse.Namespace) -> None:
-    place = "/" + (args.node or "").strip("/")
-    names = server.names(place, timeout=args.timeout)
-    if not names and place != "/":
+    namespace = "/" + (args.node or "").strip("/")
+    names = server.names(namespace, timeout=args.timeout)
+    if not names and namespace != "/":
         # Raises, with similar names, unless it is a parameter itself, or an empty namespace.
-        if not isinstance(server.get(place, timeout=args.timeout), dict):
-            names = [place]
+        if not isinstance(server.get(namespace, timeout=args.timeout), dict):
+            names = [namespace]
         else:
-            note(f"the namespace {place} is empty")
+            note(f"the namespace {namespace} is empty")
     elif not names:
         note("no parameters are set")
     if args.json:
@@ -73,8 +75,6 @@ def _get(server: ParameterServer, args: argparse.Namespace) -> None:
 
 
 def _set(server: ParameterServer, args: argparse.Namespace) -> None:
-    from rosglass.ros1.rosparam_files import parse_value
-
     parameter, text = args.parameter, args.value
     if text is None:
         parameter, text = None, parameter
@@ -84,23 +84,21 @@ def _set(server: ParameterServer, args: argparse.Namespace) -> None:
     # Empty quotes are an empty text.
     value = parse_value(text, f"the value {text!r}") if text else ""
     server.set(name, value, timeout=args.timeout)
-    _tell(args, name, "set")
+    _print_done(args, name, "set")
 
 
 def _delete(server: ParameterServer, args: argparse.Namespace) -> None:
     name = _name(args, args.parameter)
     server.delete(name, timeout=args.timeout)
-    _tell(args, name, "deleted")
+    _print_done(args, name, "deleted")
 
 
 def _dump(server: ParameterServer, args: argparse.Namespace) -> None:
-    from rosglass.ros1.rosparam_files import dump
-
-    place = "/" + (args.node or "").strip("/")
+    namespace = "/" + (args.node or "").strip("/")
     if args.output:
-        server.save(args.output, place, timeout=args.timeout)
+        server.save(args.output, namespace, timeout=args.timeout)
         return
-    value = server.get(place, timeout=args.timeout)
+    value = server.get(namespace, timeout=args.timeout)
     if args.json:
         print_json(value)
     else:
@@ -108,8 +106,8 @@ def _dump(server: ParameterServer, args: argparse.Namespace) -> None:
 
 
 def _load(server: ParameterServer, args: argparse.Namespace) -> None:
-    file, place = _file(args)
-    names = server.load(file, place, timeout=args.timeout)
+    file, namespace = _file(args)
+    names = server.load(file, namespace, timeout=args.timeout)
     if args.json:
         print_json(names)
     else:
@@ -126,14 +124,14 @@ def _file(args: argparse.Namespace) -> tuple[str, str]:
     return second, "/" + first.strip("/")
 
 
-def _tell(args: argparse.Namespace, name: str, done: str) -> None:
+def _print_done(args: argparse.Namespace, name: str, done: str) -> None:
     if args.json:
         print_json({"successful": True, "reason": ""})
     else:
         print(f"{name} is {done}")
 
 
-_DOES = {
+_HANDLERS = {
     "list": _list,
     "get": _get,
     "set": _set,

@@ -2,117 +2,49 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import logging
+import os
 import select
 import shutil
 import sys
 from datetime import datetime
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rosglass.cli.connecting import End, add_connection_options, connect, seconds
+from rosglass.bags import Player, open_bag
+from rosglass.cli.arguments import PLAY_KEYS
+from rosglass.cli.connecting import End, connect
 from rosglass.cli.output import CLEAR_LINE, note
+from rosglass.interfaces import ros1_name
+
+if sys.platform != "win32":
+    import termios
+    import tty
 
 if TYPE_CHECKING:
+    import argparse
     from collections.abc import Iterator
 
-    from rosglass.bags import Bag, Channel, Player
+    from rosglass.bags import Bag, Channel
 
-__all__ = ["configure", "run"]
+__all__ = ["run"]
 
-_KEYS = (
-    "space pauses, s sends one message, left and right jump 10 s, + and - change the rate, q ends"
-)
 #: Key codes of terminals, in order of matching.
 _JUMPS = {"\033[D": -10.0, "\033[C": 10.0}
 
 
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's options."""
-    parser.add_argument("file", metavar="FILE", type=Path, help="MCAP file, ROS 2 bag or ROS 1 bag")
-    parser.add_argument(
-        "--list", action="store_true", help="list the contents of the recording and exit"
-    )
-    parser.add_argument("--json", action="store_true", help="with --list: as JSON")
-    parser.add_argument(
-        "-r", "--rate", type=float, default=1.0, help="2 is twice as fast (default: %(default)g)"
-    )
-    parser.add_argument("-l", "--loop", action="store_true", help="start over at the end")
-    parser.add_argument(
-        "--clock",
-        nargs="?",
-        type=float,
-        const=40.0,
-        default=0.0,
-        metavar="HZ",
-        help="publish /clock, for nodes with use_sim_time (default rate: 40 Hz)",
-    )
-    parser.add_argument(
-        "-t", "--topics", nargs="+", default=[], metavar="TOPIC", help="play only these"
-    )
-    parser.add_argument(
-        "-x",
-        "--exclude",
-        "--exclude-regex",
-        default="",
-        metavar="REGEX",
-        help="exclude matching topics",
-    )
-    parser.add_argument(
-        "-m",
-        "--remap",
-        nargs="+",
-        default=[],
-        type=_rule,
-        metavar="OLD:=NEW",
-        help="publish a topic under another name",
-    )
-    parser.add_argument(
-        "--start",
-        "--start-offset",
-        type=seconds,
-        default=0.0,
-        metavar="SECONDS",
-        help="start at this time in the recording",
-    )
-    parser.add_argument(
-        "--duration", "--playback-duration", type=seconds, metavar="SECONDS",
-        help="play only this long",
-    )  # fmt: skip
-    parser.add_argument(
-        "-d",
-        "--delay",
-        type=seconds,
-        default=1.0,
-        metavar="SECONDS",
-        help="time for subscriptions to connect before the first message (default: %(default)g)",
-    )
-    parser.add_argument(
-        "-p", "--paused", "--start-paused", action="store_true", help="start paused"
-    )
-    parser.add_argument(
-        "--no-keys", "--disable-keyboard-controls", action="store_true", help="ignore keys"
-    )
-    add_connection_options(parser)
-    parser.epilog = f"Keys during playback: {_KEYS}."
-
-
 def run(args: argparse.Namespace) -> int:
     """Play until the end, Ctrl-C or SIGTERM."""
-    from rosglass.bags import Player, open_bag
-
     with open_bag(args.file) as bag:
         if args.list:
-            print(json.dumps(_table(bag), indent=2) if args.json else _listing(bag))
+            print(json.dumps(_summary(bag), indent=2) if args.json else _listing(bag))
             return 0
         if not args.verbose:
             # This command prints what is not played, and why.
             logging.getLogger("rosglass.bags").setLevel(logging.CRITICAL)
         with (
-            connect(args, patient=True) as node,
+            connect(args, wait_for_start=True) as node,
             Player(
                 node,
                 bag,
@@ -155,13 +87,13 @@ def _print_problems(player: Player, printed: dict[str, str], *, last: bool = Fal
 def _watch(player: Player, bag: Bag, end: End, printed: dict[str, str], *, keys: bool) -> None:
     interactive = keys and sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
     if interactive:
-        print(_KEYS)
-    with _keys() if interactive else contextlib.nullcontext():
+        print(PLAY_KEYS)
+    with _unbuffered_keys() if interactive else contextlib.nullcontext():
         while not end.is_set() and not player.wait(0.0 if interactive else 0.2):
             _print_problems(player, printed)
             if not interactive:
                 continue
-            if select.select([sys.stdin], [], [], 0.2)[0] and not _obey(player, bag):
+            if select.select([sys.stdin], [], [], 0.2)[0] and not _on_keys(player, bag):
                 break
             status = player.status()
             lag = f", {status.lag:.1f} s behind" if status.lag > 0.5 else ""
@@ -176,10 +108,8 @@ def _watch(player: Player, bag: Bag, end: End, printed: dict[str, str], *, keys:
         print()
 
 
-def _obey(player: Player, bag: Bag) -> bool:
+def _on_keys(player: Player, bag: Bag) -> bool:
     """Handle pressed keys; return False to end."""
-    import os
-
     typed = os.read(sys.stdin.fileno(), 16).decode(errors="replace")
     if typed in _JUMPS:
         player.seek(min(max(player.position + _JUMPS[typed], 0.0), bag.duration))
@@ -197,11 +127,8 @@ def _obey(player: Player, bag: Bag) -> bool:
 
 
 @contextlib.contextmanager
-def _keys() -> Iterator[None]:
+def _unbuffered_keys() -> Iterator[None]:
     """Read keys one by one; Ctrl-C still ends the program."""
-    import termios
-    import tty
-
     before = termios.tcgetattr(sys.stdin)
     tty.setcbreak(sys.stdin)
     try:
@@ -210,14 +137,7 @@ def _keys() -> Iterator[None]:
         termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
 
 
-def _rule(text: str) -> tuple[str, str]:
-    old, separator, new = text.partition(":=")
-    if not (separator and old and new):
-        raise argparse.ArgumentTypeError(f"{text!r} is not of the form /old:=/new")
-    return old, new
-
-
-def _table(bag: Bag) -> dict[str, Any]:
+def _summary(bag: Bag) -> dict[str, Any]:
     return {
         "file": str(bag.path),
         "start": bag.start / 1e9,
@@ -225,15 +145,13 @@ def _table(bag: Bag) -> dict[str, Any]:
         "duration": bag.duration,
         "problem": bag.problem,
         "topics": [
-            {"topic": c.topic, "type": _kind(c), "wire": c.wire, "messages": c.count}
+            {"topic": c.topic, "type": _type_name(c), "wire": c.wire, "messages": c.count}
             for c in bag.channels
         ],
     }
 
 
-def _kind(channel: Channel) -> str:
-    from rosglass.interfaces import ros1_name
-
+def _type_name(channel: Channel) -> str:
     return ros1_name(channel.type_name) if channel.wire == "ros1" else channel.type_name
 
 
@@ -244,5 +162,5 @@ def _listing(bag: Bag) -> str:
         lines.append(f"  {bag.problem}")
     for channel in bag.channels:
         count = "?" if channel.count < 0 else channel.count
-        lines.append(f"  {count:>8} {channel.topic} [{_kind(channel)}]")
+        lines.append(f"  {count:>8} {channel.topic} [{_type_name(channel)}]")
     return "\n".join(lines)

@@ -13,38 +13,15 @@ from typing import TYPE_CHECKING
 
 import rosglass
 from rosglass.cli import end_at_once, is_interrupt
-from rosglass.cli.completion import is_completing, offer
-from rosglass.cli.output import EscapingStream
-from rosglass.cli.subcommands import Parser, add_verbose
-from rosglass.cli.worlds import names_ros1
+from rosglass.cli.arguments import COMMANDS
+from rosglass.cli.output import EscapingStream, note
+from rosglass.cli.parser import Parser, add_verbose, is_completing
 
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Sequence
 
-__all__ = ["COMMANDS", "run"]
-
-#: Subcommand -> (module, one-line help). Modules have ``configure(parser)``, ``run(args) -> int``.
-COMMANDS = {
-    "run": ("rosglass.cli.run", "open an interface written in QML"),
-    "rviz": ("rosglass.cli.rviz", "open RViz with interfaces over its 3D view"),
-    "qml-path": ("rosglass.cli.qml_path", "print the folders of the QML modules, for editors"),
-    "demo": ("rosglass.cli.demo", "open the demo cockpit on a simulated robot"),
-    "robot": ("rosglass.cli.robot", "run the simulated robot"),
-    "topic": ("rosglass.cli.topic", "inspect topics, receive and publish messages"),
-    "service": ("rosglass.cli.service", "inspect and call services"),
-    "action": ("rosglass.cli.action", "inspect actions and send goals"),
-    "param": ("rosglass.cli.param", "read and set the parameters of nodes"),
-    "node": ("rosglass.cli.node", "inspect nodes"),
-    "interface": ("rosglass.cli.interface", "show message, service and action types"),
-    "record": ("rosglass.cli.record", "record topics to an MCAP file or a ROS 1 bag"),
-    "play": ("rosglass.cli.play", "play a recording: MCAP, ROS 2 bag or ROS 1 bag"),
-    "bridge": ("rosglass.cli.bridge", "relay topics, services and actions between two graphs"),
-    "doctor": ("rosglass.cli.doctor", "find what blocks the connection to the robot"),
-    "router": ("rosglass.cli.router", "run a Zenoh router for ROS 2 (rmw_zenoh)"),
-    "completion": ("rosglass.cli.completion_command", "print the shell code for Tab completion"),
-}
-
+__all__ = ["build_parser", "run"]
 
 #: Commands that load Qt: Ctrl-C ends the process until they handle it themselves.
 _WITH_QT = ("run", "rviz", "demo")
@@ -72,13 +49,14 @@ def build_parser(command: str | None = None) -> argparse.ArgumentParser:
     add_verbose(parser)
     parser.set_defaults(verbose=0)
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for name, (module, summary) in COMMANDS.items():
+    for name, (declare_arguments, summary) in COMMANDS.items():
         sub = subparsers.add_parser(
             name, help=summary, description=f"{summary[0].upper()}{summary[1:]}."
         )
+        sub.set_defaults(handler="run")
         add_verbose(sub)
         if command in (name, _ALL):
-            import_module(module).configure(sub)
+            declare_arguments(sub)
     return parser
 
 
@@ -89,27 +67,27 @@ def _split(arguments: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
     """
     ours: list[str] = []
     ros: list[str] = []
-    place = 0
-    while place < len(arguments):
-        argument = arguments[place]
+    index = 0
+    while index < len(arguments):
+        argument = arguments[index]
         if argument == "--":
-            return ours, ros, list(arguments[place + 1 :])
+            return ours, ros, list(arguments[index + 1 :])
         if argument == "--ros-args":
-            end = place + 1
+            end = index + 1
             while end < len(arguments) and arguments[end] != "--":
                 end += 1
-            ros += arguments[place : end + 1]
-            place = end
+            ros += arguments[index : end + 1]
+            index = end
         else:
             ours.append(argument)
-        place += 1
+        index += 1
     return ours, ros, []
 
 
 def run(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code of :func:`rosglass.cli.main`."""
     if is_completing():
-        offer(build_parser(_ALL))
+        _complete()
     _prepare_output()
     try:
         code = _run(list(sys.argv[1:] if argv is None else argv))
@@ -121,12 +99,21 @@ def run(argv: Sequence[str] | None = None) -> int:
     return code
 
 
+def _complete() -> None:
+    """Print the completions of the line that is being typed, and end the program."""
+    try:
+        from rosglass.cli.completion import offer  # noqa: PLC0415 - argcomplete is an extra
+    except ModuleNotFoundError:
+        sys.exit(1)  # nothing may be printed into that line
+    offer(build_parser(_ALL))
+
+
 def _explain(error: Exception) -> int:
     """Print an error for users; return the exit code. Bugs of rosglass are raised again."""
     if isinstance(error, rosglass.Error):
         return _fail(str(error))
     if isinstance(error, ModuleNotFoundError):
-        from rosglass.connection import explain_missing
+        from rosglass.connection import explain_missing  # noqa: PLC0415 - only needed to explain an error
 
         missing = explain_missing(error)
         if missing:
@@ -158,22 +145,21 @@ def _run(arguments: list[str]) -> int:
         args.url = _nearby_url()
     for folder in getattr(args, "definitions", ()):
         import_module("rosglass.messages").default_library().add_path(folder)
-    command_run = import_module(COMMANDS[args.command][0]).run
+    module = import_module(f"rosglass.cli.{args.command.replace('-', '_')}")
     if args.command not in _WITH_QT and signal.getsignal(signal.SIGINT) is end_at_once:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        return int(command_run(args))
+        return int(getattr(module, args.handler)(args))
     except rosglass.Error as error:
-        if getattr(args, "ros1", hasattr(args, "url") and names_ros1(args)):
-            from rosglass.interfaces.names import spelled_ros1
+        if is_interrupt(error):
+            raise
+        from rosglass.cli.connecting import spelled_for  # noqa: PLC0415 - only needed to explain an error
 
-            return _fail(spelled_ros1(str(error)))
-        raise
+        return _fail(spelled_for(args, str(error)))
 
 
 def _nearby_url() -> str:
-    from rosglass.cli.network import nearby_url
-    from rosglass.cli.output import note
+    from rosglass.cli.network import nearby_url  # noqa: PLC0415 - not for every command
 
     url = nearby_url()
     if url:

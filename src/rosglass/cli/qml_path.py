@@ -9,27 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rosglass.errors import Error
+from rosglass.qml import IMPORT_PATHS
 
 if TYPE_CHECKING:
     import argparse
 
-__all__ = ["configure", "run"]
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's options."""
-    parser.add_argument(
-        "--qmlls-ini",
-        action="store_true",
-        help="write .qmlls.ini in this folder, which configures the QML language server of an "
-        "editor; other settings in it are kept",
-    )
+__all__ = ["run"]
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the import path, or write the settings; returns the exit code."""
-    from rosglass.qml import IMPORT_PATHS
-
     path = os.pathsep.join(map(str, IMPORT_PATHS))
     if not args.qmlls_ini:
         print(path)

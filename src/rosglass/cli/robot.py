@@ -7,75 +7,30 @@ import signal
 import sys
 import threading
 import time
-from contextlib import suppress
 from typing import TYPE_CHECKING
 
+import rosglass
+from rosglass.cli.network import refused
 from rosglass.cli.output import note
 from rosglass.comm import ConnectionState
+from rosglass.demo.processes import DUPLICATE_EXIT
+from rosglass.demo.robot import Robot, RobotOptions
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Mapping
 
     from rosglass.comm import Sample, Status
 
-__all__ = ["DUPLICATE_EXIT", "configure", "run"]
+__all__ = ["run"]
 
-#: Exit code if a robot of the same name exists already.
-DUPLICATE_EXIT = 3
-#: Seconds after the start in which another robot, whose odometry has 30 Hz, ends
-#: this one.
+#: Seconds after the start in which another robot, whose odometry has 30 Hz, ends this one.
 _DUPLICATE_WATCH_S = 5.0
 #: Seconds in which one of two robots has to leave.
 _YIELD_S = 2.0
 
 
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's options."""
-    parser.add_argument(
-        "--url",
-        default=_default_url(os.environ),
-        help="URL of the graph (default: ROSGLASS_URL, or the ROS 1 master that "
-        "ROS_MASTER_URI names, or zenoh://127.0.0.1:7447; here: %(default)s)",
-    )
-    parser.add_argument("--name", default="robot", help="name of the node (default: %(default)s)")
-    parser.add_argument(
-        "--fps", type=float, default=30.0, help="camera images per second (default: 30)"
-    )
-    parser.add_argument("--no-raw", action="store_true", help="publish no raw camera images")
-    parser.add_argument(
-        "--no-compressed", action="store_true", help="publish no compressed camera images"
-    )
-    parser.add_argument(
-        "--jpeg-quality", type=int, default=80, metavar="1-100", help="default: %(default)s"
-    )
-    parser.add_argument(
-        "--equipped",
-        action="store_true",
-        help="add a model and a point cloud for RViz, more cameras, modes, a mission and "
-        "behaviours",
-    )
-    parser.add_argument(
-        "--mode",
-        default="supervised",
-        metavar="MODE",
-        help="first mode of an equipped robot: autonomous, supervised or safe "
-        "(default: %(default)s)",
-    )
-    parser.add_argument(
-        "--leash",
-        action="store_true",
-        help="exit when standard input closes, that is, with the program that started the robot",
-    )
-    parser.set_defaults(ros_arguments=[])
-
-
 def run(args: argparse.Namespace) -> int:
     """Run the robot until SIGINT or SIGTERM."""
-    import rosglass
-    from rosglass.cli.network import refused
-    from rosglass.demo.robot import Robot, RobotOptions
-
     options = RobotOptions(
         fps=args.fps,
         raw=not args.no_raw,
@@ -87,15 +42,15 @@ def run(args: argparse.Namespace) -> int:
     end = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: end.set())
     if args.leash:
-        threading.Thread(target=_follow_leash, args=(end,), daemon=True).start()
+        threading.Thread(target=_watch_parent, args=(end,), daemon=True).start()
     node = rosglass.connect(args.url, name=args.name, arguments=args.ros_arguments)
     try:
         robot = Robot(node, options)
         try:
-            node.on_status_change(_tell)
+            node.on_status_change(_print_status)
             full = f"{node.namespace.rstrip('/')}/{node.name}"
             print(f"robot: simulated, node {full} on {args.url}; Ctrl-C ends it", flush=True)
-            _tell(node.status())
+            _print_status(node.status())
             refusal = refused(args.url)
             if refusal is not None:
                 note(f"{args.url}: {refusal[0]}; {refusal[1]}. Waiting for it")
@@ -143,30 +98,12 @@ def _duplicate(name: str, url: str) -> str:
     )
 
 
-def _default_url(env: Mapping[str, str]) -> str:
-    """Return the URL to print at the start."""
-    url = env.get("ROSGLASS_URL") or "zenoh://127.0.0.1:7447"
-    # Not needed for help and completion.
-    if env.get("ROSGLASS_URL") or not env.get("ROS_MASTER_URI"):
-        return url
-    from rosglass.connection import default_url
-    from rosglass.errors import Error
-    from rosglass.ros1.options import Ros1Options
-
-    with suppress(Error):
-        if default_url(env) == "ros1://":
-            url = "ros1://"
-            # Connecting to it reports what is wrong.
-            url += Ros1Options.parse(url, env).master.removeprefix("http://")
-    return url
-
-
-def _tell(status: Status) -> None:
+def _print_status(status: Status) -> None:
     if status.state is not ConnectionState.CLOSED:
         print(": ".join(filter(None, ("robot", status.state.value, status.detail))), flush=True)
 
 
-def _follow_leash(end: threading.Event) -> None:
+def _watch_parent(end: threading.Event) -> None:
     # The parent process holds the other end, which closes however it ends, SIGKILL included.
     # Not by sys.stdin, whose lock would have Python abort if the robot ends by itself.
     while os.read(sys.stdin.fileno(), 4096):

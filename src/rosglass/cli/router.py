@@ -7,34 +7,16 @@ import sys
 import threading
 from typing import TYPE_CHECKING
 
+from rosglass.wires.zenoh.router import Router
+
 if TYPE_CHECKING:
     import argparse
 
-__all__ = ["configure", "run"]
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the command's options."""
-    where = parser.add_mutually_exclusive_group()
-    where.add_argument(
-        "--listen",
-        default="tcp/127.0.0.1:7447",
-        metavar="tcp/HOST:PORT",
-        help="endpoint to listen on (default: %(default)s, this machine only; port 0: a free one)",
-    )
-    where.add_argument(
-        "--open",
-        action="store_const",
-        const="tcp/[::]:7447",
-        dest="listen",
-        help="listen on all interfaces, as ROS 2's own router does: tcp/[::]:7447",
-    )
+__all__ = ["run"]
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the router; returns 0 after Ctrl-C or SIGTERM."""
-    from rosglass.wires.zenoh.router import Router
-
     ended = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ended.set())

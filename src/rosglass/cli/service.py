@@ -6,102 +6,54 @@ import logging
 import time
 from typing import TYPE_CHECKING
 
-from rosglass.cli.completion import complete
 from rosglass.cli.connecting import (
-    add_connection_options,
+    await_graph,
     await_types,
     connect,
+    explained_wait,
     find,
+    is_hidden,
+    is_ros1,
     note_invalid_names,
-    settle,
-    telling,
+    spelled,
     wait,
 )
-from rosglass.cli.endpoints import describe, short
-from rosglass.cli.output import (
-    Style,
-    add_output_options,
+from rosglass.cli.endpoints import describe, print_names, short
+from rosglass.cli.messages import (
     fields,
-    note,
+    parse_fields,
     print_json,
+    split_type,
     template,
     to_json,
     to_yaml,
 )
-from rosglass.cli.subcommands import Subcommands
-from rosglass.cli.values import parse_fields, split_type
-from rosglass.cli.worlds import is_hidden, is_ros1, spelled
+from rosglass.cli.output import Style, note
 from rosglass.comm.names import similar
+from rosglass.errors import ServiceUnavailableError
 
 if TYPE_CHECKING:
     import argparse
 
     from rosglass.comm import EndpointInfo
 
-__all__ = ["configure", "run"]
+__all__ = ["call", "info", "list_services"]
 
 
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare the subcommands for services."""
-    add = Subcommands(parser).add
-    sub = add("list", "list services", _list)
-    sub.add_argument("-t", "--types", "--show-types", action="store_true", help="show types")
-    sub.add_argument(
-        "--hidden", "--include-hidden-services", action="store_true",
-        help="include those of actions",
-    )  # fmt: skip
-    _finish(sub)
-    sub = add("info", "show the servers and clients of a service", _info)
-    complete(sub.add_argument("service"), "services")
-    _finish(sub)
-    sub = add("call", "call a service and print its response", _call)
-    complete(sub.add_argument("service"), "services")
-    complete(
-        sub.add_argument(
-            "rest", nargs="*", metavar="[TYPE] VALUES", help="values as YAML: '{a: 1, b: 2}'"
-        ),
-        "service_types",
-    )
-    _finish(sub)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run the subcommand."""
-    return int(args.handler(args))
-
-
-def _finish(parser: argparse.ArgumentParser) -> None:
-    add_output_options(parser)
-    add_connection_options(parser)
-
-
-def _list(args: argparse.Namespace) -> int:
-    style = Style(args)
+def list_services(args: argparse.Namespace) -> int:
+    """Print the services."""
     with connect(args) as node:
-        settle(node)
+        await_graph(node)
         note_invalid_names(node)
         if args.types or args.json:
             await_types(node, lambda: node.services().values(), args.timeout)
         found = {s: k for s, k in node.services().items() if args.hidden or not is_hidden(node, s)}
-    if args.json:
-        print_json([{"service": name, "types": [spelled(node, t) for t in types]}
-                    for name, types in found.items()])  # fmt: skip
-        return 0
-    for name, types in found.items():
-        print(
-            name
-            + (
-                style(f" [{', '.join(spelled(node, t) for t in types)}]", "dim")
-                if args.types
-                else ""
-            )
-        )
-    if not found:
-        note("there are no services here; rosglass doctor looks why")
+    print_names(args, node, "service", found)
     return 0
 
 
-def _info(args: argparse.Namespace) -> int:
+def info(args: argparse.Namespace) -> int:
+    """Print the servers and clients of a service."""
     style = Style(args)
     with connect(args) as node:
         name = node.resolve(args.service)
@@ -130,9 +82,8 @@ def _info(args: argparse.Namespace) -> int:
     return 0
 
 
-def _call(args: argparse.Namespace) -> int:
-    from rosglass.errors import ServiceUnavailableError
-
+def call(args: argparse.Namespace) -> int:
+    """Call a service, and print the response."""
     type_name, text = split_type(args.rest)
     style = Style(args)
     deadline = time.monotonic() + args.timeout
@@ -148,14 +99,14 @@ def _call(args: argparse.Namespace) -> int:
                 gone = is_ros1(node) and not node.service_servers(name)
                 return client.type is not None or gone
 
-            with telling(lambda: client.problem):
+            with explained_wait(lambda: client.problem):
                 wait(node, settled, args.timeout)
             if client.type is None:
                 raise ServiceUnavailableError(client.problem or f"no node offers {name}")
             request = client.type.request
             values = parse_fields(text, request.name, template(request))
             began = time.monotonic()
-            with telling(lambda: client.problem or f"{name} has not answered yet"):
+            with explained_wait(lambda: client.problem or f"{name} has not answered yet"):
                 response = client.call(values, timeout=round(max(deadline - began, 1.0), 1))
             took = time.monotonic() - began
     found = fields(response, None if args.json else 100)

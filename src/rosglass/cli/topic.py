@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
+import logging
 import math
 import statistics
 import threading
@@ -11,45 +11,129 @@ from collections import deque
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rosglass.cli.completion import complete
 from rosglass.cli.connecting import (
-    TIMEOUT,
     End,
-    add_connection_options,
+    as_ros1,
+    await_graph,
     connect,
+    explained_wait,
     find,
-    natural,
+    is_hidden,
     note_invalid_names,
-    seconds,
-    settle,
-    telling,
+    spelled,
     wait,
 )
 from rosglass.cli.endpoints import describe, problems, short, sources
-from rosglass.cli.output import (
+from rosglass.cli.messages import (
     SHOWN,
     SHOWN_JSON,
-    Style,
-    add_output_options,
     fields,
-    note,
+    parse_fields,
     print_json,
+    profile,
+    split_type,
     template,
     to_json,
     to_yaml,
 )
-from rosglass.cli.subcommands import Subcommands
-from rosglass.cli.values import parse_fields, profile, split_type
-from rosglass.cli.waiting import Reasons
-from rosglass.cli.worlds import as_ros1, is_hidden, spelled
+from rosglass.cli.output import Style, note, require_reader
+from rosglass.comm import IMMEDIATE, ConnectionState
 from rosglass.comm.names import similar
+from rosglass.errors import Error, TypeNotFoundError
+from rosglass.messages import OpaqueType
 
 if TYPE_CHECKING:
+    import argparse
     from collections.abc import Callable, Iterable, Iterator
 
-    from rosglass.comm import Node, Sample
+    from rosglass.comm import Node, Sample, Subscription
 
-__all__ = ["configure", "echo", "measure", "run"]
+__all__ = ["echo", "info", "list_topics", "measure", "publish"]
+
+#: Seconds without messages that are not reported.
+_QUIET_S = 2.0
+#: How many times the usual pause between messages counts as silence.
+_PAUSES = 5
+#: Shown for an unknown type.
+_UNKNOWN = "unknown"
+#: Seconds that ROS 1's publishers may take to send their type.
+_TYPE_TIMEOUT_S = 3.0
+
+
+def list_topics(args: argparse.Namespace) -> int:
+    """Print the topics."""
+    style = Style(args)
+    with connect(args) as node:
+        await_graph(node)
+        note_invalid_names(node)
+        found = {t: k for t, k in node.topics().items() if args.hidden or not is_hidden(node, t)}
+        counts = {t: (len(node.publishers(t)), len(node.subscriptions(t))) for t in found}
+    if args.count_topics:
+        if args.json:
+            print_json({"count": len(found)})
+        else:
+            print(len(found))
+        return 0
+    if args.json:
+        print_json(
+            [
+                {"topic": t, "types": [spelled(node, one) for one in types],
+                 "publishers": counts[t][0],
+                 "subscriptions": counts[t][1]}
+                for t, types in found.items()
+            ]
+        )  # fmt: skip
+        return 0
+    for topic, types in found.items():
+        several = style(f"  {len(types)} types!", "red") if len(types) > 1 else ""
+        shown = style(f" [{_types(node, types)}]", "dim") if args.types else several
+        print(topic + shown)
+    if not found:
+        note(f"there are no topics on {args.url or 'this graph'}; rosglass doctor looks why")
+    return 0
+
+
+def info(args: argparse.Namespace) -> int:
+    """Print the publishers and subscribers of a topic."""
+    style = Style(args)
+    with connect(args) as node:
+        topic = node.resolve(args.topic)
+        ends = find(
+            node, lambda: [*node.publishers(topic), *node.subscriptions(topic)], args.timeout
+        )
+        if not ends:
+            return _unknown(node, topic)
+        ros1 = as_ros1(node)
+        if ros1 is not None:
+            publishers = ros1.ask_publishers(topic, min(args.timeout, _TYPE_TIMEOUT_S))
+            ends = [*publishers, *node.subscriptions(topic)]
+    if args.json:
+        print_json({"topic": topic, "endpoints": [describe(node, end) for end in ends]})
+        return 0
+    types = _types(node, {end.type for end in ends})
+    shown = "unknown (no publisher)" if types == _UNKNOWN and not sources(ends) else types
+    print(f"{style(topic, 'bold')} [{shown}]")
+    for problem in problems(ends):
+        print(style(f"  {problem.text}", "red"))
+    for end in ends:
+        print(f"  {end.kind.value} {style(end.node, 'cyan')}")
+        # In ROS 1, a topic has one type, which is printed above.
+        above = ("kind", "name", "node", *(("type",) if ros1 else ()))
+        for key, value in describe(node, end).items():
+            if key not in above and value:
+                print(f"    {key}: {short(value)}")
+        if ros1 and end in sources(ends) and not end.type_hash:
+            print("    does not answer: its md5 sum, and whether it latches, is not known")
+    return 0
+
+
+def _types(node: Node, names: Iterable[str]) -> str:
+    return ", ".join(sorted(spelled(node, name) for name in names if name)) or _UNKNOWN
+
+
+def _unknown(node: Node, topic: str) -> int:
+    note(f"nothing publishes or subscribes to {topic}{similar(topic, node.topics())}")
+    return 1
 
 
 def echo(args: argparse.Namespace) -> int:
@@ -58,12 +142,12 @@ def echo(args: argparse.Namespace) -> int:
     # Readers of a table would misread truncated values, or miss columns.
     limit = args.truncate or (None if args.csv else SHOWN_JSON if args.json else SHOWN)
     received = 0
-    with connect(args, patient=True) as node:
+    with connect(args, wait_for_start=True) as node:
         subscription = node.create_subscription(args.topic, args.type, qos=profile(args))
         get = _getter(args.field)
         end = End()
         due = time.monotonic() + (math.inf if args.timeout is None else args.timeout)
-        with Reasons(node, subscription, args) as reasons:
+        with _SilenceReasons(node, subscription, args) as reasons:
             while not end.is_set() and (args.count is None or received < args.count):
                 sample = subscription.wait(0.2)
                 if sample is None:
@@ -99,8 +183,6 @@ def _getter(path: str | None) -> Callable[[Sample], Any]:
 def _text(
     args: argparse.Namespace, sample: Sample, get: Callable[[Sample], Any], limit: int | None
 ) -> str:
-    from rosglass.messages import OpaqueType
-
     if args.raw or isinstance(sample.type, OpaqueType):
         data = bytes(sample.data)
         shown = data if limit is None else data[: 16 * limit]
@@ -137,8 +219,6 @@ class _Seen(NamedTuple):
 
 def measure(args: argparse.Namespace) -> int:
     """Print a figure each second, until Ctrl-C or the end of the duration."""
-    from rosglass.comm import IMMEDIATE
-
     seen: deque[_Seen] = deque(maxlen=args.window)
     lock = threading.Lock()
     wants_stamp = args.what == "delay"
@@ -149,14 +229,14 @@ def measure(args: argparse.Namespace) -> int:
         with lock:
             seen.append(_Seen(sample.received_ns, len(sample.data), delay))
 
-    with connect(args, patient=True) as node:
+    with connect(args, wait_for_start=True) as node:
         subscription = node.create_subscription(
             args.topic, args.type, qos=profile(args), raw_callback=receive, executor=IMMEDIATE
         )
         end = End()
         until = None if args.duration is None else time.monotonic() + args.duration
         shown = -1
-        with Reasons(node, subscription, args) as reasons:
+        with _SilenceReasons(node, subscription, args) as reasons:
             while not end.is_set() and not failure:
                 left = 1.0 if until is None else until - time.monotonic()
                 if left <= 0:
@@ -184,8 +264,6 @@ def measure(args: argparse.Namespace) -> int:
 
 
 def _delay(sample: Sample, failure: list[str]) -> float | None:
-    from rosglass.errors import Error
-
     try:
         stamp = sample.message()["header.stamp"]
         words = ("secs", "nsecs") if sample.wire == "ros1" else ("sec", "nanosec")
@@ -250,224 +328,13 @@ def _amount(size: float) -> str:
 _FIGURES = {"hz": _show_rate, "bw": _show_bandwidth, "delay": _show_delay}
 
 
-#: Shown for an unknown type.
-_UNKNOWN = "unknown"
-#: Seconds that ROS 1's publishers may take to send their type.
-_ANSWER = 3.0
-#: Samples that hz, bw and delay evaluate.
-_WINDOW = 10_000
-
-
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Declare the subcommands for topics."""
-    add = Subcommands(parser).add
-    sub = add("list", "list topics", _list)
-    sub.add_argument("-t", "--types", "--show-types", action="store_true", help="show types")
-    sub.add_argument("-c", "--count-topics", action="store_true", help="print the number of topics")
-    sub.add_argument(
-        "--hidden", "--include-hidden-topics", action="store_true", help="include hidden topics"
-    )
-    _finish(sub)
-    sub = add("info", "show the publishers and subscribers of a topic", _info)
-    complete(sub.add_argument("topic"), "topics")
-    _finish(sub)
-    sub = add("echo", "print the messages of a topic", echo)
-    complete(sub.add_argument("topic"), "topics")
-    complete(sub.add_argument("type", nargs="?", help="default: the published type"), "messages")
-    sub.add_argument("-f", "--field", metavar="PATH", help="print one field, e.g. pose.position.x")
-    _count(sub, "print")
-    sub.add_argument(
-        "--full", "--full-length", action="store_true", help="print long arrays in full"
-    )
-    sub.add_argument(
-        "-l", "--truncate", "--truncate-length", type=natural, metavar="N",
-        help="maximum array elements to print (default: 36; 10000 with --json; all with --csv)",
-    )  # fmt: skip
-    sub.add_argument("--csv", action="store_true", help="print comma-separated values")
-    sub.add_argument("--raw", action="store_true", help="print the raw bytes in hexadecimal")
-    sub.add_argument("--stamps", action="store_true", help="print the time of reception")
-    sub.set_defaults(what="echo")
-    _qos(sub, "best_available")
-    _finish(sub, timeout=None)
-    for name, summary in (
-        ("hz", "measure how often a topic's messages come"),
-        ("bw", "measure how many bytes a topic takes"),
-        ("delay", "measure how old stamped messages are when they come"),
-    ):
-        sub = add(name, summary, measure)
-        complete(sub.add_argument("topic"), "topics")
-        complete(
-            sub.add_argument("type", nargs="?", help="default: the published type"), "messages"
-        )
-        sub.add_argument(
-            "-w",
-            "--window",
-            type=natural,
-            default=_WINDOW,
-            help="number of messages to average over",
-        )
-        sub.add_argument("-d", "--duration", type=seconds, help="exit after this time in seconds")
-        sub.set_defaults(what=name)
-        _qos(sub, "best_available")
-        _finish(sub)
-    sub = add("pub", "publish messages on a topic", _publish)
-    complete(sub.add_argument("topic"), "topics")
-    complete(
-        sub.add_argument(
-            "rest", nargs="*", metavar="[TYPE] VALUES", help="values as YAML: '{data: hello}'"
-        ),
-        "messages",
-    )
-    sub.add_argument("-r", "--rate", type=_rate, default=1.0, metavar="HZ", help="default: 1")
-    _count(sub, "publish")
-    sub.add_argument(
-        "-w",
-        "--wait",
-        "--wait-matching-subscriptions",
-        type=int,
-        metavar="N",
-        help="wait for this number of subscriptions first (default: 1 with --once, else 0)",
-    )
-    sub.add_argument(
-        "--keep-alive", type=seconds, default=0.5, metavar="SECONDS",
-        help="wait after the last message for its delivery (default: %(default)g)",
-    )  # fmt: skip
-    _qos(sub, "default")
-    _finish(sub)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run the subcommand."""
-    return int(args.handler(args))
-
-
-def _finish(parser: argparse.ArgumentParser, *, timeout: float | None = TIMEOUT) -> None:
-    add_output_options(parser)
-    add_connection_options(parser, timeout=timeout)
-
-
-def _count(parser: argparse.ArgumentParser, verb: str) -> None:
-    parser.add_argument(
-        "-n",
-        "-t",
-        "--count",
-        "--times",
-        type=natural,
-        help=f"{verb} this number of messages and exit",
-    )
-    parser.add_argument(
-        "-1",
-        "--once",
-        dest="count",
-        action="store_const",
-        const=1,
-        help=f"{verb} one message and exit",
-    )
-
-
-def _qos(parser: argparse.ArgumentParser, default: str) -> None:
-    group = parser.add_argument_group("quality of service")
-    group.add_argument(
-        "--qos",
-        "--qos-profile",
-        default=default,
-        metavar="PROFILE",
-        help="default, sensor_data, latched, best_available, ... (default: %(default)s)",
-    )
-    group.add_argument("--depth", "--qos-depth", type=natural, help="history depth")
-    for policy, words in (
-        ("reliability", ("reliable", "best_effort")),
-        ("durability", ("volatile", "transient_local")),
-        ("history", ("keep_last", "keep_all")),
-    ):
-        group.add_argument(f"--qos-{policy}", choices=words, help="overrides the profile")
-
-
-def _rate(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0 < value <= 10_000:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a rate above 0 and up to 10000")
-    return value
-
-
-def _list(args: argparse.Namespace) -> int:
-    style = Style(args)
-    with connect(args) as node:
-        settle(node)
-        note_invalid_names(node)
-        found = {t: k for t, k in node.topics().items() if args.hidden or not is_hidden(node, t)}
-        counts = {t: (len(node.publishers(t)), len(node.subscriptions(t))) for t in found}
-    if args.count_topics:
-        if args.json:
-            print_json({"count": len(found)})
-        else:
-            print(len(found))
-        return 0
-    if args.json:
-        print_json(
-            [
-                {"topic": t, "types": [spelled(node, kind) for kind in kinds],
-                 "publishers": counts[t][0],
-                 "subscriptions": counts[t][1]}
-                for t, kinds in found.items()
-            ]
-        )  # fmt: skip
-        return 0
-    for topic, kinds in found.items():
-        several = style(f"  {len(kinds)} types!", "red") if len(kinds) > 1 else ""
-        shown = style(f" [{_types(node, kinds)}]", "dim") if args.types else several
-        print(topic + shown)
-    if not found:
-        note(f"there are no topics on {args.url or 'this graph'}; rosglass doctor looks why")
-    return 0
-
-
-def _info(args: argparse.Namespace) -> int:
-    style = Style(args)
-    with connect(args) as node:
-        topic = node.resolve(args.topic)
-        ends = find(
-            node, lambda: [*node.publishers(topic), *node.subscriptions(topic)], args.timeout
-        )
-        if not ends:
-            return _unknown(node, topic)
-        ros1 = as_ros1(node)
-        if ros1 is not None:
-            publishers = ros1.ask_publishers(topic, min(args.timeout, _ANSWER))
-            ends = [*publishers, *node.subscriptions(topic)]
-    if args.json:
-        print_json({"topic": topic, "endpoints": [describe(node, end) for end in ends]})
-        return 0
-    kinds = _types(node, {end.type for end in ends})
-    unknown = "unknown (no publisher)" if kinds == _UNKNOWN and not sources(ends) else kinds
-    print(f"{style(topic, 'bold')} [{unknown}]")
-    for problem in problems(ends):
-        print(style(f"  {problem.text}", "red"))
-    for end in ends:
-        print(f"  {end.kind.value} {style(end.node, 'cyan')}")
-        # In ROS 1, a topic has one type, which is printed above.
-        above = ("kind", "name", "node", *(("type",) if ros1 else ()))
-        for key, value in describe(node, end).items():
-            if key not in above and value:
-                print(f"    {key}: {short(value)}")
-        if ros1 and end in sources(ends) and not end.type_hash:
-            print("    does not answer: its md5 sum, and whether it latches, is not known")
-    return 0
-
-
-def _types(node: Node, names: Iterable[str]) -> str:
-    return ", ".join(sorted(spelled(node, name) for name in names if name)) or _UNKNOWN
-
-
-def _publish(args: argparse.Namespace) -> int:
+def publish(args: argparse.Namespace) -> int:
+    """Publish messages, until Ctrl-C or up to the requested number."""
     type_name, text = split_type(args.rest)
-    with connect(args, patient=args.count is None) as node:
+    with connect(args, wait_for_start=args.count is None) as node:
         topic = node.resolve(args.topic)
         if type_name is None:
-            type_name = _announced(node, topic, args.timeout)
+            type_name = _type_in_use(node, topic, args.timeout)
         publisher = node.create_publisher(topic, type_name, profile(args))
         values = parse_fields(text, publisher.type.name, template(publisher.type))
         message = publisher.type.create(values)
@@ -479,7 +346,7 @@ def _publish(args: argparse.Namespace) -> int:
                 return publisher.hint or f"{topic}: {there} of {wanted} subscriptions are there"
             return ""
 
-        with telling(missing):
+        with explained_wait(missing):
             wait(node, lambda: publisher.subscription_count() >= wanted, args.timeout)
         there = publisher.subscription_count()
         if there < wanted:
@@ -510,8 +377,8 @@ def _publish(args: argparse.Namespace) -> int:
     return end.code
 
 
-def _announced(node: Node, topic: str, timeout: float) -> str:
-    from rosglass.errors import TypeNotFoundError
+def _type_in_use(node: Node, topic: str, timeout: float) -> str:
+    """Return the type that other nodes use; raises TypeNotFoundError."""
 
     def types() -> list[str]:
         ends = [*node.subscriptions(topic), *node.publishers(topic)]
@@ -520,7 +387,7 @@ def _announced(node: Node, topic: str, timeout: float) -> str:
     def missing() -> str:
         return f"no node uses {topic}{similar(topic, node.topics())}"
 
-    with telling(missing):
+    with explained_wait(missing):
         found = wait(node, types, timeout)
     if len(found) == 1:
         return found[0]
@@ -531,6 +398,88 @@ def _announced(node: Node, topic: str, timeout: float) -> str:
     raise TypeNotFoundError(f"no node uses {topic} yet: give its type, e.g. {example}{hint}")
 
 
-def _unknown(node: Node, topic: str) -> int:
-    note(f"nothing publishes or subscribes to {topic}{similar(topic, node.topics())}")
-    return 1
+class _SilenceReasons:
+    """Prints why no messages, or no more messages, are received; each reason once.
+
+    Args:
+        node: The subscribing node.
+        subscription: The subscription; closed at the end.
+        args: The command's options.
+    """
+
+    def __init__(self, node: Node, subscription: Subscription, args: argparse.Namespace) -> None:
+        self._node, self._subscription = node, subscription
+        self._command = f"rosglass topic {args.what} {args.topic}"
+        self._began = self._received_at = time.monotonic()
+        self._received = 0
+        self._pause = 0.0
+        self._printed = ""
+        self._log = logging.getLogger("rosglass.comm")
+        self._quiet = not args.verbose
+
+    def __enter__(self) -> _SilenceReasons:
+        self._log.addFilter(self._passes)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._subscription.close()
+        self._log.removeFilter(self._passes)
+
+    def on_count(self, count: int) -> None:
+        """Update the number of messages received so far."""
+        if count == self._received:
+            return
+        now = time.monotonic()
+        self._pause = (now - self._began) / count
+        self._received, self._received_at, self._printed = count, now, ""
+
+    def report(self, *, last: bool = False) -> str:
+        """Print the reason if it is new, and return it; empty if there is none.
+
+        Args:
+            last: Whether this is the last report, before the command ends.
+
+        Raises:
+            BrokenPipeError: The reader of the output has exited.
+        """
+        require_reader()
+        silent = time.monotonic() - self._received_at
+        if silent < _QUIET_S and not last:
+            return ""
+        reason = self._reason(silent)
+        if reason and reason != self._printed:
+            self._printed = reason
+            # Conflicting definitions take pages.
+            shown = reason.partition("\n")[0].rstrip() if self._quiet else reason
+            note(f"{self._subscription.topic}: {spelled(self._node, shown)}")
+        return reason
+
+    def _reason(self, silent: float) -> str:
+        found = self._subscription
+        status = self._node.status()
+        if status.state is not ConnectionState.CONNECTED and not self._node.url.startswith("dds:"):
+            return status.detail
+        publishers = self._node.publishers(found.topic)
+        types = sorted({end.type for end in publishers})
+        if len(types) > 1 and found.type is None:
+            return f"published with several types, say which: {self._command} {types[0]}"
+        if not publishers:
+            if self._received:
+                return "it has no publisher any more"
+            return f"it has no publisher{self._guess()}"
+        if found.problem or found.hint:
+            return found.problem or found.hint
+        if not self._received:
+            return "published, but nothing has been received yet"
+        if self._received > 1 and silent > max(_QUIET_S, _PAUSES * self._pause):
+            return "no more messages, although it is still advertised"
+        return ""
+
+    def _guess(self) -> str:
+        known = [name for name in self._node.topics() if self._node.publishers(name)]
+        return similar(self._subscription.topic, known)
+
+    def _passes(self, record: logging.LogRecord) -> bool:
+        """Drop log messages that this class prints."""
+        ours = record.getMessage().startswith(f"{self._subscription.topic}: ")
+        return not (ours and self._quiet and record.levelno == logging.WARNING)

@@ -16,8 +16,10 @@ from rosglass.errors import Error
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["LEASH", "Child", "VirtualScreen", "start_robot"]
+__all__ = ["DUPLICATE_EXIT", "LEASH", "Child", "VirtualScreen", "start_robot"]
 
+#: Exit code of ``rosglass robot`` if there is a robot of its name already.
+DUPLICATE_EXIT = 3
 _EXIT_TIMEOUT_S = 3.0
 #: Prefix of a command: the system ends it when this program ends, even if that is killed.
 LEASH = ("setpriv", "--pdeathsig", "TERM") if shutil.which("setpriv") else ()

@@ -46,7 +46,7 @@ BOMBS = {
 def readers(folder):
     """Return what reads YAML that others have written: parameter files, values, recordings."""
     from rosglass.bags.bag import read_profiles
-    from rosglass.cli.values import parse_fields
+    from rosglass.cli.messages import parse_fields
     from rosglass.ros1 import rosparam_files as ros1
     from rosglass.ros2 import parameter_files as ros2
 

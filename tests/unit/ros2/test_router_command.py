@@ -22,7 +22,7 @@ def routers(monkeypatch):
         def _watch(self, session):
             return None
 
-    monkeypatch.setattr(module, "Router", FakeRouter)
+    monkeypatch.setattr("rosglass.cli.router.Router", FakeRouter)
     monkeypatch.setattr("threading.Event.wait", lambda self, timeout=None: True)
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     yield made

@@ -1,0 +1,272 @@
+"""How command lines are parsed: the parser, and the options and types that commands share.
+
+Imports nothing slow: ``--help`` and Tab completion wait for it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from functools import partial
+from math import isfinite
+from typing import TYPE_CHECKING, Any, NoReturn
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = [
+    "TIMEOUT_S",
+    "Parser",
+    "Subcommands",
+    "add_connection_options",
+    "add_definitions_option",
+    "add_output_options",
+    "add_verbose",
+    "complete",
+    "complete_files",
+    "is_completing",
+    "number",
+    "pair",
+    "positive_int",
+    "seconds",
+]
+
+#: Default of --timeout.
+TIMEOUT_S = 10.0
+
+
+class Parser(argparse.ArgumentParser):
+    """Accepts options before, after and between arguments, as ``ros2`` commands are written.
+
+    argparse alone rejects ``pub --once /topic TYPE``, and ``echo /topic --once TYPE``.
+    """
+
+    _mixing = False
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """See argparse."""
+        has_commands = any(action.nargs == argparse.PARSER for action in self._actions)
+        if self._mixing or is_completing():
+            return super().parse_known_args(args, namespace)
+        if has_commands:
+            found, unknown = super().parse_known_args(args, namespace)
+        else:
+            self._mixing = True
+            try:
+                found, unknown = self.parse_known_intermixed_args(args, namespace)
+            finally:
+                self._mixing = False
+        if unknown:
+            self._refuse(unknown)
+        return found, unknown
+
+    def _refuse(self, unknown: list[str]) -> NoReturn:
+        """End with this command's own usage; argparse alone shows that of ``rosglass``."""
+        from rosglass.comm.names import similar  # noqa: PLC0415 - only needed to explain an error
+
+        options = [one for action in self._actions for one in action.option_strings]
+        hints = (similar(one.partition("=")[0], options) for one in unknown if one[:1] == "-")
+        self.error(f"unrecognized arguments: {' '.join(unknown)}{next(filter(None, hints), '')}")
+
+
+class Subcommands:
+    """The subcommands of a command, such as ``rosglass topic list``.
+
+    Args:
+        parser: Parser of the command.
+    """
+
+    def __init__(self, parser: argparse.ArgumentParser) -> None:
+        self._commands = parser.add_subparsers(metavar="WHAT", required=True)
+
+    def add(
+        self, name: str, summary: str, handler: str, aliases: tuple[str, ...] = ()
+    ) -> argparse.ArgumentParser:
+        """Add a subcommand, and return the parser of its options.
+
+        Args:
+            name: Name of the subcommand.
+            summary: Its help, in one line.
+            handler: The function of the command's module that runs it.
+            aliases: Other names.
+        """
+        parser = self._commands.add_parser(
+            name,
+            aliases=aliases,
+            help=summary,
+            description=f"{summary[0].upper()}{summary[1:]}.",
+        )
+        parser.set_defaults(handler=handler, what=name)
+        add_verbose(parser)
+        return parser
+
+
+# -- options -------------------------------------------------------------------------------------
+
+
+def add_verbose(parser: argparse.ArgumentParser) -> None:
+    """Declare ``-v``, which may stand after each word of a command."""
+    parser.add_argument(
+        "-v",
+        "--verbose",
+        action="count",
+        default=argparse.SUPPRESS,
+        help="log more; -vv logs everything",
+    )
+
+
+def add_output_options(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--json`` and ``--color``."""
+    group = parser.add_argument_group("output")
+    group.add_argument("--json", action="store_true", help="print JSON")
+    group.add_argument(
+        "--color",
+        choices=("auto", "always", "never"),
+        default="auto",
+        help="auto: on a terminal, unless NO_COLOR is set (default: %(default)s)",
+    )
+
+
+def add_connection_options(
+    parser: argparse.ArgumentParser, *, timeout: float | None = TIMEOUT_S
+) -> None:
+    """Declare the options that select the robot."""
+    group = parser.add_argument_group("connection")
+    group.add_argument(
+        "--url",
+        default="",
+        help="URL of the robot, e.g. zenoh://192.168.1.5:7447, dds://?domain=5 or "
+        "ros1://192.168.1.5:11311; default: ROSGLASS_URL, or ROS's own variables, or the "
+        "Zenoh router or ROS 1 master of this machine",
+    )
+    group.add_argument(
+        "--node-name", default="", metavar="NAME", help="name of this node (default: a unique one)"
+    )
+    add_definitions_option(group)
+    group.add_argument(
+        "--timeout",
+        type=seconds,
+        action=_Given,
+        default=timeout,
+        metavar="SECONDS",
+        help="time to wait for the robot to answer "
+        + (
+            f"(default: {timeout:g})"
+            if timeout is not None
+            else f"(default: {TIMEOUT_S:g}), and for each message (default: for ever)"
+        ),
+    )
+    parser.set_defaults(ros_arguments=[], looks_nearby=True)
+
+
+def add_definitions_option(parser: argparse._ActionsContainer) -> None:
+    """Declare the option for type definitions in unusual places."""
+    parser.add_argument(
+        "--definitions",
+        action="append",
+        default=[],
+        metavar="FOLDER",
+        help="a package or workspace with definitions that the robot does not send; may "
+        "be repeated",
+    )
+
+
+class _Given(argparse.Action):
+    """Stores a value, and records that it was given."""
+
+    def __call__(
+        self,
+        _parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        _option: str | None = None,
+    ) -> None:
+        setattr(namespace, self.dest, values)
+        setattr(namespace, f"{self.dest}_given", True)
+
+
+# -- types of arguments --------------------------------------------------------------------------
+
+
+def number(
+    least: float, most: float, expected: str, *, above: bool = False
+) -> Callable[[str], float]:
+    """Return the type of options that take a number from `least` to `most`.
+
+    Args:
+        least: The smallest number.
+        most: The largest number.
+        expected: What the option expects, for the error.
+        above: Whether `least` itself is too small.
+    """
+
+    def parse(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = float("nan")
+        if not (isfinite(value) and least <= value <= most) or (above and value == least):
+            raise argparse.ArgumentTypeError(f"{text!r} is not {expected}")
+        return value
+
+    return parse
+
+
+#: Seconds from 0 on.
+seconds = number(0, 1e9, "a number of seconds, 0 or more")
+
+
+def positive_int(text: str) -> int:
+    """Parse a count of 1 or more; a type of options."""
+    if not (text.isascii() and text.isdigit() and 0 < int(text[:10]) < 2**31):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 1 or more")
+    return int(text)
+
+
+def pair(form: str) -> Callable[[str], tuple[str, str]]:
+    """Return the type of options that take two names with ``:=`` between them.
+
+    Args:
+        form: What is expected, for the error, such as ``/old:=/new``.
+    """
+
+    def parse(text: str) -> tuple[str, str]:
+        first, separator, second = text.partition(":=")
+        if not (separator and first and second):
+            raise argparse.ArgumentTypeError(f"{text!r} is not of the form {form}")
+        return first, second
+
+    return parse
+
+
+# -- Tab completion ------------------------------------------------------------------------------
+
+
+def is_completing() -> bool:
+    """Return whether the shell requests completions, instead of running a command."""
+    return "_ARGCOMPLETE" in os.environ
+
+
+def complete(argument: argparse.Action, what: str) -> None:
+    """Enable Tab completion of an argument.
+
+    Args:
+        argument: As returned by ``add_argument``.
+        what: ``topics``, ``services``, ``actions``, ``nodes``, ``messages``, ``interfaces`` (all
+            kinds of types), ``service_types`` or ``action_types``.
+    """
+    argument.completer = partial(_complete, what)  # type: ignore[attr-defined]
+
+
+def _complete(what: str, *, prefix: str, parsed_args: argparse.Namespace, **_: Any) -> list[str]:
+    from rosglass.cli.completion import complete_names  # noqa: PLC0415 - not for help
+
+    return complete_names(what, prefix, parsed_args)
+
+
+def complete_files(argument: argparse.Action, suffix: str) -> None:
+    """Enable Tab completion with folders, and files whose name ends in `suffix`."""
+    if is_completing():
+        from argcomplete.completers import FilesCompleter  # noqa: PLC0415 - an extra
+
+        argument.completer = FilesCompleter((suffix,))  # type: ignore[attr-defined]
