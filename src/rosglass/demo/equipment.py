@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 __all__ = ["CAMERAS", "Equipment"]
 
 CAMERAS = ("rear", "left", "right", "thermal")
-_CLOUD_PERIOD, _CAMERA_PERIOD = 0.5, 0.1
+_CLOUD_PERIOD_S, _CAMERA_PERIOD_S = 0.5, 0.1
 #: Seconds after which an unchanged cloud is sent again.
-_CLOUD_CONFIRM = 1.4
+_CLOUD_REPEAT_S = 1.4
 _WIDTH, _HEIGHT = 320, 240
 
 
@@ -86,20 +86,20 @@ class Equipment:
     def scan(self, ending: Callable[[float], bool]) -> None:
         """Publish the cloud until `ending`, which waits some seconds, returns true."""
         sent, changed = -math.inf, False
-        while not ending(_CLOUD_PERIOD):
+        while not ending(_CLOUD_PERIOD_S):
             state, now = self._simulation.state, time.monotonic()
             if abs(state.pitch) + abs(state.roll) < 0.3:
                 ranges = self._scanner.scan(state.x, state.y, state.yaw, state.carrier_phase)
                 changed |= self._cloud.look(state, ranges)
             # Displays rebuild it for each message.
-            due = changed or now - sent >= _CLOUD_CONFIRM
+            due = changed or now - sent >= _CLOUD_REPEAT_S
             if due and self._points.subscription_count():
                 self._points.publish(self._cloud.message(Time.now()))
                 sent, changed = now, False
 
     def film(self, ending: Callable[[float], bool]) -> None:
         """Publish the subscribed images until `ending` returns true."""
-        while not ending(_CAMERA_PERIOD):
+        while not ending(_CAMERA_PERIOD_S):
             for name, publisher in self._pictures.items():
                 if publisher.subscription_count():
                     picture = self._picture(name)
@@ -119,7 +119,7 @@ class Equipment:
 
         state = self._simulation.state
         turn = {"rear": math.pi, "left": math.pi / 2, "right": -math.pi / 2}.get(name, 0.0)
-        whole = self._camera.render(_seen_to(state, turn), body=name in ("rear", "thermal"))
+        whole = self._camera.render(_turned(state, turn), body=name in ("rear", "thermal"))
         small = cv2.resize(whole, (_WIDTH, _HEIGHT), interpolation=cv2.INTER_AREA)
         if name == "thermal":
             red, _, blue = (small[..., k].astype(np.int16) for k in range(3))
@@ -130,7 +130,7 @@ class Equipment:
         return small
 
 
-def _seen_to(state: RobotState, turn: float) -> RobotState:
+def _turned(state: RobotState, turn: float) -> RobotState:
     """Return a state whose camera looks in the direction of another camera, turned by an angle."""
     c, s = math.cos(turn), math.sin(turn)
     front_left, front_right, rear_left, rear_right = state.flippers

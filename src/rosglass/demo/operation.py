@@ -37,8 +37,8 @@ __all__ = [
 ACTIVE, PREEMPTED, SUCCEEDED, ABORTED, REJECTED = 1, 2, 3, 4, 5
 #: Frames in which a goal is accepted: the robot's localization does not drift.
 _FRAMES = ("map", "odom", "")
-#: Seconds between two confirmations of an unchanged state.
-_CONFIRM = 0.5
+#: Seconds after which an unchanged state is published again.
+_REPEAT_PERIOD_S = 0.5
 
 
 class DriveGoal:
@@ -52,7 +52,7 @@ class DriveGoal:
     def __init__(self, node: Node, refusal: Callable[[], str]) -> None:
         self._refusal = refusal
         self._lock = threading.Lock()
-        self._place: tuple[float, float] | None = None
+        self._position: tuple[float, float] | None = None
         self._count, self._published_at = 0, -math.inf
         self._status: list[dict[str, Any]] = []
         kind = "actionlib_msgs/msg/GoalStatusArray"
@@ -62,9 +62,9 @@ class DriveGoal:
         )
 
     @property
-    def place(self) -> tuple[float, float] | None:
+    def position(self) -> tuple[float, float] | None:
         """Position of the goal in metres in the frame map; None without a goal."""
-        return self._place
+        return self._position
 
     def end(self, status: int, text: str) -> None:
         """End the current goal; does nothing without one.
@@ -74,27 +74,27 @@ class DriveGoal:
             text: The reason.
         """
         with self._lock:
-            active, self._place = self._place is not None, None
+            active, self._position = self._position is not None, None
             if active:
                 self._status[-1].update(status=status, text=text)
         if active:
-            self._tell()
+            self._publish_status()
 
     def confirm(self) -> None:
         """Publish its state again from time to time."""
-        if time.monotonic() - self._published_at >= _CONFIRM:
-            self._tell()
+        if time.monotonic() - self._published_at >= _REPEAT_PERIOD_S:
+            self._publish_status()
 
     def close(self) -> None:
         """Accept no more goals; safe to call twice."""
         self._subscription.close()
 
     def _on_goal(self, message: Message) -> None:
-        place, frame = message.pose.position, message.header.frame_id
+        target, frame = message.pose.position, message.header.frame_id
         if frame.lstrip("/") not in _FRAMES:
             refusal = f"goals are expected in the frame map, not in {frame}"
-        elif not (math.isfinite(place.x) and math.isfinite(place.y)):
-            refusal = f"{place.x}, {place.y} is no place"
+        elif not (math.isfinite(target.x) and math.isfinite(target.y)):
+            refusal = f"{target.x}, {target.y} is no place"
         else:
             refusal = self._refusal()
         self.end(PREEMPTED, "another goal came")
@@ -108,10 +108,10 @@ class DriveGoal:
                     "text": refusal or "on the way to the goal",
                 }
             ]
-            self._place = None if refusal else (place.x, place.y)
-        self._tell()
+            self._position = None if refusal else (target.x, target.y)
+        self._publish_status()
 
-    def _tell(self) -> None:
+    def _publish_status(self) -> None:
         self._published_at = time.monotonic()
         with self._lock:
             status = [dict(entry) for entry in self._status]
@@ -123,11 +123,12 @@ MODES = ("autonomous", "supervised", "safe")
 WAYPOINTS = ((-3.6, -1.8), (-2.2, -0.3), (-2.4, 2.6), (-4.4, 1.8), (-5.0, -1.0))
 BEHAVIOURS = ("Look around", "Turn around", "Flippers up", "Flippers flat", "Return to dock")
 _log = logging.getLogger("rosglass.demo.robot")
-_PERIOD = 0.1
-_NEAR, _NEAR_ANGLE = 0.25, 0.05
-#: Speeds of autonomous driving in metres and radians per second, and careful speed in m/s.
-_SPEED, _TURN, _CAREFUL = 0.55, 0.9, 0.3
-_FLIPPER_TIME = 2.0
+_PERIOD_S = 0.1
+#: Metres and radians from a target that count as reached.
+_POSITION_TOLERANCE, _ANGLE_TOLERANCE = 0.25, 0.05
+#: Speeds of autonomous driving in metres and radians per second, and of mode safe in m/s.
+_SPEED, _TURN_RATE, _SAFE_SPEED = 0.55, 0.9, 0.3
+_FLIPPER_TIMEOUT_S = 2.0
 
 
 class Operation:
@@ -189,7 +190,7 @@ class Operation:
         self._send["/mission/path"].publish(_path())
         trigger = "std_srvs/srv/Trigger"
         self._parts: list[Any] = [
-            node.create_service_server(f"/mode/{name}", trigger, self._chooser(name))
+            node.create_service_server(f"/mode/{name}", trigger, self._mode_handler(name))
             for name in MODES
         ]
         self._parts += [
@@ -200,21 +201,21 @@ class Operation:
         if node.wire == "ros1":
             kind = "flexbe_msgs/action/BehaviorExecution"
             self._parts.append(
-                node.create_action_server("/flexbe/execute_behavior", kind, self._behave)
+                node.create_action_server("/flexbe/execute_behavior", kind, self._on_behaviour)
             )
 
     @property
     def max_speed(self) -> float:
         """Highest speed in the current mode, in metres per second."""
-        return _CAREFUL if self.mode == "safe" else math.inf
+        return _SAFE_SPEED if self.mode == "safe" else math.inf
 
     def work(self) -> None:
         """Drive and publish the state, until :meth:`close`."""
-        while not self._ending.wait(_PERIOD):
+        while not self._ending.wait(_PERIOD_S):
             state = self._state()
-            self._tell("/mode", self.mode)
-            self._tell("/mission/waypoint", self.next_waypoint)
-            self._tell("/mission/state", self.proceed(state))
+            self._publish("/mode", self.mode)
+            self._publish("/mission/waypoint", self.next_waypoint)
+            self._publish("/mission/state", self.proceed(state))
             self.goal.confirm()
 
     def take_over(self) -> None:
@@ -237,8 +238,8 @@ class Operation:
             return "emergency stop"
         if self._behaviour:
             return self._behaviour.lower()
-        if (place := self.goal.place) is not None:
-            if self._steer(state, place):
+        if (target := self.goal.position) is not None:
+            if self._steer(state, target):
                 self.goal.end(SUCCEEDED, "the goal is reached")
             return "driving to the goal"
         if self.mode != "autonomous":
@@ -253,33 +254,33 @@ class Operation:
         """Drive towards a position; return whether it is reached."""
         x, y = target[0] - state.x, target[1] - state.y
         distance = math.hypot(x, y)
-        if distance < _NEAR:
+        if distance < _POSITION_TOLERANCE:
             self._drive(0.0, 0.0)
             return True
-        rest = math.remainder(math.atan2(y, x) - state.yaw, math.tau)
-        speed = min(_SPEED, 0.9 * distance) * max(0.0, 1 - abs(rest) / 0.6)
-        self._drive(speed, max(-_TURN, min(_TURN, 2 * rest)))
+        remaining = math.remainder(math.atan2(y, x) - state.yaw, math.tau)
+        speed = min(_SPEED, 0.9 * distance) * max(0.0, 1 - abs(remaining) / 0.6)
+        self._drive(speed, max(-_TURN_RATE, min(_TURN_RATE, 2 * remaining)))
         return False
 
-    def _tell(self, topic: str, data: Any) -> None:
+    def _publish(self, topic: str, data: Any) -> None:
         value, published_at = self._published.get(topic, (None, -math.inf))
         now = time.monotonic()
-        if data != value or now - published_at >= _CONFIRM:
+        if data != value or now - published_at >= _REPEAT_PERIOD_S:
             self._published[topic] = (data, now)
             self._send[topic].publish(data=data)
 
-    def _chooser(self, name: str) -> Callable[[Message], dict[str, Any]]:
-        def choose(_: Message) -> dict[str, Any]:
+    def _mode_handler(self, name: str) -> Callable[[Message], dict[str, Any]]:
+        def on_request(_: Message) -> dict[str, Any]:
             self.mode = name
             if name == "safe":
                 self._interruption = "the mode is safe now"
             if name != "supervised":
                 self.goal.end(PREEMPTED, f"the mode is {name} now")
             self._drive(0.0, 0.0)
-            self._tell("/mode", name)
+            self._publish("/mode", name)
             return {"success": True, "message": name}
 
-        return choose
+        return on_request
 
     def _on_pause(self, request: Message) -> dict[str, Any]:
         self._paused = bool(request.data)
@@ -300,7 +301,7 @@ class Operation:
             return f"no goals in mode {self.mode}; choose supervised"
         return ""
 
-    def _behave(self, goal: Any) -> dict[str, str] | None:
+    def _on_behaviour(self, goal: Any) -> dict[str, str] | None:
         """Execute a behaviour; the status text says why it failed or was cancelled."""
         try:
             return self._execute(goal)
@@ -327,7 +328,7 @@ class Operation:
                 "Turn around": lambda: self._turn(goal, math.pi),
                 "Flippers up": lambda: self._move_flippers(goal, 1.2),
                 "Flippers flat": lambda: self._move_flippers(goal, 0.0),
-                "Return to dock": lambda: self._go(goal, self._dock),
+                "Return to dock": lambda: self._drive_to(goal, self._dock),
             }[name]()
             moved = math.dist((start.x, start.y), (self._state().x, self._state().y))
             return {"outcome": "cancelled" if goal.is_cancel_requested else f"{moved:.1f} m driven"}
@@ -338,7 +339,7 @@ class Operation:
     def _steps(self, goal: ServerGoal) -> Any:
         """Yield the robot's state periodically, until the behaviour has to end."""
         while not goal.is_cancel_requested:
-            if self._ending.wait(_PERIOD):
+            if self._ending.wait(_PERIOD_S):
                 raise Error("the robot ends")
             state = self._state()
             if state.emergency_stop:
@@ -348,41 +349,41 @@ class Operation:
             yield state
 
     def _turn(self, goal: ServerGoal, angle: float) -> None:
-        last, rest = self._state().yaw, angle
+        last, remaining = self._state().yaw, angle
         for state in self._steps(goal):
-            rest -= math.remainder(state.yaw - last, math.tau)
+            remaining -= math.remainder(state.yaw - last, math.tau)
             last = state.yaw
-            if rest < _NEAR_ANGLE:
+            if remaining < _ANGLE_TOLERANCE:
                 return
-            goal.publish_feedback({"current_state": f"{math.degrees(rest):.0f}° to go"})
-            self._drive(0.0, max(0.15, min(_TURN, 2 * rest)))
+            goal.publish_feedback({"current_state": f"{math.degrees(remaining):.0f}° to go"})
+            self._drive(0.0, max(0.15, min(_TURN_RATE, 2 * remaining)))
 
     def _move_flippers(self, goal: ServerGoal, angle: float) -> None:
         self._flippers([angle] * 4)
-        until = time.monotonic() + _FLIPPER_TIME
+        until = time.monotonic() + _FLIPPER_TIMEOUT_S
         for state in self._steps(goal):
-            rest = max(abs(angle - now) for now in state.flippers)
-            if rest < _NEAR_ANGLE or time.monotonic() > until:
+            remaining = max(abs(angle - now) for now in state.flippers)
+            if remaining < _ANGLE_TOLERANCE or time.monotonic() > until:
                 return
-            goal.publish_feedback({"current_state": f"{math.degrees(rest):.0f}° to go"})
+            goal.publish_feedback({"current_state": f"{math.degrees(remaining):.0f}° to go"})
 
-    def _go(self, goal: ServerGoal, target: tuple[float, float]) -> None:
+    def _drive_to(self, goal: ServerGoal, target: tuple[float, float]) -> None:
         for state in self._steps(goal):
-            rest = math.dist(target, (state.x, state.y))
-            goal.publish_feedback({"current_state": f"{rest:.1f} m to go"})
+            remaining = math.dist(target, (state.x, state.y))
+            goal.publish_feedback({"current_state": f"{remaining:.1f} m to go"})
             if self._steer(state, target):
                 return
 
 
 def _path() -> dict[str, Any]:
     now = Time.now()
-    places = [*WAYPOINTS, WAYPOINTS[0]]
+    round_trip = [*WAYPOINTS, WAYPOINTS[0]]
     upright = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
     poses = [
         {
             "header": header(now, "map"),
             "pose": {"position": {"x": x, "y": y, "z": 0.1}, "orientation": upright},
         }
-        for x, y in places
+        for x, y in round_trip
     ]
     return {"header": header(now, "map"), "poses": poses}

@@ -20,6 +20,7 @@ __all__ = ["DUPLICATE_EXIT", "LEASH", "Child", "VirtualScreen", "start_robot"]
 
 #: Exit code of ``rosglass robot`` if there is a robot of its name already.
 DUPLICATE_EXIT = 3
+#: Seconds that a program has to end by itself.
 _EXIT_TIMEOUT_S = 3.0
 #: Prefix of a command: the system ends it when this program ends, even if that is killed.
 LEASH = ("setpriv", "--pdeathsig", "TERM") if shutil.which("setpriv") else ()
@@ -60,14 +61,7 @@ class Child(Handle):
         """Terminate it, or kill it after 3 s. Safe to call twice."""
         if self._process.stdin is not None:
             self._process.stdin.close()
-        if self._process.poll() is not None:
-            return
-        self._process.terminate()
-        try:
-            self._process.wait(_EXIT_TIMEOUT_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        _terminate(self._process)
 
 
 def start_robot(url: str, options: Sequence[str] = ()) -> Child:
@@ -131,13 +125,19 @@ class VirtualScreen(Handle):
 
     def close(self) -> None:
         """End it; safe to call twice."""
-        if self.process.poll() is None:
-            self.process.terminate()
-            try:
-                self.process.wait(_EXIT_TIMEOUT_S)
-            except subprocess.TimeoutExpired:
-                self.process.kill()
-                self.process.wait()
+        _terminate(self.process)
+
+
+def _terminate(process: subprocess.Popen[bytes]) -> None:
+    """Terminate a process unless it has ended, or kill it after a while."""
+    if process.poll() is not None:
+        return
+    process.terminate()
+    try:
+        process.wait(_EXIT_TIMEOUT_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 def _read_line(descriptor: int, timeout: float) -> str:

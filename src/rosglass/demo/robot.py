@@ -1,4 +1,4 @@
-"""The simulated robot as a ROS 2 node: its threads, its topics and the commands it accepts.
+"""The simulated robot as a node: its threads, topics and services, and the commands it accepts.
 
 Three threads, so that none waits for another: the body moves at 100 Hz and never sends anything;
 the reporter sends the small topics; the camera renders and sends pictures. Commands arrive on the
@@ -14,30 +14,35 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import QoS, Time
+from rosglass.comm import ParameterDescriptor, QoS, Range, Time
 from rosglass.demo import telemetry
-from rosglass.demo.duties import Duties
 from rosglass.demo.scan import LaserScanner, occupancy
 from rosglass.demo.simulation import CommandRejectedError, Simulation
-from rosglass.errors import Error, NodeClosedError
+from rosglass.errors import Error, NodeClosedError, TypeNotFoundError, UnsupportedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rosglass.comm import Node, Publisher
+    from rosglass.comm import Node, ParameterEvent, Publisher, ServerGoal
     from rosglass.demo.equipment import Equipment
     from rosglass.demo.simulation import RobotState
     from rosglass.messages import Message
 
-__all__ = ["Robot", "RobotOptions"]
+__all__ = ["Robot", "RobotOptions", "Services"]
 
 _log = logging.getLogger("rosglass.demo.robot")
-_BODY_PERIOD = 0.01
-_REPORT_PERIOD = 1 / 30
-#: Reports per message of a topic.
-_EVERY = {"scan": 3, "joints": 2, "confirm": 5, "battery": 15, "diagnostics": 15}
-_GRID_RESOLUTION = 0.05
-_LOG_EVERY = 2.0
+_MOVE_PERIOD_S, _REPORT_PERIOD_S, _TURN_PERIOD_S = 0.01, 1 / 30, 0.1
+#: Topic -> one message in so many reports.
+_REPORTS_PER_MESSAGE = {"scan": 3, "joints": 2, "confirm": 5, "battery": 15, "diagnostics": 15}
+#: Metres per cell of the map.
+_MAP_RESOLUTION = 0.05
+#: Seconds between two log messages about refused commands.
+_LOG_PERIOD_S = 2.0
+_SPEED_PARAMETER = "max_speed"
+#: Limits of that parameter in metres per second.
+_MIN_SPEED, _MAX_SPEED = 0.1, 1.2
+#: Rate of a turn in radians per second, and its tolerance in radians.
+_TURN_RATE, _TURN_TOLERANCE = 0.8, 0.03
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,7 @@ class Robot:
 
     Attributes:
         options: Its options.
-        duties: Its service and action, and its highest speed, a parameter.
+        services: Its service and action, and its highest speed, a parameter.
 
     Raises:
         ModuleNotFoundError: OpenCV is not installed.
@@ -98,12 +103,12 @@ class Robot:
         self._lock = threading.Lock()
         self._ending = threading.Event()
         self._threads: list[threading.Thread] = []
-        self._rejected, self._logged_at = 0, -_LOG_EVERY
+        self._rejected, self._logged_at = 0, -_LOG_PERIOD_S
         self._frame_period, self._render_time = 0.0, 0.0
         self._send = _publishers(node, self.options)
         self._subscriptions = [
-            node.create_subscription(topic, kind, self._guarded(topic, take), qos)
-            for topic, kind, take, qos in (
+            node.create_subscription(topic, kind, self._counting_refusals(topic, handler), qos)
+            for topic, kind, handler, qos in (
                 # Only the newest command counts: an old one must not be driven after it.
                 ("/cmd_vel", "geometry_msgs/msg/Twist", self._on_velocity, 1),
                 ("/emergency_stop", "std_msgs/msg/Bool", self._on_stop, 10),
@@ -116,7 +121,7 @@ class Robot:
                 ),
             )
         ]
-        self.duties = Duties(node, lambda: self.state, self._switch, self._drive)
+        self.services = Services(node, lambda: self.state, self._switch, self._drive)
         self._equipment: Equipment | None = None
         if self.options.equipped:
             self._equipment = self._equip(node)
@@ -129,11 +134,11 @@ class Robot:
     def start(self) -> None:
         """Start the threads."""
         now = Time.now()
-        cells = occupancy(self._simulation.world, _GRID_RESOLUTION)
+        cells = occupancy(self._simulation.world, _MAP_RESOLUTION)
         frames, work = (
             telemetry.static_frames(now),
             [
-                ("body", self._live),
+                ("body", self._move),
                 ("reporter", self._report),
                 ("camera", self._film),
             ],
@@ -147,9 +152,11 @@ class Robot:
                 ("cameras", lambda: more.film(self._ending.wait)),
             ]
         self._send["/tf_static"].publish(frames)
-        self._send["/map"].publish(telemetry.occupancy_grid(cells, _GRID_RESOLUTION, now))
+        self._send["/map"].publish(telemetry.occupancy_grid(cells, _MAP_RESOLUTION, now))
         for name, job in work:
-            thread = threading.Thread(target=self._guard(job), name=f"robot {name}", daemon=True)
+            thread = threading.Thread(
+                target=self._stopping_after(job), name=f"robot {name}", daemon=True
+            )
             self._threads.append(thread)
             thread.start()
 
@@ -160,7 +167,7 @@ class Robot:
     def close(self) -> None:
         """Stop moving and end the threads; safe to call twice, from any thread but the robot's."""
         self._ending.set()
-        self.duties.close()
+        self.services.close()
         if self._equipment is not None:
             self._equipment.operation.close()
         for subscription in self._subscriptions:
@@ -168,7 +175,9 @@ class Robot:
         for thread in self._threads:
             thread.join(2.0)
 
-    def _guard(self, work: Callable[[], None]) -> Callable[[], None]:
+    def _stopping_after(self, work: Callable[[], None]) -> Callable[[], None]:
+        """Return a thread's function: `work`, and the end of the robot, however it ends."""
+
         def run() -> None:
             try:
                 work()
@@ -182,19 +191,21 @@ class Robot:
 
         return run
 
-    def _guarded(self, topic: str, take: Callable[[Message], None]) -> Callable[[Message], None]:
+    def _counting_refusals(
+        self, topic: str, handler: Callable[[Message], None]
+    ) -> Callable[[Message], None]:
         def run(message: Message) -> None:
             try:
-                take(message)
+                handler(message)
             except Error as error:
-                self._refuse(topic, error)
+                self._on_refused(topic, error)
 
         return run
 
-    def _refuse(self, topic: str, error: Error) -> None:
+    def _on_refused(self, topic: str, error: Error) -> None:
         self._rejected += 1
         now = time.monotonic()
-        if now - self._logged_at >= _LOG_EVERY:
+        if now - self._logged_at >= _LOG_PERIOD_S:
             self._logged_at = now
             _log.warning("%s: %s (%d refused so far)", topic, error, self._rejected)
 
@@ -229,7 +240,7 @@ class Robot:
             self._simulation.command_flippers(angles)
 
     def _drive(self, speed: float, turn: float) -> None:
-        fastest = self.duties.max_speed
+        fastest = self.services.max_speed
         if self._equipment is not None:
             fastest = min(fastest, self._equipment.operation.max_speed)
         if math.isfinite(speed) and abs(speed) <= self._simulation.limits.believable:
@@ -259,33 +270,33 @@ class Robot:
     def _confirm(self) -> None:
         self._send["/emergency_stop/state"].publish(data=self.state.emergency_stop)
 
-    def _live(self) -> None:
+    def _move(self) -> None:
         last = time.monotonic()
-        while not self._ending.wait(_BODY_PERIOD):
+        while not self._ending.wait(_MOVE_PERIOD_S):
             now = time.monotonic()
             with self._lock:
                 self._simulation.advance(now - last)
             last = now
 
     def _report(self) -> None:
-        beat = _Beat(_REPORT_PERIOD)
+        rate = _Rate(_REPORT_PERIOD_S)
         send, count = self._send, 0
-        while not self._ending.wait(beat.rest()):
+        while not self._ending.wait(rate.remaining()):
             state, now = self.state, Time.now()
             send["/odom"].publish(telemetry.odometry(state, now))
             send["/tf"].publish(telemetry.moving_frames(state, now))
             send["/imu"].publish(telemetry.imu(state, now))
-            if count % _EVERY["joints"] == 0:
+            if count % _REPORTS_PER_MESSAGE["joints"] == 0:
                 send["/joint_states"].publish(telemetry.joints(state, now))
-            if count % _EVERY["scan"] == 0:
+            if count % _REPORTS_PER_MESSAGE["scan"] == 0:
                 ranges = self._scanner.scan(state.x, state.y, state.yaw, state.carrier_phase)
                 send["/scan"].publish(telemetry.scan(ranges, now))
-            if count % _EVERY["confirm"] == 1:
+            if count % _REPORTS_PER_MESSAGE["confirm"] == 1:
                 self._confirm()
                 send["/flashlight/state"].publish(data=state.flashlight)
-            if count % _EVERY["battery"] == 2:
+            if count % _REPORTS_PER_MESSAGE["battery"] == 2:
                 send["/battery_state"].publish(telemetry.battery(state, now))
-            if count % _EVERY["diagnostics"] == 7:
+            if count % _REPORTS_PER_MESSAGE["diagnostics"] == 7:
                 send["/diagnostics"].publish(
                     telemetry.diagnostics(
                         state,
@@ -302,9 +313,9 @@ class Robot:
 
         # Two cores must be enough for the robot, the cockpit and the middleware between them.
         cv2.setNumThreads(1)
-        beat = _Beat(1 / self.options.fps)
+        rate = _Rate(1 / self.options.fps)
         number, since = 0, time.monotonic()
-        while not self._ending.wait(beat.rest()):
+        while not self._ending.wait(rate.remaining()):
             begin = time.perf_counter()
             picture = self._camera.render(self.state)
             stamp = Time.now()
@@ -345,15 +356,100 @@ class Robot:
             compressed.publish(header=header, format="rgb8; jpeg compressed bgr8", data=data)
 
 
-class _Beat:
-    """Keeps a rate; missed beats are skipped, not made up for."""
+class Services:
+    """The robot's service ``/flashlight/set``, action ``/turn`` and parameter ``max_speed``.
+
+    Args:
+        node: Node that offers them.
+        state: Returns the robot's current state.
+        switch: Switches its flashlight.
+        drive: Takes metres and radians per second.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        state: Callable[[], RobotState],
+        switch: Callable[[bool], None],
+        drive: Callable[[float, float], None],
+    ) -> None:
+        self._state, self._switch, self._drive = state, switch, drive
+        self._ending = threading.Event()
+        what, limits = "Highest speed in metres per second", Range(_MIN_SPEED, _MAX_SPEED)
+        try:
+            speed = node.parameters.declare(
+                _SPEED_PARAMETER, _MAX_SPEED, ParameterDescriptor(description=what, range=limits)
+            )
+        except UnsupportedError:
+            # ROS 1 has no ranges.
+            speed = node.parameters.declare(
+                _SPEED_PARAMETER, _MAX_SPEED, ParameterDescriptor(description=what)
+            )
+        # Cached: ROS 1 reads it from the master, without which the robot must still drive.
+        self._max_speed = speed
+        self._parts: list[Any] = [
+            node.parameters.on_change(self._on_parameters),
+            node.create_service_server("/flashlight/set", "std_srvs/srv/SetBool", self._on_switch),
+        ]
+        try:
+            kind = "turtlesim/action/RotateAbsolute"
+            self._parts.append(node.create_action_server("/turn", kind, self._turn))
+        except TypeNotFoundError:
+            _log.info("/turn is not offered: ROS 1 has no turtlesim/RotateAbsolute")
+
+    @property
+    def max_speed(self) -> float:
+        """Highest speed in metres per second; the slowest while its value is invalid."""
+        value = self._max_speed
+        if isinstance(value, (int, float)) and _MIN_SPEED <= value <= _MAX_SPEED:
+            return float(value)
+        return _MIN_SPEED
+
+    def close(self) -> None:
+        """Withdraw them; safe to call twice."""
+        self._ending.set()
+        for part in self._parts:
+            part.close()
+
+    def _on_parameters(self, event: ParameterEvent) -> None:
+        self._max_speed = {**event.new, **event.changed}.get(_SPEED_PARAMETER, self._max_speed)
+        if _SPEED_PARAMETER in event.deleted:
+            self._max_speed = None
+
+    def _on_switch(self, request: Message) -> dict[str, Any]:
+        self._switch(request.data)
+        on = self._state().flashlight
+        return {"success": on == request.data, "message": "on" if on else "off"}
+
+    def _turn(self, goal: ServerGoal) -> dict[str, float]:
+        """Turn on the spot to a heading; ends where it is if cancelled or stopped."""
+        wanted, start = float(goal.goal.theta), self._state().yaw
+        if not math.isfinite(wanted):
+            raise Error(f"the heading {wanted} is no angle")
+        while not self._ending.wait(_TURN_PERIOD_S):
+            state = self._state()
+            remaining = math.remainder(wanted - state.yaw, math.tau)
+            goal.publish_feedback({"remaining": remaining})
+            done = (
+                abs(remaining) < _TURN_TOLERANCE or goal.is_cancel_requested or state.emergency_stop
+            )
+            self._drive(0.0, 0.0 if done else max(-_TURN_RATE, min(_TURN_RATE, 2 * remaining)))
+            if state.emergency_stop:
+                raise Error("the emergency stop is latched; release it first")
+            if done:
+                return {"delta": math.remainder(state.yaw - start, math.tau)}
+        raise Error("the robot ends")
+
+
+class _Rate:
+    """Keeps a rate; missed periods are skipped, not made up for."""
 
     def __init__(self, period: float) -> None:
         self._period = period
         self._next = time.monotonic()
 
-    def rest(self) -> float:
-        """Return the seconds until the next beat."""
+    def remaining(self) -> float:
+        """Return the seconds until the next period."""
         self._next += self._period
         left = self._next - time.monotonic()
         if left < -self._period:

@@ -101,7 +101,7 @@ class Goal:
 
 @pytest.fixture
 def rig(stub_node: type[StubNode], monkeypatch: pytest.MonkeyPatch) -> Rig:
-    monkeypatch.setattr(module, "_PERIOD", 0.0)
+    monkeypatch.setattr(module, "_PERIOD_S", 0.0)
     return Rig(stub_node())
 
 
@@ -158,7 +158,7 @@ def test_a_goal_is_driven_to(rig: Rig) -> None:
 def test_a_goal_in_another_mode_is_refused_with_the_reason(rig: Rig, mode: str) -> None:
     rig.node.ask(f"/mode/{mode}")
     assert rig.send(1, 1) == (REJECTED, f"no goals in mode {mode}; choose supervised")
-    assert rig.operation.goal.place is None
+    assert rig.operation.goal.position is None
 
 
 def test_goals_that_are_refused(rig: Rig) -> None:
@@ -186,7 +186,7 @@ def test_what_ends_a_goal_is_told(rig: Rig, event: Any, status: int, reason: str
     rig.proceed()
     assert rig.told[0] == status
     assert reason in rig.told[1]
-    assert rig.operation.goal.place is None
+    assert rig.operation.goal.position is None
 
 
 def test_the_newest_goal_counts(rig: Rig) -> None:
@@ -263,8 +263,8 @@ def test_everything_is_told_again_and_again(
     stub_node: type[StubNode], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """An operator must see within a second that the robot is silent."""
-    monkeypatch.setattr(module, "_CONFIRM", 0.0)
-    monkeypatch.setattr(module, "_PERIOD", 0.001)
+    monkeypatch.setattr(module, "_REPEAT_PERIOD_S", 0.0)
+    monkeypatch.setattr(module, "_PERIOD_S", 0.001)
     rig = Rig(stub_node())
     thread = threading.Thread(target=rig.operation.work)
     thread.start()

@@ -34,9 +34,9 @@ def test_it_starts_and_says_how_fast_it_may_drive(robot: tuple[Any, Robot]) -> N
 )
 def test_nonsense_makes_it_slow(robot: tuple[Any, Robot], value: Any, used: float) -> None:
     node, made = robot
-    assert made.duties.max_speed == 1.2
+    assert made.services.max_speed == 1.2
     node.parameters.set({"max_speed": value})
-    eventually(lambda: made.duties.max_speed == used)
+    eventually(lambda: made.services.max_speed == used)
 
 
 def test_it_drives_and_stops_without_the_master(
@@ -49,7 +49,7 @@ def test_it_drives_and_stops_without_the_master(
     eventually(lambda: drive.subscription_count() and stop.subscription_count())
     made.start()
     node.parameters.set({"max_speed": 0.4})
-    eventually(lambda: made.duties.max_speed == 0.4)
+    eventually(lambda: made.services.max_speed == 0.4)
     master.stop()
     eventually(lambda: node.status().state is not ConnectionState.CONNECTED)
     eventually(lambda: drive.publish(linear={"x": 1.0}) or made.state.speed > 0.3)
