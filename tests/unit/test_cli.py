@@ -161,6 +161,13 @@ def test_negative_values_are_values() -> None:
     assert args.value == "-5"
 
 
+def test_a_graph_in_this_process(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["topic", "list", "--url", "local://cli"]) == 0
+    assert "there are no topics" in capsys.readouterr().err
+    assert main(["node", "info", "/arm", "--url", "local://cli"]) == 1
+    assert "there is no node /arm" in capsys.readouterr().err
+
+
 def test_bags_as_in_ros2(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert main(["bag", "info", str(tmp_path / "none.mcap")]) == 1
     assert "none.mcap does not exist" in capsys.readouterr().err

@@ -59,7 +59,7 @@ _REPORT_PERIOD_S = 1.0
 #: topics 4 to 13.
 _INTRODUCTION_S = {"dds": 8.0, "zenoh": 18.0}
 #: Seconds without changes after which the graph counts as complete; some are at once.
-_QUIET_S = {"zenoh": 0.3, "dds": 0.7, "ros1": 0.0, "replay": 0.0}
+_QUIET_S = {"zenoh": 0.3, "dds": 0.7, "ros1": 0.0, "replay": 0.0, "local": 0.0}
 
 
 def connect(args: argparse.Namespace, *, wait_for_start: bool = False) -> Node:
