@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
-from rosglass.rviz.camera import Picker
+from rosglass.rviz.camera import Camera, Picker, RvizPicker
 from rosglass.rviz.displays import Displays
 from rosglass.rviz.host import Hook
 from rosglass.rviz.tools import Tools
 from rosglass.rviz.trackers import Frames, Trackers
-from rosglass.rviz.view import View, Views
+from rosglass.rviz.view import CurrentView, RvizViews, View, Views
 from rosglass.rviz.window import config_file
 
 if TYPE_CHECKING:
@@ -78,27 +78,32 @@ class Access(QtCore.QObject):
     @cached_property
     def frames(self) -> Frames:
         """The robot's coordinate frames."""
-        return Frames(self._session, self.window)
+        return Frames(self._session, lambda: self.fixed_frame)
 
     @cached_property
     def view(self) -> View:
         """The camera."""
-        return View(self.window, self.frames)
+        window = self.window
+        view = View(CurrentView(window), self.frames, window.before_frame)
+        window.config_loading.connect(view.end_motion)
+        window.closing.connect(view.close)
+        return view
 
     @cached_property
     def views(self) -> Views:
         """The view types and the saved views."""
-        return Views(self.window)
+        return RvizViews(self.window)
 
     @cached_property
     def picker(self) -> Picker:
         """Picking of 3D points, and screenshots."""
-        return Picker(self.window)
+        return RvizPicker(self.window)
 
     @cached_property
     def trackers(self) -> Trackers:
         """Trackers of points in the 3D view."""
-        return Trackers(self.window, lambda: self.frames)
+        window = self.window
+        return Trackers(window.before_frame, lambda: Camera(window), lambda: self.frames)
 
     @property
     def fixed_frame(self) -> str:

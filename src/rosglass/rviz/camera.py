@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from rosglass.rviz.window import Window
 
-__all__ = ["Camera", "Picker", "ProjectedPoint"]
+__all__ = ["Camera", "Picker", "ProjectedPoint", "RvizPicker"]
 
 
 #: Ogre's name of RViz's 3D view; number 0 is a hidden window of one pixel.
@@ -140,11 +140,7 @@ def _point(point: Sequence[float]) -> NDArray[np.float64]:
 
 
 class Picker:
-    """Picks points and takes pictures by redrawing the 3D view, which takes milliseconds."""
-
-    def __init__(self, window: Window) -> None:
-        self._window = window
-        self._busy = False
+    """Picks points and takes pictures of a 3D view; base class of RViz's."""
 
     def pick(self, x: float, y: float, radius: float = 0.0) -> tuple[float, float, float] | None:
         """Return the point of the scene at a position in the view.
@@ -167,6 +163,59 @@ class Picker:
                 "expected finite x and y, and a radius from 0 to 100, in units of the view, got "
                 f"{shown([x, y, radius])[1:-1]}"
             )
+        return self._pick(x, y, radius)
+
+    def picture(self) -> Any:
+        """Return a picture of the 3D view with its overlays, a ``QImage``.
+
+        Raises:
+            Error: The view cannot be drawn now.
+        """
+        raise NotImplementedError
+
+    def window_picture(self) -> Any:
+        """Return a picture of the whole window, a ``QImage``."""
+        raise NotImplementedError
+
+    def screenshot(self, file: str | os.PathLike[str], *, window: bool = False) -> Path:
+        """Save a picture of the 3D view with its overlays.
+
+        Args:
+            file: The picture file; its suffix determines the format, e.g. ``.png`` or ``.jpg``.
+            window: Whether to include the rest of its window.
+
+        Returns:
+            The absolute path.
+
+        Raises:
+            Error: The view cannot be drawn now, or the file cannot be written.
+        """
+        path = Path(file).expanduser().absolute()
+        known = sorted(
+            {bytes(kind).decode() for kind in QtGui.QImageWriter.supportedImageFormats()}
+        )
+        if path.suffix.lower().lstrip(".") not in known:
+            raise Error(f"{path}: the name must end in one of .{', .'.join(known)}")
+        if not path.parent.is_dir():
+            raise Error(f"{path}: there is no folder {path.parent}; create it first")
+        image = self.window_picture() if window else self.picture()
+        writer = QtGui.QImageWriter(str(path))
+        if not writer.write(image):
+            raise Error(f"{path}: the picture could not be written: {writer.errorString()}")
+        return path
+
+    def _pick(self, x: float, y: float, radius: float) -> tuple[float, float, float] | None:
+        raise NotImplementedError
+
+
+class RvizPicker(Picker):
+    """Picks points and takes pictures by redrawing RViz's view, which takes milliseconds."""
+
+    def __init__(self, window: Window) -> None:
+        self._window = window
+        self._busy = False
+
+    def _pick(self, x: float, y: float, radius: float) -> tuple[float, float, float] | None:
         ratio = self._window.view_size()[2]
         width, height = self._size()
         column, row = math.floor(x * ratio), height - 1 - math.floor(y * ratio)
@@ -204,34 +253,8 @@ class Picker:
         image = QtGui.QImage(rows.data, width, height, 4 * width, QtGui.QImage.Format_RGB32)
         return image.copy()
 
-    def screenshot(self, file: str | os.PathLike[str], *, window: bool = False) -> Path:
-        """Save a picture of the 3D view with its overlays.
-
-        Args:
-            file: The picture file; its suffix determines the format, e.g. ``.png`` or ``.jpg``.
-            window: Whether to include the rest of RViz's window.
-
-        Returns:
-            The absolute path.
-
-        Raises:
-            Error: The view cannot be drawn now, or the file cannot be written.
-        """
-        path = Path(file).expanduser().absolute()
-        known = sorted(
-            {bytes(kind).decode() for kind in QtGui.QImageWriter.supportedImageFormats()}
-        )
-        if path.suffix.lower().lstrip(".") not in known:
-            raise Error(f"{path}: the name must end in one of .{', .'.join(known)}")
-        if not path.parent.is_dir():
-            raise Error(f"{path}: there is no folder {path.parent}; create it first")
-        image = self._grab_window() if window else self.picture()
-        writer = QtGui.QImageWriter(str(path))
-        if not writer.write(image):
-            raise Error(f"{path}: the picture could not be written: {writer.errorString()}")
-        return path
-
-    def _grab_window(self) -> Any:
+    def window_picture(self) -> Any:
+        """Return a picture of RViz's window."""
         widget = self._window.widget
         grabbed = widget.grab().toImage()
         # Qt's picture does not contain what Ogre draws.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
-from rosglass.rviz.host import address, as_pyside, class_of
+from rosglass.rviz.host import Hook, address, as_pyside, class_of
 from rosglass.rviz.plugins import DISPLAY, PluginList, declared, require_class_id
 from rosglass.rviz.properties import (
     child_properties,
@@ -183,7 +183,9 @@ class Displays(PluginList):
     status_changed = Signal()
 
     def __init__(self, window: Window) -> None:
-        super().__init__(window)
+        super().__init__()
+        self._window = window
+        self._hook = Hook(self._on_change)
         self._root = window.manager.getRootDisplayGroup()
         self._items: list[Display]
         self._status = status_of(self._root)

@@ -12,13 +12,10 @@ from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.interfaces.provider import workspace
 from rosglass.qt import QtCore, Signal
-from rosglass.rviz.host import Hook
 from rosglass.rviz.property_values import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-
-    from rosglass.rviz.window import Window
 
 __all__ = ["DISPLAY", "TOOL", "VIEW", "PluginList", "declared", "require_class_id"]
 
@@ -84,7 +81,7 @@ def _classes(file: str) -> list[ElementTree.Element]:
 
 
 class PluginList(QtCore.QObject):
-    """Base class of RViz's list of tools and list of displays.
+    """Base class of the list of tools and the list of displays.
 
     Derived classes implement :meth:`_sync_items`, which updates :attr:`_items`, and
     :meth:`_sync_rest`. Signals are emitted from the event loop, when RViz has finished its work, so
@@ -98,18 +95,16 @@ class PluginList(QtCore.QObject):
     #: An item has changed. Argument: the item.
     changed = Signal(object)
 
-    def __init__(self, window: Window) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._window = window
         #: Items have `handle` (None after removal), `exists` and `refresh()`.
         self._items: list[Any] = []
         self._known: list[Any] = []
         self._scheduled = False
-        self._hook = Hook(self._on_change)
 
     @property
     def all(self) -> list[Any]:
-        """The items in RViz's order."""
+        """The items in the order of RViz's panel or tool bar."""
         return list(self._items)
 
     def emit_changes(self) -> None:

@@ -393,7 +393,13 @@ def _file_path(use: str = "") -> Callable[[Any], str]:
 
 
 class RvizObject(RegisteredProperties):
-    """The object ``rviz`` in the QML of an overlay; see "The rviz object" in ``docs/rviz.md``."""
+    """The object ``rviz`` in the QML of an overlay; see "The rviz object" in ``docs/rviz.md``.
+
+    Args:
+        overlay: The overlay.
+        engine: Its engine.
+        access: The 3D view; None for that of the session.
+    """
 
     #: Name in error messages.
     CALLED = "rviz"
@@ -412,7 +418,9 @@ class RvizObject(RegisteredProperties):
 
     runtime: Runtime
 
-    def __init__(self, overlay: Overlay, engine: QtQml.QQmlEngine) -> None:
+    def __init__(
+        self, overlay: Overlay, engine: QtQml.QQmlEngine, access: Access | None = None
+    ) -> None:
         super().__init__()
         runtime = runtime_of(engine)
         assert runtime is not None
@@ -428,7 +436,7 @@ class RvizObject(RegisteredProperties):
         held = [self, spell_checked(runtime, self)]
         engine.destroyed.connect(lambda *_: held.clear())
         self._follow(overlay.arranged, self._on_arranged)
-        access = runtime.session.shared.get(ACCESS)
+        self._access = access = access or runtime.session.shared.get(ACCESS)
         if access is not None:
             self._follow(access.fullscreen_changed, self.isFullscreenChanged)
             self._follow(access.bare_changed, self.isBareChanged)
@@ -445,22 +453,22 @@ class RvizObject(RegisteredProperties):
         disconnects, self._disconnects = self._disconnects, []
         for disconnect in disconnects:
             disconnect()
-        access = self.__dict__.get("access")
-        if access is not None:
+        access = self._access
+        if access is not None and "trackers" in access.__dict__:
             # A program without an event loop may delete the engine much later.
             access.trackers.remove_all(self.runtime)
 
-    @cached_property
+    @property
     def access(self) -> Access:
         """The 3D view.
 
         Raises:
             Error: The overlay's session has none.
         """
-        found: Access | None = self.runtime.session.shared.get(ACCESS)
-        if found is None:
+        self._access = self._access or self.runtime.session.shared.get(ACCESS)
+        if self._access is None:
             raise Error("there is no RViz: the overlay's session belongs to no Application")
-        return found
+        return self._access
 
     @cached_property
     def tool_manager(self) -> QmlToolManager:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.qt import Signal
-from rosglass.rviz.host import address, mangled_class_of, pyqt
+from rosglass.rviz.host import Hook, address, mangled_class_of, pyqt
 from rosglass.rviz.overlay import QML_CLASS, REFERENCE_QML_CLASS
 from rosglass.rviz.plugins import DISPLAY, TOOL, PluginList, declared, require_class_id
 from rosglass.rviz.qt5 import QtGui
@@ -110,7 +110,9 @@ class Tools(PluginList):
     selected = Signal()
 
     def __init__(self, window: Window) -> None:
-        super().__init__(window)
+        super().__init__()
+        self._window = window
+        self._hook = Hook(self._on_change)
         self._manager = window.manager.getToolManager()
         self._items: list[Tool]
         self._known_current: Tool | None = None

@@ -12,7 +12,6 @@ from rosglass.errors import Error, LookupException, TransformException
 from rosglass.qml.element import DEFAULT_TIMEOUT_MS
 from rosglass.qml.tf_buffer import TfLink
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, Signal, is_alive
-from rosglass.rviz.camera import Camera
 from rosglass.rviz.property_values import shown
 from rosglass.rviz.qml_members import VARIANT, errors_to_js, point_of, to_python
 
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
     from rosglass.comm.time import Time
     from rosglass.qml.runtime import Runtime
     from rosglass.qml.session import Session
-    from rosglass.rviz.window import Window
+    from rosglass.rviz.camera import Camera
     from rosglass.tf import Transform, TransformBuffer
 
 __all__ = ["FIXED_FRAME", "Frames", "Tracker", "Trackers"]
@@ -38,14 +37,19 @@ FIXED_FRAME = "<Fixed Frame>"
 
 
 class Frames(QtCore.QObject):
-    """The transforms received by the overlays' node, because RViz's own are not accessible."""
+    """The transforms received by the overlays' node, because RViz's own are not accessible.
+
+    Args:
+        session: The session of the overlays.
+        fixed_frame: Returns the fixed frame.
+    """
 
     #: Transforms start or stop being received.
     available_changed = Signal()
 
-    def __init__(self, session: Session, window: Window) -> None:
+    def __init__(self, session: Session, fixed_frame: Callable[[], str]) -> None:
         super().__init__()
-        self._session, self._window = session, window
+        self._session, self._fixed_frame = session, fixed_frame
         self._tf_link: TfLink | None = None
         self._node: Node | None = None
         #: Error texts for missing frames, each with its creation time.
@@ -60,15 +64,15 @@ class Frames(QtCore.QObject):
 
     @property
     def fixed(self) -> str:
-        """RViz's fixed frame."""
-        return str(self._window.manager.getFixedFrame())
+        """The fixed frame."""
+        return self._fixed_frame()
 
     def steady(self) -> float:
         """Return the current time for measuring ages, in seconds; see :meth:`Session.steady`."""
         return self._session.steady()
 
     def locate(self, frame: str, time: Time | None = None) -> Transform:
-        """Return the transform from a frame to RViz's fixed frame.
+        """Return the transform from a frame to the fixed frame.
 
         Args:
             frame: Name of the frame; empty or :data:`FIXED_FRAME` for the fixed frame itself.
@@ -108,7 +112,7 @@ class Frames(QtCore.QObject):
         """Return an error text that says which of the two frames is missing."""
         known = [] if self._tf_link is None else sorted(self._tf_link.buffer.tree())
         if not fixed:
-            return f"RViz has no fixed frame to transform {frame!r} into; choose one"
+            return f"there is no fixed frame to transform {frame!r} into; choose one"
         if not known:
             return f"there is no frame {frame!r}: nothing is received on /tf and /tf_static"
         there = f"there are {', '.join(known[:_MAX_NAMED_FRAMES])}" + (
@@ -117,10 +121,8 @@ class Frames(QtCore.QObject):
         if frame not in known:
             return f"there is no frame {frame!r}{similar(frame, known) or f'; {there}'}"
         if fixed not in known:
-            return (
-                f"{frame!r} cannot be shown: RViz's fixed frame {fixed!r} does not exist; {there}"
-            )
-        return f"there is no transform from {frame!r} to RViz's fixed frame {fixed!r}: {error}"
+            return f"{frame!r} cannot be shown: the fixed frame {fixed!r} does not exist; {there}"
+        return f"there is no transform from {frame!r} to the fixed frame {fixed!r}: {error}"
 
     def close(self) -> None:
         """Stop receiving transforms; safe to call twice."""
@@ -271,14 +273,22 @@ class Tracker(QtCore.QObject):
 
 
 class Trackers:
-    """All trackers of an RViz, updated before each frame that it draws."""
+    """All trackers of a 3D view, updated before each frame that it draws.
 
-    def __init__(self, window: Window, frames: Callable[[], Frames]) -> None:
-        self._window, self._frames = window, frames
+    Args:
+        before_frame: Signal that the view is about to draw.
+        camera: Returns the view's camera.
+        frames: Returns the robot's frames.
+    """
+
+    def __init__(
+        self, before_frame: Any, camera: Callable[[], Camera], frames: Callable[[], Frames]
+    ) -> None:
+        self._make_camera, self._frames = camera, frames
         self._trackers: list[Tracker] = []
         self._camera: Camera | None = None
         self._scales: dict[Tracker, float] = {}
-        window.before_frame.connect(self._before_frame)
+        before_frame.connect(self._before_frame)
 
     def add(
         self,
@@ -325,7 +335,7 @@ class Trackers:
             Error: The frame is unknown.
         """
         if self._camera is None:
-            self._camera = Camera(self._window)
+            self._camera = self._make_camera()
         stamp = 0
         if frame:
             there = self._frames().locate(frame)

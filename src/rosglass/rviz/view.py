@@ -40,7 +40,16 @@ if TYPE_CHECKING:
     from rosglass.rviz.trackers import Frames
     from rosglass.rviz.window import Window
 
-__all__ = ["ORBIT", "TOP_DOWN", "CurrentView", "View", "ViewMode", "ViewSettings", "Views"]
+__all__ = [
+    "ORBIT",
+    "TOP_DOWN",
+    "CurrentView",
+    "RvizViews",
+    "View",
+    "ViewMode",
+    "ViewSettings",
+    "Views",
+]
 
 
 _log = logging.getLogger("rosglass.rviz")
@@ -409,6 +418,11 @@ class View(QtCore.QObject):
     Points are in metres. Moving the camera by other means, e.g. with the mouse, ends a movement.
     Shifting it also ends tracking; turning or zooming it does not. The first movement replaces
     other view types (FPS, ThirdPersonFollower) with ``rviz/Orbit``.
+
+    Args:
+        current: The current view, whose camera it moves.
+        frames: The robot's frames.
+        before_frame: Signal that the view is about to draw.
     """
 
     #: :attr:`mode` has changed.
@@ -418,9 +432,9 @@ class View(QtCore.QObject):
     #: :attr:`problem` has changed. Argument: the new text.
     problem_changed = Signal(str)
 
-    def __init__(self, window: Window, frames: Frames) -> None:
+    def __init__(self, current: CurrentView, frames: Frames, before_frame: Any) -> None:
         super().__init__()
-        self._frames, self._current = frames, CurrentView(window)
+        self._frames, self._current = frames, current
         #: The view controller's settings.
         self.settings = ViewSettings()
         self._tracked, self._problem = "", ""
@@ -437,9 +451,7 @@ class View(QtCore.QObject):
         self._last_mode = self.mode
         self._last_frame = time.monotonic()
         self._closed = False
-        window.before_frame.connect(self._step)
-        window.config_loading.connect(self._end_motion)
-        window.closing.connect(self.close)
+        before_frame.connect(self._step)
         self._current.changed.connect(self._on_view_changed)
 
     @property
@@ -583,7 +595,7 @@ class View(QtCore.QObject):
 
     def reset(self) -> None:
         """Show the fixed frame's origin in 3D from (4, 0, 3), and stop tracking."""
-        self._end_motion()
+        self.end_motion()
         self._write(_RESET_ORBIT, ORBIT)
         self._emit_mode()
 
@@ -597,7 +609,7 @@ class View(QtCore.QObject):
         Raises:
             Error: A distance is not finite, or the new focus is too far away.
         """
-        self._end_motion()
+        self.end_motion()
         now = self._current.read()
         x, y, _ = now.focus + Point(-ahead, -left, 0.0).turned(now.yaw)
         focus = self._in_fixed((x, y, now.focus.z), "")
@@ -637,7 +649,7 @@ class View(QtCore.QObject):
         self._write(goal, TOP_DOWN if in_2d else ORBIT)
         self._emit_mode()
 
-    def _end_motion(self) -> None:
+    def end_motion(self) -> None:
         """End movement and tracking."""
         self._movement = None
         self.track("")
@@ -657,7 +669,7 @@ class View(QtCore.QObject):
         except (AttributeError, RuntimeError, TypeError):
             # E.g. another version of RViz that names the views' properties differently.
             _log.exception("RViz's camera cannot be moved")
-            self._end_motion()
+            self.end_motion()
         self._emit_mode()
 
     def _advance(self, now: float) -> None:
@@ -786,48 +798,44 @@ _MAX_NAME_LENGTH = 1000
 
 
 class Views(QtCore.QObject):
-    """RViz's view types and saved views."""
+    """The view types and saved views; base class of RViz's."""
 
     #: :attr:`kind` has changed.
     kind_changed = Signal()
     #: :attr:`saved` has changed.
     saved_changed = Signal()
 
-    def __init__(self, window: Window) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._manager = window.manager.getViewManager()
         self._known = (self.kind, self.saved)
         self._scheduled = False
-        self._hook = Hook(self._on_change)
-        self._hook.watch(self._manager, "currentChanged()", "configChanged()")
 
     @property
     def kinds(self) -> list[str]:
         """Class ids of the available view types, e.g. ``rviz/Orbit``."""
-        return list(declared(VIEW))
+        raise NotImplementedError
 
     @property
     def kind(self) -> str:
         """Class id of the current view."""
-        return str(self._manager.getCurrent().getClassId())
+        return self._current_kind()
 
     @kind.setter
     def kind(self, kind: str) -> None:
         # RViz crashes on an unknown type.
-        if kind not in declared(VIEW):
+        if kind not in self.kinds:
             raise Error(
                 f"there is no view type {shown(kind)}{self._hint(kind)}; "
                 f"there are {', '.join(self.kinds)}"
             )
         if kind != self.kind:
-            self._manager.setCurrentViewControllerType(kind)
+            self._switch(kind)
         self.emit_changes()
 
     @property
     def saved(self) -> list[str]:
         """Names of the saved views, in the order of the Views panel; not unique."""
-        manager = self._manager
-        return [str(manager.getViewAt(at).getName()) for at in range(manager.getNumViews())]
+        raise NotImplementedError
 
     def save(self, name: str) -> None:
         """Save the current view, replacing a saved view of the same name.
@@ -840,9 +848,8 @@ class Views(QtCore.QObject):
         if len(name) > _MAX_NAME_LENGTH:
             raise Error(f"expected a name of at most {_MAX_NAME_LENGTH} characters")
         if name in self.saved:
-            self._manager.takeAt(self.saved.index(name)).deleteLater()
-        self._manager.copyCurrentToList()
-        self._manager.getViewAt(self._manager.getNumViews() - 1).setName(name)
+            self._take(self.saved.index(name))
+        self._append(name)
         self.emit_changes()
 
     def show(self, name: str | int) -> None:
@@ -854,7 +861,7 @@ class Views(QtCore.QObject):
         Raises:
             Error: No such view is saved.
         """
-        self._manager.setCurrentFrom(self._manager.getViewAt(self._index(name)))
+        self._show(self._index(name))
         self.emit_changes()
 
     def remove(self, name: str | int) -> None:
@@ -863,7 +870,7 @@ class Views(QtCore.QObject):
         Raises:
             Error: No such view is saved.
         """
-        self._manager.takeAt(self._index(name)).deleteLater()
+        self._take(self._index(name))
         self.emit_changes()
 
     def emit_changes(self) -> None:
@@ -895,3 +902,61 @@ class Views(QtCore.QObject):
         if not self._scheduled:
             self._scheduled = True
             QtCore.QTimer.singleShot(0, self.emit_changes)
+
+    # Of each 3D view.
+
+    def _current_kind(self) -> str:
+        raise NotImplementedError
+
+    def _switch(self, kind: str) -> None:
+        """Change to another type of view."""
+        raise NotImplementedError
+
+    def _append(self, name: str) -> None:
+        """Save the current view, as the last one."""
+        raise NotImplementedError
+
+    def _show(self, index: int) -> None:
+        """Show a saved view."""
+        raise NotImplementedError
+
+    def _take(self, index: int) -> None:
+        """Remove a saved view."""
+        raise NotImplementedError
+
+
+class RvizViews(Views):
+    """RViz's view types and saved views."""
+
+    def __init__(self, window: Window) -> None:
+        self._manager = window.manager.getViewManager()
+        super().__init__()
+        self._hook = Hook(self._on_change)
+        self._hook.watch(self._manager, "currentChanged()", "configChanged()")
+
+    @property
+    def kinds(self) -> list[str]:
+        """Class ids of the available view types, e.g. ``rviz/Orbit``."""
+        return list(declared(VIEW))
+
+    @property
+    def saved(self) -> list[str]:
+        """Names of the saved views, in the order of the Views panel; not unique."""
+        manager = self._manager
+        return [str(manager.getViewAt(at).getName()) for at in range(manager.getNumViews())]
+
+    def _current_kind(self) -> str:
+        return str(self._manager.getCurrent().getClassId())
+
+    def _switch(self, kind: str) -> None:
+        self._manager.setCurrentViewControllerType(kind)
+
+    def _append(self, name: str) -> None:
+        self._manager.copyCurrentToList()
+        self._manager.getViewAt(self._manager.getNumViews() - 1).setName(name)
+
+    def _show(self, index: int) -> None:
+        self._manager.setCurrentFrom(self._manager.getViewAt(index))
+
+    def _take(self, index: int) -> None:
+        self._manager.takeAt(index).deleteLater()
