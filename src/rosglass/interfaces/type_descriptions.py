@@ -570,6 +570,11 @@ def cache_folder() -> str:
         return ""
     if chosen:
         return os.path.abspath(os.path.expanduser(chosen))
+    return system_cache_folder("types")
+
+
+def system_cache_folder(name: str) -> str:
+    """Return the path of a folder of rosglass in the system's cache folder."""
     home = os.path.expanduser("~")
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA") or os.path.join(home, "AppData", "Local")
@@ -579,7 +584,7 @@ def cache_folder() -> str:
         base = os.environ.get("XDG_CACHE_HOME", "")
         # The specification says that relative paths count as unset.
         base = base if os.path.isabs(base) else os.path.join(home, ".cache")
-    return os.path.join(base, "rosglass", "types")
+    return os.path.join(base, "rosglass", name)
 
 
 class TypeCache:
