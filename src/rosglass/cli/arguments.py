@@ -17,7 +17,6 @@ from rosglass.cli.parser import (
     add_definitions_option,
     add_output_options,
     complete,
-    complete_files,
     number,
     pair,
     positive_int,
@@ -183,7 +182,7 @@ def _rviz(parser: argparse.ArgumentParser) -> None:
         help="RViz's config; package://name/path for a file in a package (default: RViz's own "
         "default). Also remappings, as for RViz: scan:=/robot/scan",
     )
-    complete_files(config, "rviz")
+    complete(config, "*.rviz")
     overlay = parser.add_argument(
         "--overlay",
         dest="overlays",
@@ -193,7 +192,7 @@ def _rviz(parser: argparse.ArgumentParser) -> None:
         help="an interface over the 3D view; package://name/path for a file in a package; may be "
         "repeated, the last one is uppermost",
     )
-    complete_files(overlay, "qml")
+    complete(overlay, "*.qml")
     parser.add_argument(
         "--url",
         default="",

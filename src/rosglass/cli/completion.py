@@ -6,15 +6,18 @@ module provides the names in the graph and the library.
 
 from __future__ import annotations
 
+import argparse
+from functools import partial
 from typing import TYPE_CHECKING
 
 import argcomplete
+from argcomplete.completers import FilesCompleter
 from argcomplete.shell_integration import shellcode
 
 import rosglass
 
 if TYPE_CHECKING:
-    import argparse
+    from collections.abc import Iterator
 
 __all__ = ["complete_names", "offer", "run"]
 
@@ -32,19 +35,36 @@ def run(args: argparse.Namespace) -> int:
 
 def offer(parser: argparse.ArgumentParser) -> None:
     """Print the completions for the shell, and end the program."""
+    for argument in _arguments(parser):
+        what = getattr(argument, "completes", "")
+        if what.startswith("*."):
+            argument.completer = FilesCompleter((what.removeprefix("*."),))  # type: ignore[attr-defined]
+        elif what:
+            argument.completer = partial(complete_names, what)  # type: ignore[attr-defined]
     argcomplete.autocomplete(parser)
 
 
-def complete_names(what: str, prefix: str, args: argparse.Namespace) -> list[str]:
+def _arguments(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
+    """Yield the arguments of a parser and its subcommands."""
+    for action in parser._actions:
+        yield action
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield from _arguments(command)
+
+
+def complete_names(
+    what: str, *, prefix: str, parsed_args: argparse.Namespace, **_: object
+) -> list[str]:
     """Return the names that begin with `prefix`; none on any error.
 
     Args:
         what: As for :func:`rosglass.cli.parser.complete`.
         prefix: What is typed so far.
-        args: The options typed so far.
+        parsed_args: The options typed so far.
     """
     try:
-        return [name for name in _names(what, args) if name.startswith(prefix)]
+        return [name for name in _names(what, parsed_args) if name.startswith(prefix)]
     except Exception:  # nothing may be printed into the line that is being typed
         return []
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import os
-from functools import partial
 from math import isfinite
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -23,7 +22,6 @@ __all__ = [
     "add_output_options",
     "add_verbose",
     "complete",
-    "complete_files",
     "is_completing",
     "number",
     "pair",
@@ -253,20 +251,6 @@ def complete(argument: argparse.Action, what: str) -> None:
     Args:
         argument: As returned by ``add_argument``.
         what: ``topics``, ``services``, ``actions``, ``nodes``, ``messages``, ``interfaces`` (all
-            kinds of types), ``service_types`` or ``action_types``.
+            kinds of types), ``service_types`` or ``action_types``; or, for files, ``*.qml``.
     """
-    argument.completer = partial(_complete, what)  # type: ignore[attr-defined]
-
-
-def _complete(what: str, *, prefix: str, parsed_args: argparse.Namespace, **_: Any) -> list[str]:
-    from rosglass.cli.completion import complete_names  # noqa: PLC0415 - not for help
-
-    return complete_names(what, prefix, parsed_args)
-
-
-def complete_files(argument: argparse.Action, suffix: str) -> None:
-    """Enable Tab completion with folders, and files whose name ends in `suffix`."""
-    if is_completing():
-        from argcomplete.completers import FilesCompleter  # noqa: PLC0415 - an extra
-
-        argument.completer = FilesCompleter((suffix,))  # type: ignore[attr-defined]
+    argument.completes = what  # type: ignore[attr-defined]
