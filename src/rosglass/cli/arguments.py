@@ -242,6 +242,46 @@ def _rviz(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _view(parser: argparse.ArgumentParser) -> None:
+    config = parser.add_argument(
+        "config",
+        metavar="CONFIG.rviz",
+        nargs="?",
+        default="",
+        help="a config of RViz 1 or RViz 2; package://name/path for a file in a package (default: "
+        "a grid and the robot's frames)",
+    )
+    complete(config, "*.rviz")
+    parser.add_argument(
+        "--url",
+        default="",
+        help="URL of the robot, e.g. zenoh://192.168.1.5:7447, or replay:FILE for a "
+        "recording; default: ROSGLASS_URL, or ROS's own variables, or the Zenoh router "
+        "or ROS 1 master of this machine",
+    )
+    parser.add_argument("--name", default="", help="node name (default: rosglass_view)")
+    parser.add_argument(
+        "--fixed-frame",
+        metavar="FRAME",
+        default="",
+        help="the fixed frame, instead of the one in the config",
+    )
+    parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
+    parser.add_argument(
+        "--kiosk",
+        action="store_true",
+        help="fill the screen with the 3D view alone, without panels; ignore attempts to close "
+        "the window (Alt-F4); Ctrl-C and SIGTERM end it",
+    )
+    _add_interface_options(parser, "the window", "the window", after=3.0)
+    parser.set_defaults(arguments=[], ros_arguments=[], looks_nearby=True)
+    parser.epilog = (
+        "F10 hides the panels, F11 fills the screen. Displays that rosglass does not have are kept "
+        "in the file. Needs Qt 6, and OpenGL, Vulkan, Metal or Direct3D: docs/scene.md. Arguments "
+        "after --ros-args are for ROS."
+    )
+
+
 def _qml_path(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--qmlls-ini",
@@ -806,6 +846,7 @@ def _completion(parser: argparse.ArgumentParser) -> None:
 COMMANDS = {
     "run": (_run, "open an interface written in QML"),
     "rviz": (_rviz, "open RViz with interfaces over its 3D view"),
+    "view": (_view, "open the robot's 3D view, as RViz does, without RViz"),
     "qml-path": (_qml_path, "print the folders of the QML modules, for editors"),
     "demo": (_demo, "open the demo cockpit on a simulated robot"),
     "robot": (_robot, "run the simulated robot"),

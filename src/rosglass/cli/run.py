@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from rosglass.qml.application import Application
 
-__all__ = ["QUIET_MEDIA", "Picture", "format_log", "run", "show"]
+__all__ = ["QUIET_MEDIA", "Picture", "format_log", "quiet_media", "run", "show"]
 
 #: Rules for messages of Qt that are of no use to users of an interface.
 QUIET_MEDIA = "qt.multimedia.symbolsresolver=false;qt.multimedia.ffmpeg*=false;qt.qpa.theme*=false"
@@ -50,6 +50,13 @@ def run(args: argparse.Namespace) -> int:
         return 1
 
 
+def quiet_media() -> None:
+    """Hide messages of Qt that are of no use to users; Qt reads this when it is loaded."""
+    rules = os.environ.get("QT_LOGGING_RULES", "")
+    if QUIET_MEDIA not in rules:
+        os.environ["QT_LOGGING_RULES"] = ";".join(filter(None, [QUIET_MEDIA, rules]))
+
+
 def show(
     file: str,
     *,
@@ -79,10 +86,7 @@ def show(
         UnsupportedError: There is no display.
         RosArgumentError: One of the arguments for ROS is not valid.
     """
-    # Qt reads these when it is loaded.
-    os.environ["QT_LOGGING_RULES"] = ";".join(
-        filter(None, [QUIET_MEDIA, os.environ.get("QT_LOGGING_RULES", "")])
-    )
+    quiet_media()
     if screenshot is not None:
         # Grabbing waits for the renderer, which may wait for Python.
         os.environ["QSG_RENDER_LOOP"] = "basic"

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 from functools import cache
+from pathlib import Path
 from typing import Any
 
+from PySide6.QtCore import QUrl
 from PySide6.QtQml import qmlRegisterType
 
 from rosglass.scene.displays.geometry import (
@@ -26,11 +28,12 @@ from rosglass.scene.displays.pose import (
     PoseWithCovarianceDisplay,
 )
 from rosglass.scene.displays.tf import TFDisplay
+from rosglass.scene.panel_models import DisplaysModel
 from rosglass.scene.scene import Scene
 from rosglass.scene.scene_view import SceneView
 from rosglass.scene.view_config import GroupDisplay
 
-__all__ = ["DISPLAYS", "register"]
+__all__ = ["DISPLAYS", "PANELS", "register"]
 
 #: The displays; in QML, each has the name of its class.
 DISPLAYS = (
@@ -51,6 +54,8 @@ DISPLAYS = (
     TwistStampedDisplay,
     WrenchStampedDisplay,
 )
+#: Panels written in QML.
+PANELS = ("DisplaysPanel", "ViewsPanel")
 Scene.TYPES.update({display.TYPE: display for display in (*DISPLAYS, GroupDisplay)})
 
 
@@ -64,5 +69,8 @@ def register() -> None:
     os.environ.setdefault("QSG_RENDER_LOOP", "basic")
     # PySide takes texts for names, which its hints do not say.
     register_type: Any = qmlRegisterType
-    for kind in (SceneView, *DISPLAYS):
+    for kind in (SceneView, DisplaysModel, *DISPLAYS):
         register_type(kind, "RosScene", 1, 0, kind.__name__)
+    for name in PANELS:
+        file = Path(__file__).with_name("panels") / f"{name}.qml"
+        register_type(QUrl.fromLocalFile(str(file)), "RosScene", 1, 0, name)

@@ -100,7 +100,7 @@ class Scene(Element):
             if found is None:
                 hint = similar(kind, self.TYPES) or f"; there are: {', '.join(sorted(self.TYPES))}"
                 raise Error(f"there is no type of displays {shown(kind)}{hint}")
-            display = found(self, self._runtime)
+            display = found(self, self._find_runtime())
             by_name = {setting.name: path for path, setting in found.SETTINGS.items()}
             try:
                 for key, value in settings.items():

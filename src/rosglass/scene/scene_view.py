@@ -18,7 +18,7 @@ from rosglass.scene.picking import pick
 from rosglass.scene.renderer import Frame, SceneRenderer
 from rosglass.scene.scene import Scene
 from rosglass.scene.view_config import collect_config, load_config
-from rosglass.scene.views import create_view
+from rosglass.scene.views import VIEWS, create_view
 
 if TYPE_CHECKING:
     import os
@@ -179,6 +179,41 @@ class SceneView(QQuickRhiItem):
         self._on_placed()
         self.viewChanged.emit()
         self.camera_moved()
+
+    #: The types of views.
+    viewTypes = Property(list, lambda self: list(VIEWS), constant=True)  # noqa: ARG005
+
+    @Slot(result="QVariantList")
+    def viewSettings(self) -> list[dict[str, Any]]:
+        """Return the settings of the view: name, text and description."""
+        return [
+            {
+                "name": one["path"],
+                "text": _setting_text(one["value"]),
+                "description": one["description"],
+            }
+            for one in self._view.describe()
+        ]
+
+    @Slot(str, str, result=str)
+    def setViewSetting(self, name: str, text: str) -> str:
+        """Change a setting of the view; return why it does not fit, or an empty text."""
+        try:
+            self._view.set(name, _setting_value(self._view.get(name), text))
+        except Error as error:
+            return str(error)
+        self.camera_moved()
+        return ""
+
+    @Slot()
+    def resetView(self) -> None:
+        """Return to where the view was at first."""
+        self._view.reset()
+        self.camera_moved()
+
+    def pictures_drawn(self) -> int:
+        """Return how many pictures were drawn."""
+        return sum(one.count for one in self._renderers if Shiboken.isValid(one))
 
     # -- config files ----------------------------------------------------------------------------
 
@@ -350,6 +385,24 @@ class SceneView(QQuickRhiItem):
 
 _BUTTONS = int(Button.LEFT | Button.RIGHT | Button.MIDDLE)
 _MODIFIERS = int(Modifier.SHIFT | Modifier.CTRL | Modifier.ALT)
+
+
+def _setting_text(value: Any) -> str:
+    if isinstance(value, dict):
+        return "; ".join(f"{number:.5g}" for number in value.values())
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _setting_value(before: Any, text: str) -> Any:
+    """Return a text as what a setting of a view holds; texts that do not fit stay texts."""
+    if isinstance(before, bool):
+        return {"true": True, "false": False}.get(text.strip().lower(), text)
+    if isinstance(before, tuple):
+        numbers = text.replace(";", " ").replace(",", " ").split()
+        return dict(zip("XYZ", numbers, strict=False)) if len(numbers) == 3 else text
+    return text
+
+
 #: Renderers of items that are gone, until C++ has deleted them.
 _ORPHANS: list[SceneRenderer] = []
 

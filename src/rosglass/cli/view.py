@@ -1,0 +1,62 @@
+"""``rosglass view``: open the robot's 3D view, as RViz does, without RViz."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rosglass.cli.run import quiet_media, show
+from rosglass.errors import QmlError, UnsupportedError
+
+if TYPE_CHECKING:
+    import argparse
+
+__all__ = ["run"]
+
+
+def run(args: argparse.Namespace) -> int:
+    """Show the view until it is closed; returns the exit code.
+
+    Raises:
+        Error: The config is missing, or is no config of RViz.
+        UnsupportedError: There is no Qt 6, or it would draw without a graphics interface.
+    """
+    quiet_media()
+    if args.renderer == "software" or os.environ.get("QT_QUICK_BACKEND") == "software":
+        raise UnsupportedError(
+            "Qt's software renderer draws no 3D: use --renderer opengl, unset QT_QUICK_BACKEND; "
+            "without a graphics card, Mesa's llvmpipe will do"
+        )
+    try:
+        from rosglass.scene.program import WINDOW, ViewProgram  # noqa: PLC0415 - loads Qt
+    except ModuleNotFoundError as error:
+        if not str(error.name).startswith("PySide6"):
+            raise
+        raise UnsupportedError(
+            'the 3D view needs Qt 6: pip install "rosglass[qml]" (inside RViz\'s Python there is '
+            "Qt 5; use another virtual environment)"
+        ) from None
+    program = ViewProgram(args.config, args.fixed_frame, kiosk=args.kiosk)
+    try:
+        return show(
+            str(WINDOW),
+            screenshot=None if args.screenshot is None else Path(args.screenshot),
+            after=args.after,
+            verbose=args.verbose > 1,
+            end_process=True,
+            longest_script=args.longest_script,
+            url=args.url,
+            name=args.name or "rosglass_view",
+            context={"program": program},
+            fullscreen=args.fullscreen,
+            kiosk=args.kiosk,
+            renderer=args.renderer,
+            allow_network=args.allow_network,
+            arguments=args.arguments,
+            ros_arguments=args.ros_arguments,
+        )
+    except QmlError as error:
+        print(error, file=sys.stderr)
+        return 1

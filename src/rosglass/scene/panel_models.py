@@ -1,0 +1,369 @@
+"""The rows of the Displays panel: options, displays, their status and their settings."""
+# ruff: noqa: N802, N815 - the names of slots, signals and properties are Qt's
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from PySide6.QtCore import QAbstractListModel, QModelIndex, Qt
+from PySide6.QtGui import QColor
+
+from rosglass.errors import Error
+from rosglass.interfaces.names import ros1_name
+from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
+from rosglass.scene.display import TopicDisplay
+from rosglass.scene.scene_view import SceneView
+from rosglass.scene.view_config import GroupDisplay, UnknownDisplay
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rosglass.scene.display import Display
+    from rosglass.scene.settings import Setting
+
+__all__ = ["DisplaysModel"]
+
+#: Milliseconds between two looks at what has no signal of its own.
+_REFRESH_MS = 250
+_FIXED_FRAME, _BACKGROUND = "Fixed Frame", "Background Color"
+
+
+class _Row(NamedTuple):
+    """A row of the panel.
+
+    Attributes:
+        key: What stays the same while values change.
+        depth: Levels of indentation.
+        label: Its name.
+        kind: Of the setting, or ``options``, ``display``, ``status``.
+        value: What is shown.
+        description: For the tooltip.
+        level: ``ok``, ``warn`` or ``error``.
+        checked: Of displays, whether it is enabled.
+        expandable: Whether it has rows below it.
+        expanded: Whether these are shown.
+        choices: Of enumerations and names of frames.
+    """
+
+    key: tuple[Any, ...]
+    depth: int
+    label: str
+    kind: str
+    value: Any = ""
+    description: str = ""
+    level: str = "ok"
+    checked: bool = True
+    expandable: bool = False
+    expanded: bool = False
+    choices: tuple[str, ...] = ()
+
+
+_ROLES = {
+    Qt.ItemDataRole.UserRole + number: name for number, name in enumerate(_Row._fields[1:], 1)
+}
+
+
+def _text(value: Any) -> Any:
+    """Return a value as the panel shows it."""
+    if isinstance(value, QColor):
+        return value.name()
+    if hasattr(value, "scalar"):
+        return f"{value.x():g}; {value.y():g}; {value.z():g}; {value.scalar():g}"
+    if hasattr(value, "toVector4D"):
+        return f"{value.x():g}; {value.y():g}; {value.z():g}"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return value
+
+
+def _value(setting: Setting, text: Any) -> Any:
+    """Return what the user has entered, as the setting takes it.
+
+    Raises:
+        Error: It does not fit.
+    """
+    kind = setting.kind.NAME
+    if kind in ("vector", "quaternion") and isinstance(text, str):
+        names = "xyzw"[: 3 if kind == "vector" else 4]
+        numbers = text.replace(";", " ").replace(",", " ").split()
+        if len(numbers) != len(names):
+            raise Error(f"expected {len(names)} numbers, e.g. {'; '.join('0' * len(names))}")
+        return setting.kind.restore(dict(zip(names, numbers, strict=True)))
+    if kind in ("int", "float") and isinstance(text, str):
+        return setting.kind.restore(text.strip())
+    return setting.kind.read(text)
+
+
+class DisplaysModel(QAbstractListModel):
+    """The rows of a Displays panel, flat, each with its depth; a base of lists in QML.
+
+    ``view`` is the :class:`SceneView` that it shows and changes.
+    """
+
+    viewChanged = Signal()
+    #: The user has entered something that does not fit: why.
+    refused = Signal(str)
+
+    def __init__(self, parent: QtCore.QObject | None = None) -> None:
+        super().__init__(parent)
+        self._view: SceneView | None = None
+        self._rows: list[_Row] = []
+        self._expanded: set[tuple[Any, ...]] = {("options",)}
+        self._timer = QtCore.QTimer(self)
+        self._timer.setInterval(_REFRESH_MS)
+        self._timer.timeout.connect(self.refresh)
+
+    def _get_view(self) -> SceneView | None:
+        return self._view
+
+    def _set_view(self, view: Any) -> None:
+        if view is self._view or not (view is None or isinstance(view, SceneView)):
+            return
+        self._view = view
+        self._timer.stop()
+        if view is not None:
+            view.scene.displayAdded.connect(lambda _: self.refresh())
+            view.scene.displayRemoved.connect(lambda _: self.refresh())
+            self._timer.start()
+        self.viewChanged.emit()
+        self.refresh()
+
+    #: The view that is shown.
+    view = Property(QtCore.QObject, _get_view, _set_view, notify=viewChanged)
+
+    # -- Qt's model ------------------------------------------------------------------------------
+
+    def rowCount(self, parent: Any = None) -> int:  # noqa: ARG002 - Qt's signature
+        """Return the number of rows."""
+        return len(self._rows)
+
+    def roleNames(self) -> dict[int, QtCore.QByteArray]:
+        """Return the names of the roles in QML."""
+        return {role: QtCore.QByteArray(name.encode()) for role, name in _ROLES.items()}
+
+    def data(self, index: Any, role: int = 0) -> Any:
+        """Return a part of a row."""
+        if not 0 <= index.row() < len(self._rows) or role not in _ROLES:
+            return None
+        value = getattr(self._rows[index.row()], _ROLES[role])
+        return list(value) if isinstance(value, tuple) else value
+
+    # -- rows ------------------------------------------------------------------------------------
+
+    @Slot()
+    def refresh(self) -> None:
+        """Show what has changed."""
+        if not is_alive(self):
+            return
+        view = self._view
+        new = list(self._walk(view)) if view is not None and is_alive(view) else []
+        old = self._rows
+        if [row.key for row in new] != [row.key for row in old]:
+            # As few rows as possible: an editor that is open stays so.
+            start = 0
+            while start < min(len(old), len(new)) and old[start].key == new[start].key:
+                start += 1
+            end = 0
+            while end < min(len(old), len(new)) - start and old[-1 - end].key == new[-1 - end].key:
+                end += 1
+            if start < len(old) - end:
+                self.beginRemoveRows(QModelIndex(), start, len(old) - end - 1)
+                self._rows = [*old[:start], *old[len(old) - end :]]
+                self.endRemoveRows()
+            if start < len(new) - end:
+                self.beginInsertRows(QModelIndex(), start, len(new) - end - 1)
+                self._rows = [
+                    *self._rows[:start],
+                    *new[start : len(new) - end],
+                    *self._rows[start:],
+                ]
+                self.endInsertRows()
+        before, self._rows = self._rows, new
+        for number, (one, other) in enumerate(zip(before, new, strict=True)):
+            if one != other:
+                index = self.index(number)
+                self.dataChanged.emit(index, index)
+
+    def _walk(self, view: SceneView) -> Iterator[_Row]:
+        scene = view.scene
+        key = ("options",)
+        yield _Row(
+            key, 0, "Global Options", "options", expandable=True, expanded=key in self._expanded
+        )
+        if key in self._expanded:
+            frames = tuple(scene.frames())
+            yield _Row(
+                (*key, _FIXED_FRAME), 1, _FIXED_FRAME, "frame", scene.fixed_frame,
+                "The frame in which everything is placed.", choices=frames,
+            )  # fmt: skip
+            yield _Row(
+                (*key, _BACKGROUND), 1, _BACKGROUND, "color",
+                view.property("background").name(), "What is behind everything.",
+            )  # fmt: skip
+        yield from self._walk_group(view, None, 0)
+
+    def _walk_group(self, view: SceneView, group: Display | None, depth: int) -> Iterator[_Row]:
+        for display in view.scene.displays:
+            if display.group is not group or not is_alive(display):
+                continue
+            key = ("display", id(display))
+            expanded = key in self._expanded
+            yield _Row(
+                key, depth, display.name, "display", display.TYPE, display.statusText,
+                display.statusLevel, bool(display.enabled), expandable=True, expanded=expanded,
+            )  # fmt: skip
+            if expanded:
+                yield from self._walk_display(display, key, depth + 1)
+                if isinstance(display, GroupDisplay):
+                    yield from self._walk_group(view, display, depth + 1)
+
+    def _walk_display(self, display: Display, key: Any, depth: int) -> Iterator[_Row]:
+        for name, line in display.status_lines.items():
+            yield _Row(
+                (*key, "status", name), depth, name, "status", line.text, line.text, line.level
+            )
+        for path, setting in display.SETTINGS.items():
+            yield _Row(
+                (*key, path),
+                depth + path.count("/"),
+                path.rpartition("/")[2],
+                setting.kind.NAME,
+                _text(getattr(display, setting.name)),
+                setting.description,
+                choices=self._choices(display, setting),
+            )
+
+    def _choices(self, display: Display, setting: Setting) -> tuple[str, ...]:
+        if setting.kind.NAME == "enum":
+            return tuple(setting.kind.options["choices"])
+        if setting.kind.NAME == "frame" and display.scene is not None:
+            return ("<Fixed Frame>", *display.scene.frames())
+        if setting.kind.NAME == "topic" and isinstance(display, TopicDisplay):
+            wanted = display.MESSAGES
+            return tuple(name for name, kinds in self._topics() if set(kinds) & set(wanted))
+        return ()
+
+    def _topics(self) -> list[tuple[str, list[str]]]:
+        node = self._view.scene.node if self._view is not None else None
+        if node is None:
+            return []
+        try:
+            return [
+                (name, [ros1_name(kind) for kind in kinds])
+                for name, kinds in sorted(node.topics().items())
+            ]
+        except Error:
+            return []
+
+    # -- changes ---------------------------------------------------------------------------------
+
+    def _display_at(self, row: int) -> Display | None:
+        if self._view is None or not 0 <= row < len(self._rows):
+            return None
+        key = self._rows[row].key
+        displays = self._view.scene.displays
+        return next((one for one in displays if key[:2] == ("display", id(one))), None)
+
+    @Slot(int)
+    def toggle(self, row: int) -> None:
+        """Show or hide the rows below one."""
+        if 0 <= row < len(self._rows):
+            self._expanded ^= {self._rows[row].key}
+            self.refresh()
+
+    @Slot(int, bool)
+    def setEnabled(self, row: int, enabled: bool) -> None:
+        """Show or hide a display."""
+        display = self._display_at(row)
+        if display is not None:
+            display.enabled = enabled
+            self.refresh()
+
+    @Slot(int, "QVariant")
+    def edit(self, row: int, text: Any) -> None:
+        """Change the setting of a row to what the user has entered."""
+        view, display = self._view, self._display_at(row)
+        if view is None or not 0 <= row < len(self._rows):
+            return
+        path = self._rows[row].key[-1]
+        try:
+            if display is not None:
+                display.set(path, _value(display.SETTINGS[path], text))
+            elif path == _FIXED_FRAME:
+                view.scene.fixed_frame = text
+            elif path == _BACKGROUND:
+                colour = QColor(text)
+                if not colour.isValid():
+                    raise Error(f"expected a colour, e.g. '#303030', got {text!r}")
+                view.setProperty("background", colour)
+        except Error as error:
+            self.refused.emit(f"{path}: {error}")
+        self.refresh()
+        # An editor shows again what the setting has.
+        index = self.index(row)
+        self.dataChanged.emit(index, index)
+
+    @Slot(int, str)
+    def rename(self, row: int, name: str) -> None:
+        """Give a display another name."""
+        display = self._display_at(row)
+        if display is not None and name.strip():
+            display.name = name.strip()
+            self.refresh()
+
+    @Slot(int)
+    def remove(self, row: int) -> None:
+        """Remove a display, with those in it."""
+        display = self._display_at(row)
+        if display is None or self._view is None:
+            return
+        scene = self._view.scene
+        for inner in scene.displays:
+            if inner.group is display:
+                scene.remove(inner)
+        scene.remove(display)
+
+    @Slot(int, int)
+    def move(self, row: int, target: int) -> None:
+        """Move a display to the place of the one in another row."""
+        display, other = self._display_at(row), self._display_at(target)
+        if display is None or other is None or display is other or self._view is None:
+            return
+        scene = self._view.scene
+        scene.move(display, scene.displays.index(other))
+        self.refresh()
+
+    @Slot(result="QVariantList")
+    def types(self) -> list[str]:
+        """Return the types of displays that can be added."""
+        if self._view is None:
+            return []
+        hidden = {UnknownDisplay.TYPE}
+        return sorted(set(self._view.scene.TYPES) - hidden)
+
+    @Slot(result="QVariantList")
+    def suggestions(self) -> list[dict[str, str]]:
+        """Return the robot's topics that a display can show: topic, its type, and the display."""
+        if self._view is None:
+            return []
+        found = []
+        for topic, kinds in self._topics():
+            for name, display in sorted(self._view.scene.TYPES.items()):
+                shown = set(getattr(display, "MESSAGES", ()))
+                if shown & set(kinds):
+                    found.append({"topic": topic, "type": kinds[0], "display": name})
+        return found
+
+    @Slot(str, str)
+    def add(self, kind: str, topic: str = "") -> None:
+        """Add a display of a type, for a topic if there is one."""
+        if self._view is None:
+            return
+        try:
+            settings = {"topic": topic} if topic else {}
+            display = self._view.scene.add(kind, "", **settings)
+        except Error as error:
+            self.refused.emit(str(error))
+            return
+        self._expanded.add(("display", id(display)))
+        self.refresh()

@@ -1,0 +1,121 @@
+import QtQuick
+import QtQuick.Controls.Fusion
+import QtQuick.Dialogs
+import QtQuick.Layouts
+import RosScene 1.0
+
+// The window of `rosglass view`: the 3D view and its panels. `program` is a ViewProgram.
+ApplicationWindow {
+    id: window
+
+    property bool panels: !program.kiosk
+    property var displays: displaysPanel
+
+    width: 1280
+    height: 800
+    visible: true
+    title: (program.configName || "new view") + (program.modified ? " *" : "") + " - rosglass view"
+
+    Component.onCompleted: program.begin(scene, overlays)
+    onClosing: close => { if (!program.mayClose()) { close.accepted = false; closing.open() } }
+
+    Shortcut { sequences: [StandardKey.Save]; onActivated: window.save() }
+    Shortcut { sequences: [StandardKey.Open]; onActivated: opening.open() }
+    Shortcut { sequence: "F10"; onActivated: window.panels = !window.panels }
+    Shortcut { sequence: "F11"; onActivated: window.visibility = window.visibility === Window.FullScreen ? Window.Windowed : Window.FullScreen }
+
+    function save() {
+        if (program.configName)
+            program.save("")
+        else
+            saving.open()
+    }
+
+    header: ToolBar {
+        visible: window.panels
+        RowLayout {
+            anchors.fill: parent
+            ToolButton { text: "Open"; onClicked: opening.open() }
+            ToolButton { text: "Save"; onClicked: window.save() }
+            ToolButton { text: "Save as"; onClicked: saving.open() }
+            ToolSeparator { }
+            Item { Layout.fillWidth: true }
+            ToolButton { text: "Panels"; checkable: true; checked: window.panels; onToggled: window.panels = checked }
+        }
+    }
+
+    SplitView {
+        anchors.fill: parent
+        DisplaysPanel {
+            id: displaysPanel
+            objectName: "displaysPanel"
+            visible: window.panels
+            SplitView.preferredWidth: 330
+            view: scene
+        }
+        SceneView {
+            id: scene
+            objectName: "scene"
+            SplitView.fillWidth: true
+            SplitView.minimumWidth: 100
+            focus: true
+
+            Item { id: overlays; anchors.fill: parent }
+            Label {
+                anchors.centerIn: parent
+                width: Math.min(implicitWidth, parent.width - 40)
+                visible: scene.problem !== ""
+                text: scene.problem
+                textFormat: Text.PlainText
+                wrapMode: Text.Wrap
+                padding: 12
+                color: "white"
+                background: Rectangle { color: "#c0801010"; radius: 6 }
+            }
+        }
+        ViewsPanel {
+            visible: window.panels
+            SplitView.preferredWidth: 250
+            view: scene
+        }
+    }
+
+    footer: Pane {
+        visible: window.panels
+        padding: 4
+        RowLayout {
+            anchors.fill: parent
+            Label { Layout.maximumWidth: window.width / 2; text: program.connection; textFormat: Text.PlainText; elide: Text.ElideRight; color: program.connected ? palette.text : "#ffc040" }
+            ToolSeparator { }
+            Label { text: program.time; textFormat: Text.PlainText }
+            ToolSeparator { }
+            Label { Layout.fillWidth: true; text: program.message; textFormat: Text.PlainText; elide: Text.ElideRight }
+            Label { text: program.frameRate + " fps" }
+        }
+    }
+
+    FileDialog {
+        id: opening
+        title: "Open an RViz config"
+        nameFilters: ["RViz configs (*.rviz)", "All files (*)"]
+        onAccepted: program.open(selectedFile)
+    }
+    FileDialog {
+        id: saving
+        title: "Save the RViz config"
+        fileMode: FileDialog.SaveFile
+        defaultSuffix: "rviz"
+        nameFilters: ["RViz configs (*.rviz)"]
+        onAccepted: program.save(selectedFile)
+    }
+    MessageDialog {
+        id: closing
+        title: "rosglass view"
+        text: "The view has changed. Save it?"
+        buttons: MessageDialog.Save | MessageDialog.Discard | MessageDialog.Cancel
+        onButtonClicked: (button, role) => {
+            if (button === MessageDialog.Save) window.save()
+            else if (button === MessageDialog.Discard) { program.discard(); window.close() }
+        }
+    }
+}

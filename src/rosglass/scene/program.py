@@ -1,0 +1,224 @@
+"""The program ``rosglass view``: RViz's window, on any robot, without RViz."""
+# ruff: noqa: N802, N815 - the names of slots, signals and properties are QML's
+
+from __future__ import annotations
+
+import logging
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import Error
+from rosglass.qml.modules import locate
+from rosglass.qml.properties import ReadOnly, report
+from rosglass.qml.runtime import runtime_of
+from rosglass.qt import QtCore, Slot, is_alive
+from rosglass.scene.rviz_config import RvizConfig
+from rosglass.scene.view_config import apply_config, collect_config
+
+if TYPE_CHECKING:
+    import os
+
+    from rosglass.qml.session import Session
+    from rosglass.scene.scene_view import SceneView
+
+__all__ = ["WINDOW", "ViewProgram", "config_file"]
+
+_log = logging.getLogger("rosglass.scene")
+#: The program's window.
+WINDOW = Path(__file__).with_name("panels") / "View.qml"
+#: Milliseconds between two looks at clock, frame rate and changes.
+_REFRESH_MS = 500
+#: Seconds for which a message stays in the status bar.
+_MESSAGE_S = 10.0
+
+
+def config_file(place: str | os.PathLike[str]) -> Path:
+    """Return the path of a config, if it is one.
+
+    Args:
+        place: A path, or ``package://name/path``.
+
+    Raises:
+        Error: There is no such file, or it is a folder.
+    """
+    path = locate(place)
+    if path.is_dir():
+        inside = ", ".join(sorted(file.name for file in path.glob("*.rviz"))[:5])
+        raise Error(f"{place}: this is a folder; name a config in it{f': {inside}' * bool(inside)}")
+    if not path.is_file():
+        raise Error(f"{place}: there is no such file")
+    return path
+
+
+class ViewProgram(QtCore.QObject):
+    """What the window of ``rosglass view`` shows beside its view, and what its buttons do.
+
+    Args:
+        config: The ``.rviz`` file to open; empty for RViz's default, a grid.
+        fixed_frame: The fixed frame instead of the config's; empty for none.
+        kiosk: Whether the panels are hidden.
+
+    Raises:
+        Error: The config cannot be read.
+    """
+
+    configName = ReadOnly(str, "")
+    modified = ReadOnly(bool, False)
+    #: State of the connection, in words.
+    connection = ReadOnly(str, "")
+    connected = ReadOnly(bool, False)
+    #: The robot's time, and this machine's.
+    time = ReadOnly(str, "")
+    message = ReadOnly(str, "")
+    frameRate = ReadOnly(int, 0)
+    kiosk = ReadOnly(bool, False)
+
+    def __init__(
+        self,
+        config: str | os.PathLike[str] = "",
+        fixed_frame: str = "",
+        *,
+        kiosk: bool = False,
+    ) -> None:
+        super().__init__()
+        self._session: Session | None = None
+        self._path = config_file(config) if config else None
+        # Read before the window is shown: a mistake in its name is an error of the command.
+        self._config = RvizConfig.load(self._path) if self._path is not None else None
+        self._fixed_frame = fixed_frame
+        self._view: SceneView | None = None
+        self._saved = ""
+        self._discarded = False
+        self._said_at = 0.0
+        self._counted, self._counted_at = 0, time.monotonic()
+        report(self, kiosk=kiosk)
+        self._timer = QtCore.QTimer(self)
+        self._timer.setInterval(_REFRESH_MS)
+        self._timer.timeout.connect(self._refresh)
+
+    @property
+    def view(self) -> SceneView | None:
+        """The view, once the window has made it."""
+        return self._view
+
+    @Slot(QtCore.QObject, QtCore.QObject)
+    def begin(self, view: Any, overlays: Any) -> None:  # noqa: ARG002 - overlays are shown by others
+        """Take the window's view, and show the config in it; called by the window."""
+        self._view = view
+        runtime = runtime_of(view)
+        assert runtime is not None
+        self._session = session = runtime.session
+        if self._config is None:
+            view.scene.add("Grid")
+            view.scene.add("TF")
+        else:
+            self._show(self._config)
+        if self._fixed_frame:
+            view.scene.fixed_frame = self._fixed_frame
+        if not session.is_initialized:
+            session.init("rosglass_view")
+        self._remember()
+        self._timer.start()
+        self._refresh()
+
+    def _show(self, config: RvizConfig) -> None:
+        assert self._view is not None
+        notes = apply_config(self._view, config)
+        self._view.config = config
+        for note in notes:
+            _log.warning("%s: %s", config.source, note)
+        report(self, configName=Path(config.source).name)
+        if notes:
+            self.say(f"{len(notes)} notes on {Path(config.source).name}: {notes[0]}")
+
+    def say(self, text: str) -> None:
+        """Show a message in the status bar for some seconds."""
+        self._said_at = time.monotonic()
+        report(self, message=text)
+
+    def _remember(self) -> None:
+        self._saved = self._text()
+
+    def _text(self) -> str:
+        """Return the config as it would be saved, for a look at whether it has changed."""
+        if self._view is None:
+            return ""
+        config = collect_config(self._view)
+        views = config.manager.get("Views", {})
+        # Where the camera stands is no change worth a question.
+        current = views.pop("Current", None)
+        try:
+            return config.dump()
+        finally:
+            if current is not None:
+                views["Current"] = current
+
+    @Slot(QtCore.QUrl)
+    @Slot(str)
+    def open(self, place: Any) -> None:
+        """Open a config; an error is shown in the status bar."""
+        try:
+            self._show(RvizConfig.load(config_file(_local(place))))
+        except Error as error:
+            _log.error("%s", error)
+            self.say(str(error))
+            return
+        self._remember()
+        self._refresh()
+
+    @Slot(QtCore.QUrl)
+    @Slot(str)
+    def save(self, place: Any) -> None:
+        """Save the config; where it was opened for an empty place."""
+        if self._view is None:
+            return
+        try:
+            self._view.save_config(_local(place))
+        except Error as error:
+            _log.error("%s", error)
+            self.say(str(error))
+            return
+        assert self._view.config is not None
+        report(self, configName=Path(self._view.config.source).name)
+        self._remember()
+        self.say(f"saved to {self._view.config.source}")
+        self._refresh()
+
+    @Slot(result=bool)
+    def mayClose(self) -> bool:
+        """Return whether nothing would be lost."""
+        return self._discarded or not self._path or self._text() == self._saved
+
+    @Slot()
+    def discard(self) -> None:
+        """Let the window close without saving."""
+        self._discarded = True
+
+    def _refresh(self) -> None:
+        view, session = self._view, self._session
+        if view is None or session is None or not is_alive(view):
+            self._timer.stop()
+            return
+        now = time.monotonic()
+        if self.message and now - self._said_at > _MESSAGE_S:
+            report(self, message="")
+        drawn = view.pictures_drawn()
+        rate = round((drawn - self._counted) / max(now - self._counted_at, 0.001))
+        self._counted, self._counted_at = drawn, now
+        node = session.node
+        ros_time = node.now().seconds if node is not None else 0.0
+        report(
+            self,
+            frameRate=rate,
+            modified=bool(self._path) and self._text() != self._saved,
+            connected=session.state == "connected",
+            connection=f"{session.state}: {session.detail}" if session.detail else session.state,
+            time=f"ROS {ros_time:.2f}   wall {time.strftime('%H:%M:%S')}",
+        )
+
+
+def _local(place: Any) -> str:
+    if isinstance(place, QtCore.QUrl):
+        return place.toLocalFile()
+    return str(place)
