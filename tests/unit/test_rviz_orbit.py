@@ -47,11 +47,11 @@ def test_movements_turn_the_short_way_and_end_where_they_should() -> None:
 def test_it_goes_along_with_a_frame() -> None:
     before, after = FramePose(Point(1, 1, 0), 0.0), FramePose(Point(5, 1, 1), math.pi / 2)
     orbit = Orbit.between(Point(3, 1, 2), Point(2, 1, 0))
-    carried = orbit.carried(before, after)
+    carried = orbit.moved_with(before, after)
     assert near(carried.focus, Point(5, 2, 1))
     assert near(carried.eye, Point(5, 3, 3))
-    assert near(after.seen(carried.focus), before.seen(orbit.focus))
-    assert near(after.outside(after.seen(Point(4, 5, 6))), Point(4, 5, 6))
+    assert near(after.to_local(carried.focus), before.to_local(orbit.focus))
+    assert near(after.to_fixed(after.to_local(Point(4, 5, 6))), Point(4, 5, 6))
 
 
 def test_movements_begin_and_end_softly() -> None:

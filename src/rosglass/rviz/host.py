@@ -87,8 +87,8 @@ def rviz() -> Any:
     """Return RViz's bindings (``rviz.bindings``)."""
     # Importing the package itself would load all modules of PyQt5.
     package = importlib.util.find_spec("rviz")
-    places = (package and package.submodule_search_locations) or ()
-    found = PathFinder.find_spec(_BINDINGS, list(places))
+    folders = (package and package.submodule_search_locations) or ()
+    found = PathFinder.find_spec(_BINDINGS, list(folders))
     if found is None or found.loader is None or _BINDINGS in sys.modules:
         return _load("rviz").bindings
     with _advising("rviz"):

@@ -143,8 +143,8 @@ class LostScreen(Handle):
     def check(self) -> None:
         """Check windows before drawing; does not return if one was destroyed."""
         with self._lock:
-            gone = not self._closed and self._windows & self._connection.destroyed()
-        if gone:
+            destroyed = not self._closed and self._windows & self._connection.destroyed()
+        if destroyed:
             self._end()
         if self._ending:
             time.sleep(_EXIT_PAUSE_S)

@@ -41,7 +41,7 @@ class Point(NamedTuple):
         x, y, z = _numbers(other)
         return Point(self.x - x, self.y - y, self.z - z)
 
-    def turned(self, yaw: float) -> Point:
+    def rotated(self, yaw: float) -> Point:
         """Return the vector rotated around z by an angle in radians."""
         c, s = math.cos(yaw), math.sin(yaw)
         return Point(c * self.x - s * self.y, s * self.x + c * self.y, self.z)
@@ -73,13 +73,13 @@ class FramePose(NamedTuple):
     point: Point
     yaw: float
 
-    def seen(self, point: Point) -> Point:
+    def to_local(self, point: Point) -> Point:
         """Transform a point from the fixed frame into this frame."""
-        return (point - self.point).turned(-self.yaw)
+        return (point - self.point).rotated(-self.yaw)
 
-    def outside(self, point: Point) -> Point:
+    def to_fixed(self, point: Point) -> Point:
         """Transform a point from this frame into the fixed frame."""
-        return self.point + point.turned(self.yaw)
+        return self.point + point.rotated(self.yaw)
 
 
 class Orbit(NamedTuple):
@@ -133,10 +133,10 @@ class Orbit(NamedTuple):
             self.pitch + (other.pitch - self.pitch) * part,
         )
 
-    def carried(self, before: FramePose, after: FramePose) -> Orbit:
+    def moved_with(self, before: FramePose, after: FramePose) -> Orbit:
         """Return the camera moved along with a frame, from its old to its new pose."""
         turn = shortest_turn(before.yaw, after.yaw)
-        focus = after.point + (self.focus - before.point).turned(turn)
+        focus = after.point + (self.focus - before.point).rotated(turn)
         return self._replace(focus=focus, yaw=self.yaw + turn)
 
     def is_near(self, other: Orbit) -> bool:

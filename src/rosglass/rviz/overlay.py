@@ -334,8 +334,8 @@ def _describe(kind: type[BaseException], error: BaseException, trace: TracebackT
     except RecursionError:
         # No stack is left for reading the traceback.
         frames = traceback.StackSummary()
-    place = f"{frames[-1].filename}:{frames[-1].lineno}: " if frames else ""
-    return f"{place}{kind.__name__}: {error}"
+    location = f"{frames[-1].filename}:{frames[-1].lineno}: " if frames else ""
+    return f"{location}{kind.__name__}: {error}"
 
 
 def _owner(trace: TracebackType | None) -> Overlay | None:

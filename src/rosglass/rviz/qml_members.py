@@ -466,10 +466,10 @@ class _MissingMembers(QtCore.QObject):
 
     def _warn(self, asked: str, item: QJSValue) -> None:
         caller = self._runtime.caller()
-        place = (caller.file, caller.line, asked)
-        if place in self._warned or len(self._warned) > _MAX_WARNINGS:
+        location = (caller.file, caller.line, asked)
+        if location in self._warned or len(self._warned) > _MAX_WARNINGS:
             return
-        self._warned.add(place)
+        self._warned.add(location)
         log_from_qml("", logging.WARNING, f"{_missing(item, asked)}; it is undefined", caller)
 
     @Slot(QJSValue, QJSValue, QJSValue, QJSValue, result=bool)

@@ -65,8 +65,8 @@ def _mode(value: Any) -> int:
     return value
 
 
-def _vector(place: Point) -> QtGui.QVector3D:
-    return QtGui.QVector3D(*place)
+def _vector(value: Point) -> QtGui.QVector3D:
+    return QtGui.QVector3D(*value)
 
 
 class QmlTool(QmlWrapper):

@@ -51,8 +51,8 @@ class MemoryCleaner(QtCore.QObject):
 
     @Slot()
     def _clean(self) -> None:
-        gone, self._collect_garbage = self._collect_garbage, False
-        if gone:
+        collect, self._collect_garbage = self._collect_garbage, False
+        if collect:
             gc.collect()
         trim = _malloc_trim()
         if trim is not None:
@@ -166,9 +166,9 @@ class Stack(QtCore.QObject):
             overlays: Some of the overlays; the others keep their positions.
         """
         number = {id(overlay): at for at, overlay in enumerate(overlays)}
-        places = [at for at, e in enumerate(self._entries) if id(e.overlay) in number]
-        moved = sorted((self._entries[at] for at in places), key=lambda e: number[id(e.overlay)])
-        for at, entry in zip(places, moved, strict=True):
+        positions = [at for at, e in enumerate(self._entries) if id(e.overlay) in number]
+        moved = sorted((self._entries[at] for at in positions), key=lambda e: number[id(e.overlay)])
+        for at, entry in zip(positions, moved, strict=True):
             self._entries[at] = entry
         self._arrange()
 

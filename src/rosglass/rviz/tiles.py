@@ -104,11 +104,11 @@ def changed_tiles(
         for rect in within:
             rows = slice(rect.top // TILE, -(-rect.bottom // TILE))
             columns = slice(rect.left // TILE, -(-rect.right // TILE))
-            place = (
+            area = (
                 slice(rows.start * TILE, rows.stop * TILE),
                 slice(columns.start * TILE, columns.stop * TILE),
             )
-            tiles[rows, columns] |= covered_tiles(pixels[place] ^ before[place])
+            tiles[rows, columns] |= covered_tiles(pixels[area] ^ before[area])
         return tiles
     for top in range(0, height, _ROWS_AT_A_TIME):
         now, then = pixels[top : top + _ROWS_AT_A_TIME], before[top : top + _ROWS_AT_A_TIME]

@@ -203,8 +203,8 @@ class Tools(PluginList):
             known.pop(address(handle)) if address(handle) in known else Tool(self, handle)
             for handle in handles
         ]
-        for gone in known.values():
-            gone.handle = None
+        for removed in known.values():
+            removed.handle = None
 
 
 def loading_error(handle: Any, class_id: str, base: str) -> str:

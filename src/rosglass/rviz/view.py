@@ -511,13 +511,13 @@ class View(QtCore.QObject):
         Raises:
             Error: `eye` is not three finite numbers, or too far away, or the frame is unknown.
         """
-        place, now = self._in_fixed(eye, frame), self._final_orbit()
+        position, now = self._in_fixed(eye, frame), self._final_orbit()
         in_2d = self.mode is ViewMode.MODE_2D
         if in_2d and switch_to_3d:
             in_2d, now = False, now._replace(pitch=self._pitch_3d)
         elif in_2d:
-            place = Point(place.x, place.y, now.eye.z)
-        goal = now._replace(focus=now.focus + (place - now.eye))
+            position = Point(position.x, position.y, now.eye.z)
+        goal = now._replace(focus=now.focus + (position - now.eye))
         self._store_offset(goal, stop_tracking)
         self._start(goal, animate, in_2d=in_2d)
 
@@ -611,7 +611,7 @@ class View(QtCore.QObject):
         """
         self.end_motion()
         now = self._current.read()
-        x, y, _ = now.focus + Point(-ahead, -left, 0.0).turned(now.yaw)
+        x, y, _ = now.focus + Point(-ahead, -left, 0.0).rotated(now.yaw)
         focus = self._in_fixed((x, y, now.focus.z), "")
         self._write(now._replace(focus=focus), self._view_class())
 
@@ -629,7 +629,7 @@ class View(QtCore.QObject):
             self.track("")
         elif self._tracked:
             try:
-                self._offset = self._pose_of(self._tracked).seen(goal.focus)
+                self._offset = self._pose_of(self._tracked).to_local(goal.focus)
             except Error:
                 self._offset = None
 
@@ -686,37 +686,37 @@ class View(QtCore.QObject):
 
     def _carry_movement(self) -> None:
         """Move start and goal of a movement along with the tracked frame."""
-        place, movement = self._tracked_pose(), self._movement
-        if place is None or movement is None:
+        pose, movement = self._tracked_pose(), self._movement
+        if pose is None or movement is None:
             return
-        before, self._frame_pose = self._frame_pose or place, place
-        start, goal = movement.start.carried(before, place), movement.goal.carried(before, place)
+        before, self._frame_pose = self._frame_pose or pose, pose
+        start, goal = (end.moved_with(before, pose) for end in (movement.start, movement.goal))
         self._movement = movement._replace(start=start, goal=goal)
 
     def _follow(self, part: float) -> None:
-        place = self._tracked_pose()
-        if place is None:
+        pose = self._tracked_pose()
+        if pose is None:
             return
         now = self._current.read()
         if self._offset is None:
-            self._offset = place.seen(now.focus)
-        yaw = place.yaw if self._frame_pose is None else self._frame_pose.yaw
-        turn = shortest_turn(yaw, place.yaw) * part
-        self._frame_pose = FramePose(place.point, yaw + turn)
-        focus = now.focus.towards(place.outside(self._offset), part)
+            self._offset = pose.to_local(now.focus)
+        yaw = pose.yaw if self._frame_pose is None else self._frame_pose.yaw
+        turn = shortest_turn(yaw, pose.yaw) * part
+        self._frame_pose = FramePose(pose.point, yaw + turn)
+        focus = now.focus.towards(pose.to_fixed(self._offset), part)
         moved = now._replace(focus=focus, yaw=now.yaw + turn)
         if not moved.is_near(now):
             self._write(moved, self._view_class())
 
     def _tracked_pose(self) -> FramePose | None:
         try:
-            place = self._pose_of(self._tracked)
+            pose = self._pose_of(self._tracked)
         except Error as error:
             # Keep the first text: the error may read differently in each frame.
             self._set_problem(self._problem or str(error))
             return None
         self._set_problem("")
-        return place
+        return pose
 
     def _end_if_moved(self) -> None:
         """End movement or tracking if something else moved the camera since the last frame."""
@@ -753,11 +753,11 @@ class View(QtCore.QObject):
                 _log.warning("the camera cannot follow %s: %s", self._tracked, problem)
             self.problem_changed.emit(problem)
 
-    def _in_fixed(self, place: Sequence[float], frame: str) -> Point:
+    def _in_fixed(self, position: Sequence[float], frame: str) -> Point:
         try:
-            x, y, z = (float(number) for number in place)
+            x, y, z = (float(number) for number in position)
         except (TypeError, ValueError):
-            raise Error(f"expected x, y and z in metres, got {shown(place)}") from None
+            raise Error(f"expected x, y and z in metres, got {shown(position)}") from None
         if not all(math.isfinite(number) for number in (x, y, z)):
             raise Error(f"expected finite metres, got {shown([x, y, z])}")
         if not isinstance(frame, str):

@@ -539,11 +539,11 @@ class ViewEntry(QtCore.QObject):
     @Slot()
     def _check_deleted(self) -> None:
         """Detect entries that RViz has deleted, for which Python gets no signal."""
-        gone = [entry for entry in self._shown if not entry.alive]
-        for entry in gone:
+        deleted = [entry for entry in self._shown if not entry.alive]
+        for entry in deleted:
             self._shown.remove(entry)
             entry.close()
-        if gone and not self._loading:
+        if deleted and not self._loading:
             self._reset_without_entry()
 
     @Slot()

@@ -111,8 +111,8 @@ class Canvas(QtWidgets.QGraphicsView):  # type: ignore[misc]
         words = np.frombuffer(picture.constBits(), np.uint32).reshape(self.pixels.shape)
         rects = [self._in_pixels(rect, own) for rect in stale.rects()]
         for rect in rects:
-            place = slice(rect.top, rect.bottom), slice(rect.left, rect.right)
-            self.pixels[place] = words[place]
+            area = slice(rect.top, rect.bottom), slice(rect.left, rect.right)
+            self.pixels[area] = words[area]
         return rects
 
     def _render(self, region: Any, picture: Any) -> None:

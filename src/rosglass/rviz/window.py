@@ -316,10 +316,10 @@ class Window(QtCore.QObject):
 
     def _fill_screen(self) -> None:
         """Resize the window to the screen if no window manager has done so."""
-        place = self.widget.windowHandle().screen().geometry()
-        if self.fullscreen and self.widget.size() != place.size():
+        screen = self.widget.windowHandle().screen().geometry()
+        if self.fullscreen and self.widget.size() != screen.size():
             self._resized_to_screen = True
-            self.widget.setGeometry(place)
+            self.widget.setGeometry(screen)
 
     def _on_status(self, status: str) -> None:
         if status == _LOADING_STATUS:
@@ -383,16 +383,16 @@ class _CloseWatch(QtCore.QObject):
         return True
 
 
-def config_file(place: str | os.PathLike[str]) -> Path:
+def config_file(source: str | os.PathLike[str]) -> Path:
     """Return the path of an RViz config file, after checking it.
 
     Args:
-        place: A path, or ``package://name/path``.
+        source: A path, or ``package://name/path``.
 
     Raises:
         Error: The file does not exist, cannot be read, or is not an RViz config.
     """
-    path = locate(place)
+    path = locate(source)
     if not path.is_file():
         wrong = "is a folder" if path.is_dir() else "does not exist"
         raise Error(f"{path} {wrong}; expected an RViz config file (.rviz){near(path)}")
