@@ -216,7 +216,9 @@ class Codec:
         """The class of shells around a whole message."""
         found: type[Message] = self.made(
             "root",
-            lambda: shell_class(self, True, lambda shell, attr: self._fill(shell, True, attr)),
+            lambda: shell_class(
+                self.schema, self.plain, lambda shell, attr: self._fill(shell, True, attr)
+            ),
         )
         return found
 
@@ -225,7 +227,9 @@ class Codec:
         """The class of shells around a message inside another."""
         found: type[Message] = self.made(
             "shell",
-            lambda: shell_class(self, False, lambda shell, attr: self._fill(shell, False, attr)),
+            lambda: shell_class(
+                self.schema, None, lambda shell, attr: self._fill(shell, False, attr)
+            ),
         )
         return found
 

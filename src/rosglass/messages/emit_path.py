@@ -6,7 +6,6 @@ They step over everything before the last target, and ignore everything after it
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import FieldPathError
@@ -15,12 +14,12 @@ from rosglass.messages.emit_read import Reader
 from rosglass.messages.layout import START, Cursor
 from rosglass.messages.message import column_type, resolve_path
 from rosglass.messages.schema import Kind
-from rosglass.messages.source import Source, number_type, unpacker
+from rosglass.messages.source import Source, load_numpy, number_type, unpacker
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.messages.codec import Codec
+    from rosglass.messages.emit_read import EmittedCodec
     from rosglass.messages.layout import Wire
     from rosglass.messages.message import Step
     from rosglass.messages.schema import Member, Schema
@@ -31,7 +30,7 @@ __all__ = ["path_function"]
 
 
 def path_function(
-    codec: Codec,
+    codec: EmittedCodec,
     paths: tuple[str, ...],
     single: bool,
     other: Callable[[Any], Any],
@@ -69,7 +68,7 @@ def path_function(
 
 
 def _constant_offsets(
-    codec: Codec, source: Source, targets: list[tuple[str, Route, str]], other: Any
+    codec: EmittedCodec, source: Source, targets: list[tuple[str, Route, str]], other: Any
 ) -> bool:
     """Read numbers at constant offsets, header included, in one call; False if that can't be."""
     wire = codec.wire
@@ -124,7 +123,7 @@ def _constant_offset(schema: Schema, route: Route, wire: Wire) -> int | None:
 class _Walk:
     """Emits the steps to every target."""
 
-    def __init__(self, codec: Codec, source: Source) -> None:
+    def __init__(self, codec: EmittedCodec, source: Source) -> None:
         self.codec, self.wire, self.source = codec, codec.wire, source
 
     def _fork(self, reader: Reader) -> Reader:
@@ -253,7 +252,7 @@ class _Walk:
         inner = _constant_offset(schema, rest, self.wire)
         count = reader.count(member)
         reader.check_count(layout.min_size(schema, self.wire), count)
-        numpy = import_module("numpy")
+        numpy = load_numpy()
         if stride is not None and inner is not None:
             number = rest[-1][0].number
             assert number is not None

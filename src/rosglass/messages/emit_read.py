@@ -8,16 +8,17 @@ sends a final NUL), sequences are a count and their elements.
 from __future__ import annotations
 
 from contextlib import contextmanager
-from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rosglass.messages import layout
 from rosglass.messages.layout import Cursor, Knowledge
 from rosglass.messages.schema import Kind
+from rosglass.messages.sequences import ElementCodec
 from rosglass.messages.source import (
     MAX_EMPTY,
     Source,
     iterator,
+    load_numpy,
     number_type,
     read_wide,
     too_short,
@@ -28,10 +29,45 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
 
-    from rosglass.messages.codec import Codec
+    from rosglass.messages.message import Message
     from rosglass.messages.schema import Member, Schema
+    from rosglass.messages.sequences import MessageSequence
 
-__all__ = ["Reader", "Skipper", "is_shared"]
+__all__ = ["EmittedCodec", "Reader", "Skipper", "is_shared"]
+
+
+class EmittedCodec(ElementCodec, Protocol):
+    """The classes and functions that generated code uses for a message and for those inside it.
+
+    A :class:`~rosglass.messages.codec.Codec`, which has them generated when they are first used.
+    """
+
+    cls: type[Message]
+
+    def of(self, schema: Schema) -> EmittedCodec:
+        """Return the codec of another schema on the same wire."""
+
+    @property
+    def shell(self) -> type[Message]:
+        """The class of shells around a message inside another."""
+
+    @property
+    def sequence(self) -> type[MessageSequence]:
+        """The class of lazy arrays of this schema."""
+
+    @property
+    def skipper(self) -> Callable[[Any, int], int]:
+        """The function ``skip(buffer, offset) -> end``."""
+
+    @property
+    def reader_of_one(self) -> Callable[[Any, int], tuple[Message, int]]:
+        """The function ``read(buffer, offset) -> (message, end)``."""
+
+    def reader_of_many(self, known: Knowledge) -> Callable[[Any, int, int], tuple[Any, int]]:
+        """Return ``read(buffer, offset, count) -> (list, end)`` for offsets that match `known`."""
+
+    def nested_writer(self, from_dict: bool, joined: bool, lenient: bool) -> Callable[..., int]:
+        """Return the function by which other writers write a nested message."""
 
 
 _NEAR = 256
@@ -56,7 +92,7 @@ class Skipper:
         cursor: Position of the code in the buffer.
     """
 
-    def __init__(self, codec: Codec, source: Source, cursor: Cursor) -> None:
+    def __init__(self, codec: EmittedCodec, source: Source, cursor: Cursor) -> None:
         self.codec, self.wire = codec, codec.wire
         self.source, self.cursor = source, cursor
         #: Numbers to be unpacked together: target, format character, size.
@@ -453,7 +489,7 @@ class Reader(Skipper):
         number = member.number
         assert number is not None
         start = self.elements_start(number.size, count)
-        numpy = import_module("numpy")
+        numpy = load_numpy()
         array = self.source.bind(numpy.ndarray, "array")
         dtype = self.source.bind(number_type(number.dtype, self.wire.order), number.dtype)
         view = f"{array}(({count},), {dtype}, b, {start})"
@@ -502,7 +538,7 @@ class Reader(Skipper):
             self._sequence(codec, target, count, start)
             self.pass_stride(schema, stride, count, start)
 
-    def _sequence(self, codec: Codec, target: str, count: str, start: str) -> None:
+    def _sequence(self, codec: EmittedCodec, target: str, count: str, start: str) -> None:
         """Create a lazy array."""
         name, cls = self.source.fresh("q"), self.source.bind(codec.sequence, "S")
         self.source.line(f"{target} = {name} = {cls}()")

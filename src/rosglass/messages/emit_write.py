@@ -13,17 +13,17 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rosglass.messages import layout
-from rosglass.messages.conversion import array_packer, as_bool, as_float, as_int
 from rosglass.messages.emit_read import is_shared
 from rosglass.messages.layout import ANYWHERE, START, Cursor, Knowledge
 from rosglass.messages.schema import Kind
 from rosglass.messages.sequences import same_bytes
 from rosglass.messages.source import MAX_EMPTY, Source, as_list, odd, own, packer, write_wide
+from rosglass.messages.values import array_packer, as_bool, as_float, as_int
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from rosglass.messages.codec import Codec
+    from rosglass.messages.emit_read import EmittedCodec
     from rosglass.messages.schema import Member, Schema
 
 __all__ = ["Writer"]
@@ -43,7 +43,7 @@ class Writer:
     """
 
     def __init__(
-        self, codec: Codec, source: Source, from_dict: bool, joined: bool, lenient: bool
+        self, codec: EmittedCodec, source: Source, from_dict: bool, joined: bool, lenient: bool
     ) -> None:
         self.codec, self.wire, self.source = codec, codec.wire, source
         self.from_dict, self.joined, self.lenient = from_dict, joined, lenient
@@ -419,7 +419,7 @@ class Writer:
         self.cursor.move("o", known)
 
 
-def nested_write_function(codec: Codec, from_dict: bool, joined: bool, lenient: bool) -> Any:
+def nested_write_function(codec: EmittedCodec, from_dict: bool, joined: bool, lenient: bool) -> Any:
     """Return ``write(value, add, o) -> o``, which other write functions call.
 
     ``add`` takes the parts, ``o`` is the position in the message (0 on wires that do not align).
@@ -435,7 +435,10 @@ def nested_write_function(codec: Codec, from_dict: bool, joined: bool, lenient: 
 
 
 def write_function(
-    codec: Codec, from_dict: bool, joined: bool, convert: Callable[[Any, Exception], Any] | None
+    codec: EmittedCodec,
+    from_dict: bool,
+    joined: bool,
+    convert: Callable[[Any, Exception], Any] | None,
 ) -> Any:
     """Return ``write(value)``: the bytes of a message or dict, or their parts.
 

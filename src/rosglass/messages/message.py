@@ -16,16 +16,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.errors import ConversionError, DecodeError, Error, FieldPathError
 from rosglass.messages.schema import Kind
-from rosglass.messages.source import hint, number_type
+from rosglass.messages.source import hint, load_numpy, number_type
+from rosglass.messages.values import elements, numbers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     import numpy as np
 
-    from rosglass.messages.codec import Codec
     from rosglass.messages.schema import Member, Schema
-    from rosglass.messages.types import MessageType
 
 __all__ = [
     "Message",
@@ -45,7 +44,6 @@ __all__ = [
     "to_json",
     "to_yaml",
     "touch",
-    "type_of",
     "writable",
 ]
 
@@ -66,7 +64,7 @@ class Message:
     paths (``message["poses[2].position.x"]``). A field whose name is a Python keyword has an
     underscore appended as an attribute (``message.from_``) and keeps its name everywhere else.
     A field named like a method (``copy``) or ``type`` hides it: code for any message uses
-    :func:`type_of` and ``Message.copy(message)``.
+    :func:`~rosglass.messages.type_of` and ``Message.copy(message)``.
 
     Numeric arrays of a received message are numpy views of its bytes and read-only: use
     :meth:`writable` or a :meth:`copy` to change single elements. Values are checked when the
@@ -82,12 +80,12 @@ class Message:
     _schema__: ClassVar[Schema]
     #: Decodes a shell; None for plain classes.
     _fill__: ClassVar[Callable[[Message], None] | None] = None
-    #: The codec whose whole message a root shell's buffer is; None for all others.
-    _root__: ClassVar[Codec | None] = None
+    #: The codec for whole messages like the bytes of a root shell; None for all others.
+    _root__: ClassVar[object] = None
 
     @property
-    def type(self) -> MessageType:
-        """The message's type."""
+    def type(self) -> Any:
+        """The message's :class:`~rosglass.messages.MessageType`, unless it has a field `type`."""
         return self._schema__.type
 
     def __getattr__(self, name: str) -> Any:
@@ -179,25 +177,22 @@ class Message:
         return same(self, other)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        kind = type_of(self)
+        kind = self._schema__.type
         return _restore, (kind, kind.encode(self))
 
     def __repr__(self) -> str:
         return short(self)
 
 
-def _restore(kind: MessageType, data: bytes) -> Message:
-    return kind.decode(data, wstring_width=4) if kind.wire == "cdr" else kind.decode(data)
+def _restore(kind: Any, data: bytes) -> Message:
+    cdr = kind.wire == "cdr"
+    made: Message = kind.decode(data, wstring_width=4) if cdr else kind.decode(data)
+    return made
 
 
 def _no_field(schema: Schema, name: str) -> str:
     known = [member.name for member in schema.members]
     return f"{schema.name} has no field {name!r}; {hint(name, known)}"
-
-
-def type_of(message: Message) -> MessageType:
-    """Return the type of any message, even of one with a field called ``type``."""
-    return message._schema__.type
 
 
 def touch(message: Message) -> None:
@@ -246,7 +241,7 @@ def _same_value(member: Member, one: Any, other: Any) -> bool:
         return False
     if member.number is None:
         return all(left == right for left, right in zip(one, other, strict=True))
-    numpy = import_module("numpy")
+    numpy = load_numpy()
     left, right = numpy.asarray(one), numpy.asarray(other)
     equal = left == right
     if left.dtype.kind == "f":
@@ -296,17 +291,17 @@ def _make_class(schema: Schema) -> type[Message]:
 
 
 def shell_class(
-    codec: Codec, root: bool, compile_fill: Callable[[Any, str], Callable[[Any], Any]]
+    schema: Schema, root: object, compile_fill: Callable[[Any, str], Callable[[Any], Any]]
 ) -> type[Message]:
     """Return the class of a schema's shells: its plain class with every field shadowed.
 
     Args:
-        codec: Codec of the shells' bytes.
-        root: Whether a shell's buffer is the whole message.
+        schema: The schema.
+        root: The codec for whole messages like the shells' bytes; None for parts of messages.
         compile_fill: Called with the class and the name of an attribute; returns the function that
             decodes a shell and returns that attribute (nothing for an empty name).
     """
-    cls = plain_class(codec.schema)
+    cls = plain_class(schema)
 
     def fill(message: Message) -> None:
         made = compile_fill(shell, "")
@@ -316,11 +311,11 @@ def shell_class(
     body: dict[str, Any] = {
         "__slots__": (),
         "__module__": cls.__module__,
-        "_schema__": codec.schema,
-        "_root__": codec if root else None,
+        "_schema__": schema,
+        "_root__": root,
         "_fill__": staticmethod(fill),
     }
-    for member in codec.schema.members:
+    for member in schema.members:
         body[member.attr] = _first_access(member.attr, compile_fill)
     shell: Any = type(cls.__name__, (cls,), body)
     made: type[Message] = shell
@@ -499,7 +494,7 @@ def _follow(message: Any, route: list[tuple[Member, Step | None]], path: str) ->
             if rest and member.kind is Kind.STRUCT:
                 found = [_follow(element, rest, path) for element in value]
                 leaf = column_type(rest)
-                return found if leaf is None else import_module("numpy").array(found, leaf)
+                return found if leaf is None else load_numpy().array(found, leaf)
     return value
 
 
@@ -539,7 +534,8 @@ def _put(message: Message, route: list[tuple[Member, Step | None]], path: str, v
             if member.number is not None:
                 target = _own(holder, member)
                 count = len(range(len(target))[step]) if isinstance(step, slice) else 1
-                value = _conversion().elements(member, step, count, value, path)
+                assert not isinstance(step, str)  # names are members by now
+                value = elements(member, step, count, value, path)
             target[step] = value
         else:
             target = target[step]
@@ -562,18 +558,13 @@ def _own(holder: Any, member: Member) -> Any:
     array = getattr(holder, member.attr)
     flags = getattr(array, "flags", None)
     if flags is None:  # a value assigned to the field
-        array = _conversion().numbers(member, array, member.name)
+        array = numbers(member, array, member.name)
     elif flags.writeable:
         return array
     else:
         array = array.copy()
     setattr(holder, member.attr, array)
     return array
-
-
-def _conversion() -> Any:
-    # Imported late: it creates messages, which need this module.
-    return import_module("rosglass.messages.conversion")
 
 
 _SHOWN = 6

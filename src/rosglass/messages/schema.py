@@ -20,8 +20,6 @@ from rosglass.interfaces.resolver import MAX_DEPTH, Extent
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Mapping
 
-    from rosglass.messages.types import MessageType
-
 __all__ = ["Kind", "Member", "Number", "Schema", "schema_of"]
 
 #: Names of :class:`~rosglass.messages.message.Message` that no field may take.
@@ -156,8 +154,8 @@ class Schema:
         cache: Objects that other modules derive from the schema (class, codecs), by key.
     """
 
-    #: Creates the public type of a schema; set by :mod:`rosglass.messages.types`.
-    make_type: ClassVar[Callable[[Schema], MessageType]]
+    #: Creates a schema's MessageType; set by :mod:`rosglass.messages.types`, which is above.
+    make_type: ClassVar[Callable[[Schema], Any]]
 
     def __init__(self, definition: Definition, members: tuple[Member, ...], extent: Extent) -> None:
         self.definition, self.extent = definition, extent
@@ -184,10 +182,9 @@ class Schema:
                 return self.cache[key]
 
     @property
-    def type(self) -> MessageType:
-        """The public type of this schema."""
-        kept: MessageType = self.cached("type", lambda: Schema.make_type(self))
-        return kept
+    def type(self) -> Any:
+        """The MessageType of this schema."""
+        return self.cached("type", lambda: Schema.make_type(self))
 
 
 _interned: weakref.WeakValueDictionary[Hashable, Schema] = weakref.WeakValueDictionary()

@@ -3,21 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, MutableSequence
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, overload
 
 from rosglass.errors import UnsupportedError
+from rosglass.messages import layout
 from rosglass.messages.schema import Kind
+from rosglass.messages.source import load_numpy
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from rosglass.messages.codec import Codec
     from rosglass.messages.layout import Wire
     from rosglass.messages.message import Message
     from rosglass.messages.schema import Schema
 
-__all__ = ["MessageSequence", "record_type", "same_bytes"]
+__all__ = ["ElementCodec", "MessageSequence", "record_type", "same_bytes"]
+
+
+class ElementCodec(Protocol):
+    """Decodes the elements of an array; a :class:`~rosglass.messages.codec.Codec`."""
+
+    schema: Schema
+    wire: Wire
+    stride: tuple[int, int] | None
+
+    def read_many(self, buffer: bytes | memoryview, offset: int, count: int) -> list[Message]:
+        """Decode `count` elements from `offset` on."""
+
+    def element(self, buffer: bytes | memoryview, offset: int) -> Message:
+        """Return the shell of an element."""
+
+    def skip(self, buffer: bytes | memoryview, offset: int) -> int:
+        """Return the offset after the element at `offset`."""
 
 
 class MessageSequence(MutableSequence["Message"]):
@@ -28,7 +45,7 @@ class MessageSequence(MutableSequence["Message"]):
     """
 
     __slots__ = ("_buffer", "_count", "_items", "_offsets", "_start")
-    _codec: ClassVar[Codec]
+    _codec: ClassVar[ElementCodec]
     #: All elements; until they are decoded, those accessed by index, or None.
     _items: list[Message] | dict[int, Message] | None
     _buffer: bytes | memoryview
@@ -127,7 +144,7 @@ class MessageSequence(MutableSequence["Message"]):
         dtype = record_type(codec.schema, codec.wire)
         if dtype is None or codec.stride is None:
             raise UnsupportedError(f"{codec.schema.name}: its elements are not of constant size")
-        numpy = import_module("numpy")
+        numpy = load_numpy()
         with codec.schema.lock:
             if self._items is None:
                 made = numpy.ndarray(
@@ -181,9 +198,7 @@ def _record_at(schema: Schema, wire: Wire, position: int) -> np.dtype | None:
 
 
 def _record_type(schema: Schema, wire: Wire, start: int) -> np.dtype | None:
-    from rosglass.messages import layout  # noqa: PLC0415 - not needed unless asked for
-
-    numpy = import_module("numpy")
+    numpy = load_numpy()
     names, formats, offsets, position = [], [], [], start
     for member in schema.members:
         count = 1 if member.fixed_count is None else member.fixed_count

@@ -22,6 +22,7 @@ __all__ = [
     "Source",
     "TooShortError",
     "iterator",
+    "load_numpy",
     "number_type",
     "packer",
     "read_wide",
@@ -161,10 +162,15 @@ def as_list(value: Any) -> list[Any]:
     raise OddValueError
 
 
+def load_numpy() -> Any:
+    """Return numpy, which messages without numeric arrays do not need; importing it is slow."""
+    return import_module("numpy")
+
+
 @lru_cache(maxsize=64)
 def number_type(dtype: str, order: str) -> np.dtype:
     """Return the numpy type with its byte order; the machine's own is numpy's singleton."""
-    found: np.dtype = import_module("numpy").dtype(order + dtype)
+    found: np.dtype = load_numpy().dtype(order + dtype)
     return found
 
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from rosglass.interfaces.definition import Field
     from rosglass.messages.message import Message
 
-__all__ = ["Constants", "MessageType", "OpaqueType", "portable"]
+__all__ = ["Constants", "MessageType", "OpaqueType", "portable", "type_of"]
 
 
 _WIRES = {
@@ -485,8 +485,7 @@ class MessageType:
 
 def _untouched(value: Any, codec: Codec) -> bytes | memoryview | None:
     """Return the bytes of a shell that was received by `codec` and never decoded."""
-    root = getattr(value, "_root__", None)
-    if root is not codec and (root is None or root.plain is not codec):
+    if getattr(value, "_root__", None) is not codec:
         return None
     return getattr(value, "_buffer__", None)
 
@@ -511,6 +510,12 @@ def portable(definition: Definition) -> Definition:
 
 
 Schema.make_type = MessageType._of_schema
+
+
+def type_of(message: Message) -> MessageType:
+    """Return the type of any message, even of one with a field called ``type``."""
+    found: MessageType = message._schema__.type
+    return found
 
 
 _HASHES = {1: re.compile(r"[0-9a-f]{32}"), 2: re.compile(r"RIHS[0-9]{2}_[0-9a-f]{64}")}
