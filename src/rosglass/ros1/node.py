@@ -23,7 +23,7 @@ from rosglass.ros1.parameter_server import ParameterServer
 from rosglass.ros1.roscpp_services import RoscppServices
 from rosglass.ros1.services import Services
 from rosglass.wires.tcpros.announced_types import AnnouncedTypes
-from rosglass.wires.tcpros.core import TcprosCore
+from rosglass.wires.tcpros.node import TcprosNode
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Mapping
@@ -51,7 +51,7 @@ __all__ = ["Ros1Node"]
 _log = logging.getLogger("rosglass.ros1")
 
 
-class Core(TcprosCore):
+class Core(TcprosNode):
     """The core of a ROS 1 node, which resolves its names.
 
     Args:

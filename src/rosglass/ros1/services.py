@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rosglass.messages import Message, ServiceType
     from rosglass.wires.base import OnReply, OnRequest
     from rosglass.wires.tcpros.core import TcprosCore
+    from rosglass.wires.tcpros.node import TcprosNode
     from rosglass.wires.tcpros.service_replier import TcprosReplier
     from rosglass.wires.tcpros.service_requester import ServerInfo, ServiceLocation
 
@@ -38,7 +39,7 @@ class Services:
         types: The types that other nodes' servers announce.
     """
 
-    def __init__(self, core: TcprosCore) -> None:
+    def __init__(self, core: TcprosNode) -> None:
         self._core = core
         self.types = ServiceTypes(core)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from tcpros import node_uri, publisher_address
 
-from rosglass.wires.tcpros import core
+from rosglass.wires.tcpros import node as tcpros_node
 
 FLOOD = 1000
 HEADER = b"\x14\0\0\0\x10\0\0\0callerid=/nobody"
@@ -75,8 +75,8 @@ def test_floods_leave_threads_and_files_and_the_node_answers(node, connect, even
 
 
 def test_there_are_fewer_connections_than_files(connect, eventually, monkeypatch):
-    assert 100 <= core.max_connections() <= 10_000
-    monkeypatch.setattr(core, "max_connections", lambda: 50)
+    assert 100 <= tcpros_node.max_connections() <= 10_000
+    monkeypatch.setattr(tcpros_node, "max_connections", lambda: 50)
     node = connect("panel", own_services=False)
     publisher = node.create_publisher("/speed", "std_msgs/Float64")
     eventually(lambda: node.publishers("/speed"))

@@ -60,7 +60,7 @@ class Core:
 def call_from(peer: str, own: str) -> tuple[list[Any], Core]:
     """Call a node's `shutdown` between these addresses: the answer, and the node."""
     core = Core()
-    slave = Slave(core, lambda _: None)  # type: ignore[arg-type]
+    slave = Slave(core, None, lambda _: None)  # type: ignore[arg-type]
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def serve() -> None:

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from rosglass.wires.tcpros.connection import Connection
     from rosglass.wires.tcpros.core import TcprosCore
     from rosglass.wires.tcpros.master import Master
-    from rosglass.wires.tcpros.topics import Topics
 
     Buffer = bytes | bytearray | memoryview
 
@@ -54,19 +53,25 @@ class Publication(Member):
 
     Args:
         core: The node.
-        topics: The node's topics.
         topic: Absolute topic name.
         type: The message type.
+        current: Returns the topic's publication as of now, None if it is not published.
 
     Attributes:
         writers: The writers of its publishers.
         numbers: The sequence numbers of messages that begin with a header.
     """
 
-    def __init__(self, core: TcprosCore, topics: Topics, topic: str, type: MessageType) -> None:
+    def __init__(
+        self,
+        core: TcprosCore,
+        topic: str,
+        type: MessageType,
+        current: Callable[[], Publication | None],
+    ) -> None:
         self.topic, self.type = topic, type
         self.endpoint = (EndpointKind.PUBLISHER, topic)
-        self._core, self._topics = core, topics
+        self._core, self._current = core, current
         #: Guards the connections and latched messages: each subscriber gets each message once.
         self._lock = threading.Lock()
         self.numbers = itertools.count(1)
@@ -255,7 +260,7 @@ class Publication(Member):
 
     def successor(self) -> Member | None:
         """Return the topic's new publication, if it is published again."""
-        return self._topics.published().get(self.topic)
+        return self._current()
 
     def _refusals(self) -> list[str]:
         """Return why subscribers were refused that the master still lists."""

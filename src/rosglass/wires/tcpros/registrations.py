@@ -36,8 +36,6 @@ _POLL_S = 1.0
 _UNREGISTER_TIMEOUT_S, _ABORT_TIMEOUT_S = 1.5, 0.5
 #: Polls with a publisher that is not connected until the subscription is registered again.
 _MAX_MISSED_POLLS = 2
-#: Seconds that the master may take to look up the node's name.
-_OWNER_TIMEOUT_S = 1.0
 
 
 class Member(NodeMember):
@@ -133,19 +131,6 @@ class Registrations:
             self._thread.join(_ABORT_TIMEOUT_S)
         if left := self._tried.copy():
             unregister_later(self._core, left)
-
-    def owner(self) -> str:
-        """Return the URI of another node that has this node's name; empty if there is none.
-
-        Raises:
-            ConnectionLostError: The master does not answer.
-        """
-        core = self._core
-        try:
-            uri = core.master.call("lookupNode", core.name.full, timeout=_OWNER_TIMEOUT_S)
-        except MasterError:
-            return ""
-        return "" if uri in core.uris else str(uri)
 
     # -- the thread ------------------------------------------------------------------------------
 

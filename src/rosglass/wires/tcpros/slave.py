@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.wires.tcpros.core import TcprosCore
+    from rosglass.wires.tcpros.topics import Topics
 
 __all__ = ["Slave"]
 
@@ -77,6 +78,7 @@ class Slave(socketserver.ThreadingMixIn):
 
     Args:
         core: The node.
+        topics: Its topics.
         on_parameter_changed: Called with the name of a subscribed parameter that has changed.
     """
 
@@ -85,8 +87,11 @@ class Slave(socketserver.ThreadingMixIn):
     #: Read by the request handler.
     logRequests = False  # noqa: N815 - named by the standard library
 
-    def __init__(self, core: TcprosCore, on_parameter_changed: Callable[[str], None]) -> None:
-        self._core, self._on_parameter_changed = core, on_parameter_changed
+    def __init__(
+        self, core: TcprosCore, topics: Topics, on_parameter_changed: Callable[[str], None]
+    ) -> None:
+        self._core, self._topics = core, topics
+        self._on_parameter_changed = on_parameter_changed
         #: Guards the connections: none is shut down whose descriptor is closed, and may be reused.
         self._lock = threading.Lock()
         self._log_once = LogOnce()
@@ -185,11 +190,11 @@ class Slave(socketserver.ThreadingMixIn):
     def _bus_info(self, _: object) -> list[list[Any]]:
         """Return the connections, as ``rosnode info`` shows them."""
         found: list[list[Any]] = []
-        for topic, publication in self._core.topics.published().items():
+        for topic, publication in self._topics.published().items():
             for link in publication.links():
                 peer = link.header.get("callerid", link.peer)
                 found.append([len(found) + 1, peer, "o", _PROTOCOL, topic, True, link.info])
-        for topic, shared in self._core.topics.subscribed().items():
+        for topic, shared in self._topics.subscribed().items():
             for source in shared.links():
                 # The publisher's URI: rosnode and rqt_graph find the node by it.
                 row = [len(found) + 1, source.uri, "i", _PROTOCOL, topic, source.connected]
@@ -200,7 +205,7 @@ class Slave(socketserver.ThreadingMixIn):
         """Return statistics of publishers, subscriptions and services."""
         publishers = [
             [topic, _NOT_COUNTED, [[n, _NOT_COUNTED, _NOT_COUNTED, True] for n, _ in links]]
-            for topic, publication in self._core.topics.published().items()
+            for topic, publication in self._topics.published().items()
             for links in [enumerate(publication.links(), 1)]
         ]
         subscriptions = [
@@ -211,16 +216,16 @@ class Slave(socketserver.ThreadingMixIn):
                     for n, link in enumerate(shared.links(), 1)
                 ],
             ]
-            for topic, shared in self._core.topics.subscribed().items()
+            for topic, shared in self._topics.subscribed().items()
         ]
         return [publishers, subscriptions, []]
 
     def _publications(self, _: object) -> list[list[str]]:
-        published = self._core.topics.published()
+        published = self._topics.published()
         return [[topic, ros1_name(one.type.name)] for topic, one in sorted(published.items())]
 
     def _subscriptions(self, _: object) -> list[list[str]]:
-        subscribed = self._core.topics.subscribed()
+        subscribed = self._topics.subscribed()
         return [[topic, one.type_name] for topic, one in sorted(subscribed.items())]
 
     def _shutdown(self, connection: socket.socket, caller: object, reason: object = "") -> int:
@@ -244,7 +249,7 @@ class Slave(socketserver.ThreadingMixIn):
 
     def _update_publishers(self, caller: object, topic: object, uris: object) -> int:
         _text(caller, "caller_id")
-        shared = self._core.topics.subscribed().get(_text(topic, "topic"))
+        shared = self._topics.subscribed().get(_text(topic, "topic"))
         publishers = [_text(uri, "publishers") for uri in _list(uris, "publishers")]
         if shared is not None:
             shared.on_publishers_changed(publishers)
@@ -253,7 +258,7 @@ class Slave(socketserver.ThreadingMixIn):
     def _request_topic(self, caller: object, topic: object, protocols: object) -> list[Any]:
         """Return how to connect to a published topic."""
         _text(caller, "caller_id")
-        if not self._core.topics.serves(_text(topic, "topic")):
+        if not self._topics.serves(_text(topic, "topic")):
             raise KeyError(f"{self._core.name} does not publish {topic}")
         offered = _list(protocols, "protocols")
         asked = [one[0] if isinstance(one, list) and one else one for one in offered]

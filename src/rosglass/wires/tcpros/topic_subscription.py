@@ -54,7 +54,6 @@ if TYPE_CHECKING:
     from rosglass.wires.tcpros.core import BlockingPool, TcprosCore
     from rosglass.wires.tcpros.io_loop import IoLoop
     from rosglass.wires.tcpros.master import Master
-    from rosglass.wires.tcpros.topics import Topics
 
     Received = bytes | memoryview
 
@@ -69,23 +68,34 @@ class TopicSubscription(Member):
 
     Args:
         core: The node.
-        topics: The node's topics.
         topic: Absolute topic name.
         type_name: The registered type, ``pkg/Type``; ``*`` for any.
+        unreachable: Logs publishers that cannot be reached.
+        current: Returns the topic's registration as of now, None if it is not subscribed to.
+        latched: Returns the last message of each latched publisher of the node itself.
 
     Attributes:
+        unreachable: As given.
         readers: One for each subscription; replaced, never changed: the loop's thread iterates over
             them for each message. :meth:`join` and :meth:`leave` are called under the topics' lock.
         eager: Whether messages are handed on as they are received.
     """
 
-    def __init__(self, core: TcprosCore, topics: Topics, topic: str, type_name: str) -> None:
-        self.core, self.topic = core, topic
+    def __init__(
+        self,
+        core: TcprosCore,
+        topic: str,
+        type_name: str,
+        unreachable: UnreachableLog,
+        current: Callable[[], TopicSubscription | None],
+        latched: Callable[[], list[memoryview]],
+    ) -> None:
+        self.core, self.topic, self.unreachable = core, topic, unreachable
         self.endpoint = (EndpointKind.SUBSCRIPTION, topic)
         self.type_name = type_name
         self.readers: tuple[TypeNegotiation, ...] = ()
         self.eager = True
-        self._topics = topics
+        self._current, self._latched = current, latched
         #: By URI; changed in the loop's thread only.
         self._links: dict[str, PublisherLink] = {}
         self._closed = False
@@ -114,7 +124,7 @@ class TopicSubscription(Member):
     def _catch_up(self, reader: TypeNegotiation, link: PublisherLink) -> None:
         """Hand on the latched messages that a connection of its own would have received."""
         if link.is_local:
-            for data in self._topics.latched(self.topic):
+            for data in self._latched():
                 reader.on_messages(link, [data], time.time_ns())
         elif link.latched is not None:
             reader.on_messages(link, [link.latched], time.time_ns())
@@ -239,7 +249,7 @@ class TopicSubscription(Member):
 
     def successor(self) -> Member | None:
         """Return the topic's new registration, if it is subscribed to again."""
-        return self._topics.subscribed().get(self.topic)
+        return self._current()
 
     def follow(self, moved: bool, idle: bool) -> None:
         """Check for silent publishers, and let the subscriptions' feeds follow the graph."""
@@ -689,7 +699,7 @@ class PublisherLink:
         self._latches = header.get("latching") == "1"
         self._silence, self._count = SilenceMonitor(), 0
         self._measured_at, self._measured, self._rate = time.monotonic(), 0, 0.0
-        self._core.unreachable.on_publisher_connected(self)
+        self.subscription.unreachable.on_publisher_connected(self)
         self.subscription.on_publisher_connected(self)
 
     def _on_frames(self, frames: list[Received], _: int) -> None:
@@ -730,7 +740,7 @@ class PublisherLink:
         what = "was lost" if was_connected else "cannot be received from"
         self.problem, self.lost = f"{self.name} {what}: {reason}; trying again", was_connected
         if not was_connected:
-            self._core.unreachable.on_publisher_failed(self)
+            self.subscription.unreachable.on_publisher_failed(self)
         self.subscription.on_publisher_disconnected(self)
         if not self.ended:
             self._core.loop.after(self._delay, self._begin)

@@ -18,6 +18,7 @@ from rosglass.wires.tcpros.publication import Publication
 from rosglass.wires.tcpros.topic_subscription import (
     TopicSubscription,
     TypeNegotiation,
+    UnreachableLog,
     ask_publisher,
 )
 
@@ -44,7 +45,7 @@ class Topics:
     """
 
     def __init__(self, core: TcprosCore) -> None:
-        self._core = core
+        self._core, self._unreachable = core, UnreachableLog(core.loop, core.pool)
         #: Guards which endpoint of a topic is the first one, and which the last.
         self._lock = threading.Lock()
         self._publications: dict[str, Publication] = {}
@@ -71,7 +72,9 @@ class Topics:
             publication = self._publications.get(topic)
             new = publication is None
             if publication is None:
-                publication = Publication(self._core, self, topic, type)
+                publication = Publication(
+                    self._core, topic, type, lambda: self._publications.get(topic)
+                )
             writer = publication.join(type, endpoint.qos, self._end_writer)
             self._publications[topic] = publication
         if new:
@@ -96,7 +99,14 @@ class Topics:
                 message_type = subscription.type
                 name = ANY if message_type is None else ros1_name(message_type.name)
                 name = ros1_name(type_name) if type_name else name
-                shared = self._subscribed[topic] = TopicSubscription(self._core, self, topic, name)
+                shared = self._subscribed[topic] = TopicSubscription(
+                    self._core,
+                    topic,
+                    name,
+                    self._unreachable,
+                    lambda: self._subscribed.get(topic),
+                    lambda: self.latched(topic),
+                )
             matching = TypeNegotiation(
                 self._core, shared, type_name, ignore_local, self._end_subscription
             )
