@@ -142,7 +142,7 @@ def _from_field(value: object) -> object:
     """Return the Time or Duration of a message's field; other objects unchanged."""
     if isinstance(value, (Time, Duration)):
         return value
-    from rosglass.messages.message import Stamp  # noqa: PLC0415 - numpy
+    from rosglass.messages.message import Stamp  # noqa: PLC0415 - QML files need none so early
 
     if not isinstance(value, Stamp):
         return value

@@ -7,6 +7,14 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from rosglass.errors import Error, TypeNotFoundError, UnsupportedError
 from rosglass.interfaces import announced_hashes
+from rosglass.messages import (
+    ActionType,
+    MessageType,
+    OpaqueType,
+    ServiceType,
+    default_library,
+    load,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -14,7 +22,6 @@ if TYPE_CHECKING:
     from rosglass.comm.graph import EndpointInfo
     from rosglass.comm.promise import Promise
     from rosglass.interfaces import InterfaceDefinition, Library
-    from rosglass.messages import ActionType, MessageType, OpaqueType, ServiceType
 
     _T = TypeVar("_T", MessageType, ServiceType, ActionType)
 
@@ -81,8 +88,6 @@ class Types:
     @property
     def library(self) -> Library:
         """The source of definitions."""
-        from rosglass.messages import default_library  # noqa: PLC0415 - numpy
-
         return default_library() if self._library is None else self._library
 
     def message(self, wanted: str | MessageType, hash: str = "") -> MessageType:
@@ -97,26 +102,18 @@ class Types:
             UnsupportedError: It is a type of the other ROS version.
             DefinitionConflictError: No definition has `hash`.
         """
-        from rosglass.messages import MessageType  # noqa: PLC0415 - numpy
-
         return self._find(wanted, MessageType, hash, "message")
 
     def opaque(self, name: str, hash: str, reason: str) -> OpaqueType:
         """Return a placeholder for a message type without definition."""
-        from rosglass.messages import OpaqueType  # noqa: PLC0415 - numpy
-
         return OpaqueType(name, hash, reason, ros=self._ros)
 
     def service(self, wanted: str | ServiceType, hash: str = "") -> ServiceType:
         """Return a service type; arguments and errors as in :meth:`message`."""
-        from rosglass.messages import ServiceType  # noqa: PLC0415 - numpy
-
         return self._find(wanted, ServiceType, hash, "service")
 
     def action(self, wanted: str | ActionType, hash: str = "") -> ActionType:
         """Return an action type; arguments and errors as in :meth:`message`."""
-        from rosglass.messages import ActionType  # noqa: PLC0415 - numpy
-
         return self._find(wanted, ActionType, hash, "action")
 
     def request(
@@ -178,8 +175,6 @@ class Types:
         return found
 
     def _find(self, wanted: object, kind: type[_T], hash: str, word: str) -> _T:
-        from rosglass.messages import load  # noqa: PLC0415 - numpy
-
         if not isinstance(wanted, str):
             return self._check(wanted, kind, word)
         found = load(wanted, ros=self._ros, library=self._library, hash=hash)

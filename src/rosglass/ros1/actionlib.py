@@ -16,9 +16,10 @@ from rosglass.comm import EndpointKind, GoalStatus, History, QoS, Time
 from rosglass.errors import DecodeError
 from rosglass.interfaces.definition import ActionDefinition, Definition
 from rosglass.interfaces.derived import derive
+from rosglass.messages import ActionType, MessageType
 
 if TYPE_CHECKING:
-    from rosglass.messages import ActionType, Message, MessageType
+    from rosglass.messages import Message
     from rosglass.wires.tcpros.announced_types import AnnouncedTypes
     from rosglass.wires.tcpros.graph import Graph
 
@@ -97,8 +98,6 @@ def assemble(
         result: Type of the topic with results.
         feedback: Type of the topic with feedback.
     """
-    from rosglass.messages import ActionType  # noqa: PLC0415 - numpy
-
     base = name.replace("/action/", "/msg/")
     parts = (
         goal.definition.nested[f"{base}Goal"],
@@ -174,8 +173,6 @@ def state_of(status: Message) -> ServerState:
 
 
 def _derived(action: ActionType, suffix: str, status: Definition) -> MessageType:
-    from rosglass.messages import MessageType  # noqa: PLC0415 - numpy
-
     made = derive(action.definition, suffix)
     assert isinstance(made, Definition)
     return MessageType(replace(made, nested={**status.nested, **made.nested}))

@@ -22,6 +22,7 @@ from rosglass.errors import (
     TypeNotFoundError,
 )
 from rosglass.interfaces import adding_definitions, ros1_name, split_name
+from rosglass.messages import load
 from rosglass.ros1.actionlib import (
     FEEDBACK,
     GOAL,
@@ -91,8 +92,6 @@ def fetch(
         f"{name} was not received", core.dispatcher, cancellable=True
     )
     if hash:
-        from rosglass.messages import load  # noqa: PLC0415 - numpy
-
         with suppress(Error):
             promise.set_result(load(name, ros=1, library=core.types.library, hash=hash))
             return promise
@@ -197,8 +196,6 @@ class _Fetch(Member):
         return None if self._node or self._hash else self._in_library()
 
     def _in_library(self) -> AnyType | None:
-        from rosglass.messages import load  # noqa: PLC0415 - numpy
-
         with suppress(TypeNotFoundError):
             return load(self._name, ros=1, library=self._core.types.library)
         return None

@@ -14,12 +14,13 @@ from rosglass.errors import Error
 from rosglass.interfaces import parse_message
 from rosglass.interfaces.definition import Definition, ServiceDefinition
 from rosglass.interfaces.derived import derive
+from rosglass.messages import ActionType, MessageType, ServiceType
 from rosglass.ros2.announced import Announced, choose, mismatches, missing, rivals
 
 if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
     from rosglass.comm.types import Types
-    from rosglass.messages import ActionType, Message, MessageType, ServiceType
+    from rosglass.messages import Message
     from rosglass.ros2.core import Core
 
 __all__ = [
@@ -100,8 +101,6 @@ class ActionTypes:
     @classmethod
     def of(cls, action: ActionType, types: Types) -> ActionTypes:
         """Return the types derived from an action; raises TypeNotFoundError without action_msgs."""
-        from rosglass.messages import MessageType, ServiceType  # noqa: PLC0415 - numpy
-
         send_goal, get_result = (
             ServiceType(_service(action, suffix)) for suffix in ("_SendGoal", "_GetResult")
         )
@@ -124,8 +123,6 @@ def assemble(
 
     A robot announces its version of an action by the hash of each part.
     """
-    from rosglass.messages import ActionType  # noqa: PLC0415 - numpy
-
     name = action.name
     definition = replace(
         action.definition,

@@ -12,6 +12,7 @@ from rosglass.comm import EndpointInfo, EndpointKind, Liveliness, Sample
 from rosglass.comm.events import conflicts, words
 from rosglass.comm.subscription import Problem, TopicMatching
 from rosglass.errors import Error
+from rosglass.interfaces import join_name
 from rosglass.ros2.announced import nodes_of
 
 if TYPE_CHECKING:
@@ -584,6 +585,4 @@ class _Failure:
 
 
 def _full_name(name: str) -> str:
-    from rosglass.interfaces import join_name  # noqa: PLC0415 - not needed to connect
-
     return join_name(name)

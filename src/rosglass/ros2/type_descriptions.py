@@ -43,6 +43,7 @@ from rosglass.interfaces import (
 from rosglass.interfaces.definition import parts_of
 from rosglass.interfaces.derived import derive, derived_from
 from rosglass.interfaces.names import KINDS, split_name
+from rosglass.messages import ServiceType, load
 from rosglass.ros2.announced import nodes_of
 from rosglass.ros2.rmw_services import create_service_client, create_service_server
 
@@ -53,7 +54,7 @@ if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo, NodeName, ServiceClient
     from rosglass.comm.types import Types
     from rosglass.interfaces import Definition, InterfaceDefinition
-    from rosglass.messages import ActionType, Message, MessageType, ServiceType
+    from rosglass.messages import ActionType, Message, MessageType
     from rosglass.ros2.core import Core
     from rosglass.wires.base import Middleware
 
@@ -97,8 +98,6 @@ _MAX_ANSWER = 8 << 20
 
 def service_type() -> ServiceType:
     """Return the type of the service, independent of the node's own library."""
-    from rosglass.messages import ServiceType, load  # noqa: PLC0415 - numpy
-
     found = load(_TYPE)
     assert isinstance(found, ServiceType)
     return found
@@ -393,8 +392,6 @@ class TypeFetcher(NodeMember):
         return self._requests.setdefault(key, TypeRequest(*key))
 
     def _load(self, name: str, type_hash: str) -> AnyType:
-        from rosglass.messages import load  # noqa: PLC0415 - numpy
-
         return load(name, ros=2, library=self._core.types.library, hash=type_hash)
 
     def _expire(self, name: str, promise: Promise[AnyType], timeout: float) -> None:

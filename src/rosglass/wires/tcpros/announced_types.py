@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 from rosglass.comm.types import Types
 from rosglass.errors import DefinitionConflictError, Error, TypeNotFoundError
 from rosglass.interfaces import adding_definitions, full_text, join_name, split_name
+from rosglass.messages import MessageType, ServiceType, load
 from rosglass.wires.tcpros.connection import ANY
 
 if TYPE_CHECKING:
     from rosglass.interfaces import Library
-    from rosglass.messages import ActionType, MessageType, ServiceType
+    from rosglass.messages import ActionType
 
 __all__ = ["AnnouncedTypes"]
 
@@ -80,8 +81,6 @@ class AnnouncedTypes(Types):
             DefinitionError: The definition breaks a rule.
             InvalidNameError: `name` is not a type name.
         """
-        from rosglass.messages import ServiceType, load  # noqa: PLC0415 - numpy
-
         if not name:
             raise TypeNotFoundError("its server does not announce its type; give the type")
         hint = "ROS 1 servers send no definitions"
@@ -101,8 +100,6 @@ class AnnouncedTypes(Types):
         return known
 
     def _known(self, full: str, md5: str) -> MessageType | None:
-        from rosglass.messages import MessageType, load  # noqa: PLC0415 - numpy
-
         with suppress(Error):
             found = load(full, ros=1, library=self._library, hash=md5)
             if isinstance(found, MessageType):
@@ -110,8 +107,6 @@ class AnnouncedTypes(Types):
         return None
 
     def _from_text(self, full: str, md5: str, text: str) -> MessageType:
-        from rosglass.messages import MessageType  # noqa: PLC0415 - numpy
-
         if not text.strip():
             raise TypeNotFoundError(
                 f"{full}: its publisher sends no definition, and no other one with md5 {md5} is "

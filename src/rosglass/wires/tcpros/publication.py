@@ -14,6 +14,7 @@ from rosglass.comm import Durability, EndpointInfo, EndpointKind, History, NodeN
 from rosglass.comm.inbox import INBOX_LIMIT
 from rosglass.errors import ConversionError, DefinitionConflictError, UnsupportedError
 from rosglass.interfaces import ros1_name
+from rosglass.messages import OpaqueType
 from rosglass.wires.base import Writer
 from rosglass.wires.tcpros.connection import ANY, Frame
 from rosglass.wires.tcpros.graph import split
@@ -395,15 +396,11 @@ class PublicationWriter(Writer):
 
 def definition_text(types: Any, message_type: MessageType) -> str:
     """Return a type's full definition; that of an opaque type as it was received."""
-    from rosglass.messages import OpaqueType  # noqa: PLC0415 - numpy
-
     return message_type.text if isinstance(message_type, OpaqueType) else types.text(message_type)
 
 
 def _has_header(type: MessageType) -> bool:
     """Return whether messages begin with a header, whose sequence number publishers set."""
-    from rosglass.messages import OpaqueType  # noqa: PLC0415 - numpy
-
     if isinstance(type, OpaqueType):
         return False
     fields = type.definition.fields

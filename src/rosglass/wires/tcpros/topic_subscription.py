@@ -28,6 +28,7 @@ from rosglass.errors import (
 )
 from rosglass.interfaces import join_name, ros1_name
 from rosglass.interfaces.counterparts import RENAMED
+from rosglass.messages import OpaqueType
 from rosglass.wires.base import Reader
 from rosglass.wires.tcpros.connection import ANY, Connection
 from rosglass.wires.tcpros.graph import split
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from rosglass.comm.subscription import SubscriptionFeed
-    from rosglass.messages import MessageType, OpaqueType
+    from rosglass.messages import MessageType
     from rosglass.wires.tcpros.core import BlockingPool, TcprosCore
     from rosglass.wires.tcpros.io_loop import IoLoop
     from rosglass.wires.tcpros.master import Master
@@ -515,8 +516,6 @@ class TypeNegotiation(TopicMatching, Reader):
 
 def _opaque(name: str, md5: str, text: str, reason: str) -> OpaqueType | None:
     """Return a type without definition; None if the name or sum is not valid."""
-    from rosglass.messages import OpaqueType  # noqa: PLC0415 - numpy
-
     try:
         return OpaqueType(name, md5, reason, text=text, ros=1)
     except InvalidNameError:
