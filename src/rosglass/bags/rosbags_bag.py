@@ -19,7 +19,7 @@ from rosbags.rosbag2 import storage_mcap
 
 from rosglass.bags.bag import Bag, BagMessage, Channel, LeftOut, decompress, parse_profile
 from rosglass.comm import QoS
-from rosglass.comm.text_files import check_yaml, read_text
+from rosglass.comm.text_files import check_yaml, load_pyyaml, read_text
 from rosglass.errors import BagError
 from rosglass.interfaces.names import join_name
 
@@ -135,8 +135,7 @@ class RosbagsBag(Bag):
 
 def _check_metadata(path: Path) -> None:
     """Raise YAMLError if a bag's metadata expands beyond the limits of :func:`check_yaml`."""
-    import yaml  # noqa: PLC0415 - for few recordings
-
+    yaml = load_pyyaml()
     if path.is_file():
         text, _ = read_text(path, _MAX_METADATA)
         check_yaml(text)

@@ -3,19 +3,33 @@
 from __future__ import annotations
 
 import os
-import tempfile
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from rosglass.errors import ParameterError
 
-__all__ = ["check_yaml", "explain_yaml_error", "load_yaml", "read_text", "write_text"]
+__all__ = [
+    "check_yaml",
+    "explain_yaml_error",
+    "load_pyyaml",
+    "load_yaml",
+    "read_text",
+    "write_text",
+]
 
 #: Maximum number of values in a YAML text, after expanding aliases (``&a [*b, *b]``).
 _MAX_VALUES = 1_000_000
 #: Maximum levels of nesting; the loaders of libyaml and PyYAML recurse.
 _MAX_DEPTH = 100
+
+
+def load_pyyaml() -> Any:
+    """Return PyYAML, which is slow to import, and which few programs need."""
+    import yaml  # noqa: PLC0415 - as above
+
+    return yaml
 
 
 def load_yaml(text: str, loader: Any = None) -> list[Any]:
@@ -28,8 +42,7 @@ def load_yaml(text: str, loader: Any = None) -> list[Any]:
     Raises:
         yaml.YAMLError: The text is not valid YAML, or exceeds the limits.
     """
-    import yaml  # noqa: PLC0415 - few programs need it
-
+    yaml = load_pyyaml()
     check_yaml(text)
     try:
         return list(yaml.load_all(text, Loader=loader or yaml.SafeLoader))
@@ -46,8 +59,7 @@ def check_yaml(text: str, max_values: int = _MAX_VALUES) -> None:
         text: The text.
         max_values: Maximum number of values, with aliases expanded.
     """
-    import yaml  # noqa: PLC0415
-
+    yaml = load_pyyaml()
     #: Anchor and number of values of each open list and mapping; the text itself is the first.
     open_ = [("", 0)]
     sizes: dict[str, int] = {}
@@ -126,18 +138,16 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     """
     target = Path(_checked(path))
     try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
+        part = target.with_name(f".{target.name}.{os.getpid()}.{time.time_ns()}")
+        with part.open("x", encoding="utf-8") as file:
+            try:
                 file.write(text)
-            mask = os.umask(0)
-            os.umask(mask)
-            Path(name).chmod(0o666 & ~mask)
-            Path(name).replace(target)
-        except BaseException:
-            with suppress(OSError):
-                Path(name).unlink()
-            raise
+                file.close()
+                part.replace(target)
+            except BaseException:
+                with suppress(OSError):
+                    part.unlink()
+                raise
     except OSError as error:
         raise ParameterError(f"{target} cannot be written: {error.strerror or error}") from None
 

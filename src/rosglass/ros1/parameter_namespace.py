@@ -25,6 +25,7 @@ from rosglass.comm.executor import check_plain
 from rosglass.comm.names import similar
 from rosglass.comm.parameters import RemoteParameters, check_values
 from rosglass.errors import ConnectionLostError, NodeClosedError, ParameterError, UnsupportedError
+from rosglass.ros1 import rosparam_files
 from rosglass.ros1.parameter_server import flat, same, to_wire
 
 if TYPE_CHECKING:
@@ -284,8 +285,6 @@ class Ros1Parameters(Parameters):
     def save(self, path: str | PathLike[str]) -> None:
         """Write the parameters into a file, as ``rosparam dump FILE /node`` does."""
         self._core.check_open()
-        from rosglass.ros1 import rosparam_files  # noqa: PLC0415 - yaml
-
         rosparam_files.write(path, self._namespace.tree(_TIMEOUT_S))
 
     def close(self) -> None:
@@ -389,8 +388,6 @@ class RemoteNamespace(RemoteParameters):
 
     def save(self, path: str | PathLike[str], deadline: Deadline) -> None:
         """Write a file, as ``rosparam dump FILE /node`` does."""
-        from rosglass.ros1 import rosparam_files  # noqa: PLC0415 - yaml
-
         rosparam_files.write(path, self._namespace.tree(_seconds(deadline)))
 
     def close(self) -> None:

@@ -33,6 +33,7 @@ from rosglass.errors import (
     ParameterError,
     shown,
 )
+from rosglass.ros1 import rosparam_files
 from rosglass.wires.tcpros.registrations import Member
 
 if TYPE_CHECKING:
@@ -237,8 +238,6 @@ class ParameterServer(Handle):
             ParameterError: The file cannot be read, or a value is not valid for a parameter; then
                 nothing is set.
         """
-        from rosglass.ros1 import rosparam_files  # noqa: PLC0415 - yaml
-
         wanted: dict[str, Any] = {}
         place = self.resolve(namespace or self._core.name.namespace)
         found = rosparam_files.read(path)
@@ -264,8 +263,6 @@ class ParameterServer(Handle):
         Raises:
             ParameterError: The namespace does not exist, or the file cannot be written.
         """
-        from rosglass.ros1 import rosparam_files  # noqa: PLC0415 - yaml
-
         rosparam_files.write(path, self.get(namespace, timeout=timeout))
 
     # -- without waiting -------------------------------------------------------------------------

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm.names import similar
 from rosglass.errors import ConversionError, InvalidNameError, ParameterError, RosArgumentError
 from rosglass.ros1.names import absolute_namespace, expand, validate_node_name
+from rosglass.ros1.parameter_server import to_wire
+from rosglass.ros1.rosparam_files import parse_value
 from rosglass.wires.tcpros.address import check_host, parse_uri
 
 if TYPE_CHECKING:
@@ -192,9 +194,6 @@ class _Parser:
         self._special[key] = value
 
     def _parameter(self, text: str, name: str, value: str) -> None:
-        from rosglass.ros1.parameter_server import to_wire  # noqa: PLC0415 - xmlrpc
-        from rosglass.ros1.rosparam_files import parse_value  # noqa: PLC0415 - yaml
-
         try:
             expand("~" + name, "n", "/")
             if not name:

@@ -10,11 +10,16 @@ import ast
 import math
 import operator
 import re
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
-from rosglass.comm.text_files import explain_yaml_error, load_yaml, read_text, write_text
+from rosglass.comm.text_files import (
+    explain_yaml_error,
+    load_pyyaml,
+    load_yaml,
+    read_text,
+    write_text,
+)
 from rosglass.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -81,7 +86,13 @@ def parse_value(text: str, label: str) -> Any:
 
 def dump(value: Any) -> str:
     """Return a value or namespace as YAML, in the layout of ``rosparam dump``."""
-    text = yaml.dump(value, Dumper=_Dumper, default_flow_style=False, allow_unicode=True)
+    yaml = load_pyyaml()
+
+    class Dumper(yaml.SafeDumper):  # type: ignore[misc, name-defined]
+        def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - PyYAML's
+            return True  # equal values are written in full, for readers
+
+    text: str = yaml.dump(value, Dumper=Dumper, default_flow_style=False, allow_unicode=True)
     return text.removesuffix("...\n")
 
 
@@ -92,31 +103,34 @@ def write(path: str | os.PathLike[str], value: Any) -> None:
 
 def _documents(text: str, label: str, fault: str = "no parameter file") -> list[Any]:
     try:
-        return load_yaml(text, _Loader)
-    except yaml.YAMLError as error:
+        return load_yaml(text, _loader())
+    except load_pyyaml().YAMLError as error:
         raise ParameterError(explain_yaml_error(error, label, fault)) from None
 
 
-class _Loader(yaml.SafeLoader):
-    """YAML with angles, in which duplicate keys are errors."""
+class _Constructors:
+    """YAML with angles, in which duplicate keys are errors; for PyYAML's SafeLoader."""
 
-    def mapping(self, node: yaml.MappingNode) -> dict[Any, Any]:
+    construct_mapping: Callable[..., dict[Any, Any]]
+    construct_scalar: Callable[[Any], Any]
+
+    def mapping(self, node: Any) -> dict[Any, Any]:
         seen: set[Any] = set()
         for key, _ in node.value:
-            if isinstance(key, yaml.ScalarNode):
+            if isinstance(key, load_pyyaml().ScalarNode):
                 if key.value in seen:
                     raise _problem(key, f"{key.value!r} is there twice")
                 seen.add(key.value)
         return self.construct_mapping(node, deep=True)
 
-    def degrees(self, node: yaml.ScalarNode) -> float:
+    def degrees(self, node: Any) -> float:
         text = _inside(str(self.construct_scalar(node)), "deg")
         try:
             return float(text) * math.pi / 180.0
         except ValueError:
             raise _problem(node, f"{text!r} is no number of degrees; e.g. deg(90)") from None
 
-    def radians(self, node: yaml.ScalarNode) -> float:
+    def radians(self, node: Any) -> float:
         text = _inside(str(self.construct_scalar(node)), "rad")
         try:
             return _calculate(ast.parse(text, mode="eval").body)
@@ -126,10 +140,17 @@ class _Loader(yaml.SafeLoader):
             ) from None
 
 
-class _Dumper(yaml.SafeDumper):
-    def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - PyYAML's
-        """Write equal values in full, for readers."""
-        return True
+@cache
+def _loader() -> Any:
+    class Loader(_Constructors, load_pyyaml().SafeLoader):  # type: ignore[misc]
+        pass
+
+    Loader.add_constructor("tag:yaml.org,2002:map", Loader.mapping)
+    Loader.add_constructor("!degrees", Loader.degrees)
+    Loader.add_constructor("!radians", Loader.radians)
+    Loader.add_implicit_resolver("!degrees", _DEGREES, ["d"])
+    Loader.add_implicit_resolver("!radians", _RADIANS, ["r"])
+    return Loader
 
 
 def _inside(text: str, word: str) -> str:
@@ -149,12 +170,6 @@ def _calculate(node: ast.AST) -> float:
     raise ValueError
 
 
-def _problem(node: yaml.Node, problem: str) -> yaml.MarkedYAMLError:
-    return yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
-
-
-_Loader.add_constructor("tag:yaml.org,2002:map", _Loader.mapping)
-_Loader.add_constructor("!degrees", _Loader.degrees)
-_Loader.add_constructor("!radians", _Loader.radians)
-_Loader.add_implicit_resolver("!degrees", _DEGREES, ["d"])
-_Loader.add_implicit_resolver("!radians", _RADIANS, ["r"])
+def _problem(node: Any, problem: str) -> Exception:
+    made: Exception = load_pyyaml().MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
+    return made

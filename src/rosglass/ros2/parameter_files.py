@@ -14,10 +14,8 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
 from rosglass.comm.names import validate_node_name
-from rosglass.comm.text_files import explain_yaml_error, read_text, write_text
+from rosglass.comm.text_files import explain_yaml_error, load_pyyaml, read_text, write_text
 from rosglass.errors import InvalidNameError, ParameterError
 
 if TYPE_CHECKING:
@@ -122,8 +120,21 @@ def dump(nodes: Mapping[str, Mapping[str, ParameterValue]]) -> str:
     Args:
         nodes: Parameters by dotted name, by the node's full name.
     """
+    yaml = load_pyyaml()
+
+    class Dumper(yaml.SafeDumper):  # type: ignore[misc, name-defined]
+        def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - PyYAML's
+            return True  # nodes refuse aliases
+
+    def represent_text(dumper: Any, text: str) -> Any:
+        # Strings that rcl_yaml_param_parser would read as another type.
+        ambiguous = text in _TRUE or text in _FALSE or _looks_like_number(text)
+        return dumper.represent_scalar(_STR_TAG, text, style="'" if ambiguous else None)
+
+    Dumper.add_representer(str, represent_text)
     document = {node: {_KEY: _nested(parameters)} for node, parameters in nodes.items()}
-    return yaml.dump(document, Dumper=_Dumper, default_flow_style=False)
+    dumped: str = yaml.dump(document, Dumper=Dumper, default_flow_style=False)
+    return dumped
 
 
 def write(path: str | os.PathLike[str], nodes: Mapping[str, Mapping[str, ParameterValue]]) -> None:
@@ -136,23 +147,24 @@ class _Reader:
 
     def __init__(self, text: str, label: str) -> None:
         self._label = label
+        self._yaml = yaml = load_pyyaml()
         self._events: Iterator[Any] = yaml.parse(text, Loader=yaml.SafeLoader)
 
     def nodes(self) -> Iterator[tuple[str, dict[str, ParameterValue]]]:
-        while not isinstance(event := self._next(), yaml.StreamEndEvent):
-            if isinstance(event, yaml.MappingStartEvent):
+        while not isinstance(event := self._next(), self._yaml.StreamEndEvent):
+            if isinstance(event, self._yaml.MappingStartEvent):
                 yield from self._node("", event, 0)
-            elif isinstance(event, (yaml.ScalarEvent, yaml.SequenceStartEvent)):
+            elif isinstance(event, (self._yaml.ScalarEvent, self._yaml.SequenceStartEvent)):
                 raise self._error(event, f"expected node names with {_KEY!r} below them")
 
     def value(self) -> ParameterValue:
         found: ParameterValue = None
-        while not isinstance(event := self._next(), yaml.StreamEndEvent):
-            if isinstance(event, yaml.ScalarEvent):
+        while not isinstance(event := self._next(), self._yaml.StreamEndEvent):
+            if isinstance(event, self._yaml.ScalarEvent):
                 found = self._scalar(event)
-            elif isinstance(event, yaml.SequenceStartEvent):
+            elif isinstance(event, self._yaml.SequenceStartEvent):
                 found = self._sequence()
-            elif isinstance(event, yaml.MappingStartEvent):
+            elif isinstance(event, self._yaml.MappingStartEvent):
                 raise self._error(event, "a parameter's value is a scalar or a list, not a mapping")
         return found
 
@@ -160,9 +172,9 @@ class _Reader:
         """Return the next event; aliases are refused, as in nodes."""
         try:
             event = next(self._events)
-        except yaml.YAMLError as error:
+        except self._yaml.YAMLError as error:
             raise ParameterError(explain_yaml_error(error, self._label, "not YAML")) from None
-        if isinstance(event, yaml.AliasEvent):
+        if isinstance(event, self._yaml.AliasEvent):
             raise self._error(
                 event,
                 f"aliases (*{event.anchor}) are not part of parameter files; repeat the value",
@@ -175,8 +187,8 @@ class _Reader:
 
     def _pairs(self) -> Iterator[tuple[Any, str, Any]]:
         """Read a mapping's keys, each with the first event of its value."""
-        while not isinstance(key := self._next(), yaml.MappingEndEvent):
-            if not isinstance(key, yaml.ScalarEvent):
+        while not isinstance(key := self._next(), self._yaml.MappingEndEvent):
+            if not isinstance(key, self._yaml.ScalarEvent):
                 raise self._error(key, "a key must be a name, not a list or a mapping")
             if not key.value:
                 raise self._error(key, "a key is empty")
@@ -191,10 +203,10 @@ class _Reader:
             if name == _KEY:
                 if not namespace:
                     raise self._error(key, f"{_KEY!r} needs the name of a node above it")
-                if not isinstance(begin, yaml.MappingStartEvent):
+                if not isinstance(begin, self._yaml.MappingStartEvent):
                     raise self._error(begin, f"expected names of parameters below {_KEY!r}")
                 yield self._full(key, namespace), dict(self._parameters("", begin, 0))
-            elif isinstance(begin, yaml.MappingStartEvent):
+            elif isinstance(begin, self._yaml.MappingStartEvent):
                 yield from self._node(
                     f"{namespace}/{name}" if namespace else name, begin, depth + 1
                 )
@@ -226,17 +238,17 @@ class _Reader:
             raise self._error(start, "too deeply nested")
         for _key, name, begin in self._pairs():
             full = f"{prefix}.{name}" if prefix else name
-            if isinstance(begin, yaml.MappingStartEvent):
+            if isinstance(begin, self._yaml.MappingStartEvent):
                 yield from self._parameters(full, begin, depth + 1)
-            elif isinstance(begin, yaml.SequenceStartEvent):
+            elif isinstance(begin, self._yaml.SequenceStartEvent):
                 yield full, self._sequence()
             else:
                 yield full, self._scalar(begin)
 
     def _sequence(self) -> ParameterValue:
         items: list[Any] = []
-        while not isinstance(event := self._next(), yaml.SequenceEndEvent):
-            if not isinstance(event, yaml.ScalarEvent):
+        while not isinstance(event := self._next(), self._yaml.SequenceEndEvent):
+            if not isinstance(event, self._yaml.ScalarEvent):
                 raise self._error(event, "a list in a list is no parameter's value")
             item = self._scalar(event)
             if item is None:
@@ -332,25 +344,8 @@ def _nested(parameters: Mapping[str, ParameterValue]) -> dict[str, Any]:
     return root
 
 
-class _Dumper(yaml.SafeDumper):
-    """Writes strings that nodes read as strings, and repeats equal lists without aliases."""
-
-    def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - PyYAML's
-        """Write equal values in full: nodes refuse aliases."""
-        return True
-
-    def text(self, data: str) -> yaml.ScalarNode:
-        """Quote strings for YAML that ``rcl_yaml_param_parser`` would read as another type."""
-        ambiguous = data in _TRUE or data in _FALSE or _looks_like_number(data)
-        style = "'" if ambiguous else None
-        return self.represent_scalar(_STR_TAG, data, style=style)
-
-
 def _looks_like_number(text: str) -> bool:
     try:
         return not isinstance(_number(text), str)
     except OverflowError:
         return True
-
-
-_Dumper.add_representer(str, lambda dumper, data: dumper.text(data))

@@ -34,6 +34,7 @@ from rosglass.comm.executor import check_plain
 from rosglass.comm.node import OtherNode
 from rosglass.comm.parameters import RemoteParameters, check_values
 from rosglass.errors import NodeClosedError, ParameterError, shown
+from rosglass.ros2 import parameter_files
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -322,8 +323,6 @@ class Ros2Parameters(Parameters):
     def load(self, path: str | PathLike[str]) -> None:
         """Set the parameters that a file contains for this node; see the base class."""
         self._check_open()
-        from rosglass.ros2 import parameter_files  # noqa: PLC0415 - yaml
-
         values = parameter_files.read(path).for_node(self.node)
         if not values:
             raise ParameterError(f"{path} has no parameters for {self.node}")
@@ -342,8 +341,6 @@ class Ros2Parameters(Parameters):
     def save(self, path: str | PathLike[str]) -> None:
         """Write the parameters to a file that can be loaded; raises ParameterError."""
         self._check_open()
-        from rosglass.ros2 import parameter_files  # noqa: PLC0415 - yaml
-
         values = {name: value.value for name, value in self.snapshot().items()}
         parameter_files.write(path, {self.node: values})
 
@@ -809,8 +806,6 @@ class RemoteParameterServices(OtherNode, RemoteParameters):
 
     def load(self, path: str | PathLike[str], deadline: Deadline) -> list[str]:
         """Set the parameters that a file contains for the node, including wildcards."""
-        from rosglass.ros2 import parameter_files  # noqa: PLC0415 - yaml
-
         given = parameter_files.read(path).for_node(self.node)
         values = {name: value for name, value in given.items() if value is not None}
         if not values:
@@ -832,8 +827,6 @@ class RemoteParameterServices(OtherNode, RemoteParameters):
 
     def save(self, path: str | PathLike[str], deadline: Deadline) -> None:
         """Write the node's parameters as ``ros2 param dump`` does."""
-        from rosglass.ros2 import parameter_files  # noqa: PLC0415 - yaml
-
         parameter_files.write(path, {self.node: self.values(None, deadline)})
 
     def _ask(

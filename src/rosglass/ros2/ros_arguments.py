@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm.names import expand, validate_namespace, validate_node_name
 from rosglass.errors import InvalidNameError, ParameterError, RosArgumentError
+from rosglass.ros2.parameter_files import matches, parse_value, read
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -155,8 +156,6 @@ class Arguments:
 
         Rules that name the node win over those for all nodes; otherwise the last wins.
         """
-        from rosglass.ros2.parameter_files import matches  # noqa: PLC0415 - yaml
-
         values: dict[str, ParameterValue] = {}
         base = node.rpartition("/")[2]
         for exact in (False, True):
@@ -335,8 +334,6 @@ class _Parser:
             raise self._error(f"{text!r}: {error}") from None
 
     def _parameter(self, text: str) -> _Assignment:
-        from rosglass.ros2.parameter_files import parse_value  # noqa: PLC0415 - yaml
-
         node, name, value, start = self._split(text, "--param")
         bad = re.search(r"[\s:*]|\.\.|^\.|\.$", name)
         if bad:
@@ -354,8 +351,6 @@ class _Parser:
             raise self._error(f"{text!r}: {error}") from None
 
     def _file(self, path: str) -> None:
-        from rosglass.ros2.parameter_files import read  # noqa: PLC0415 - yaml
-
         try:
             self._assignments += [_Assignment(*entry) for entry in read(path).entries]
         except ParameterError as error:
