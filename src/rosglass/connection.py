@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 from rosglass.comm.handle import check_flag
 from rosglass.errors import ArgumentError, UnsupportedError
 from rosglass.interfaces import Library
+from rosglass.ros2.ros_arguments import Arguments
+from rosglass.wires.zenoh.options import ZenohOptions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -139,7 +141,7 @@ def connect(
         raise ArgumentError("library", library, "a rosglass.Library, or None for the shared one")
     check_flag(own_services, "own_services", "connect()")
     if url.lower().startswith("replay:"):
-        from rosglass.bags.replay_node import connect_replay  # noqa: PLC0415
+        from rosglass.bags.replay_node import connect_replay  # noqa: PLC0415 - few play any
 
         return connect_replay(url, *_resolve_name(name, namespace, arguments))
     if scheme not in ("dds", "zenoh", "ros1", "local") or not separator:
@@ -148,26 +150,13 @@ def connect(
             f"cannot connect to {url!r}: {reason}; known: {_KNOWN}, e.g. {_EXAMPLES}"
         )
     if scheme == "ros1":
-        from rosglass.ros1.node import Ros1Node  # noqa: PLC0415
-        from rosglass.ros1.options import Ros1Options  # noqa: PLC0415
-        from rosglass.ros1.remapping_arguments import Arguments as Ros1Arguments  # noqa: PLC0415
+        from rosglass.ros1.node import connect_ros1  # noqa: PLC0415 - a program uses one ROS
 
-        options = Ros1Options.parse(url, arguments=Ros1Arguments.parse(arguments))
-        return Ros1Node(
-            options,
-            url,
-            options.node_name(name),
-            options.namespace(namespace),
-            library,
-            options.arguments.parameters,
-            own_services=own_services,
-        )
-    from rosglass.ros2.ros_arguments import Arguments  # noqa: PLC0415
-
+        return connect_ros1(url, name, namespace, library, arguments, own_services)
     parsed = Arguments.parse(arguments)
     name, namespace = _resolve_name(name, namespace, arguments)
     middleware = {"dds": _dds, "zenoh": _zenoh, "local": _local}[scheme](url)
-    from rosglass.ros2.node import Ros2Node  # noqa: PLC0415
+    from rosglass.ros2.node import Ros2Node  # noqa: PLC0415 - a program uses one ROS
 
     return Ros2Node(middleware, url, name, namespace, library, parsed, own_services=own_services)
 
@@ -176,8 +165,6 @@ def _resolve_name(
     name: str | None, namespace: str | None, arguments: Sequence[str]
 ) -> tuple[str, str]:
     """Return the name and namespace of a node by ROS 2's rules."""
-    from rosglass.ros2.ros_arguments import Arguments  # noqa: PLC0415
-
     if name is None:
         number = next(_anonymous)
         name = f"rosglass_{os.getpid()}" + (f"_{number}" if number > 1 else "")
@@ -218,17 +205,14 @@ def default_url(env: Mapping[str, str]) -> str:
 
 
 def _zenoh(url: str) -> Middleware:
-    # Zenoh's package is optional, and slow to import.
     if find_spec("zenoh") is None or find_spec("xxhash") is None:
         raise UnsupportedError(
             f"cannot connect to {url!r}: Zenoh is not installed; "
             'install it with: pip install "rosglass[zenoh]"; '
             "without it, there are dds:// (other ROS 2 robots) and ros1://host:11311 (ROS 1)"
         )
-    from rosglass.wires.zenoh.options import ZenohOptions  # noqa: PLC0415
-
     options = ZenohOptions.parse(url, os.environ)
-    from rosglass.wires.zenoh.middleware import ZenohMiddleware  # noqa: PLC0415
+    from rosglass.wires.zenoh.middleware import ZenohMiddleware  # noqa: PLC0415 - an extra
 
     return ZenohMiddleware(options)
 
@@ -240,16 +224,13 @@ def _dds(url: str) -> Middleware:
             'install it with: pip install "rosglass[dds]"; '
             "without it, there are zenoh:// (ROS 2 with rmw_zenoh) and ros1://host:11311 (ROS 1)"
         )
-    from rosglass.wires.dds.domain import DdsOptions  # noqa: PLC0415
+    from rosglass.wires.dds.middleware import DdsMiddleware  # noqa: PLC0415 - an extra
 
-    options = DdsOptions.parse(url, os.environ)
-    from rosglass.wires.dds.middleware import DdsMiddleware  # noqa: PLC0415
-
-    return DdsMiddleware(options)
+    return DdsMiddleware.from_url(url, os.environ)
 
 
 def _local(url: str) -> Middleware:
-    from rosglass.wires.local import LocalMiddleware  # noqa: PLC0415 - few need it
+    from rosglass.wires.local import LocalMiddleware  # noqa: PLC0415 - for tests
 
     return LocalMiddleware(url)
 

@@ -12,28 +12,34 @@ from rosglass.comm import (
     QoS,
     Subscription,
 )
+from rosglass.comm.action_server import ActionServer
 from rosglass.comm.builtin_services import BuiltinServices
 from rosglass.comm.handle import check_flag, check_may_wait
+from rosglass.comm.parameters import ParameterClient
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.rclpy_names import check_order
 from rosglass.errors import InvalidNameError
 from rosglass.ros1.actionlib import actions
+from rosglass.ros1.actionlib_client import ActionlibClient
+from rosglass.ros1.actionlib_server import ActionlibServer
 from rosglass.ros1.names import absolute_namespace, expand, validate_node_name
+from rosglass.ros1.options import Ros1Options
+from rosglass.ros1.parameter_namespace import RemoteNamespace
 from rosglass.ros1.parameter_server import ParameterServer
+from rosglass.ros1.remapping_arguments import Arguments
 from rosglass.ros1.roscpp_services import RoscppServices
 from rosglass.ros1.services import Services
+from rosglass.ros1.type_discovery import fetch
 from rosglass.wires.tcpros.announced_types import AnnouncedTypes
 from rosglass.wires.tcpros.node import TcprosNode
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Mapping
+    from collections.abc import Awaitable, Callable, Mapping, Sequence
 
     from rosglass.comm import (
-        ActionServer,
         Answer,
         EndpointInfo,
         Executor,
-        ParameterClient,
         Promise,
         ServerGoal,
         ServiceClient,
@@ -42,11 +48,9 @@ if TYPE_CHECKING:
     from rosglass.comm.action_server import Result
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
-    from rosglass.ros1.actionlib_client import ActionlibClient
-    from rosglass.ros1.options import Ros1Options
     from rosglass.ros1.parameter_namespace import Ros1Parameters
 
-__all__ = ["Ros1Node"]
+__all__ = ["Ros1Node", "connect_ros1"]
 
 _log = logging.getLogger("rosglass.ros1")
 
@@ -82,6 +86,27 @@ class Core(TcprosNode):
     def expand(self, name: str) -> str:
         """Return the absolute name of anything, not remapped; raises InvalidNameError."""
         return expand(name, self.name.name, self.name.namespace)
+
+
+def connect_ros1(
+    url: str,
+    name: str | None,
+    namespace: str | None,
+    library: Library | None,
+    arguments: Sequence[str],
+    own_services: bool,
+) -> Ros1Node:
+    """Connect to the master of a ``ros1://`` URL; see :func:`rosglass.connect`."""
+    options = Ros1Options.parse(url, arguments=Arguments.parse(arguments))
+    return Ros1Node(
+        options,
+        url,
+        options.node_name(name),
+        options.namespace(namespace),
+        library,
+        options.arguments.parameters,
+        own_services=own_services,
+    )
 
 
 class Ros1Node(Node):
@@ -198,8 +223,6 @@ class Ros1Node(Node):
         self, name: str, type: str | ActionType | None = None
     ) -> ActionlibClient:
         """Return a client of an action; see :meth:`rosglass.comm.Node.create_action_client`."""
-        from rosglass.ros1.actionlib_client import ActionlibClient  # noqa: PLC0415
-
         self._core.check_open()
         check_order("create_action_client", name, type)
         wanted = None if type is None else self._core.types.action(type)
@@ -228,9 +251,6 @@ class Ros1Node(Node):
             simple: Whether one goal is executed at a time, as by actionlib's SimpleActionServer: a
                 newer goal preempts it, and is executed after it.
         """
-        from rosglass.comm.action_server import ActionServer  # noqa: PLC0415
-        from rosglass.ros1.actionlib_server import ActionlibServer  # noqa: PLC0415
-
         self._core.check_open()
         check_order("create_action_server", name, type)
         action_type = self._core.types.action(type)
@@ -264,9 +284,6 @@ class Ros1Node(Node):
         Raises:
             InvalidNameError: The name breaks ROS's rules.
         """
-        from rosglass.comm.parameters import ParameterClient  # noqa: PLC0415 - few need it
-        from rosglass.ros1.parameter_namespace import RemoteNamespace  # noqa: PLC0415
-
         self._core.check_open()
         full = self._node_name(node)
         return ParameterClient(RemoteNamespace(self._core, self._parameter_server, full))
@@ -338,8 +355,6 @@ class Ros1Node(Node):
         timeout: float | None = 5.0,
     ) -> Promise[MessageType | ServiceType | ActionType]:
         """Fetch a type from the graph; see :meth:`rosglass.comm.Node.fetch_type_async`."""
-        from rosglass.ros1.type_discovery import fetch  # noqa: PLC0415 - for those who ask only
-
         self._core.check_open()
         owner = "" if node is None else self._node_name(node)
         return fetch(self._core, self._topics, self._services, name, hash, owner, timeout)

@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import IMMEDIATE, QoS
 from rosglass.comm.builtin_services import USE_SIM_TIME, BuiltinProtocol, SimTime
+from rosglass.comm.log import NodeLog, RosoutTopic, clean, message_of
 from rosglass.errors import ServiceError
+from rosglass.ros1.parameter_namespace import Ros1Parameters
 from rosglass.ros1.parameter_server import StartParameters
 
 if TYPE_CHECKING:
@@ -22,9 +24,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm import Node
     from rosglass.comm.builtin_services import BuiltinServices
-    from rosglass.comm.log import NodeLog
     from rosglass.messages import Message
-    from rosglass.ros1.parameter_namespace import Ros1Parameters
     from rosglass.ros1.parameter_server import ParameterServer
     from rosglass.wires.tcpros.core import TcprosCore
 
@@ -89,14 +89,10 @@ class RoscppServices(BuiltinProtocol["Ros1Parameters"]):
         services: BuiltinServices[Ros1Parameters],  # noqa: ARG002 - they need not be closed
     ) -> Ros1Parameters:
         """Return the node's parameters on the master's server."""
-        from rosglass.ros1.parameter_namespace import Ros1Parameters  # noqa: PLC0415
-
         return Ros1Parameters(self._core, self._server)
 
     def create_log(self, services: BuiltinServices[Ros1Parameters]) -> NodeLog:
         """Return the log; its logger is below ``ros``, as in roscpp: ``ros.arm.gripper``."""
-        from rosglass.comm.log import NodeLog, RosoutTopic, clean, message_of  # noqa: PLC0415
-
         core, numbers = self._core, itertools.count(1)
         without_topics = self._server.subscribe(_NO_TOPICS)
         services.own(without_topics)

@@ -6,12 +6,24 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import IMMEDIATE, Node, NodeName, QoS, Subscription
+from rosglass.comm.action_server import ActionServer
 from rosglass.comm.builtin_services import USE_SIM_TIME, BuiltinProtocol, BuiltinServices, SimTime
+from rosglass.comm.lifecycle import LifecycleClient
+from rosglass.comm.log import NodeLog, RosoutTopic, clean, message_of
 from rosglass.comm.names import validate_namespace, validate_node_name
+from rosglass.comm.parameters import ParameterClient
 from rosglass.comm.qos import check_profile
 from rosglass.comm.rclpy_names import check_order
 from rosglass.comm.subscription import SubscriptionFeed
+from rosglass.ros2.action_client import Ros2ActionClient
+from rosglass.ros2.action_server import Ros2ActionServerProtocol
 from rosglass.ros2.core import Core
+from rosglass.ros2.parameters import (
+    DESCRIBE_TYPES,
+    ParameterServices,
+    RemoteParameterServices,
+    Ros2Parameters,
+)
 from rosglass.ros2.rmw_services import create_service_client, create_service_server
 from rosglass.ros2.ros_arguments import NO_ARGUMENTS
 from rosglass.ros2.topic_matching import GraphMatching
@@ -22,21 +34,17 @@ if TYPE_CHECKING:
 
     from rosglass.comm import (
         ActionClient,
-        ActionServer,
         Answer,
         Executor,
-        LifecycleClient,
-        ParameterClient,
         Promise,
         ServerGoal,
         ServiceClient,
         ServiceServer,
     )
     from rosglass.comm.action_server import Result
-    from rosglass.comm.log import NodeLog
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
-    from rosglass.ros2.parameters import Change, Ros2Parameters
+    from rosglass.ros2.parameters import Change
     from rosglass.ros2.ros_arguments import Arguments
     from rosglass.wires.base import Middleware
 
@@ -130,8 +138,6 @@ class Ros2Node(Node):
         self._core.check_open()
         check_order("create_action_client", name, type)
         self._core.types.ensure(type)
-        from rosglass.ros2.action_client import Ros2ActionClient  # noqa: PLC0415 - few need it
-
         return Ros2ActionClient(self._core, self.resolve(name), type)
 
     def create_action_server(
@@ -148,9 +154,6 @@ class Ros2Node(Node):
         self._core.check_open()
         check_order("create_action_server", name, type)
         self._core.types.ensure(type)
-        from rosglass.comm.action_server import ActionServer  # noqa: PLC0415 - few need it
-        from rosglass.ros2.action_server import Ros2ActionServerProtocol  # noqa: PLC0415
-
         kind = self._core.types.action(type)
         protocol = Ros2ActionServerProtocol(self._core, self.resolve(name), kind)
         return ActionServer(self._core, protocol, execute, accept, cancel, executor)
@@ -163,16 +166,11 @@ class Ros2Node(Node):
 
     def create_parameter_client(self, node: str | NodeName) -> ParameterClient:
         """Return a client of another node's parameters; `node` is its full name."""
-        from rosglass.comm.parameters import ParameterClient  # noqa: PLC0415 - few need it
-        from rosglass.ros2.parameters import RemoteParameterServices  # noqa: PLC0415
-
         self._core.check_open()
         return ParameterClient(RemoteParameterServices(self, self._node_name(node)))
 
     def create_lifecycle_client(self, node: str | NodeName) -> LifecycleClient:
         """Return a client that drives a lifecycle node; `node` is its full name."""
-        from rosglass.comm.lifecycle import LifecycleClient  # noqa: PLC0415
-
         self._core.check_open()
         return LifecycleClient(self, self._node_name(node))
 
@@ -236,8 +234,6 @@ class RclServices(BuiltinProtocol["Ros2Parameters"]):
 
     def create_parameters(self, services: BuiltinServices[Ros2Parameters]) -> Ros2Parameters:
         """Return the parameters; from here on, the clock follows ``use_sim_time``."""
-        from rosglass.ros2.parameters import Ros2Parameters  # noqa: PLC0415
-
         core, full = self._core, self._core.name.full
         parameters = Ros2Parameters(full, core.dispatcher, core.arguments.parameters(full))
         sim_time = SimTime(core, self._node.create_subscription)
@@ -256,8 +252,6 @@ class RclServices(BuiltinProtocol["Ros2Parameters"]):
 
     def create_log(self, services: BuiltinServices[Ros2Parameters]) -> NodeLog:  # noqa: ARG002
         """Return the log; its logger has rcl's name: ``/arm/gripper`` logs as arm.gripper."""
-        from rosglass.comm.log import NodeLog, RosoutTopic  # noqa: PLC0415
-
         core, arguments = self._core, self._core.arguments
         topic = RosoutTopic("rcl_interfaces/msg/Log", QoS.rosout(), _log_fields)
         return NodeLog(
@@ -271,8 +265,6 @@ class RclServices(BuiltinProtocol["Ros2Parameters"]):
 
     def offer(self, services: BuiltinServices[Ros2Parameters]) -> Iterator[None]:
         """Announce ``/rosout``, and offer descriptions of types and the parameter services."""
-        from rosglass.ros2.parameters import DESCRIBE_TYPES, ParameterServices  # noqa: PLC0415
-
         core, parameters = self._core, services.parameters
         services.log.open()
         yield
@@ -288,8 +280,6 @@ class RclServices(BuiltinProtocol["Ros2Parameters"]):
 
 def _log_fields(record: logging.LogRecord) -> dict[str, Any]:
     """Return the fields of a ``Log`` message."""
-    from rosglass.comm.log import clean, message_of  # noqa: PLC0415
-
     return {
         "stamp": {
             "sec": int(record.created),

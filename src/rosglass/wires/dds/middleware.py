@@ -12,6 +12,7 @@ from rosglass.errors import DecodeError, Error, NodeClosedError
 from rosglass.wires.base import Middleware, Reader, Replier, Requester, Writer
 from rosglass.wires.dds import cyclone
 from rosglass.wires.dds.cyclone import BuiltinTopic, Discovered, Event, matched_publication, take
+from rosglass.wires.dds.domain import DdsOptions
 from rosglass.wires.dds.endpoints import DdsReader, DdsWriter, SampleReader, SampleWriter, Taken
 from rosglass.wires.dds.graph import (
     PARTICIPANT_USER_DATA,
@@ -26,6 +27,7 @@ from rosglass.wires.dds.graph import (
 )
 from rosglass.wires.dds.participant import Participant
 from rosglass.wires.dds.services import DdsReplier, DdsRequester
+from rosglass.wires.dds.type_lookup import announced_definition
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -34,7 +36,6 @@ if TYPE_CHECKING:
     from rosglass.comm.graph import Graph
     from rosglass.interfaces import Definition
     from rosglass.wires.base import OnReply, OnRequest, OnSample
-    from rosglass.wires.dds.domain import DdsOptions
 
 __all__ = ["DdsDiscovery", "DdsMiddleware"]
 
@@ -221,6 +222,11 @@ class DdsMiddleware(Middleware):
         self._graph: Graph
         self._changed: Callable[[], None] = lambda: None
 
+    @classmethod
+    def from_url(cls, url: str, env: Mapping[str, str]) -> DdsMiddleware:
+        """Return the participant for a ``dds://`` URL; see :meth:`DdsOptions.parse`."""
+        return cls(DdsOptions.parse(url, env))
+
     def open(self, graph: Graph, changed: Callable[[], None]) -> None:
         """Join the domain."""
         self._graph, self._changed = graph, changed
@@ -286,8 +292,6 @@ class DdsMiddleware(Middleware):
 
     def describe_type(self, endpoint: EndpointInfo, timeout: float) -> Definition | None:
         """Return the definition that an endpoint announces through XTypes."""
-        from rosglass.wires.dds.type_lookup import announced_definition  # noqa: PLC0415 - rarely used
-
         provider = f"wire {endpoint.node} (TypeLookup)"
         entity = self._joined().entity
         return announced_definition(entity, endpoint.gid, provider, timeout)

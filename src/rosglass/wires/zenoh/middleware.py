@@ -39,6 +39,7 @@ from rosglass.wires.zenoh.endpoints import (
     Declaration,
     LocalRegistry,
     Pump,
+    SharedMemory,
     ZenohWriter,
 )
 from rosglass.wires.zenoh.keys import Token, gid_of, graph_key
@@ -58,7 +59,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm.graph import Graph
-    from rosglass.wires.zenoh.endpoints import SharedMemory
     from rosglass.wires.zenoh.options import ZenohOptions
 
 __all__ = ["ZenohMiddleware"]
@@ -113,8 +113,6 @@ class ZenohMiddleware(Middleware):
         self._pumps: list[Pump] = []
         self._shared: SharedMemory | None = None
         if json.loads(self._config.get_json("transport/shared_memory/enabled")):
-            from rosglass.wires.zenoh.endpoints import SharedMemory  # noqa: PLC0415 - not everywhere
-
             self._shared = SharedMemory()
         self._readers: LocalRegistry[ZenohReader] = LocalRegistry()
         self._servers: LocalRegistry[ZenohReplier] = LocalRegistry()
