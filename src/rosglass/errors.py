@@ -40,6 +40,10 @@ from __future__ import annotations
 
 import builtins
 import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 __all__ = [
     "ArgumentError",
@@ -102,6 +106,20 @@ def shown(value: object) -> str:
     except Exception as error:  # an integer of 5,000 digits, or a class of the user's
         text = f"a value that cannot be shown ({type(error).__name__}: {error})"
     return f"{text[:77]}..." if len(text) > 80 else text
+
+
+def close_matches(name: str, known: Iterable[str], most: int, cutoff: float) -> list[str]:
+    """Return the known names that are most like `name`, for an error's hint.
+
+    Args:
+        name: The name.
+        known: Names that would be right.
+        most: How many to return.
+        cutoff: Likeness from 0 to 1 that they need.
+    """
+    import difflib  # noqa: PLC0415 - most programs have no error to explain
+
+    return difflib.get_close_matches(name, list(known), most, cutoff)
 
 
 def _shortened(text: str) -> str:

@@ -6,7 +6,6 @@ The latter as in ``rosnode``. API: ROS wiki, "ROS/Slave_API" (getPid, shutdown) 
 
 from __future__ import annotations
 
-import difflib
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -32,7 +31,13 @@ from rosglass.cli.messages import print_json, to_json
 from rosglass.cli.output import Style, note
 from rosglass.comm import EndpointKind
 from rosglass.comm.names import similar
-from rosglass.errors import ConnectionLostError, Error, MasterError, UnsupportedError
+from rosglass.errors import (
+    ConnectionLostError,
+    Error,
+    MasterError,
+    UnsupportedError,
+    close_matches,
+)
 from rosglass.wires.tcpros.master import call_node
 
 if TYPE_CHECKING:
@@ -99,7 +104,7 @@ def info(args: argparse.Namespace) -> int:
 
 def _unknown(node: Node, name: str) -> int:
     names = other_nodes(node)
-    close = difflib.get_close_matches(name, names, 3, 0.5)
+    close = close_matches(name, names, 3, 0.5)
     hint = f"Did you mean {' or '.join(close)}?" if close else f"There are: {', '.join(names)}"
     note(f"there is no node {name}. {hint}")
     return 1

@@ -32,6 +32,7 @@ __all__ = [
     "executor_for",
     "is_coroutine_function",
     "let_exit",
+    "load_asyncio",
     "run_job",
 ]
 
@@ -218,6 +219,13 @@ class RetryingExecutor(Executor):
         )
 
 
+def load_asyncio() -> Any:
+    """Return asyncio, which takes 10 ms to import, and which only programs that use it need."""
+    import asyncio  # noqa: PLC0415 - as above
+
+    return asyncio
+
+
 class LoopExecutor(Executor):
     """Runs callbacks and coroutines in an asyncio event loop.
 
@@ -235,10 +243,8 @@ class LoopExecutor(Executor):
         Raises:
             ArgumentError: No loop runs here, so that `callback` could never be called.
         """
-        import asyncio  # noqa: PLC0415 - only for those who use it
-
         try:
-            return cls(asyncio.get_running_loop())
+            return cls(load_asyncio().get_running_loop())
         except RuntimeError:
             raise ArgumentError(
                 "callback",
@@ -251,10 +257,8 @@ class LoopExecutor(Executor):
     @property
     def is_current(self) -> bool:
         """Whether the calling thread is running the loop."""
-        import asyncio  # noqa: PLC0415 - only for those who use it
-
         try:
-            return asyncio.get_running_loop() is self._loop
+            return load_asyncio().get_running_loop() is self._loop
         except RuntimeError:
             return False
 
@@ -264,9 +268,8 @@ class LoopExecutor(Executor):
 
     def run(self, coroutine: Coroutine[Any, Any, Any]) -> Future[Any]:
         """Run a coroutine in the loop; return the future of its result."""
-        import asyncio  # noqa: PLC0415 - only for those who use it
-
-        return asyncio.run_coroutine_threadsafe(coroutine, self._loop)
+        future: Future[Any] = load_asyncio().run_coroutine_threadsafe(coroutine, self._loop)
+        return future
 
 
 def is_coroutine_function(callback: object) -> bool:

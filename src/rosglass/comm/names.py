@@ -12,10 +12,11 @@ from __future__ import annotations
 import itertools
 import os
 import re
+import socket
 import time
 from typing import TYPE_CHECKING
 
-from rosglass.errors import InvalidNameError
+from rosglass.errors import InvalidNameError, close_matches
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -234,8 +235,6 @@ def anonymous_name(name: str) -> str:
     alone are not unique: programs in containers often have the same one. In ROS 1, a second node
     with a name shuts down the first one.
     """
-    import socket  # noqa: PLC0415 - only needed to connect
-
     host = re.sub(r"[^A-Za-z0-9_]", "_", socket.gethostname())
     # ROS 2 forbids two underscores in a row.
     text = f"{name}_{host}_{os.getpid()}_{int(time.time() * 1000)}_{next(_numbers)}"
@@ -244,14 +243,12 @@ def anonymous_name(name: str) -> str:
 
 def similar(name: str, known: Iterable[str]) -> str:
     """Return a hint at known names that are similar to `name`; empty if there are none."""
-    import difflib  # noqa: PLC0415 - only needed to explain an error
-
     names = [other for other in known if other != name]
     base = name.rpartition("/")[2]
     near = [other for other in names if other.rpartition("/")[2] == base]
     plain = _plain(name)
     near += [other for other in names if _plain(other) == plain]
-    near += difflib.get_close_matches(name, names, 2, 0.8)
+    near += close_matches(name, names, 2, 0.8)
     return f"; did you mean {' or '.join(list(dict.fromkeys(near))[:2])}?" if near else ""
 
 

@@ -9,11 +9,12 @@ from concurrent.futures import TimeoutError as _NotYet
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from rosglass.comm.executor import RetryingExecutor, run_job
+from rosglass.comm.executor import RetryingExecutor, load_asyncio, run_job
 from rosglass.comm.handle import check_may_wait
 from rosglass.errors import ArgumentError, TimeoutError  # noqa: A004 - the field's own word
 
 if TYPE_CHECKING:
+    import asyncio
     from collections.abc import Callable, Generator
 
     from rosglass.comm.handle import Executor
@@ -68,9 +69,8 @@ class Promise(Future[_T]):
             self.add_done_callback(_notify_cancel)
 
     def __await__(self) -> Generator[Any, None, _T]:
-        import asyncio  # noqa: PLC0415 - only needed in asyncio programs
-
-        return asyncio.wrap_future(self).__await__()
+        future: asyncio.Future[_T] = load_asyncio().wrap_future(self)
+        return future.__await__()
 
     def result(self, timeout: float | None = None) -> _T:
         """Wait for the result and return it, or raise the operation's error.

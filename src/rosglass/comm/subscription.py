@@ -23,7 +23,7 @@ from rosglass.comm.events import (
     TopicEndpoint,
     conflict_events,
 )
-from rosglass.comm.executor import IMMEDIATE, check_plain
+from rosglass.comm.executor import IMMEDIATE, check_plain, load_asyncio
 from rosglass.comm.graph import ConnectionState, EndpointKind
 from rosglass.comm.handle import Executor, Handle, check_flag, check_may_wait
 from rosglass.comm.inbox import ImmediateInbox, Inbox, Sample
@@ -198,8 +198,7 @@ class Subscription(TopicEndpoint):
             yield sample
 
     async def __aiter__(self) -> AsyncIterator[Sample]:
-        import asyncio  # noqa: PLC0415 - only needed in asyncio programs
-
+        asyncio = load_asyncio()
         loop = asyncio.get_running_loop()
         arrived = asyncio.Event()
 

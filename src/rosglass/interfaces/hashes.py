@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from rosglass.interfaces.definition import Field, InterfaceDefinition
 
-__all__ = ["announced_hashes", "full_text", "md5", "rihs01", "type_description"]
+__all__ = ["announced_hashes", "full_text", "load_json", "md5", "rihs01", "type_description"]
 
 # type_description_interfaces/msg/FieldType's constants. rosidl turns a .msg file's char into IDL's
 # uint8, so its id is 3 (AddTwoInts' official hash depends on it); IDL's own has FIELD_TYPE_CHAR.
@@ -122,9 +122,7 @@ def _md5_text(
 
 
 def _md5(text: str) -> str:
-    import hashlib  # noqa: PLC0415 - its 3 ms would be spent by all who load a definition
-
-    return hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
+    return _digest("md5", text)
 
 
 def rihs01(definition: InterfaceDefinition) -> str:
@@ -134,15 +132,25 @@ def rihs01(definition: InterfaceDefinition) -> str:
         UnsupportedError: `definition` is a ROS 1 one, or no definition.
         DefinitionError: `definition` is not resolved.
     """
-    import hashlib  # noqa: PLC0415 - as above
-    import json  # noqa: PLC0415
-
     description = type_description(definition)
     for part in (description["type_description"], *description["referenced_type_descriptions"]):
         for field in part["fields"]:
             del field["default_value"]
-    text = json.dumps(description, separators=(", ", ": "))
-    return f"RIHS01_{hashlib.sha256(text.encode()).hexdigest()}"
+    text = load_json().dumps(description, separators=(", ", ": "))
+    return f"RIHS01_{_digest('sha256', text)}"
+
+
+def _digest(algorithm: str, text: str) -> str:
+    import hashlib  # noqa: PLC0415 - its 3 ms would be spent by all who load a definition
+
+    return hashlib.new(algorithm, text.encode(), usedforsecurity=False).hexdigest()
+
+
+def load_json() -> Any:
+    """Return Python's json module, whose 1 ms would be spent by all who load a definition."""
+    import json  # noqa: PLC0415 - as above
+
+    return json
 
 
 def announced_hashes(definition: InterfaceDefinition) -> tuple[str, ...]:

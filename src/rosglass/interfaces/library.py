@@ -12,6 +12,7 @@ from rosglass.errors import (
     InvalidNameError,
     TypeNotFoundError,
     UnsupportedError,
+    close_matches,
 )
 from rosglass.interfaces.definition import Definition, ServiceDefinition, parts_of
 from rosglass.interfaces.derived import compose, derive, derived_from
@@ -552,17 +553,15 @@ class Library:
         return text
 
     def _explain(self, name: str, ros: int) -> str:
-        import difflib  # noqa: PLC0415 - only needed to explain an error
-
         looked = [text for text in (p.describe(ros) for p in self._chain) if text]
         names = self.names(ros)
         other = self.names(3 - ros)
         short = {f"{n.split('/')[0]}/{n.split('/')[2]}".lower(): n for n in reversed(names)}
         wanted = "/".join(part for part in name.split("/") if part not in KINDS)
-        near = difflib.get_close_matches(wanted.lower(), short, 3, 0.75)
+        near = close_matches(wanted.lower(), short, 3, 0.75)
         # Types with a long package name in common are not similar for that.
         base = wanted.rpartition("/")[2].lower()
-        near = [m for m in near if difflib.get_close_matches(base, [m.rpartition("/")[2]])]
+        near = [m for m in near if close_matches(base, [m.rpartition("/")[2]], 1, 0.6)]
         if near[:1] == [wanted.lower()]:
             del near[1:]  # only the case is wrong
         close = [short[match] for match in near]

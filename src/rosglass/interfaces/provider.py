@@ -10,6 +10,7 @@ importing rosbags takes too long for a GUI's first message. rosbags has messages
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 from abc import ABC, abstractmethod
@@ -40,6 +41,8 @@ __all__ = [
     "workspace",
     "workspace_variables",
 ]
+
+_log = logging.getLogger("rosglass.interfaces")
 
 
 class Provider(ABC):
@@ -392,9 +395,7 @@ def _scan(root: str, ros_versions: frozenset[int]) -> Iterator[_Package]:
 
 
 def _warn_too_many(root: str) -> None:
-    import logging  # noqa: PLC0415 - takes 4 ms, and is rarely needed
-
-    logging.getLogger("rosglass.interfaces").warning(
+    _log.warning(
         "stopped looking for packages in %s after %d folders; name the packages' own folders "
         "instead",
         root,

@@ -33,7 +33,7 @@ from rosglass.interfaces.definition import (
     parts_of,
 )
 from rosglass.interfaces.derived import derive, derived_from
-from rosglass.interfaces.hashes import announced_hashes, type_description
+from rosglass.interfaces.hashes import announced_hashes, load_json, type_description
 from rosglass.interfaces.idl import parse_idl
 from rosglass.interfaces.names import (
     check_field_name,
@@ -631,9 +631,7 @@ class TypeCache:
             "type_description": type_description(definition),
             "type_sources": type_sources(definition),
         }
-        import json  # noqa: PLC0415 - its 2 ms would be spent by all who load a definition
-
-        data = json.dumps(entry, indent=1).encode()
+        data = load_json().dumps(entry, indent=1).encode()
         if len(data) > _MAX_ENTRY:
             return
         try:
@@ -671,9 +669,7 @@ class TypeCache:
 
 
 def _read(text: str, name: str, type_hash: str) -> InterfaceDefinition:
-    import json  # noqa: PLC0415 - as above
-
-    entry = json.loads(text)
+    entry = load_json().loads(text)
     provider = f"cache, from {entry['source'].removeprefix('wire ')}"
     described = parse_type_description(entry["type_description"], provider=provider)
     definition = add_type_sources(described, entry["type_sources"], verbatim=True)

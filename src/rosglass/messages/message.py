@@ -15,6 +15,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.errors import ConversionError, DecodeError, Error, FieldPathError
+from rosglass.interfaces.hashes import load_json
 from rosglass.messages.schema import Kind
 from rosglass.messages.source import hint, load_numpy, number_type
 from rosglass.messages.values import elements, numbers
@@ -610,7 +611,7 @@ def plain(value: Any) -> Any:
 
 def to_json(message: Message, indent: int | None = None) -> str:
     """Return the message as strict JSON."""
-    dumped: str = import_module("json").dumps(
+    dumped: str = load_json().dumps(
         finite(plain(to_dict(message))), indent=indent, ensure_ascii=False, allow_nan=False
     )
     return dumped

@@ -10,6 +10,7 @@ from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from rosglass.errors import close_matches
 from rosglass.interfaces.resolver import MAX_EMPTY
 
 if TYPE_CHECKING:
@@ -176,9 +177,7 @@ def number_type(dtype: str, order: str) -> np.dtype:
 
 def hint(name: Any, known: Sequence[str]) -> str:
     """Return a hint for an unknown field name."""
-    near = (
-        import_module("difflib").get_close_matches(name, known, 1) if isinstance(name, str) else []
-    )
+    near = close_matches(name, known, 1, 0.6) if isinstance(name, str) else []
     return f"did you mean {near[0]!r}?" if near else f"it has: {', '.join(known) or 'no fields'}"
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import socket
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
 from rosglass.errors import ArgumentError
 
@@ -95,8 +96,6 @@ def parse_uri(uri: str, what: str) -> tuple[str, int]:
         uri: Such as ``http://robot:11311/``.
         what: What the URI is of, for the error.
     """
-    from urllib.parse import urlsplit  # noqa: PLC0415 - takes a while to import
-
     try:
         parts = urlsplit(uri)
         host, port = parts.hostname, parts.port

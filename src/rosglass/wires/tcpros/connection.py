@@ -25,6 +25,9 @@ from typing import TYPE_CHECKING
 from rosglass.errors import DecodeError
 from rosglass.wires.tcpros.io_loop import READ, WRITE
 
+if sys.platform == "linux":
+    import fcntl
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
@@ -149,8 +152,6 @@ class UnackedBytes:
         """Return how many bytes the peer has not acknowledged; 0 where that is unknown."""
         if sys.platform != "linux":
             return 0
-        import fcntl  # noqa: PLC0415 - not on Windows
-
         try:
             (waiting,) = _int.unpack(fcntl.ioctl(self._sock, _SIOCOUTQ, bytes(_int.size)))
         except OSError:

@@ -16,6 +16,11 @@ from rosglass.wires.tcpros.service_replier import TcprosReplier
 from rosglass.wires.tcpros.slave import Slave
 from rosglass.wires.tcpros.topics import Topics
 
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None  # type: ignore[assignment]
+
 if TYPE_CHECKING:
     import socket
     from collections.abc import Callable
@@ -199,9 +204,7 @@ class TcprosNode(TcprosCore):
 
 def max_connections() -> int:
     """Return how many connections to accept: half of the files that may be open."""
-    try:
-        import resource  # noqa: PLC0415 - not on Windows
-    except ImportError:
+    if resource is None:
         return 1000
     soft = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
     return 10_000 if soft == resource.RLIM_INFINITY else min(10_000, soft // 2)
