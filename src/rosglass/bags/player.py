@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Durability, Handle, QoS
 from rosglass.errors import BagError, Error, NodeClosedError
+from rosglass.messages import Translation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -316,8 +317,6 @@ class Player(Handle):
         found = channel.type()
         convert = None
         if channel.wire != self._node.wire:
-            from rosglass.messages import Translation  # noqa: PLC0415 - only for the other ROS's
-
             translation = Translation(found)
             found, convert = translation.type, translation.encode
         publisher = self._node.create_publisher(topic, found, channel.profile())
@@ -654,11 +653,11 @@ def open_bag(path: str | os.PathLike[str]) -> Bag:
     if not found.exists():
         raise BagError(f"{found} does not exist; name an MCAP file, a ROS 2 bag or a ROS 1 bag")
     if found.is_file() and (found.suffix == ".mcap" or _starts_with(found, _MCAP)):
-        from rosglass.bags.mcap_file import McapBag  # noqa: PLC0415 - the library is an extra
+        from rosglass.bags.mcap_file import McapBag  # noqa: PLC0415 - mcap is an extra
 
         return McapBag(found)
-    from rosglass.bags.ros1_bag_file import MAGIC, Ros1CutBag  # noqa: PLC0415 - for few files
-    from rosglass.bags.rosbags_bag import RosbagsBag  # noqa: PLC0415 - slow to import
+    from rosglass.bags.ros1_bag_file import MAGIC, Ros1CutBag  # noqa: PLC0415 - rosbags is an extra
+    from rosglass.bags.rosbags_bag import RosbagsBag  # noqa: PLC0415 - the same
 
     try:
         return RosbagsBag(found)

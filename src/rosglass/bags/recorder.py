@@ -68,10 +68,10 @@ def create(path: Path, wire: str, compression: str) -> RecordingFile:
 
 def _make(path: Path, file: BinaryIO, wire: str, compression: str) -> RecordingFile:
     if path.suffix == ".bag":
-        from rosglass.bags.ros1_bag_file import Ros1BagFile  # noqa: PLC0415 - slow to import
+        from rosglass.bags.ros1_bag_file import Ros1BagFile  # noqa: PLC0415 - rosbags is an extra
 
         return Ros1BagFile(path, file, compression)
-    from rosglass.bags.mcap_file import McapFile  # noqa: PLC0415 - the library is an extra
+    from rosglass.bags.mcap_file import McapFile  # noqa: PLC0415 - mcap is an extra
 
     return McapFile(file, wire, compression)
 

@@ -7,8 +7,12 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import cv2
+import numpy as np
+
 from rosglass.comm import QoS, Time
 from rosglass.demo import telemetry
+from rosglass.demo.cloud import Cloud
 from rosglass.demo.model import PARTS, urdf
 from rosglass.demo.operation import Operation
 
@@ -52,8 +56,6 @@ class Equipment:
         flippers: Callable[[Sequence[float]], None],
         mode: str,
     ) -> None:
-        from rosglass.demo.cloud import Cloud  # noqa: PLC0415 - needs OpenCV
-
         self._node, self._simulation, self._camera = node, simulation, camera
         self._scanner, self._cloud = scanner, Cloud(simulation.world)
         dock = simulation.world.dock
@@ -114,9 +116,6 @@ class Equipment:
                     )
 
     def _picture(self, name: str) -> Any:
-        import cv2  # noqa: PLC0415 - an extra
-        import numpy as np  # noqa: PLC0415
-
         state = self._simulation.state
         turn = {"rear": math.pi, "left": math.pi / 2, "right": -math.pi / 2}.get(name, 0.0)
         whole = self._camera.render(_turned(state, turn), body=name in ("rear", "thermal"))

@@ -19,6 +19,7 @@ from rosglass.demo import telemetry
 from rosglass.demo.scan import LaserScanner, occupancy
 from rosglass.demo.simulation import CommandRejectedError, Simulation
 from rosglass.errors import Error, NodeClosedError, TypeNotFoundError, UnsupportedError
+from rosglass.images.encodings import opencv
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -309,10 +310,8 @@ class Robot:
             count += 1
 
     def _film(self) -> None:
-        import cv2  # noqa: PLC0415 - an extra
-
         # Two cores must be enough for the robot, the cockpit and the middleware between them.
-        cv2.setNumThreads(1)
+        opencv().setNumThreads(1)
         rate = _Rate(1 / self.options.fps)
         number, since = 0, time.monotonic()
         while not self._ending.wait(rate.remaining()):
@@ -346,8 +345,7 @@ class Robot:
         info.publish(telemetry.camera_info(stamp, info.type.ros))
         compressed = self._send.get("/camera/image_raw/compressed")
         if compressed is not None and compressed.subscription_count():
-            import cv2  # noqa: PLC0415 - an extra
-
+            cv2 = opencv()
             _, data = cv2.imencode(
                 ".jpg",
                 cv2.cvtColor(picture, cv2.COLOR_RGB2BGR),

@@ -14,6 +14,7 @@ import os
 from typing import TYPE_CHECKING
 
 from rosglass.comm import anonymous_name
+from rosglass.connection import connect
 from rosglass.errors import InvalidNameError
 from rosglass.rviz.host import cpp_function
 
@@ -142,8 +143,6 @@ def connect_beside_rviz(
     Raises:
         InvalidNameError: The name is that of RViz's own node.
     """
-    from rosglass.connection import connect  # noqa: PLC0415 - not before someone connects
-
     full = f"{namespace.rstrip('/')}/{name}"
     if full == node_name():
         raise InvalidNameError(

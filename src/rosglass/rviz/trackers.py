@@ -14,6 +14,7 @@ from rosglass.qml.tf_buffer import TfLink
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, Signal, is_alive
 from rosglass.rviz.property_values import shown
 from rosglass.rviz.qml_members import VARIANT, errors_to_js, point_of, to_python
+from rosglass.tf import Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
     from rosglass.qml.session import Session
     from rosglass.rviz.camera import Camera
-    from rosglass.tf import Transform, TransformBuffer
+    from rosglass.tf import TransformBuffer
 
 __all__ = ["FIXED_FRAME", "Frames", "Tracker", "Trackers"]
 
@@ -81,8 +82,6 @@ class Frames(QtCore.QObject):
         Raises:
             Error: The frame is unknown, or not connected to the fixed frame.
         """
-        from rosglass.tf import Transform  # noqa: PLC0415 - only when it is needed
-
         frame, fixed = frame.lstrip("/"), self.fixed.lstrip("/")
         if frame in ("", FIXED_FRAME, fixed):
             return Transform(frame_id=fixed, child_frame_id=fixed)

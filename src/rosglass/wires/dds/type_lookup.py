@@ -77,10 +77,10 @@ def announced_definition(
         TimeoutError: Its participant does not send it.
         DefinitionError: It is not a ROS 2 message.
     """
-    from cyclonedds import _clayer  # noqa: PLC0415 - takes 0.2 s to import
-    from cyclonedds.idl._typesupport.DDS.XTypes import TypeObject  # noqa: PLC0415
+    from cyclonedds import _clayer, builtin  # noqa: PLC0415 - takes 0.2 s to import
+    from cyclonedds.idl._typesupport.DDS.XTypes import TypeObject  # noqa: PLC0415 - the same
 
-    root = _type_id(participant, guid)
+    root = _type_id(builtin, participant, guid)
     if root is None:
         return None
     deadline = time.monotonic() + timeout
@@ -101,10 +101,8 @@ def announced_definition(
     return described
 
 
-def _type_id(participant: int, guid: bytes) -> Any:
+def _type_id(builtin: Any, participant: int, guid: bytes) -> Any:
     """Return the identifier of an endpoint's type, None if it announces none."""
-    from cyclonedds import builtin  # noqa: PLC0415 - as above
-
     key = UUID(bytes=guid)
     owner: Any = SimpleNamespace(_ref=participant)  # no other attribute is used
     for topic in (builtin.BuiltinTopicDcpsPublication, builtin.BuiltinTopicDcpsSubscription):
