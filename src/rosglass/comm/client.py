@@ -53,11 +53,11 @@ class Client(Handle):
         """Return whether a compatible server is available."""
 
     @abstractmethod
-    def _conflicts(self) -> list[str]:
+    def _server_conflicts(self) -> list[str]:
         """Return the problems that the user has to fix, in words."""
 
     @abstractmethod
-    def _absence(self) -> str:
+    def _unavailable_reason(self) -> str:
         """Return why no server is available, if there are no conflicts."""
 
     @property
@@ -65,9 +65,9 @@ class Client(Handle):
         """Why the server cannot be called, in words; empty if there is no problem."""
         if self._closed:
             return "the client is closed"
-        problems = self._conflicts()
+        problems = self._server_conflicts()
         if not problems and not self.ready:
-            problems.append(self._absence())
+            problems.append(self._unavailable_reason())
         return "; ".join(problems)
 
     def wait_for_server(self, timeout: float | None = None) -> bool:
@@ -91,7 +91,7 @@ class Client(Handle):
 
     def _log_conflicts(self, log: logging.Logger, level: int = logging.WARNING) -> None:
         """Log the problems that the user has to fix, once."""
-        conflicts = "; ".join(self._conflicts())
+        conflicts = "; ".join(self._server_conflicts())
         if conflicts and conflicts != self._logged_conflicts:
             log.log(level, "%s: %s", self.name, conflicts)
         self._logged_conflicts = conflicts

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm.executor import check_plain
-from rosglass.comm.node import OtherNode
+from rosglass.comm.node import RemoteNodeClient
 from rosglass.comm.promise import Deadline
 from rosglass.comm.time import Time
 from rosglass.errors import TransitionError
@@ -78,7 +78,7 @@ class TransitionEvent(NamedTuple):
     transition: Transition
 
 
-class LifecycleClient(OtherNode):
+class LifecycleClient(RemoteNodeClient):
     """Drives a lifecycle node; created by :meth:`Node.create_lifecycle_client`.
 
     Methods that call the node take `timeout`, the total seconds to wait (None for no limit), and

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from rosglass.comm.time import Duration, Time
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
 
-__all__ = ["Node", "OtherNode"]
+__all__ = ["Node", "RemoteNodeClient"]
 
 #: Pause between two checks whether a node that spins is closed.
 _SPIN_POLL_S = 0.2
@@ -483,7 +483,7 @@ class Node(Handle):
         self._core.close()
 
 
-class OtherNode(Handle):
+class RemoteNodeClient(Handle):
     """Clients of another node's built-in services, and subscriptions to its events.
 
     Args:

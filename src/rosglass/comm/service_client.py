@@ -125,11 +125,11 @@ class ServiceRequester(ABC):
         """Return whether a compatible server is available."""
 
     @abstractmethod
-    def conflicts(self) -> list[str]:
+    def server_conflicts(self) -> list[str]:
         """Return the problems that the user has to fix, in words."""
 
     @abstractmethod
-    def absence(self) -> str:
+    def unavailable_reason(self) -> str:
         """Return why no server is available, if there are no conflicts."""
 
     @abstractmethod
@@ -217,11 +217,11 @@ class ServiceClient(Client):
     def _is_ready(self) -> bool:
         return not self._closed and self._requester.ready()
 
-    def _conflicts(self) -> list[str]:
-        return self._requester.conflicts()
+    def _server_conflicts(self) -> list[str]:
+        return self._requester.server_conflicts()
 
-    def _absence(self) -> str:
-        return self._requester.absence()
+    def _unavailable_reason(self) -> str:
+        return self._requester.unavailable_reason()
 
     def wait_for_server(self, timeout: float | None = None) -> bool:
         """Wait up to `timeout` seconds (None: forever) for a server; return whether there is one.

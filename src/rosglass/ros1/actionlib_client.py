@@ -779,15 +779,15 @@ class ActionlibClient(ActionClient, Member):
         if closed:
             ends.close()
 
-    def _conflicts(self) -> list[str]:
+    def _server_conflicts(self) -> list[str]:
         discovery, ends = self._discovery, self._ends
         if discovery is not None:
             return [discovery.problem] if discovery.problem else []
         return [] if ends is None else ends.problems()
 
-    def _absence(self) -> str:
+    def _unavailable_reason(self) -> str:
         ends = self._ends
-        connecting = "" if ends is None else ends.absence(self._heard)
+        connecting = "" if ends is None else ends.unavailable_reason(self._heard)
         if connecting:
             return connecting
         names = offered(self._core.graph)
@@ -899,7 +899,7 @@ class _ClientTopics:
         problems += [end.problem for end in self._publishers.values()]
         return list(dict.fromkeys(problem for problem in problems if problem))
 
-    def absence(self, heard: Collection[str]) -> str:
+    def unavailable_reason(self, heard: Collection[str]) -> str:
         """Return why none of the connected nodes is a server yet; empty if none is connected.
 
         Args:

@@ -582,14 +582,14 @@ class Ros2ActionClient(ActionClient, NodeMember):
                 return
         job()
 
-    def _conflicts(self) -> list[str]:
-        problems = self._version.conflicts()
+    def _server_conflicts(self) -> list[str]:
+        problems = self._version.server_conflicts()
         ends = self._ends
         if not problems and ends is not None:
             problems = [end.middleware_problem for end in ends.services if end.middleware_problem]
         return list(dict.fromkeys(problems))
 
-    def _absence(self) -> str:
+    def _unavailable_reason(self) -> str:
         ends = self._ends
         if ends is not None and any(end.server_ids() for end in ends.services):
             missing = ", ".join(end.name for end in ends.services if not end.ready)

@@ -221,7 +221,7 @@ class ActionVersion:
             types is not None and any(version.pending for version, _ in self._parts())
         )
 
-    def conflicts(self) -> list[str]:
+    def server_conflicts(self) -> list[str]:
         """Return the conflicts with servers, one sentence each."""
         types = self.types
         problems = [self._choice, self._missing, self._failure]

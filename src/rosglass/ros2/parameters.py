@@ -31,7 +31,7 @@ from rosglass.comm import (
 )
 from rosglass.comm.builtin_services import USE_SIM_TIME
 from rosglass.comm.executor import check_plain
-from rosglass.comm.node import OtherNode
+from rosglass.comm.node import RemoteNodeClient
 from rosglass.comm.parameters import RemoteParameters, check_values
 from rosglass.errors import NodeClosedError, ParameterError, shown
 from rosglass.ros2 import parameter_files
@@ -739,7 +739,7 @@ class ParameterServices(Handle):
         return {"successful": not reason, "reason": reason}
 
 
-class RemoteParameterServices(OtherNode, RemoteParameters):
+class RemoteParameterServices(RemoteNodeClient, RemoteParameters):
     """Another node's parameters, accessed through its parameter services.
 
     Args:

@@ -217,7 +217,7 @@ class Ros2Requester(ServiceRequester):
     def _fitting(self, servers: Sequence[EndpointInfo]) -> list[EndpointInfo]:
         return [server for server in servers if self._announced.fits(server)]
 
-    def conflicts(self) -> list[str]:
+    def server_conflicts(self) -> list[str]:
         """Return the conflicts with servers, one sentence each."""
         problems = [self._choice, self._announced.failure, self._failure]
         problems = [text for text in problems if text]
@@ -230,7 +230,7 @@ class Ros2Requester(ServiceRequester):
             problems += [problem] if problem and not problems else others
         return problems
 
-    def absence(self) -> str:
+    def unavailable_reason(self) -> str:
         """Return why no server is available although none conflicts."""
         servers = self._fitting(self._servers())
         if servers:

@@ -129,14 +129,14 @@ class TcprosRequester(ServiceRequester):
         """Return whether there is a server of the right type."""
         return self._finder.ready
 
-    def conflicts(self) -> list[str]:
+    def server_conflicts(self) -> list[str]:
         """Return the problems that the user has to fix."""
         conflict = self._finder.conflict()
         return [conflict] if conflict else []
 
-    def absence(self) -> str:
+    def unavailable_reason(self) -> str:
         """Return why there is no server, apart from conflicts."""
-        return self._finder.absence()
+        return self._finder.unavailable_reason()
 
     def server_name(self) -> str:
         """Return the name of the server's node."""
@@ -599,7 +599,7 @@ class ServiceFinder:
             return self._type_fault
         return self.mismatch()
 
-    def absence(self) -> str:
+    def unavailable_reason(self) -> str:
         """Return why there is no server, apart from conflicts."""
         if self._fault:
             return self._fault
