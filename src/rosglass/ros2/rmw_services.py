@@ -439,10 +439,10 @@ class Ros2Requester(ServiceRequester):
     def _has_left(self, pending: PendingCall, here: frozenset[bytes | str]) -> bool:
         """Return whether the servers that a request was sent to have left."""
         route = pending.route
-        stranded = route.requester.stranded(pending.number)
+        lost = route.requester.is_reply_lost(pending.number)
         if self._waits_for_reconnect:
-            return bool(stranded and self.ready())  # it can be sent again
-        return stranded or (bool(route.servers) and not route.servers & here)
+            return bool(lost and self.ready())  # it can be sent again
+        return lost or (bool(route.servers) and not route.servers & here)
 
     def close(self) -> None:
         """Close the requester; safe to call twice."""

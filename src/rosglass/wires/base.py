@@ -186,7 +186,7 @@ class Requester(Handle):
                 call; the middleware may drop the request then.
         """
 
-    def stranded(self, number: int) -> bool:
+    def is_reply_lost(self, number: int) -> bool:
         """Return whether every server that was sent a request has left since, even if it is back.
 
         For middlewares that lose replies sent in between, without knowing.

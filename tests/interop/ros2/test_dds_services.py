@@ -229,11 +229,11 @@ def test_what_is_taken_while_it_is_received_does_not_stay(start_services, node, 
     taken: list[bool] = []
     for end in (DdsRequester, DdsReplier):
 
-        def count(self: Any, *sample: Any, original: Any = end._hasten) -> bool:
+        def count(self: Any, *sample: Any, original: Any = end._on_received) -> bool:
             taken.append(original(self, *sample))
             return taken[-1]
 
-        monkeypatch.setattr(end, "_hasten", count)
+        monkeypatch.setattr(end, "_on_received", count)
     node.create_service_server("/kept", types[ADD], lambda r: {"sum": r.a + r.b})
     peer = start_services("rosglass", "keeper", ["add"])
     client = ready(node.create_service_client("/keeper/add", types[ADD]))

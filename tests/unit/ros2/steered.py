@@ -98,7 +98,7 @@ class SteeredRequester(LocalRequester):
         if self.linked is None:  # else the test answers
             super()._fail(number, reason)
 
-    def stranded(self, number: int) -> bool:
+    def is_reply_lost(self, number: int) -> bool:
         return self._numbers.index(number) + 1 in self.abandoned
 
     def forget(self, number: int) -> None:

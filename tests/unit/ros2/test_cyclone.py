@@ -36,10 +36,10 @@ PROFILES = [
 @pytest.fixture
 def fresh():
     """Forget the library before and after."""
-    for loaded in (cyclone.library, cyclone.keeping):
+    for loaded in (cyclone.library, cyclone.library_with_gil):
         loaded.cache_clear()
     yield
-    for loaded in (cyclone.library, cyclone.keeping):
+    for loaded in (cyclone.library, cyclone.library_with_gil):
         loaded.cache_clear()
 
 
@@ -141,4 +141,4 @@ def test_a_package_without_library_is_refused(fresh, monkeypatch):
 
     monkeypatch.setattr(cyclone, "distribution", lambda _: Empty)
     with pytest.raises(UnsupportedError, match="no library in it"):
-        cyclone.keeping()
+        cyclone.library_with_gil()

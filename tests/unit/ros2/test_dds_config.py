@@ -8,7 +8,7 @@ import pytest
 
 import rosglass
 from rosglass.wires.dds import domain as dds_domain
-from rosglass.wires.dds.domain import DdsOptions, domain_config, users_part
+from rosglass.wires.dds.domain import DdsOptions, domain_config, user_config
 
 
 def config(url="dds://", **env):
@@ -115,8 +115,8 @@ LO += "</General></Domain></CycloneDDS>"
 def test_the_users_own_configuration_comes_last_and_so_wins():
     whole = config(CYCLONEDDS_URI=LO)
     assert whole.endswith("," + LO)
-    assert users_part(whole) == LO
-    assert users_part(config()) == ""
+    assert user_config(whole) == LO
+    assert user_config(config()) == ""
 
 
 @pytest.mark.parametrize(
@@ -163,4 +163,4 @@ def test_what_the_url_and_the_users_configuration_both_say_is_refused(tmp_path, 
     ],
 )
 def test_what_only_one_of_them_says_is_taken(url, own):
-    assert users_part(config(url, CYCLONEDDS_URI=own)) == own
+    assert user_config(config(url, CYCLONEDDS_URI=own)) == own

@@ -139,7 +139,7 @@ def test_another_version_of_the_series_is_used_with_a_word_on_what_is_lost(
     assert "libddsc" in cyclone.library_path()
     lost = "services and actions of nodes that use Fast DDS or RustDDS cannot be called"
     assert (lost in caplog.text) == (version != cyclone.VERSION)
-    assert bool(cyclone.strange_version()) == (version != cyclone.VERSION)
+    assert bool(cyclone.untested_version()) == (version != cyclone.VERSION)
 
 
 def test_private_layouts_of_another_version_are_left_alone(monkeypatch):

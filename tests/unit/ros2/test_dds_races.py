@@ -25,7 +25,7 @@ from rosglass.wires.dds.cyclone_identity import Identity, Origin, Origins
 from rosglass.wires.dds.domain import DdsOptions, DiscoveryRange
 from rosglass.wires.dds.middleware import DdsMiddleware
 from rosglass.wires.dds.participant import Participant
-from rosglass.wires.dds.service_endpoints import Ends, Matched, Outbox
+from rosglass.wires.dds.service_endpoints import MatchedEndpoints, Outbox, ServiceEndpoints
 from rosglass.wires.dds.services import DdsReplier
 
 ADD = "example_interfaces/srv/AddTwoInts"
@@ -45,17 +45,17 @@ def ends(monkeypatch):
     class Haunted(Origins):
         stale: Origin | None = None
 
-        def of(self, serdata: int) -> Origin | None:
-            return super().of(serdata) if self.stale is None else self.stale
+        def pop(self, serdata: int) -> Origin | None:
+            return super().pop(serdata) if self.stale is None else self.stale
 
-    class Kept(Ends):
+    class Kept(ServiceEndpoints):
         def __init__(self, participant, graph, endpoint, on_taken, on_matched) -> None:
             super().__init__(participant, graph, endpoint, on_taken, on_matched)
             self.on_taken = on_taken
             made.append(self)
 
     monkeypatch.setattr(service_endpoints, "Origins", Haunted)
-    monkeypatch.setattr(services, "Ends", Kept)
+    monkeypatch.setattr(services, "ServiceEndpoints", Kept)
     return made
 
 
@@ -108,7 +108,7 @@ def held(participant):
         def __enter__(self) -> None:
             self.free, stands = threading.Event(), threading.Event()
             self.entity = -1
-            participant.pump.visit(self.entity, lambda: stands.set() or self.free.wait(30))
+            participant.pump.poll(self.entity, lambda: stands.set() or self.free.wait(30))
             assert stands.wait(30)
 
         def __exit__(self, *_: object) -> None:
@@ -201,12 +201,12 @@ def test_a_request_that_comes_again_is_carried_out_once(server, eventually):
 def test_what_is_known_of_a_readers_samples_goes_with_it():
     one, two = Origins(), Origins()
     one.follow(0x1000)
-    one._noted[0x2000] = ELSEWHERE
+    one._recorded[0x2000] = ELSEWHERE
     # Another reader's type, where the first one's was.
     two.follow(0x1000)
     one.close()
-    assert one.of(0x2000) is None
-    assert two.of(0x2000) is None
+    assert one.pop(0x2000) is None
+    assert two.pop(0x2000) is None
     two.follow(0x1000)
     two.close()
 
@@ -230,10 +230,10 @@ def test_requests_are_waited_for_no_longer_than_they_can_come(monkeypatch, caplo
     callbacks, got = [], []
     ends = SimpleNamespace(
         depth=depth,
-        origins=SimpleNamespace(hasten=callbacks.append),
+        origins=SimpleNamespace(set_receiver=callbacks.append),
         reader=SimpleNamespace(guid=b""),
         writers=SimpleNamespace(by_guid={client.guid: client}),
-        sender=lambda _, origin: (client, origin),
+        find_sender=lambda _, origin: (client, origin),
         start=lambda: None,
     )
 
@@ -241,25 +241,25 @@ def test_requests_are_waited_for_no_longer_than_they_can_come(monkeypatch, caplo
         callbacks.append(arguments[3])
         return ends
 
-    monkeypatch.setattr(services, "Ends", make_ends)
+    monkeypatch.setattr(services, "ServiceEndpoints", make_ends)
     endpoint = EndpointInfo(EndpointKind.SERVICE_SERVER, SERVICE, ADD, NodeName("/", "here"))
     participant: Any = SimpleNamespace(pump=None)
     replier = DdsReplier(
         participant, Graph(lambda: None), endpoint, lambda request, _: got.append(request.sequence)
     )
-    receive, hasten = callbacks
+    receive, on_received = callbacks
     for origin in origins[:4]:
-        assert not hasten(origin, b"")
+        assert not on_received(origin, b"")
     replier.quick = True
     receive([(b"", 0, 0, Origin(client.guid[12:], 2, None, client.guid[:12]))])
-    assert not hasten(origins[4], b"")  # it would overtake the four
+    assert not on_received(origins[4], b"")  # it would overtake the four
     assert lost_requests(caplog) == []
     receive([(b"", 0, 0, origins[2])])
     lost = [f"/add: 2 requests are lost, as more than {depth} waited"] * told
     assert lost_requests(caplog) == lost
     receive([(b"", 0, 0, origins[3])])
     receive([(b"", 0, 0, origins[4])])
-    assert hasten(origins[5], b"")
+    assert on_received(origins[5], b"")
     assert got == [2, 3, 4, 5, 6]
     assert lost_requests(caplog) == lost
 
@@ -280,13 +280,13 @@ def test_who_looked_first_for_counterparts_has_not_the_last_word(server):
         return found
 
     cyclone_dds = b"\x01\x10"
-    matched = server.ends.writers = Matched(
+    matched = server.ends.writers = MatchedEndpoints(
         1, handles, lambda _, handle: SimpleNamespace(guid=cyclone_dds + bytes([handle]))
     )
-    first = threading.Thread(target=server.ends.look)
+    first = threading.Thread(target=server.ends.refresh)
     first.start()
     assert looked.wait(30)
-    second = threading.Thread(target=server.ends.look)
+    second = threading.Thread(target=server.ends.refresh)
     second.start()
     second.join(0.1)
     go_on.set()
@@ -298,7 +298,7 @@ def test_who_looked_first_for_counterparts_has_not_the_last_word(server):
 def test_some_who_left_are_remembered(monkeypatch):
     monkeypatch.setattr("rosglass.wires.dds.service_endpoints._MAX_DEPARTED", 2)
     here = [1]
-    matched = Matched(
+    matched = MatchedEndpoints(
         1, lambda _: here, lambda _, h: SimpleNamespace(guid=h) if h in here else None
     )
     for handle in (2, 3):
@@ -369,6 +369,6 @@ def test_what_cannot_be_handed_on_holds_up_nothing_else(participant, caplog, eve
         return len(results) < 3
 
     participant.pump.watch(reader, Event.DATA_AVAILABLE, act)
-    participant.pump.visit(reader, None)
+    participant.pump.poll(reader, None)
     eventually(lambda: results == [True, False, False])
     assert "what arrived cannot be handed on" in caplog.text

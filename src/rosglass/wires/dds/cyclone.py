@@ -71,8 +71,8 @@ __all__ = [
     "delete",
     "guid",
     "handle",
-    "keeping",
     "library",
+    "library_with_gil",
     "lost_samples",
     "matched_publication",
     "matched_publications",
@@ -194,7 +194,7 @@ def library() -> Any:
     return _declare(ctypes.CDLL(library_path()))
 
 
-def strange_version() -> str:
+def untested_version() -> str:
     """Return why private layouts cannot be used, empty with the tested version.
 
     The public interface works with every version of the series.
@@ -204,7 +204,7 @@ def strange_version() -> str:
 
 
 @cache
-def keeping() -> Any:
+def library_with_gil() -> Any:
     """Return the library with functions that keep the GIL, for short calls that take no lock.
 
     Releasing the GIL costs more than such a call, and acquiring it again up to a switch interval.
@@ -339,7 +339,7 @@ def start_at_first_sample(reader: int) -> str:
     Returns:
         Why this is not possible on this machine, empty if it is.
     """
-    if strange := strange_version():
+    if strange := untested_version():
         return strange
     lib, entity = library(), pointer()
     lib.dds_entity_pin.argtypes = [_entity, POINTER(pointer)]
@@ -484,7 +484,7 @@ def library_path() -> str:
         raise UnsupportedError(
             f"cyclonedds {found.version} is installed, but {VERSION} is needed; {remedy}"
         )
-    if strange := strange_version():
+    if strange := untested_version():
         _warn(strange, remedy)
     if sys.maxsize < 2**32:
         raise UnsupportedError("DDS needs a 64-bit Python")

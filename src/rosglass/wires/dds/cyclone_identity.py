@@ -46,7 +46,7 @@ from ctypes import (
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.wires.dds import cyclone
-from rosglass.wires.dds.cyclone import keeping
+from rosglass.wires.dds.cyclone import library_with_gil
 from rosglass.wires.dds.cyclone_samples import COPIED, payload
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ class Hook(ABC):
 
     def check(self, sertype: int) -> str:
         """Replace a type's functions; return why that is not possible, empty if it is."""
-        if strange := cyclone.strange_version():
+        if strange := cyclone.untested_version():
             return strange
         if sys.platform != "linux" or sys.byteorder != "little":
             return f"DDS on {sys.platform} does without identities: it was never tried there"
@@ -174,7 +174,7 @@ def _table_of(sertype: int) -> Any:
 def make_sample(sertype: int, data: bytes) -> int:
     """Return the address of a new serdata, for tests; raises ValueError if none is created."""
     part = (c_size_t * 2)(ctypes.cast(c_char_p(data), c_void_p).value or 0, len(data))
-    made = keeping().ddsi_serdata_from_ser_iov(sertype, SDK_DATA, 1, part, len(data))
+    made = library_with_gil().ddsi_serdata_from_ser_iov(sertype, SDK_DATA, 1, part, len(data))
     if not made:
         raise ValueError("no sample can be made")
     return int(made)
@@ -320,7 +320,7 @@ class Origins:
 
     def __init__(self) -> None:
         self._type = 0
-        self._noted: dict[int, Origin] = {}
+        self._recorded: dict[int, Origin] = {}
         self._take: Take | None = None
 
     def create_topic(self, participant: int, name: str, type_name: str) -> int:
@@ -334,7 +334,7 @@ class Origins:
         self._type = sertype
         _readers[sertype] = self
 
-    def of(self, serdata: int) -> Origin | None:
+    def pop(self, serdata: int) -> Origin | None:
         """Return and remove the origin of a sample; None if it was sent within this process.
 
         For a sample from this process, the result may be the origin of one that was dropped unread:
@@ -343,10 +343,10 @@ class Origins:
         Args:
             serdata: The sample's address, while the caller still holds a reference to it.
         """
-        return self._noted.pop(serdata, None)
+        return self._recorded.pop(serdata, None)
 
-    def hasten(self, take: Take | None) -> None:
-        """Deliver samples of other processes on the thread that receives them.
+    def set_receiver(self, take: Take | None) -> None:
+        """Set the function that takes samples of other processes on their receiving thread.
 
         This saves waking a thread, a fifth of a service call's time. The library waits for `take`
         in the middle of its work: `take` must not call it except to write, and must not block.
@@ -362,22 +362,22 @@ class Origins:
         self._take = None
         if _readers.get(self._type) is self:
             del _readers[self._type]
-        self._noted.clear()
+        self._recorded.clear()
 
-    def note(self, serdata: int, fragments: int) -> None:
+    def record(self, serdata: int, fragments: int) -> None:
         """Record the origin of a sample just created from fragments, and deliver it."""
-        self._noted.pop(serdata, None)
+        self._recorded.pop(serdata, None)
         found = _read(fragments)
         if found is None:
             return
-        while len(self._noted) >= _MAX_ORIGINS:
-            self._noted.pop(next(iter(self._noted)), None)
-        self._noted[serdata] = found
+        while len(self._recorded) >= _MAX_ORIGINS:
+            self._recorded.pop(next(iter(self._recorded)), None)
+        self._recorded[serdata] = found
         take = self._take
         if take is not None:
-            keeping().ddsi_serdata_ref(serdata)
+            library_with_gil().ddsi_serdata_ref(serdata)
             if take(found, payload(serdata)):
-                self._noted[serdata] = found._replace(taken=True)
+                self._recorded[serdata] = found._replace(taken=True)
 
 
 class _Reading(Hook):
@@ -392,7 +392,7 @@ class _Reading(Hook):
             try:
                 origins = _readers.get(sertype)
                 if serdata is not None and kind == SDK_DATA and origins is not None:
-                    origins.note(serdata, fragments)
+                    origins.record(serdata, fragments)
             except Exception:
                 _log.exception("the origin of a DDS sample cannot be noted")
             return serdata
@@ -418,7 +418,7 @@ class _Reading(Hook):
         try:
             serdata = from_ser(sertype, SDK_DATA, ctypes.addressof(rdata), len(data))
         finally:
-            found = dict(origins._noted)
+            found = dict(origins._recorded)
             origins.close()
         expect(bytes(payload(serdata)), data)
         expect(found, {serdata: sent})
@@ -573,7 +573,7 @@ class _Writing(Hook):
         data = b"\x00\x01\x00\x00rosglass"
         qos = inline_qos(Identity(bytes(range(16)), 7))
         serdata = make_sample(sertype, _MARK + qos + data)
-        lib = keeping()
+        lib = library_with_gil()
         expect(lib.ddsi_serdata_size(serdata), len(data))
         # Samples within this process have no header to flag.
         expect(_bytes_of(serdata, 0, len(data), None), data)
@@ -593,7 +593,7 @@ class _Writing(Hook):
     def _measure(self, sertype: int) -> None:
         part = (c_size_t * 2)()
         serdata = make_sample(sertype, b"\x00\x01\x00\x00rosglass")
-        lib = keeping()
+        lib = library_with_gil()
         lib.ddsi_serdata_to_ser_ref(serdata, 0, 12, part)
         self._header = part[0] - serdata
         lib.ddsi_serdata_to_ser_unref(serdata, part)
@@ -646,7 +646,7 @@ def _bytes_of(serdata: int, offset: int, size: int, packet: bytearray | None) ->
         _XMSG.pack_into(room, 0, _XMSG_ROOM, 36, 0, 0)
         c_uint32.from_address(part + _XMSG_KIND).value = 1
         c_void_p.from_address(part + _XMSG_DATA).value = ctypes.addressof(headers)
-    lib = keeping()
+    lib = library_with_gil()
     lib.ddsi_serdata_to_ser_ref(serdata, offset, size, part)
     data = string_at(c_void_p.from_address(part).value or 0, c_size_t.from_address(part + 8).value)
     lib.ddsi_serdata_to_ser_unref(serdata, part)

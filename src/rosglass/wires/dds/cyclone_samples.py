@@ -14,7 +14,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import NodeClosedError, UnsupportedError
-from rosglass.wires.dds.cyclone import TIMEOUT, check_alive, keeping, library
+from rosglass.wires.dds.cyclone import TIMEOUT, check_alive, library, library_with_gil
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -58,7 +58,7 @@ class Batch:
         self._info_bytes = memoryview(self._infos).cast("B")
         self._at = ctypes.addressof(self._serdata), ctypes.addressof(self._infos)
         # No thread that calls Python holds its lock, and no other holds it longer than this call.
-        self._take = keeping().dds_takecdr
+        self._take = library_with_gil().dds_takecdr
 
     def take(self, reader: int, place: str) -> list[Taken]:
         """Take the samples that a reader holds, oldest first.
@@ -103,7 +103,7 @@ def payload(serdata: int) -> bytes | memoryview:
     Returns:
         Bytes if it is small, otherwise a read-only view of the library's own memory.
     """
-    lib, part = keeping(), _Part()
+    lib, part = library_with_gil(), _Part()
     size: int = lib.ddsi_serdata_size(serdata)
     # From here on there are two references: the one taken over, and the one for the bytes.
     lib.ddsi_serdata_to_ser_ref(serdata, 0, size, byref(part))
@@ -119,7 +119,7 @@ def payload(serdata: int) -> bytes | memoryview:
 
 def discard(serdata: int) -> None:
     """Release the reference to a sample."""
-    keeping().ddsi_serdata_unref(serdata)
+    library_with_gil().ddsi_serdata_unref(serdata)
 
 
 def sample(sertype: int, parts: Sequence[bytes | bytearray | memoryview], place: str) -> int:
@@ -142,7 +142,7 @@ def sample(sertype: int, parts: Sequence[bytes | bytearray | memoryview], place:
         pinned = [_pin(part) for part in parts]
         pieces = (_Part * len(parts))(*[_Part(pin.address, pin.size) for pin in pinned])
         total = sum(pin.size for pin in pinned)
-    lib = library() if total > COPIED else keeping()
+    lib = library() if total > COPIED else library_with_gil()
     serdata: int = lib.ddsi_serdata_from_ser_iov(sertype, _SDK_DATA, len(parts), pieces, total)
     if not serdata:
         raise UnsupportedError(
@@ -163,7 +163,7 @@ def send(writer: int, serdata: int, place: str) -> bool:
         NodeClosedError: The writer was deleted.
         ConnectionLostError: This machine cannot do it now.
     """
-    keeping().ddsi_serdata_ref(serdata)
+    library_with_gil().ddsi_serdata_ref(serdata)
     result = library().dds_writecdr(writer, serdata)
     if result == TIMEOUT:
         return False
@@ -197,7 +197,7 @@ class _Block:
     __hash__ = object.__hash__
 
     def __del__(self) -> None:
-        keeping().ddsi_serdata_unref(self.serdata)
+        library_with_gil().ddsi_serdata_unref(self.serdata)
 
 
 @lru_cache(maxsize=64)

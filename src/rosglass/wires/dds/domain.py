@@ -33,7 +33,7 @@ from rosglass.wires.dds import cyclone
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-__all__ = ["MAX_DOMAIN", "DdsOptions", "DiscoveryRange", "Domain", "domain_config", "users_part"]
+__all__ = ["MAX_DOMAIN", "DdsOptions", "DiscoveryRange", "Domain", "domain_config", "user_config"]
 
 _log = logging.getLogger("rosglass.ros2")
 #: Highest domain with valid ports: 7400 + 250 * domain and some more (RTPS 2.5, section 9.6.2).
@@ -233,7 +233,7 @@ _BUFFER = '<SocketReceiveBufferSize min="default" max="10MB"/>'
 _BURSTS = "<BurstSize><MaxRexmit>256kB</MaxRexmit></BurstSize>"
 #: Without this, Fast DDS 2.9 does not notice when our readers, writers or participants leave.
 _KEYS = "<GenerateKeyhash>true</GenerateKeyhash>"
-#: Deleting a writer blocks no thread: all linger together (`participant.Lingering`).
+#: Deleting a writer blocks no thread: all linger together (`participant.LingeringWriters`).
 _LINGER = "<WriterLingerDuration>0s</WriterLingerDuration>"
 #: Last participant index that others can find by unicast to this machine; higher ports belong to
 #: the next domain (RTPS 2.5, section 9.6.2).
@@ -326,7 +326,7 @@ class Domain(Handle):
 
 def _create(domain: int, config: str) -> int | None:
     """Return the new domain; None if something else in this process has created it."""
-    if users_part(config) and (problem := _trial(domain, config)):
+    if user_config(config) and (problem := _trial(domain, config)):
         _refuse(domain, config, problem)
     code = _create_quietly(domain, config)
     if code == _EXISTS:
@@ -363,7 +363,7 @@ def _refuse(domain: int, config: str, problem: str) -> None:
     interface = _NO_INTERFACE.match(problem)
     if interface:
         raise ArgumentError("interface", interface[1], f"one of this machine's ({problem})")
-    own = users_part(config)
+    own = user_config(config)
     if own and _trial(domain, config.removesuffix(f",{own}")) != problem:
         raise ArgumentError("CYCLONEDDS_URI", own, f"what Cyclone DDS accepts ({problem})")
     raise ConnectionLostError(f"Cyclone DDS cannot take part in domain {domain}: {problem}")
@@ -403,7 +403,9 @@ def domain_config(options: DdsOptions) -> str:
         ConnectionLostError: A peer's name is unknown.
     """
     for option, elements in _CLAIMS.items():
-        said = [name for name in elements if option in options.chosen and _says(options, name)]
+        said = [
+            name for name in elements if option in options.chosen and _has_element(options, name)
+        ]
         if said:
             raise ArgumentError(
                 option,
@@ -417,7 +419,7 @@ def domain_config(options: DdsOptions) -> str:
     return ",".join(part for part in (ours, options.config) if part)
 
 
-def users_part(config: str) -> str:
+def user_config(config: str) -> str:
     """Return the user's part of a configuration that :func:`domain_config` returned."""
     return config.partition(f"{_END},")[2]
 
@@ -460,7 +462,7 @@ def _discovery(options: DdsOptions, peers: Sequence[str]) -> str:
     )
 
 
-def _says(options: DdsOptions, element: str) -> bool:
+def _has_element(options: DdsOptions, element: str) -> bool:
     """Return whether the user's configuration has an element, for this domain or for any."""
     texts = [options.config]
     for part in options.config.split(","):
@@ -489,7 +491,7 @@ def _addresses(peers: Sequence[str]) -> list[str]:
     found: dict[str, str] = {}
     problems: dict[str, str] = {}
 
-    def look(peer: str) -> None:
+    def look_up(peer: str) -> None:
         host, colon, port = peer.partition(":")
         try:
             infos = socket.getaddrinfo(host, None, socket.AF_INET, socket.SOCK_DGRAM)
@@ -498,7 +500,7 @@ def _addresses(peers: Sequence[str]) -> list[str]:
         else:
             found[peer] = f"{infos[0][4][0]}{colon}{port}"
 
-    threads = [threading.Thread(target=look, args=(peer,), daemon=True) for peer in peers]
+    threads = [threading.Thread(target=look_up, args=(peer,), daemon=True) for peer in peers]
     until = time.monotonic() + _LOOK_UP_TIMEOUT_S
     for thread in threads:
         thread.start()

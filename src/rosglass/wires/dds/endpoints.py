@@ -107,7 +107,7 @@ class SampleWriter:
             except BaseException:
                 cyclone.delete(self._topic)
                 raise
-            participant.before_leaving(self.entity, self._stop)
+            participant.call_before_close(self.entity, self._stop)
 
     def write_parts(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
         """Send a payload in one or several parts; Cyclone DDS copies them once.
@@ -157,7 +157,7 @@ class SampleWriter:
             self._lock.release()
 
     def _delete(self) -> None:
-        self._participant.before_leaving(self.entity, None)
+        self._participant.call_before_close(self.entity, None)
         cyclone.delete(self.entity)
         # A write in another thread may be using the topic's type.
         with self._lock:
@@ -236,7 +236,7 @@ class SampleReader:
         self._eager = eager
         with suppress(NodeClosedError):
             set_events(self.entity, self._events | (Event.DATA_AVAILABLE if eager else Event.NONE))
-            self._participant.pump.visit(self.entity, None if eager else self._poll)
+            self._participant.pump.poll(self.entity, None if eager else self._poll)
 
     def flush(self) -> None:
         """Deliver the waiting samples, unless another thread is delivering."""
@@ -247,7 +247,7 @@ class SampleReader:
             finally:
                 self._delivering.release()
                 if more and self._eager:
-                    self._participant.pump.visit(self.entity, None)
+                    self._participant.pump.poll(self.entity, None)
 
     def _poll(self) -> bool:
         """Deliver the waiting samples; return whether the rate requires faster polling."""

@@ -186,14 +186,14 @@ class DdsDiscovery:
         with self._lock:
             self._nodes, self._scheduled = nodes, True
             self._seen.put_entities(ParticipantEntities(self._participant.guid, nodes))
-            self._participant.pump.visit(self._writer.entity, self._announce)
+            self._participant.pump.poll(self._writer.entity, self._announce)
 
     def _announce(self) -> None:
         """Announce our nodes if they have changed; on the pump's thread."""
         with self._lock:
             if self._scheduled:
                 self._scheduled = False
-                self._participant.pump.visit(self._writer.entity, None)
+                self._participant.pump.poll(self._writer.entity, None)
             humble = self._seen.humble if self._humble is None else self._humble
             info = ParticipantEntities(self._participant.guid, self._nodes, humble)
         if info != self._announced:

@@ -83,7 +83,7 @@ class Participant:
             self.born = time.monotonic()
             self.guid = cyclone.guid(self.entity)
             self.pump = Pump(self.entity, f"DDS domain {options.domain}")
-            self.lingering = Lingering(self.pump)
+            self.lingering = LingeringWriters(self.pump)
         except BaseException:
             self._domain.close()
             raise
@@ -97,7 +97,7 @@ class Participant:
         """Add a node; a node added twice must be removed twice."""
         with self._lock:
             self._nodes[node] = self._nodes.get(node, 0) + 1
-            self._tell()
+            self._notify()
 
     def remove_node(self, node: NodeName) -> None:
         """Remove a node."""
@@ -105,13 +105,13 @@ class Participant:
             self._nodes[node] -= 1
             if not self._nodes[node]:
                 del self._nodes[node]
-            self._tell()
+            self._notify()
 
     def add_endpoint(self, node: NodeName, guid: bytes, *, writer: bool) -> None:
         """Add a reader or writer of a node."""
         with self._lock:
             self._endpoints[guid] = (node, writer)
-            self._tell()
+            self._notify()
 
     def add_writer(self, handle: int, guid: bytes, type_hash: str) -> None:
         """Remember a topic's writer: its samples may be read after its deletion."""
@@ -124,7 +124,7 @@ class Participant:
         """Remove a reader or writer."""
         with self._lock:
             if self._endpoints.pop(guid, None) is not None:
-                self._tell()
+                self._notify()
 
     @contextmanager
     def in_use(self) -> Iterator[None]:
@@ -144,7 +144,7 @@ class Participant:
                 self._users -= 1
                 self._lock.notify_all()
 
-    def before_leaving(self, entity: int, end: Callable[[], None] | None) -> None:
+    def call_before_close(self, entity: int, end: Callable[[], None] | None) -> None:
         """Register a function to call before the entities are deleted; None removes it."""
         with self._lock:
             if end is None:
@@ -167,7 +167,7 @@ class Participant:
         cyclone.delete(self.entity)
         self._domain.close()
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         self.on_nodes(self._entities())
 
     def _entities(self) -> tuple[NodeEntities, ...]:
@@ -213,7 +213,7 @@ class Pump:
         self._acts[entity] = act
         self._waitset.attach(entity, entity)
 
-    def visit(self, entity: int, act: Callable[[], object] | None) -> None:
+    def poll(self, entity: int, act: Callable[[], object] | None) -> None:
         """Call `act` about thirty times a second, more often while it returns True.
 
         None ends this, and calls the entity's handler once, for data that is already waiting.
@@ -246,21 +246,21 @@ class Pump:
 
     def _run(self) -> None:
         while not self._closed:
-            self._do(self._turn)
+            self._run_handler(self._run_once)
 
-    def _turn(self) -> None:
+    def _run_once(self) -> None:
         again = [self._again.popleft() for _ in range(len(self._again))] if self._again else None
         woken = self._waitset.wait(0.0 if again else self._interval if self._idle else None)
         for entity in dict.fromkeys((*woken, *again)) if again else woken:
             act = self._acts.get(entity)
-            if act is not None and self._do(act):
+            if act is not None and self._run_handler(act):
                 self._again.append(entity)
         if self._idle and (now := time.monotonic()) >= self._due:
-            busy = [visit for visit in list(self._idle.values()) if self._do(visit)]
+            busy = [visit for visit in list(self._idle.values()) if self._run_handler(visit)]
             self._interval = _BUSY_POLL_S if busy else _IDLE_POLL_S
             self._due = now + self._interval
 
-    def _do(self, act: Callable[[], object]) -> object:
+    def _run_handler(self, act: Callable[[], object]) -> object:
         if self._closed:
             return None
         try:
@@ -272,7 +272,7 @@ class Pump:
             return True  # there may be more data, which is not reported again
 
 
-class Lingering:
+class LingeringWriters:
     """The closed writers of a participant that linger until their samples are acknowledged.
 
     Cyclone DDS can do this itself (``WriterLingerDuration``), but blocks the thread that deletes a
@@ -291,7 +291,7 @@ class Lingering:
         """Call `delete` once a writer's samples are acknowledged, or after a second."""
         set_events(writer, Event.NONE)  # no thread handles them any more
         self._waiting[writer] = time.monotonic() + _ACKNOWLEDGE_TIMEOUT_S, delete
-        self._pump.visit(_LINGERING, self._poll)
+        self._pump.poll(_LINGERING, self._poll)
 
     def close(self) -> None:
         """Wait until all are deleted; called by the thread that has closed the pump."""
@@ -308,4 +308,4 @@ class Lingering:
         if not self._waiting:
             self._pump.forget(_LINGERING)
             if self._waiting:  # another thread has just added one
-                self._pump.visit(_LINGERING, self._poll)
+                self._pump.poll(_LINGERING, self._poll)

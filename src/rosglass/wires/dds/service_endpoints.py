@@ -22,7 +22,13 @@ from rosglass.comm import EndpointKind
 from rosglass.comm.names import mangle_type
 from rosglass.errors import Error, NodeClosedError
 from rosglass.wires.dds import cyclone, cyclone_identity
-from rosglass.wires.dds.cyclone import Discovered, Event, keeping, publication_matched, qos_of
+from rosglass.wires.dds.cyclone import (
+    Discovered,
+    Event,
+    library_with_gil,
+    publication_matched,
+    qos_of,
+)
 from rosglass.wires.dds.cyclone_identity import Origins
 from rosglass.wires.dds.endpoints import SampleReader, SampleWriter, Taken
 from rosglass.wires.dds.graph import format_user_data
@@ -38,10 +44,10 @@ if TYPE_CHECKING:
 __all__ = [
     "PREFIX",
     "REMEDY",
-    "Ends",
-    "Matched",
+    "MatchedEndpoints",
     "Outbox",
     "Scheme",
+    "ServiceEndpoints",
     "in_main_thread",
     "in_this_process",
     "names_of",
@@ -70,7 +76,7 @@ _DEPTH = 1000
 #: Seconds that sending blocks the caller's thread for slow readers.
 _SEND_TIMEOUT_S = 0.01
 #: Seconds after matching another vendor's writer until its first sample is sure to arrive; see
-#: :meth:`Ends._start_probe`. Cyclone DDS's own writers need none.
+#: :meth:`ServiceEndpoints._start_probe`. Cyclone DDS's own writers need none.
 _SETTLING_S = 0.2
 #: Seconds after joining the domain until all peers on a usual network have answered, and until
 #: those of other vendors have begun to announce endpoints: some wait for their next heartbeat, sent
@@ -111,7 +117,7 @@ def _vendor(guid: bytes) -> str:
     return _VENDORS.get(guid[:2], f"DDS vendor {guid[:2].hex()}")
 
 
-class Matched:
+class MatchedEndpoints:
     """The readers or writers that a writer or reader is matched with.
 
     Args:
@@ -158,7 +164,7 @@ class Matched:
         self.by_guid = {found.guid: found for found in self.all}
 
 
-class Ends:
+class ServiceEndpoints:
     """The reader and the writer of a service's client or server.
 
     A server's writer is created a little later if the participant has only just joined. Both hold
@@ -212,7 +218,7 @@ class Ends:
         self._qos = replace(endpoint.qos, depth=self.depth)
         self.outbox = Outbox(self._wake, in_order=not server)
         self.writer: SampleWriter | None = None
-        self.readers: Matched | None = None
+        self.readers: MatchedEndpoints | None = None
         self.origins = Origins()
         self.reader = SampleReader(
             participant,
@@ -222,15 +228,15 @@ class Ends:
             self._place,
             on_taken,
             self.origins.create_topic,
-            self.origins.of,
-            self.look,
+            self.origins.pop,
+            self.refresh,
         )
-        self.writers = Matched(
+        self.writers = MatchedEndpoints(
             self.reader.entity, cyclone.matched_publications, cyclone.matched_publication
         )
         participant.add_endpoint(self._node, self.reader.guid, writer=False)
         _here[participant.guid[:PREFIX]] += 1
-        if not server or self._synced():
+        if not server or self._is_discovery_settled():
             try:
                 self._open()
             except BaseException:
@@ -241,27 +247,29 @@ class Ends:
         """Start delivering samples and reporting matches."""
         self._started = True
         self.reader.start()
-        self.look()
+        self.refresh()
         if self.writer is None:
             self._wake(False)
 
-    def settled(self, writer: bytes) -> bool:
+    def is_settled(self, writer: bytes) -> bool:
         """Return whether all samples of a matched writer arrive, including its first."""
         if scheme_of(writer) is Scheme.HEADER:
             return True
         return time.monotonic() - self._since.get(writer, math.inf) >= _SETTLING_S
 
-    def catch_up(self) -> None:
+    def refresh_readers(self) -> None:
         """Look up the matched readers if their number has changed before its event."""
         writer, readers = self.writer, self.readers
         if writer is None or readers is None:
             return
         # The lock that this waits for is never held while Python is called.
-        count = keeping().dds_get_matched_subscriptions(writer.entity, None, 0)
+        count = library_with_gil().dds_get_matched_subscriptions(writer.entity, None, 0)
         if count >= 0 and count != len(readers.all):
-            self.look()
+            self.refresh()
 
-    def sender(self, handle: int, origin: Origin | None) -> tuple[Discovered | None, Origin | None]:
+    def find_sender(
+        self, handle: int, origin: Origin | None
+    ) -> tuple[Discovered | None, Origin | None]:
         """Return the writer of a sample, and the sample's origin.
 
         A peer that left right after sending may never have been matched, but its sample must not be
@@ -284,7 +292,7 @@ class Ends:
             return (Discovered(False, _DEPARTED, handle) if known else None), None
         return (Discovered(False, origin.guid, handle) if origin.guid else None), origin
 
-    def strangers(self) -> list[EndpointInfo]:
+    def foreign_peers(self) -> list[EndpointInfo]:
         """Return the peers in the graph that do not use Cyclone DDS."""
         return [
             peer
@@ -292,7 +300,7 @@ class Ends:
             if scheme_of(peer.gid) is Scheme.IDENTITY
         ]
 
-    def who(self, guid: bytes) -> str:
+    def _describe_peer(self, guid: bytes) -> str:
         """Return the node and vendor of a reader or writer, for messages."""
         nodes = {
             peer.node.full
@@ -301,11 +309,11 @@ class Ends:
         }
         return f"{' or '.join(sorted(nodes)) or guid.hex()} ({_vendor(guid)})"
 
-    def name(self, guid: bytes, text: str, *values: object) -> None:
-        """Log a problem of a peer, once."""
+    def log_peer(self, guid: bytes, text: str, *values: object) -> None:
+        """Log a problem of a peer, once; `text` has a ``%s`` for the peer, then the others."""
         if guid not in self._named and len(self._named) < _MAX_NAMED:
             self._named.add(guid)
-            _log.warning(f"%s: {text}", self._service, *values)
+            _log.warning(f"%s: {text}", self._service, self._describe_peer(guid), *values)
 
     def close(self) -> None:
         """Delete reader and writer; safe to call twice."""
@@ -350,7 +358,7 @@ class Ends:
                     return
                 if self._server:
                     cyclone_identity.prepare_reply_writer(writer.entity)
-                self.readers = Matched(
+                self.readers = MatchedEndpoints(
                     writer.entity,
                     cyclone.matched_subscriptions,
                     cyclone.matched_subscription,
@@ -359,16 +367,16 @@ class Ends:
             self._participant.pump.watch(writer.entity, Event.PUBLICATION_MATCHED, self._on_event)
             self._participant.add_endpoint(self._node, writer.guid, writer=True)
 
-    def _synced(self) -> bool:
+    def _is_discovery_settled(self) -> bool:
         """Return whether clients that discover this server now are already discovered here."""
         now, seen = time.monotonic(), self._participant.seen
         age = now - self._participant.born
         if seen is None or age < _ANSWERED_S or age >= _SYNC_TIMEOUT_S:
             return age >= _ANSWERED_S
-        strangers = any(scheme_of(guid) is Scheme.IDENTITY for guid in seen.prefixes())
-        return not strangers or (age >= _HEARTBEAT_S and now - seen.moved >= _QUIET_S)
+        foreign_peers = any(scheme_of(guid) is Scheme.IDENTITY for guid in seen.prefixes())
+        return not foreign_peers or (age >= _HEARTBEAT_S and now - seen.moved >= _QUIET_S)
 
-    def look(self) -> None:
+    def refresh(self) -> None:
         """Look up the matched peers, and report changes."""
         if not self._started or self.closed:
             return
@@ -376,12 +384,12 @@ class Ends:
             self.writers.refresh()
             if self.readers is not None:
                 self.readers.refresh()
-            strangers = {
+            foreign_peers = {
                 found.guid for found in self.writers.all if scheme_of(found.guid) is Scheme.IDENTITY
             }
-            new = not strangers <= self._since.keys()
+            new = not foreign_peers <= self._since.keys()
             now, before = time.monotonic(), self._since
-            self._since = {guid: before.get(guid, now) for guid in strangers}
+            self._since = {guid: before.get(guid, now) for guid in foreign_peers}
             if new and not self.closed:
                 self._start_probe()
             if new:
@@ -423,44 +431,44 @@ class Ends:
         self._probe.clear()
 
     def _wake(self, at_once: bool) -> None:
-        """Schedule :meth:`_do_due` on the pump's thread, now or up to 30 ms later."""
+        """Schedule :meth:`_run_due_jobs` on the pump's thread, now or up to 30 ms later."""
         if self.closed:
             return
         if at_once and self.writer is not None:
-            self._participant.pump.visit(self.writer.entity, None)
+            self._participant.pump.poll(self.writer.entity, None)
         else:
-            self._participant.pump.visit(self.reader.entity, self._do_due)
+            self._participant.pump.poll(self.reader.entity, self._run_due_jobs)
 
     def _on_event(self) -> None:
         if self.closed or self.writer is None:
             return
         with suppress(NodeClosedError):
             if publication_matched(self.writer.entity):
-                self.look()
+                self.refresh()
         if self.outbox.retry():
             self._wake(False)
 
-    def _do_due(self) -> None:
+    def _run_due_jobs(self) -> None:
         """Run the due work on the pump's thread, repeatedly until none is left."""
         if self.closed:
             self._participant.pump.forget(self.reader.entity)
             return
-        unsettled = not all(self.settled(guid) for guid in self._since)
+        unsettled = not all(self.is_settled(guid) for guid in self._since)
         if not unsettled and self._probe:
             with self._lock:
                 self._end_probe()
-            self.look()
-        if self.writer is None and self._synced():
+            self.refresh()
+        if self.writer is None and self._is_discovery_settled():
             try:
                 self._open()
             except NodeClosedError:
                 return
             except Error as error:
                 _log.error("%s cannot be offered: %s", self._service, error)
-                self._participant.pump.visit(self.reader.entity, None)
+                self._participant.pump.poll(self.reader.entity, None)
                 return
         if not (self.outbox.retry() or unsettled or self.writer is None):
-            self._participant.pump.visit(self.reader.entity, None)
+            self._participant.pump.poll(self.reader.entity, None)
 
 
 @cache

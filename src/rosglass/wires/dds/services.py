@@ -27,8 +27,8 @@ from rosglass.wires.dds.graph import parse_user_data
 from rosglass.wires.dds.service_endpoints import (
     PREFIX,
     REMEDY,
-    Ends,
     Scheme,
+    ServiceEndpoints,
     in_main_thread,
     in_this_process,
     names_of,
@@ -99,7 +99,7 @@ _ANSWERLESS_S = 2.0
 
 
 class DdsRequester(Requester):
-    """The DDS writer and reader of a service client; arguments as for :class:`Ends`.
+    """The DDS writer and reader of a service client; arguments as for :class:`ServiceEndpoints`.
 
     Attributes:
         gid: Identity of its request writer, which identifies the client.
@@ -124,26 +124,28 @@ class DdsRequester(Requester):
         #: Handles of the linked servers' request readers; they change with a reconnection.
         self._linked: dict[Scheme, frozenset[int]] = {}
         #: For each sent call, the readers that have been linked ever since.
-        self._asked: dict[int, frozenset[int]] = {}
+        self._sent_to: dict[int, frozenset[int]] = {}
         #: How requests are sent now; None if no server is linked.
         self._scheme: Scheme | None = None
         #: When request readers without a known server appeared, and when to check them again.
         self._unlinked: dict[bytes, float] = {}
         self._recheck = math.inf
-        self._ends = Ends(participant, graph, endpoint, self._on_replies, self._link)
-        assert self._ends.writer is not None
-        self._writer = self._ends.writer
+        self._endpoints = ServiceEndpoints(
+            participant, graph, endpoint, self._on_replies, self._on_matched
+        )
+        assert self._endpoints.writer is not None
+        self._writer = self._endpoints.writer
         self.gid = self._writer.guid
-        self._ends.origins.hasten(self._hasten)
-        self._ends.start()
+        self._endpoints.origins.set_receiver(self._on_received)
+        self._endpoints.start()
 
     @property
     def problem(self) -> str:  # type: ignore[override]
         """Why some servers in the graph cannot be called."""
-        strangers = self._ends.strangers()
-        if not strangers:
+        foreign_peers = self._endpoints.foreign_peers()
+        if not foreign_peers:
             return ""
-        names = names_of(strangers)
+        names = names_of(foreign_peers)
         if reason := cyclone_identity.reading.problem:
             return f"{names} cannot be called: {reason}; {REMEDY}"
         if Scheme.HEADER in self._schemes():
@@ -156,12 +158,12 @@ class DdsRequester(Requester):
     def ready(self) -> bool:
         """Return whether a server's request reader and its reply writer are matched."""
         if time.monotonic() >= self._recheck:
-            self._ends.look()
-        return self._scheme is not None and not self._ends.closed
+            self._endpoints.refresh()
+        return self._scheme is not None and not self._endpoints.closed
 
     def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:
         """Send a request; see :meth:`rosglass.wires.base.Requester.send`."""
-        if self._ends.closed:
+        if self._endpoints.closed:
             raise NodeClosedError(f"the client of {self._service} is closed")
         with self._lock:
             self._calls[number] = 0
@@ -169,7 +171,7 @@ class DdsRequester(Requester):
         def expired() -> None:
             self._fail(number, "its server takes no requests")
 
-        self._ends.outbox.put(
+        self._endpoints.outbox.put(
             lambda: self._send(number, data),
             float("inf") if timeout is None else timeout,
             expired,
@@ -177,10 +179,10 @@ class DdsRequester(Requester):
             now=self._scheme is not Scheme.IDENTITY or not in_main_thread(),
         )
 
-    def stranded(self, number: int) -> bool:
+    def is_reply_lost(self, number: int) -> bool:
         """Return whether a request's servers have left, so that their replies are lost."""
-        asked = self._asked.get(number)
-        return asked is not None and not asked
+        readers = self._sent_to.get(number)
+        return readers is not None and not readers
 
     def forget(self, number: int) -> None:
         """Drop the reply to a request, if it still arrives."""
@@ -189,21 +191,21 @@ class DdsRequester(Requester):
 
     def close(self) -> None:
         """Withdraw the client; replies that still arrive are dropped."""
-        if self._ends.closed:
+        if self._endpoints.closed:
             return
-        self._ends.origins.hasten(None)
-        self._ends.close()
+        self._endpoints.origins.set_receiver(None)
+        self._endpoints.close()
         with self._lock:
             self._calls.clear()
             self._by_sequence.clear()
-            self._asked.clear()
+            self._sent_to.clear()
 
     def _send(self, number: int, data: bytes | bytearray) -> bool:
         """Send a request; return False if it must be tried again."""
         # A server that has just appeared must not get a request that it would misread.
-        self._ends.catch_up()
-        if self._scheme is Scheme.HEADER and self._ends.strangers():
-            self._ends.look()
+        self._endpoints.refresh_readers()
+        if self._scheme is Scheme.HEADER and self._endpoints.foreign_peers():
+            self._endpoints.refresh()
         scheme = self._scheme
         if scheme is None:
             if self._schemes().get(Scheme.IDENTITY) is False and number in self._calls:
@@ -231,13 +233,13 @@ class DdsRequester(Requester):
                     return False
                 raise
             self._sequence = sequence + 1 if sequence >= 0 else -1
-            self._asked[number] = self._linked.get(scheme, frozenset())
+            self._sent_to[number] = self._linked.get(scheme, frozenset())
             if scheme is Scheme.IDENTITY:
                 self._calls[number] = self._sequence
                 self._by_sequence[self._sequence] = number
         return True
 
-    def _hasten(self, origin: Origin, data: bytes | memoryview) -> bool:
+    def _on_received(self, origin: Origin, data: bytes | memoryview) -> bool:
         """Take a reply on the receiving thread; return False to get it from the pump instead."""
         quick = self.quick
         # A thread that holds the lock may be sending, and must not block the receiving thread.
@@ -255,7 +257,7 @@ class DdsRequester(Requester):
 
     def _on_replies(self, taken: list[Taken]) -> None:
         for data, _, handle, described in taken:
-            server, origin = self._ends.sender(handle, described)
+            server, origin = self._endpoints.find_sender(handle, described)
             if origin is not None and origin.taken:
                 continue
             try:
@@ -276,18 +278,18 @@ class DdsRequester(Requester):
         elif scheme_of(server) is Scheme.IDENTITY:
             if not cyclone_identity.reading.problem:
                 text = "ignoring replies of %s, which do not say what they answer"
-                self._ends.name(server, text, self._ends.who(server))
+                self._endpoints.log_peer(server, text)
         # Replies to other clients in this process carry no identity.
         elif unpack_header(data) is None and not in_this_process(server):
             text = "ignoring a reply of %s, which is too short for its header: %d bytes"
-            self._ends.name(server, text, self._ends.who(server), len(data))
+            self._endpoints.log_peer(server, text, len(data))
 
     def _match(
         self, related: Identity | None, data: bytes | memoryview
     ) -> tuple[int, Scheme] | None:
         """Return the open call that a reply answers, and the scheme that identifies it."""
         number, scheme = None, Scheme.IDENTITY
-        if related is not None and related.guid in (self.gid, self._ends.reader.guid):
+        if related is not None and related.guid in (self.gid, self._endpoints.reader.guid):
             number = self._by_sequence.get(related.sequence)
         if number is None and (header := unpack_header(data)) is not None and header[0] == self._id:
             number, scheme = header[1], Scheme.HEADER
@@ -295,7 +297,7 @@ class DdsRequester(Requester):
 
     def _drop(self, number: int) -> bool:
         """Close a call; return whether it was open."""
-        self._asked.pop(number, None)
+        self._sent_to.pop(number, None)
         sequence = self._calls.pop(number, None)
         if sequence:
             self._by_sequence.pop(sequence, None)
@@ -321,11 +323,13 @@ class DdsRequester(Requester):
 
     def _schemes(self) -> dict[Scheme, bool]:
         """Return the schemes of the linked servers, and whether replies are sure to arrive."""
-        ends, now = self._ends, time.monotonic()
-        answering = {_server_of(found): ends.settled(found.guid) for found in ends.writers.all}
+        endpoints, now = self._endpoints, time.monotonic()
+        answering = {
+            _server_of(found): endpoints.is_settled(found.guid) for found in endpoints.writers.all
+        }
         schemes: dict[Scheme, bool] = {}
         unlinked: dict[bytes, float] = {}
-        for found in () if ends.readers is None else ends.readers.all:
+        for found in () if endpoints.readers is None else endpoints.readers.all:
             scheme = scheme_of(found.guid)
             settled = answering.get(_server_of(found))
             if settled is None and scheme is Scheme.IDENTITY:
@@ -336,7 +340,7 @@ class DdsRequester(Requester):
                 schemes[scheme] = settled or schemes.get(scheme, False)
         if Scheme.IDENTITY not in schemes:
             # An announced server may take requests before it is matched here.
-            for peer in ends.strangers():
+            for peer in endpoints.foreign_peers():
                 unlinked[peer.gid] = since = self._unlinked.get(peer.gid, now)
                 if now - since < _ANSWERLESS_S:
                     schemes[Scheme.IDENTITY] = False
@@ -345,19 +349,21 @@ class DdsRequester(Requester):
 
     def _readers(self) -> dict[Scheme, frozenset[int]]:
         """Return the handles of the linked servers' request readers, by scheme."""
-        answering = {_server_of(found) for found in self._ends.writers.all}
+        answering = {_server_of(found) for found in self._endpoints.writers.all}
         readers: dict[Scheme, set[int]] = {scheme: set() for scheme in Scheme}
-        for found in () if self._ends.readers is None else self._ends.readers.all:
+        for found in () if self._endpoints.readers is None else self._endpoints.readers.all:
             if _server_of(found) in answering:
                 readers[scheme_of(found.guid)].add(found.handle)
         return {scheme: frozenset(handles) for scheme, handles in readers.items()}
 
-    def _link(self) -> None:
+    def _on_matched(self) -> None:
         """Update the route after a change of the matched servers."""
         with self._lock:
             self._linked = linked = self._readers()
             everybody = frozenset().union(*linked.values())
-            self._asked = {number: asked & everybody for number, asked in self._asked.items()}
+            self._sent_to = {
+                number: readers & everybody for number, readers in self._sent_to.items()
+            }
         now = time.monotonic()
         self._scheme = self._route()
         until = [since + _ANSWERLESS_S for since in self._unlinked.values()]
@@ -380,7 +386,7 @@ _DRAIN_TIMEOUT_S = 0.5
 
 
 @dataclass(frozen=True)
-class _Answer:
+class _ReplyTarget:
     """The data of a request that its reply needs.
 
     Attributes:
@@ -397,7 +403,7 @@ class _Answer:
 
 
 class DdsReplier(Replier):
-    """The DDS reader and writer of a service server; arguments as for :class:`Ends`.
+    """The DDS reader and writer of a service server; arguments as for :class:`ServiceEndpoints`.
 
     Attributes:
         gid: Identity of its request reader, which identifies the server.
@@ -412,41 +418,42 @@ class DdsReplier(Replier):
     ) -> None:
         self._service, self._on_request = endpoint.name, on_request
         #: Clients whose reply readers were found to be matched since the last change.
-        self._hearing: set[bytes] = set()
-        self._strangers = False
+        self._matched_clients: set[bytes] = set()
+        self._has_foreign_readers = False
         #: The newest taken request of each client, by its writer; without Cyclone DDS's clients.
         self._newest: dict[bytes, int] = {}
         #: Origins, by id(), of requests left to the pump, which no request may overtake.
-        self._left: OrderedDict[int, Origin] = OrderedDict()
+        self._pumped: OrderedDict[int, Origin] = OrderedDict()
         #: Guards these origins: requests are received on several threads.
-        self._leaving = threading.Lock()
-        self._ends = Ends(participant, graph, endpoint, self._on_requests, self._link)
+        self._pumped_lock = threading.Lock()
+        self._endpoints = ServiceEndpoints(
+            participant, graph, endpoint, self._on_requests, self._on_matched
+        )
         self._pump = participant.pump
-        self.gid = self._ends.reader.guid
-        self._ends.origins.hasten(self._hasten)
-        self._ends.start()
+        self.gid = self._endpoints.reader.guid
+        self._endpoints.origins.set_receiver(self._on_received)
+        self._endpoints.start()
 
     @property
     def problem(self) -> str:  # type: ignore[override]
         """Why some clients in the graph cannot be served."""
-        strangers = self._ends.strangers()
+        foreign_peers = self._endpoints.foreign_peers()
         reason = cyclone_identity.reading.problem or cyclone_identity.writing.problem
-        if not strangers or not reason:
+        if not foreign_peers or not reason:
             return ""
-        return f"{names_of(strangers)} cannot be answered: {reason}; {REMEDY}"
+        return f"{names_of(foreign_peers)} cannot be answered: {reason}; {REMEDY}"
 
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:
         """Send a reply once the client's reader is matched; a client that left is no error."""
         answer = request.handle
-        if not isinstance(answer, _Answer):
+        if not isinstance(answer, _ReplyTarget):
             return
 
         def expired() -> None:
-            who = self._ends.who(answer.client.guid)
             text = "%s did not get its reply: its reader of replies is not found, or takes nothing"
-            self._ends.name(answer.client.guid, text, who)
+            self._endpoints.log_peer(answer.client.guid, text)
 
-        self._ends.outbox.put(
+        self._endpoints.outbox.put(
             lambda: self._answer(answer, data),
             _REPLY_TIMEOUT_S,
             expired,
@@ -456,19 +463,19 @@ class DdsReplier(Replier):
 
     def close(self) -> None:
         """Withdraw the server."""
-        self._ends.origins.hasten(None)
+        self._endpoints.origins.set_receiver(None)
         if not self._pump.current:
-            self._ends.outbox.drain(_DRAIN_TIMEOUT_S)
-        self._ends.close()
+            self._endpoints.outbox.drain(_DRAIN_TIMEOUT_S)
+        self._endpoints.close()
 
-    def _hasten(self, origin: Origin, data: bytes | memoryview) -> bool:
+    def _on_received(self, origin: Origin, data: bytes | memoryview) -> bool:
         """Take a request on the receiving thread; return False to get it from the pump instead."""
         guid = origin.guid
-        client = self._ends.writers.by_guid.get(guid)
+        client = self._endpoints.writers.by_guid.get(guid)
         odd = client is None or (scheme_of(guid) is Scheme.HEADER and unpack_header(data) is None)
-        with self._leaving:
-            if odd or client is None or self._left or not self.quick:
-                self._left[id(origin)] = origin
+        with self._pumped_lock:
+            if odd or client is None or self._pumped or not self.quick:
+                self._pumped[id(origin)] = origin
                 return False
         try:
             self._take(client, data, origin)
@@ -478,7 +485,7 @@ class DdsReplier(Replier):
 
     def _on_requests(self, taken: list[Taken]) -> None:
         for data, _, handle, described in taken:
-            client, origin = self._ends.sender(handle, described)
+            client, origin = self._endpoints.find_sender(handle, described)
             if origin is not None and origin.taken:
                 continue
             try:
@@ -489,94 +496,93 @@ class DdsReplier(Replier):
             except Exception:
                 _log.exception("%s: a request is lost", self._service)
             if origin is not None:
-                self._has_come(origin)
+                self._on_pumped(origin)
 
-    def _has_come(self, origin: Origin) -> None:
+    def _on_pumped(self, origin: Origin) -> None:
         """Stop waiting for a request left to the pump; earlier ones count as lost."""
-        with self._leaving:
-            waiting, gone = len(self._left), 0
-            if id(origin) not in self._left:
+        with self._pumped_lock:
+            waiting, gone = len(self._pumped), 0
+            if id(origin) not in self._pumped:
                 return
-            while self._left.popitem(last=False)[0] != id(origin):
+            while self._pumped.popitem(last=False)[0] != id(origin):
                 gone += 1
-        if gone and waiting > self._ends.depth:
+        if gone and waiting > self._endpoints.depth:
             text = "%s: %d requests are lost, as more than %d waited"
-            _log.error(text, self._service, gone, self._ends.depth)
+            _log.error(text, self._service, gone, self._endpoints.depth)
 
     def _take(self, client: Discovered, data: bytes | memoryview, origin: Origin | None) -> None:
         if scheme_of(client.guid) is Scheme.HEADER:
             header = unpack_header(data)
             if header is None:
                 text = "ignoring a request of %s, which is too short for its header: %d bytes"
-                self._ends.name(client.guid, text, self._ends.who(client.guid), len(data))
+                self._endpoints.log_peer(client.guid, text, len(data))
                 return
             kept = header_of(data)
             sequence = 0 if origin is None else origin.sequence
-            answer = _Answer(client, Identity(client.guid, sequence), kept)
+            answer = _ReplyTarget(client, Identity(client.guid, sequence), kept)
             self._on_request(RequestId(client.guid, header[1], answer), without_header(data))
         elif origin is None:
             text = "cannot answer %s: %s; %s"
             why = cyclone_identity.reading.problem or "its requests have no identity"
-            self._ends.name(client.guid, text, self._ends.who(client.guid), why, REMEDY)
+            self._endpoints.log_peer(client.guid, text, why, REMEDY)
         elif origin.sequence > self._newest.get(client.guid, 0):
             # After an interruption, a client sends its history again.
             self._newest[client.guid] = origin.sequence
             given = origin.related
             reader = b"" if given is None or given.guid == UNKNOWN_GUID else given.guid
             identity = Identity(reader or client.guid, origin.sequence)
-            answer = _Answer(client, identity, reader=reader)
+            answer = _ReplyTarget(client, identity, reader=reader)
             self._on_request(RequestId(client.guid, origin.sequence, answer), data)
 
-    def _answer(self, answer: _Answer, data: bytes | bytearray) -> bool:
+    def _answer(self, answer: _ReplyTarget, data: bytes | bytearray) -> bool:
         """Send a reply; return False if it must be tried again."""
-        if not self._hears(answer):
+        if not self._is_reader_matched(answer):
             # Its event may not have been handled yet.
-            self._ends.look()
-        writer = self._ends.writer
-        if writer is None or not self._hears(answer):
+            self._endpoints.refresh()
+        writer = self._endpoints.writer
+        if writer is None or not self._is_reader_matched(answer):
             # A reply to a reader that is not matched yet would be lost.
-            return answer.client not in self._ends.writers.all
+            return answer.client not in self._endpoints.writers.all
         parts = with_header(data, answer.header) if answer.header else (data,)
         try:
-            if answer.header and not self._strangers:
+            if answer.header and not self._has_foreign_readers:
                 writer.write_parts(parts)
             elif (
                 not cyclone_identity.write_reply(writer, answer.identity, parts)
                 and not answer.header
             ):
-                who = self._ends.who(answer.client.guid)
                 text = "%s did not get its reply: Cyclone DDS sent it without identity; %s"
-                self._ends.name(answer.client.guid, text, who, REMEDY)
+                self._endpoints.log_peer(answer.client.guid, text, REMEDY)
         except TimeoutError:
             return False
         return True
 
-    def _link(self) -> None:
+    def _on_matched(self) -> None:
         """Update what depends on the matched clients."""
-        self._hearing = set()
-        readers = () if self._ends.readers is None else self._ends.readers.all
+        self._matched_clients = set()
+        readers = () if self._endpoints.readers is None else self._endpoints.readers.all
         if len(self._newest) > _MAX_REMEMBERED:
-            here = self._ends.writers.by_guid
+            here = self._endpoints.writers.by_guid
             self._newest = {guid: last for guid, last in self._newest.items() if guid in here}
         # RustDDS's clients fail on any reply without identity, even another client's.
-        self._strangers = not cyclone_identity.writing.problem and any(
+        self._has_foreign_readers = not cyclone_identity.writing.problem and any(
             scheme_of(found.guid) is Scheme.IDENTITY for found in readers
         )
 
-    def _hears(self, answer: _Answer) -> bool:
+    def _is_reader_matched(self, answer: _ReplyTarget) -> bool:
         """Return whether the client's reply reader is matched."""
-        hearing = self._hearing
+        matched = self._matched_clients
         key = answer.reader or answer.client.guid
-        if key in hearing:
+        if key in matched:
             return True
-        readers = () if self._ends.readers is None else self._ends.readers.all
+        readers = () if self._endpoints.readers is None else self._endpoints.readers.all
         if answer.reader:
             heard = any(found.guid == answer.reader for found in readers)
         else:
             client = _client_of(answer.client)
             heard = any(_client_of(found) == client for found in readers)
         if heard:
-            hearing.add(key)
+            matched.add(key)
         return heard
 
 
