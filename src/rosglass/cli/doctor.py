@@ -34,7 +34,7 @@ from rosglass.comm import ConnectionState, anonymous_name
 from rosglass.connection import default_url, explain_missing
 from rosglass.errors import ConnectionLostError, ConversionError, Error, MasterError
 from rosglass.messages import default_library
-from rosglass.wires.tcpros.address import doubt, parse_uri
+from rosglass.wires.tcpros.address import explain_unreachable, parse_uri
 from rosglass.wires.tcpros.master import call_node
 
 if TYPE_CHECKING:
@@ -428,7 +428,7 @@ def _own_address(node: Ros1Node, options: Ros1Options) -> Iterator[_Finding]:
     """Check whether the address that nodes here announce makes sense."""
     host, _ = parse_uri(options.master, "master")
     address = node.address
-    problem = doubt(address, options.source, host)
+    problem = explain_unreachable(address, options.source, host)
     if problem:
         yield _Finding("warning", "own address", problem)
     else:

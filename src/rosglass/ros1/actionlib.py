@@ -42,7 +42,7 @@ __all__ = [
     "assemble",
     "goal_id",
     "new_id",
-    "offered",
+    "served_actions",
     "stamp",
     "state_of",
     "time_of",
@@ -134,7 +134,7 @@ def actions(graph: Graph) -> dict[str, list[str]]:
     return found
 
 
-def offered(graph: Graph) -> list[str]:
+def served_actions(graph: Graph) -> list[str]:
     """Return the names of the actions that have a server."""
     publisher = EndpointKind.PUBLISHER
     return [
@@ -389,14 +389,14 @@ class CommStateMachine:
             ValueError: It contradicts what the server reported before; nothing is changed.
         """
         if reported is ServerState.LOST:
-            return self.lose()
+            return self.on_server_lost()
         steps = _NEXT[self.state].get(reported)
         if steps is None:
             raise ValueError(f"{reported.name} does not follow {self.state.name}")
         if self.state in (CommState.WAITING_FOR_RESULT, CommState.DONE):
             return []  # the first reported end counts
         self.heard = reported
-        return self._go(*steps)
+        return self._transition(*steps)
 
     def on_result(self, reported: ServerState) -> list[Step]:
         """Handle the state in a result message; ignored once the goal is done.
@@ -411,7 +411,7 @@ class CommStateMachine:
         # The result counts, whatever was reported before.
         steps = _NEXT[self.state].get(reported, ())
         self.heard = reported
-        return self._go(*steps, CommState.DONE)
+        return self._transition(*steps, CommState.DONE)
 
     def cancel(self) -> list[Step]:
         """Note that the cancellation is requested.
@@ -419,17 +419,17 @@ class CommStateMachine:
         Ignored for a goal that is being cancelled, or has ended.
         """
         if self.state in (CommState.WAITING_FOR_GOAL_ACK, CommState.PENDING, CommState.ACTIVE):
-            return self._go(CommState.WAITING_FOR_CANCEL_ACK)
+            return self._transition(CommState.WAITING_FOR_CANCEL_ACK)
         return []
 
-    def lose(self) -> list[Step]:
+    def on_server_lost(self) -> list[Step]:
         """Note that the goal is lost: its server will report nothing more."""
         if self.state is CommState.DONE:
             return []
         self.heard = ServerState.LOST
-        return self._go(CommState.DONE)
+        return self._transition(CommState.DONE)
 
-    def _go(self, *states: CommState) -> list[Step]:
+    def _transition(self, *states: CommState) -> list[Step]:
         steps = []
         for state in states:
             self.state = state

@@ -47,7 +47,7 @@ from rosglass.ros1.actionlib import (
     action_topic,
     goal_id,
     new_id,
-    offered,
+    served_actions,
     stamp,
     state_of,
     time_of,
@@ -92,7 +92,7 @@ _CANCELED = (
 )
 
 
-class Entry(NamedTuple):
+class GoalStatusEntry(NamedTuple):
     """A goal in a status message.
 
     Attributes:
@@ -129,7 +129,7 @@ class BulkCancel:
         self._affected: set[str] = set()
         self._canceled: dict[str, None] = {}
 
-    def on_sent(self, before: dict[str, Entry]) -> None:
+    def on_sent(self, before: dict[str, GoalStatusEntry]) -> None:
         """Note that it is sent, and the server's last status until then."""
         self.sent, self._sent_at = True, time.monotonic()
         for key, entry in before.items():
@@ -138,7 +138,7 @@ class BulkCancel:
             elif entry.state in _RUNNING and (self.until is None or entry.stamp <= self.until):
                 self._affected.add(key)
 
-    def on_status(self, entries: dict[str, Entry]) -> bool:
+    def on_status(self, entries: dict[str, GoalStatusEntry]) -> bool:
         """Handle a status message; return whether it is answered now."""
         for key, entry in entries.items():
             if entry.state in _CANCELED and key not in self._canceling:
@@ -314,10 +314,10 @@ class ActionlibClientGoal(ClientGoal):
         try:
             steps = self._machine.on_result(reported)
         except ValueError as error:
-            self._complain(error)
+            self._log_contradiction(error)
             return
         self.text = text
-        self._go(steps)
+        self._transition(steps)
         status = self._machine.status
         because = f": {text}" if text else ""
         if status is GoalStatus.REJECTED:
@@ -344,7 +344,9 @@ class ActionlibClientGoal(ClientGoal):
             self._alone = None
             if not self._known and settled and epoch != self._epoch:
                 self._client._ask_cancel(self._id_text)  # nothing must run unsupervised
-                self._lose(self._gone("was disconnected after it was sent the goal, before"))
+                self._lose(
+                    self._server_lost_error("was disconnected after it was sent the goal, before")
+                )
             return
         self._alone = self._alone or now
         cut_off = self._client._core.status().state is not ConnectionState.CONNECTED
@@ -356,17 +358,17 @@ class ActionlibClientGoal(ClientGoal):
         if self._machine.state is CommState.WAITING_FOR_RESULT:
             self._lose_result(f"its server ({self.server}) {what} it sent the result")
         else:
-            self._lose(self._gone(what))
+            self._lose(self._server_lost_error(what))
 
     def _lose(self, error: BaseException) -> None:
         """End it as LOST, unless it has ended."""
         if not self._done.done():
-            self._go(self._machine.lose())
+            self._transition(self._machine.on_server_lost())
             self._finish(error)
 
     # -- inside ----------------------------------------------------------------------------------
 
-    def _gone(self, what: str) -> ConnectionLostError:
+    def _server_lost_error(self, what: str) -> ConnectionLostError:
         client = self._client
         return ConnectionLostError(
             f"the server of {client.name} ({self.server}) {what} goal {self._id_text} ended; "
@@ -411,12 +413,12 @@ class ActionlibClientGoal(ClientGoal):
             self._add_cancel(answer, timeout, failure)
             self._repeats = 0
             self._ask_cancel()
-            self._go(self._machine.cancel())
+            self._transition(self._machine.cancel())
 
     def _withdraw(self) -> None:
         """End it without having sent it."""
         self._machine.on_status(ServerState.PENDING)
-        self._go(self._machine.on_result(ServerState.RECALLED))
+        self._transition(self._machine.on_result(ServerState.RECALLED))
         action_type = self._client.type
         if action_type is not None:
             self._finish(ActionResult(GoalStatus.CANCELED, action_type.result.create()))
@@ -431,22 +433,22 @@ class ActionlibClientGoal(ClientGoal):
         try:
             steps = self._machine.on_status(reported)
         except ValueError as error:
-            self._complain(error)
+            self._log_contradiction(error)
             return
         self.text = text
-        self._go(steps)
+        self._transition(steps)
         if reported is ServerState.LOST:
             reason = f"the server of {self._client.name} reports that goal {self._id_text} is lost"
             self._finish(ConnectionLostError(reason))
 
-    def _complain(self, error: ValueError) -> None:
+    def _log_contradiction(self, error: ValueError) -> None:
         if not self._odd:
             self._odd = True
             _log.warning(
                 "%s: its server %s contradicts itself: %s", self._label, self.server, error
             )
 
-    def _go(self, steps: list[Step]) -> None:
+    def _transition(self, steps: list[Step]) -> None:
         """Report the states that it has passed."""
         for state, status in steps:
             self._state_listeners.notify(state)
@@ -488,7 +490,7 @@ class ActionlibClient(ActionClient, Member):
         #: The server that goals are sent to; empty without one.
         self._server, self._since, self._epoch = "", 0.0, 0
         #: By server, its last status message, and when it was last known to be alive.
-        self._lists: dict[str, dict[str, Entry]] = {}
+        self._lists: dict[str, dict[str, GoalStatusEntry]] = {}
         self._heard: dict[str, float] = {}
         self._asked: set[str] = set()
         self._bulk_cancels: list[BulkCancel] = []
@@ -625,7 +627,7 @@ class ActionlibClient(ActionClient, Member):
 
     def _take_status(self, server: str, message: Message) -> None:
         entries = {
-            each.goal_id.id: Entry(state_of(each), each.text, time_of(each.goal_id.stamp))
+            each.goal_id.id: GoalStatusEntry(state_of(each), each.text, time_of(each.goal_id.stamp))
             for each in message.status_list
         }
         self._lists[server], self._heard[server] = entries, time.monotonic()
@@ -790,7 +792,7 @@ class ActionlibClient(ActionClient, Member):
         connecting = "" if ends is None else ends.unavailable_reason(self._heard)
         if connecting:
             return connecting
-        names = offered(self._core.graph)
+        names = served_actions(self._core.graph)
         if self.name in names:
             return f"the server of {self.name} is not connected yet"
         return self._no_server(names)

@@ -26,7 +26,7 @@ from rosglass.comm.names import similar
 from rosglass.comm.parameters import RemoteParameters, check_values
 from rosglass.errors import ConnectionLostError, NodeClosedError, ParameterError, UnsupportedError
 from rosglass.ros1 import rosparam_files
-from rosglass.ros1.parameter_server import flat, same, to_wire
+from rosglass.ros1.parameter_server import flatten, is_same_value, to_wire
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -120,12 +120,12 @@ class _Changes(Handle):
         self._subscription.close()
 
     def _on_value(self, value: Any) -> None:
-        now = dict(flat(value)) if isinstance(value, dict) else {}
+        now = dict(flatten(value)) if isinstance(value, dict) else {}
         before, self._before = self._before, now
         if before is None:
             return
         new = {name: now[name] for name in now if name not in before}
-        changed = {n: now[n] for n in now if n in before and not same(now[n], before[n])}
+        changed = {n: now[n] for n in now if n in before and not is_same_value(now[n], before[n])}
         deleted = tuple(name for name in before if name not in now)
         if new or changed or deleted:
             self._listeners.notify(ParameterEvent(self._name, new, changed, deleted))
@@ -251,7 +251,7 @@ class Ros1Parameters(Parameters):
     def names(self) -> list[str]:
         """Return the names that are set or declared, sorted."""
         self._core.check_open()
-        known = (name for name, _ in flat(self._namespace.tree(_TIMEOUT_S)))
+        known = (name for name, _ in flatten(self._namespace.tree(_TIMEOUT_S)))
         return sorted({*known, *self._declared})
 
     def on_set(self, validate: Callable[[Mapping[str, ParameterValue]], str]) -> Handle:
@@ -268,7 +268,7 @@ class Ros1Parameters(Parameters):
         self._core.check_open()
         chosen = executor or self._core.dispatcher
         check_plain(callback, f"{self.node}: on_change()")
-        before = dict(flat(self._namespace.tree(_TIMEOUT_S)))
+        before = dict(flatten(self._namespace.tree(_TIMEOUT_S)))
         return _Changes(self._namespace, callback, chosen, before)
 
     def load(self, path: str | PathLike[str]) -> None:
@@ -321,7 +321,7 @@ class RemoteNamespace(RemoteParameters):
 
     def find(self, prefixes: list[str], depth: int, deadline: Deadline) -> list[str]:
         """Return the names under `prefixes`."""
-        names = [name for name, _ in flat(self._namespace.tree(_seconds(deadline)))]
+        names = [name for name, _ in flatten(self._namespace.tree(_seconds(deadline)))]
         if not prefixes:
             return [name for name in names if not depth or name.count("/") < depth]
         return [name for name in names if any(_below(name, p, depth) for p in prefixes)]
@@ -329,7 +329,7 @@ class RemoteNamespace(RemoteParameters):
     def values(self, names: list[str] | None, deadline: Deadline) -> dict[str, ParameterValue]:
         """Return values by name; None for unset parameters."""
         if names is None:
-            return dict(sorted(flat(self._namespace.tree(_seconds(deadline)))))
+            return dict(sorted(flatten(self._namespace.tree(_seconds(deadline)))))
         wanted = {name: self._namespace.full(name) for name in names}
         if len(wanted) <= 1:
             seconds = _seconds(deadline)
@@ -371,7 +371,7 @@ class RemoteNamespace(RemoteParameters):
         # Without them, when there is no master yet or in threads that must not wait, changes are
         # those since the master's first answer.
         with suppress(ConnectionLostError, UnsupportedError):
-            before = dict(flat(self._namespace.tree(_TIMEOUT_S)))
+            before = dict(flatten(self._namespace.tree(_TIMEOUT_S)))
         made = _Changes(self._namespace, callback, executor or self._core.dispatcher, before)
         self._watches.append(made)
         if self._closed:  # just now, by another thread

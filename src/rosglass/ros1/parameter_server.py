@@ -47,11 +47,11 @@ __all__ = [
     "ParameterServer",
     "ParameterSubscription",
     "StartParameters",
-    "flat",
+    "flatten",
     "from_wire",
-    "pruned",
-    "same",
+    "is_same_value",
     "to_wire",
+    "without_empty_namespaces",
 ]
 
 _log = logging.getLogger("rosglass.ros1")
@@ -712,7 +712,9 @@ class ParameterWatch(Member):
         """
         with self._watches.subscribing:
             self._read_at = time.monotonic()
-            value = pruned(from_wire(master.call("subscribeParam", self._core.uri, self.name)))
+            value = without_empty_namespaces(
+                from_wire(master.call("subscribeParam", self._core.uri, self.name))
+            )
             self._readings += 1
             number = self._readings
         value = None if value == {} else value
@@ -723,7 +725,7 @@ class ParameterWatch(Member):
         if number < self._newest:
             return
         self._newest = number
-        changed = not self._known or not same(value, self._value)
+        changed = not self._known or not is_same_value(value, self._value)
         self._known, self._value = True, value
         for subscription in self._subscriptions:
             if changed or not subscription.known:
@@ -776,32 +778,34 @@ def from_wire(value: Any) -> Any:
     return value
 
 
-def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def flatten(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Yield name and value of each parameter in a namespace, names joined with ``/``."""
     for key, value in tree.items():
         name = f"{prefix}{key}"
         if isinstance(value, Mapping):
-            yield from flat(value, f"{name}/")
+            yield from flatten(value, f"{name}/")
         else:
             yield name, value
 
 
-def pruned(value: Any) -> Any:
+def without_empty_namespaces(value: Any) -> Any:
     """Return a value without empty namespaces, which the master returns for unset ones."""
     if not isinstance(value, dict):
         return value
-    kept = ((key, pruned(item)) for key, item in value.items())
+    kept = ((key, without_empty_namespaces(item)) for key, item in value.items())
     return {key: item for key, item in kept if item != {}}
 
 
-def same(one: Any, other: Any) -> bool:
+def is_same_value(one: Any, other: Any) -> bool:
     """Return whether two values are equal and of the same types, unlike 1, 1.0 and True."""
     if type(one) is not type(other):
         return False
     if isinstance(one, dict):
-        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+        return one.keys() == other.keys() and all(
+            is_same_value(one[key], other[key]) for key in one
+        )
     if isinstance(one, list):
-        return len(one) == len(other) and all(map(same, one, other))
+        return len(one) == len(other) and all(map(is_same_value, one, other))
     return bool(one == other) or (one != one and other != other)  # noqa: PLR0124 - not a number
 
 

@@ -53,7 +53,7 @@ class Services:
             _pending: Mapping[int, PendingCall], on_reply: OnReply, on_change: Callable[[], None]
         ) -> TcprosRequester:
             return TcprosRequester(
-                self._core, self.types.note, name, type, persistent, on_reply, on_change
+                self._core, self.types.record, name, type, persistent, on_reply, on_change
             )
 
         return ServiceClient(self._core, name, _profile(qos, name), create)
@@ -163,7 +163,7 @@ class ServiceTypes(Member):
         self._core.loop.call(lambda: self._want(name))
         return None
 
-    def note(self, name: str, peer: ServerInfo) -> None:
+    def record(self, name: str, peer: ServerInfo) -> None:
         """Store the announcement that a client has received; in the loop's thread."""
         nodes = self._core.graph.services().get(name)
         if nodes == [peer.node]:

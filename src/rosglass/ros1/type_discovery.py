@@ -448,7 +448,7 @@ class GoalProbe(Member):
         #: Replaced, never changed, and in the loop's thread only.
         self._waiting: list[tuple[Connection, dict[str, str]]] = []
         self._closed = False
-        topics.stand_in(topic, self._accept)
+        topics.set_subscriber_handler(topic, self._accept)
         core.add(self)
 
     def type(self) -> MessageType | None:
@@ -485,7 +485,7 @@ class GoalProbe(Member):
         if self._closed:
             return
         self._closed = True
-        self._topics.stand_in(self._topic, None)
+        self._topics.set_subscriber_handler(self._topic, None)
         self._core.loop.call(self._hand_over)
         self._core.remove(self)
 

@@ -103,7 +103,7 @@ def test_a_result_ends_a_goal_in_each_state(state, said):
     assert (made.terminal, made.status) == ENDS[said]
     # A second result, and whatever else comes, changes nothing.
     assert made.on_result(ServerState.ABORTED) == []
-    assert made.lose() == []
+    assert made.on_server_lost() == []
     assert made.cancel() == []
     assert made.terminal is ENDS[said][0]
 
@@ -117,7 +117,9 @@ def test_a_result_without_an_end_is_refused(said):
 
 
 @pytest.mark.parametrize("state", NOT_DONE)
-@pytest.mark.parametrize("lose", [CommStateMachine.lose, lambda m: m.on_status(ServerState.LOST)])
+@pytest.mark.parametrize(
+    "lose", [CommStateMachine.on_server_lost, lambda m: m.on_status(ServerState.LOST)]
+)
 def test_a_goal_is_lost_in_each_state(state, lose):
     made = machine(state)
     assert lose(made) == [(CommState.DONE, GoalStatus.LOST)]

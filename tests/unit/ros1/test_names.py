@@ -177,14 +177,16 @@ def test_the_address_towards_the_master_is_announced() -> None:
 
 def test_addresses_that_others_cannot_reach_are_doubted() -> None:
     # 192.0.2.0/24 is nobody's (RFC 5737).
-    told = address.doubt("192.0.2.7", "ROS_IP", "robot")
+    told = address.explain_unreachable("192.0.2.7", "ROS_IP", "robot")
     assert told.startswith("ROS_IP=192.0.2.7 is not an address of this machine: other nodes may")
-    told = address.doubt("127.0.0.1", "ROS_IP", "192.0.2.8")
+    told = address.explain_unreachable("127.0.0.1", "ROS_IP", "192.0.2.8")
     assert told.startswith("ROS_IP=127.0.0.1 reaches this machine only")
-    assert address.doubt("127.0.0.1", "", "192.0.2.8").startswith("the own address 127.0.0.1 ")
-    assert address.doubt("127.0.0.1", "ROS_IP", "localhost") == ""
-    assert address.doubt("localhost", "ROS_HOSTNAME", "127.0.0.1") == ""
-    assert address.doubt(address.own_address(), "ROS_IP", "192.0.2.8") == "" or (
+    assert address.explain_unreachable("127.0.0.1", "", "192.0.2.8").startswith(
+        "the own address 127.0.0.1 "
+    )
+    assert address.explain_unreachable("127.0.0.1", "ROS_IP", "localhost") == ""
+    assert address.explain_unreachable("localhost", "ROS_HOSTNAME", "127.0.0.1") == ""
+    assert address.explain_unreachable(address.own_address(), "ROS_IP", "192.0.2.8") == "" or (
         address.own_address() == "127.0.0.1"
     )
 

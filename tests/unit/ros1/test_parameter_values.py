@@ -11,7 +11,13 @@ import numpy as np
 import pytest
 
 from rosglass.errors import ParameterError
-from rosglass.ros1.parameter_server import flat, from_wire, pruned, same, to_wire
+from rosglass.ros1.parameter_server import (
+    flatten,
+    from_wire,
+    is_same_value,
+    to_wire,
+    without_empty_namespaces,
+)
 
 
 class Gear(IntEnum):
@@ -39,7 +45,7 @@ class Gear(IntEnum):
 def test_values_survive_the_way_over_xml(value):
     sent = to_wire("/a", value)
     (received,), _ = xmlrpc.client.loads(xmlrpc.client.dumps((sent,)))
-    assert same(from_wire(received), value)
+    assert is_same_value(from_wire(received), value)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +63,7 @@ def test_values_survive_the_way_over_xml(value):
     ],
 )
 def test_values_of_other_libraries_become_plain(value, plain):
-    assert same(from_wire(to_wire("/a", value)), plain)
+    assert is_same_value(from_wire(to_wire("/a", value)), plain)
 
 
 RECURSIVE: list = []
@@ -99,8 +105,8 @@ def test_dates_that_are_none_stay_texts():
 
 def test_namespaces_are_flattened_and_empty_ones_left_out():
     tree = {"a": {"b": 1, "c": {}}, "d": [{}], "e": {"f": {"g": {}}}}
-    assert dict(flat(tree)) == {"a/b": 1, "d": [{}]}
-    assert pruned(tree) == {"a": {"b": 1}, "d": [{}]}
+    assert dict(flatten(tree)) == {"a/b": 1, "d": [{}]}
+    assert without_empty_namespaces(tree) == {"a": {"b": 1}, "d": [{}]}
 
 
 @pytest.mark.parametrize(
@@ -116,4 +122,4 @@ def test_namespaces_are_flattened_and_empty_ones_left_out():
     ],
 )
 def test_a_change_of_type_is_a_change(one, other, equal):
-    assert same(one, other) is equal
+    assert is_same_value(one, other) is equal

@@ -193,7 +193,7 @@ def test_a_server_that_keeps_no_connections_serves_persistent_clients_too(
     start_robot()
     for _ in range(3):
         assert client.call().sum == 3
-        eventually(lambda: not client._requester.busy)
+        eventually(lambda: not client._requester.has_connections)
 
 
 # -- types ---------------------------------------------------------------------------------------

@@ -16,7 +16,14 @@ from rosglass.errors import ArgumentError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-__all__ = ["bracketed", "check_host", "doubt", "given_address", "is_loopback", "own_address"]
+__all__ = [
+    "bracketed",
+    "check_host",
+    "explain_unreachable",
+    "given_address",
+    "is_loopback",
+    "own_address",
+]
 __all__ += ["parse_uri"]
 
 #: Reserved for documentation (RFC 5737): only the route there matters, nothing is sent.
@@ -57,7 +64,7 @@ def own_address(reached_from: str = "") -> str:
     return address or "127.0.0.1"
 
 
-def doubt(address: str, source: str, master: str) -> str:
+def explain_unreachable(address: str, source: str, master: str) -> str:
     """Return why other nodes may not reach this one under an address; empty if they can.
 
     Args:

@@ -623,7 +623,7 @@ class Connection:
         """Return the length of the send queue; from any thread."""
         return len(self._outgoing)
 
-    def quiet(self) -> bool:
+    def has_nothing_to_read(self) -> bool:
         """Return whether the socket has neither data nor its end to read; from any thread."""
         if not self._turn.acquire(blocking=False):
             return False

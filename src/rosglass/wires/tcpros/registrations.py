@@ -18,7 +18,7 @@ from rosglass.comm import ConnectionState, EndpointKind, Status
 from rosglass.comm.core import NodeMember
 from rosglass.comm.log_limits import LogOnce
 from rosglass.errors import ConnectionLostError, Error, MasterError
-from rosglass.wires.tcpros.address import doubt, own_address, parse_uri
+from rosglass.wires.tcpros.address import explain_unreachable, own_address, parse_uri
 from rosglass.wires.tcpros.master import Master
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class Registrations:
         #: The master's process id, as of the last poll.
         self._process: object = None
         #: Why other nodes may not reach this one, and the address that was checked.
-        self._doubt, self._checked_host = "", ""
+        self._unreachable_reason, self._checked_host = "", ""
         #: Consecutive polls with a publisher that is not connected, by topic.
         self._missed: dict[str, int] = {}
         self._thread = threading.Thread(
@@ -166,7 +166,7 @@ class Registrations:
         else:
             self._answered = True
             self._check_address()
-            problems = [problem for problem in (*refused, self._doubt) if problem]
+            problems = [problem for problem in (*refused, self._unreachable_reason) if problem]
             core.set_status(Status(ConnectionState.CONNECTED, "; ".join(problems)))
         if changed:
             core.wake()
@@ -253,16 +253,16 @@ class Registrations:
     def _check_address(self) -> None:
         host = self._core.address[0]
         if host != self._checked_host:
-            self._checked_host, self._doubt = host, ""
+            self._checked_host, self._unreachable_reason = host, ""
             self._core.pool.run(lambda: self._look_up_address(host))
 
     def _look_up_address(self, host: str) -> None:
         """Check whether other nodes reach an address; may wait for a name server."""
         core = self._core
         master, _ = parse_uri(core.master.uri, "master")
-        found = doubt(host, core.options.source, master)
+        found = explain_unreachable(host, core.options.source, master)
         if found and host == self._checked_host:
-            self._doubt = found
+            self._unreachable_reason = found
             _log.warning("%s: %s", core.url, found)
             self._wanted.set()
 

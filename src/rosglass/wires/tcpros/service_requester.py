@@ -153,7 +153,7 @@ class TcprosRequester(ServiceRequester):
 
     def find_server(self) -> None:
         """Look up the server now, as a thread waits for it."""
-        self._core.loop.call(self._finder.look)
+        self._core.loop.call(self._finder.look_up)
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - time counts as well
         """Follow the graph."""
@@ -172,7 +172,7 @@ class TcprosRequester(ServiceRequester):
         with self._lock:
             if link is not None and usable and not self._queue:
                 taken = link.request is not None or link.settling or link.ended
-                if not taken and not pending.call.done() and link.quiet():
+                if not taken and not pending.call.done() and link.has_nothing_to_read():
                     link.request, route.link = pending, link
                     route.began = time.monotonic()
             if route.link is None:
@@ -266,7 +266,7 @@ class TcprosRequester(ServiceRequester):
                 continue
             if not self._fits(link, self.type):
                 link.end("")
-            elif link.lives():
+            elif link.is_alive():
                 return link
         return None
 
@@ -353,7 +353,7 @@ class TcprosRequester(ServiceRequester):
         if self._closed:
             return
         if reason:
-            self._finder.lose(link, reason)
+            self._finder.on_link_lost(link, reason)
         self._advance()
 
     def _loss(self, sent: float, reason: str) -> ConnectionLostError:
@@ -384,12 +384,12 @@ class TcprosRequester(ServiceRequester):
     # -- for the finder, in the loop's thread ------------------------------------------------------
 
     @property
-    def waits(self) -> bool:
+    def is_awaited(self) -> bool:
         """Whether calls or threads wait for the server."""
         return bool(self._queue) or (bool(self.waiters) and not self.ready())
 
     @property
-    def busy(self) -> bool:
+    def has_connections(self) -> bool:
         """Whether there are connections with the server, which make a probe needless."""
         return bool(self._links)
 
@@ -426,7 +426,7 @@ class TcprosRequester(ServiceRequester):
 
 
 class ServiceLink:
-    """A connection to a server; in the loop's thread, except :meth:`send` and :meth:`quiet`.
+    """A connection to a server; in the loop's thread, except :meth:`send` and :meth:`has_nothing_to_read`.
 
     Args:
         core: The node.
@@ -486,11 +486,11 @@ class ServiceLink:
         """Send a request, once the server has accepted the connection."""
         self._connection.send([_length.pack(len(data)), data])
 
-    def quiet(self) -> bool:
+    def has_nothing_to_read(self) -> bool:
         """Return whether the socket has neither data nor its end to read; from any thread."""
-        return self._connection.quiet()
+        return self._connection.has_nothing_to_read()
 
-    def lives(self) -> bool:
+    def is_alive(self) -> bool:
         """Return whether the server has not closed it; reads the socket's data."""
         self._connection.ready(READ)
         return not self._connection.closed
@@ -617,11 +617,11 @@ class ServiceFinder:
     def current(self) -> ServiceLocation | None:
         """Return the location; if it is not known or too old, look it up and return None."""
         if self.location is None or time.monotonic() - self.asked > _CACHE_S:
-            self.look()
+            self.look_up()
             return None
         return self.location
 
-    def look(self) -> None:
+    def look_up(self) -> None:
         """Look up the location, and probe the server if it is new or due."""
         if self._looking or self._retrying or self._closed:
             return
@@ -658,19 +658,19 @@ class ServiceFinder:
         self.location = location
         self._owner.on_server_found(moved)
         wanted = self.peer is None or moved or self.asked >= self._due
-        if wanted and not self._probing and not self._owner.busy:
+        if wanted and not self._probing and not self._owner.has_connections:
             self._probe(location)
 
     def _retry(self) -> None:
         """Look up the server again soon if calls or threads wait for it."""
-        if self._owner.waits and not self._retrying:
+        if self._owner.is_awaited and not self._retrying:
             self._retrying = True
             self._core.loop.after(_RETRY_S, self._again)
 
     def _again(self) -> None:
         self._retrying = False
-        if self._owner.waits:
-            self.look()
+        if self._owner.is_awaited:
+            self.look_up()
 
     # -- the type --------------------------------------------------------------------------------
 
@@ -743,7 +743,7 @@ class ServiceFinder:
         self._owner.on_server_changed()
         self._retry()
 
-    def lose(self, link: ServiceLink, reason: str) -> None:
+    def on_link_lost(self, link: ServiceLink, reason: str) -> None:
         """Handle a connection that has ended unexpectedly."""
         if link.peer is None and not link.refusal:
             self.fail(link.location, reason)
@@ -751,10 +751,10 @@ class ServiceFinder:
         if self.location in (None, link.location):
             self.asked = self._due = 0.0
         self._owner.on_server_changed()
-        if self._owner.waits:
+        if self._owner.is_awaited:
             self._retry()
         else:
-            self.look()
+            self.look_up()
 
     # -- following the graph ---------------------------------------------------------------------
 
@@ -765,13 +765,13 @@ class ServiceFinder:
         nodes = self._core.graph.services().get(self.name, [])
         if nodes != self._nodes:
             self._nodes, self._due = nodes, 0.0
-            if not nodes and not self._owner.waits:
+            if not nodes and not self._owner.is_awaited:
                 self.location = self.peer = None
                 self._fault = ""
         # The graph lags: a server that appears and leaves between two polls is never in it.
         known = bool(nodes or self._fault) or self.peer is not None
-        if (known and time.monotonic() >= self._due) or self._owner.waits:
-            self.look()
+        if (known and time.monotonic() >= self._due) or self._owner.is_awaited:
+            self.look_up()
         self._owner.on_server_changed()
 
     def close(self) -> None:

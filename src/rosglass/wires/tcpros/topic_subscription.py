@@ -154,7 +154,7 @@ class TopicSubscription(Member):
 
     # -- publishers, in the loop's thread --------------------------------------------------------
 
-    def inform(self) -> None:
+    def notify_feeds(self) -> None:
         """Notify the subscriptions' feeds of a change; from any thread."""
         for reader in self.readers:
             reader.feed.request_update()
@@ -170,7 +170,7 @@ class TopicSubscription(Member):
             if not left:
                 link.resume()
                 link.set_eager(self.eager)
-                self.inform()
+                self.notify_feeds()
 
         for reader in readers:
             reader.negotiate_type(link, decided)
@@ -184,7 +184,7 @@ class TopicSubscription(Member):
         if link.epoch != self._epoch:
             # The master does not list it: it was kept for its last messages.
             self._remove(link)
-        self.inform()
+        self.notify_feeds()
 
     def on_publishers_changed(self, uris: list[str]) -> None:
         """Connect to new publishers, and drop those that have left; from any thread."""
@@ -207,7 +207,7 @@ class TopicSubscription(Member):
                 self._links[uri] = PublisherLink(self, uri, self._epoch)
             else:
                 known.epoch = self._epoch
-        self.inform()
+        self.notify_feeds()
 
     def _remove_later(self, link: PublisherLink) -> None:
         """Remove a publisher after its last messages, unless the master lists it again."""
@@ -705,7 +705,7 @@ class PublisherLink:
         received = time.time_ns()
         self._count += len(frames)
         if self._silence.problem:
-            self.subscription.inform()  # it is none any more
+            self.subscription.notify_feeds()  # it is none any more
         if self._latches:
             self.latched = frames[-1]
         try:

@@ -50,7 +50,7 @@ class Topics:
         self._lock = threading.Lock()
         self._publications: dict[str, Publication] = {}
         #: Handlers for the subscribers of topics that are not published yet.
-        self._stand_ins: dict[str, Callable[[Connection, dict[str, str]], str]] = {}
+        self._subscriber_handlers: dict[str, Callable[[Connection, dict[str, str]], str]] = {}
         self._subscribed: dict[str, TopicSubscription] = {}
         core.create_writer = self.create_writer
 
@@ -120,14 +120,14 @@ class Topics:
     def accept(self, link: Connection, header: dict[str, str]) -> str:
         """Accept a subscriber's connection; return the reason if it is refused."""
         topic = header.get("topic", "")
-        publication, stand_in = self._publications.get(topic), self._stand_ins.get(topic)
+        publication, handler = self._publications.get(topic), self._subscriber_handlers.get(topic)
         if publication is not None:
             return publication.accept(link, header)
-        if stand_in is not None:
-            return stand_in(link, header)
+        if handler is not None:
+            return handler(link, header)
         return f"{self._core.name} does not publish {header.get('topic')}"
 
-    def stand_in(
+    def set_subscriber_handler(
         self, topic: str, accept: Callable[[Connection, dict[str, str]], str] | None
     ) -> None:
         """Set the handler for subscribers of a topic while it is not published.
@@ -138,13 +138,13 @@ class Topics:
                 to remove the handler.
         """
         if accept is None:
-            self._stand_ins.pop(topic, None)
+            self._subscriber_handlers.pop(topic, None)
         else:
-            self._stand_ins[topic] = accept
+            self._subscriber_handlers[topic] = accept
 
     def serves(self, topic: str) -> bool:
         """Return whether subscribers of a topic may connect."""
-        return topic in self._publications or topic in self._stand_ins
+        return topic in self._publications or topic in self._subscriber_handlers
 
     def drop(self, link: Connection) -> None:
         """Remove a subscriber's connection that has ended."""
