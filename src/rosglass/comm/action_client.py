@@ -268,7 +268,7 @@ class ClientGoal(Handle):
         self._feedback_listeners.clear()
         self._status_listeners.clear()
         error = NodeClosedError(f"{self._label} was closed: its end is unknown")
-        self._jobs.add(lambda: self._lose(error))
+        self._jobs.add(lambda: self._end_as_lost(error))
 
     # -- the protocol, in jobs -------------------------------------------------------------------
 
@@ -277,11 +277,11 @@ class ClientGoal(Handle):
         """Request the server to cancel it, or end it if it was not sent yet."""
 
     @abstractmethod
-    def _lose(self, error: BaseException) -> None:
+    def _end_as_lost(self, error: BaseException) -> None:
         """End it as LOST, unless it has ended."""
 
     @abstractmethod
-    def _give_up(self) -> None:
+    def _on_timeout(self) -> None:
         """End it at its timeout, unless a server has answered."""
 
     # -- for the protocol, in jobs ---------------------------------------------------------------
@@ -289,7 +289,7 @@ class ClientGoal(Handle):
     def _wait(self) -> None:
         """Start the timeout of the wait for a server."""
         if self._timeout is not None and not self._done.done():
-            give_up = partial(self._jobs.add, self._give_up)
+            give_up = partial(self._jobs.add, self._on_timeout)
             self._server_timeout = self._client._core.timers.after(self._timeout, give_up)
 
     def _set_status(self, status: GoalStatus) -> None:
@@ -311,7 +311,7 @@ class ClientGoal(Handle):
         self._client._forget(self)
         cancels, self._cancels = self._cancels, []
         for answer, _ in cancels:
-            answer.set_result(self._too_late())
+            answer.set_result(self._answer_after_end())
         if self._server_timeout is not None:
             self._server_timeout.close()
         if isinstance(end, ActionResult):
@@ -334,7 +334,7 @@ class ClientGoal(Handle):
             error = TimeoutError(failure)
             self._client._core.timers.after(timeout, lambda: answer.set_exception(error))
 
-    def _too_late(self) -> CancelAnswer:
+    def _answer_after_end(self) -> CancelAnswer:
         """Return the answer to a request to cancel the goal that arrives after its end."""
         return CancelAnswer((), f"the goal has ended already: {self._status.value}")
 
@@ -385,7 +385,7 @@ class ActionClient(Client):
     @property
     def goals(self) -> Sequence[ClientGoal]:
         """The client's goals that have not ended, in order of sending."""
-        return tuple(self._live())
+        return tuple(self._open_goals())
 
     def send_goal(
         self,
@@ -515,7 +515,7 @@ class ActionClient(Client):
 
     # -- for the protocol ------------------------------------------------------------------------
 
-    def _live(self) -> list[Any]:
+    def _open_goals(self) -> list[Any]:
         with self._lock:
             return list(self._goals.values())
 
@@ -524,27 +524,27 @@ class ActionClient(Client):
         with self._lock:
             self._goals.pop(goal.id, None)
 
-    def _ended(self) -> NodeClosedError:
+    def _client_closed_error(self) -> NodeClosedError:
         """Return the error of goals whose client was closed."""
         return NodeClosedError(
             f"the client of {self.name} was closed before the goal ended, which continues"
         )
 
-    def _unsent(self, timeout: float | None) -> ServiceUnavailableError:
+    def _not_sent_error(self, timeout: float | None) -> ServiceUnavailableError:
         """Return the error of goals that found no server within `timeout` seconds."""
         why = self.problem or "its server appeared too late"
         return ServiceUnavailableError(
             f"no goal could be sent to {self.name} within {timeout or 0.0:g} s: {why}"
         )
 
-    def _not_cancelled(self, timeout: float | None) -> ServiceUnavailableError:
+    def _not_cancelled_error(self, timeout: float | None) -> ServiceUnavailableError:
         """Return the error of requests to cancel that found no server within `timeout` seconds."""
         why = self.problem or "its server appeared too late"
         return ServiceUnavailableError(
             f"{self.name} could not be asked to cancel within {timeout or 0.0:g} s: {why}"
         )
 
-    def _no_server(self, offered: Iterable[str]) -> str:
+    def _no_server_message(self, offered: Iterable[str]) -> str:
         """Return the message that the action has no server, with a hint at a similar one."""
         kind = "" if self.type is None else f" [{self.type.name}]"
         return (

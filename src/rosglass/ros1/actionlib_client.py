@@ -239,7 +239,7 @@ class ActionlibClientGoal(ClientGoal):
             NodeClosedError: The client was closed.
         """
         if self._client.closed:
-            raise self._client._ended()
+            raise self._client._client_closed_error()
         if self._done.done():
             raise Error(f"{self._label} has ended as {self._status.value}: send a new goal instead")
         self._jobs.add(self._resend)
@@ -270,7 +270,7 @@ class ActionlibClientGoal(ClientGoal):
             }
             self._client._send(sent)
         except Error as error:
-            self._lose(error)
+            self._end_as_lost(error)
         else:
             self._sent, self.server, self._epoch = sent, server, epoch
 
@@ -282,14 +282,14 @@ class ActionlibClientGoal(ClientGoal):
         self._on_state(reported, text)
         waits = self._machine.state is CommState.WAITING_FOR_CANCEL_ACK
         if waits and self._repeats < _REPEATS and time.monotonic() - self._asked >= _REPEAT_S:
-            self._repeats += self._ask_cancel()
+            self._repeats += self._send_cancel_request()
 
     def _on_missing(self, server: str) -> None:
         """Handle a status message without it."""
         if not self._known or server != self.server or self._done.done():
             return
         if self._machine.state is not CommState.WAITING_FOR_RESULT:
-            self._lose(
+            self._end_as_lost(
                 ConnectionLostError(
                     f"the server of {self._client.name} ({server}) does not know goal "
                     f"{self._id_text} any more: the server was restarted, or the goal ended and "
@@ -329,7 +329,7 @@ class ActionlibClientGoal(ClientGoal):
         else:
             self._finish(ActionResult(status, result))
 
-    def _watch(self, status_publishers: dict[str, str], epoch: int, settled: bool) -> None:
+    def _check_server(self, status_publishers: dict[str, str], epoch: int, settled: bool) -> None:
         """Check whether its server is still there.
 
         Args:
@@ -343,8 +343,8 @@ class ActionlibClientGoal(ClientGoal):
         if self.server in status_publishers:
             self._alone = None
             if not self._known and settled and epoch != self._epoch:
-                self._client._ask_cancel(self._id_text)  # nothing must run unsupervised
-                self._lose(
+                self._client._send_cancel_request(self._id_text)  # nothing must run unsupervised
+                self._end_as_lost(
                     self._server_lost_error("was disconnected after it was sent the goal, before")
                 )
             return
@@ -358,9 +358,9 @@ class ActionlibClientGoal(ClientGoal):
         if self._machine.state is CommState.WAITING_FOR_RESULT:
             self._lose_result(f"its server ({self.server}) {what} it sent the result")
         else:
-            self._lose(self._server_lost_error(what))
+            self._end_as_lost(self._server_lost_error(what))
 
-    def _lose(self, error: BaseException) -> None:
+    def _end_as_lost(self, error: BaseException) -> None:
         """End it as LOST, unless it has ended."""
         if not self._done.done():
             self._transition(self._machine.on_server_lost())
@@ -377,23 +377,23 @@ class ActionlibClientGoal(ClientGoal):
 
     def _lose_result(self, why: str) -> None:
         ended = self._machine.status.value
-        self._lose(ConnectionLostError(f"{self._label} has ended as {ended}, but {why}"))
+        self._end_as_lost(ConnectionLostError(f"{self._label} has ended as {ended}, but {why}"))
 
-    def _give_up(self) -> None:
+    def _on_timeout(self) -> None:
         """Fail it: the server has not acknowledged it in time."""
         if self._done.done() or self._known:
             return
         client, seconds = self._client, self._timeout or 0.0
         if self._sent is None:
-            self._lose(client._unsent(seconds))
+            self._end_as_lost(client._not_sent_error(seconds))
             return
-        client._ask_cancel(self._id_text)  # nothing must run unsupervised
+        client._send_cancel_request(self._id_text)  # nothing must run unsupervised
         reason = (
             f"the server of {client.name} ({self.server}) did not acknowledge goal "
             f"{self._id_text} within {seconds:g} s; its cancellation was requested, in case the "
             "server receives it later"
         )
-        self._lose(TimeoutError(reason))
+        self._end_as_lost(TimeoutError(reason))
 
     def _resend(self) -> None:
         if self._sent is not None and not self._done.done():
@@ -401,7 +401,7 @@ class ActionlibClientGoal(ClientGoal):
 
     def _cancel(self, answer: Promise[CancelAnswer], timeout: float | None) -> None:
         if self._done.done():
-            answer.set_result(self._too_late())
+            answer.set_result(self._answer_after_end())
         elif self._sent is None:
             self._withdraw()
             answer.set_result(CancelAnswer((self.id,)))
@@ -412,7 +412,7 @@ class ActionlibClientGoal(ClientGoal):
             )
             self._add_cancel(answer, timeout, failure)
             self._repeats = 0
-            self._ask_cancel()
+            self._send_cancel_request()
             self._transition(self._machine.cancel())
 
     def _withdraw(self) -> None:
@@ -425,9 +425,9 @@ class ActionlibClientGoal(ClientGoal):
         else:
             self._finish(self._without_result())
 
-    def _ask_cancel(self) -> bool:
+    def _send_cancel_request(self) -> bool:
         self._asked = time.monotonic()
-        return self._client._ask_cancel(self._id_text)
+        return self._client._send_cancel_request(self._id_text)
 
     def _on_state(self, reported: ServerState, text: str) -> None:
         try:
@@ -461,7 +461,7 @@ class ActionlibClientGoal(ClientGoal):
             cancels, self._cancels = self._cancels, []
             for answer, _ in cancels:
                 answer.set_result(
-                    CancelAnswer((self.id,)) if last in _CANCELED else self._too_late()
+                    CancelAnswer((self.id,)) if last in _CANCELED else self._answer_after_end()
                 )
 
 
@@ -485,7 +485,7 @@ class ActionlibClient(ActionClient, Member):
         #: Runs everything that changes the client and its goals, one after the other.
         self._jobs = InOrder()
         self._topics = topics
-        self._ends: _ClientTopics | None = None
+        self._endpoints: _ClientTopics | None = None
         self._discovery: ActionDiscovery | None = None
         #: The server that goals are sent to; empty without one.
         self._server, self._since, self._epoch = "", 0.0, 0
@@ -574,19 +574,19 @@ class ActionlibClient(ActionClient, Member):
 
     def _send(self, goal: dict[str, Any]) -> None:
         """Publish a goal; raises ConversionError."""
-        if self._ends is not None:
-            self._ends.send_goal(goal)
+        if self._endpoints is not None:
+            self._endpoints.send_goal(goal)
 
-    def _ask_cancel(self, id_text: str) -> bool:
+    def _send_cancel_request(self, id_text: str) -> bool:
         """Publish a request to cancel one goal; return whether a server is connected."""
-        ends = self._ends
-        return ends is not None and not self._closed and ends.send_cancel(id_text, Time())
+        endpoints = self._endpoints
+        return endpoints is not None and not self._closed and endpoints.send_cancel(id_text, Time())
 
     # -- jobs ------------------------------------------------------------------------------------
 
     def _send_or_wait(self, goal: ActionlibClientGoal) -> None:
         if self.closed:
-            goal._lose(self._ended())
+            goal._end_as_lost(self._client_closed_error())
             return
         goal._wait()
         self._update_server()  # a goal must not be sent to a server that has left
@@ -597,7 +597,7 @@ class ActionlibClient(ActionClient, Member):
         if self.closed:
             request.answer.set_exception(NodeClosedError(f"the client of {self.name} was closed"))
             return
-        for goal in self._live():
+        for goal in self._open_goals():
             if goal._is_unsent and (request.until is None or goal.stamp <= request.until):
                 goal.cancel()
         self._update_server()  # a stop command must not be sent to a server that has left
@@ -605,12 +605,12 @@ class ActionlibClient(ActionClient, Member):
         self._send_bulk_cancels()
 
     def _send_bulk_cancels(self) -> None:
-        ends = self._ends
-        if self._server and ends is not None:
+        endpoints = self._endpoints
+        if self._server and endpoints is not None:
             for request in self._bulk_cancels:
                 if not request.sent:
                     request.on_sent(self._lists.get(self._server, {}))
-                    ends.send_cancel("", request.until or Time())
+                    endpoints.send_cancel("", request.until or Time())
 
     def _expire_bulk_cancel(self, request: BulkCancel, timeout: float) -> None:
         if request not in self._bulk_cancels:
@@ -623,7 +623,7 @@ class ActionlibClient(ActionClient, Member):
             )
             request.answer.set_exception(TimeoutError(reason))
         else:
-            request.answer.set_exception(self._not_cancelled(timeout))
+            request.answer.set_exception(self._not_cancelled_error(timeout))
 
     def _take_status(self, server: str, message: Message) -> None:
         entries = {
@@ -632,7 +632,7 @@ class ActionlibClient(ActionClient, Member):
         }
         self._lists[server], self._heard[server] = entries, time.monotonic()
         self._update_server()
-        for goal in self._live():
+        for goal in self._open_goals():
             entry = entries.get(goal.id_text)
             if entry is None:
                 goal._on_missing(server)
@@ -655,14 +655,14 @@ class ActionlibClient(ActionClient, Member):
 
     def _update_server(self) -> None:
         """Choose the server, and send it what waits for one."""
-        ends = self._ends
-        if ends is None or self._closed:
+        endpoints = self._endpoints
+        if endpoints is None or self._closed:
             return
-        status_publishers = ends.status_publishers()
+        status_publishers = endpoints.status_publishers()
         for known in (self._lists, self._heard):
             for name in known.keys() - status_publishers.keys():
                 known.pop(name)
-        complete = sorted(name for name in self._heard if not ends.missing(name))
+        complete = sorted(name for name in self._heard if not endpoints.missing(name))
         if self._server in complete:
             return
         was, self._server = self._server, next(iter(complete), "")
@@ -671,23 +671,23 @@ class ActionlibClient(ActionClient, Member):
                 self._readiness.update()
             return
         self._since, self._epoch = time.monotonic(), self._epoch + 1
-        for goal in self._live():
+        for goal in self._open_goals():
             if goal._is_unsent:
                 goal._send(self._server, self._epoch)
         self._send_bulk_cancels()
         self._readiness.update()
 
-    def _watch(self) -> None:
+    def _check_server(self) -> None:
         """Check whether the servers of goals are still there."""
         self._update_server()
-        ends = self._ends
-        if ends is None or self._closed:
+        endpoints = self._endpoints
+        if endpoints is None or self._closed:
             return
-        status_publishers = ends.status_publishers()
+        status_publishers = endpoints.status_publishers()
         settled = time.monotonic() - self._since >= _SETTLED_S
-        for goal in self._live():
-            goal._watch(status_publishers, self._epoch, settled)
-        for server in {goal.server for goal in self._live() if goal._sent is not None}:
+        for goal in self._open_goals():
+            goal._check_server(status_publishers, self._epoch, settled)
+        for server in {goal.server for goal in self._open_goals() if goal._sent is not None}:
             silent = time.monotonic() - self._heard.get(server, time.monotonic())
             if silent >= _SILENCE_S and server not in self._asked:
                 self._asked.add(server)
@@ -713,7 +713,7 @@ class ActionlibClient(ActionClient, Member):
             self._heard.pop(server)
             self._server = "" if self._server == server else self._server
             self._readiness.update()
-            for goal in self._live():
+            for goal in self._open_goals():
                 if goal.server == server:
                     goal._lose_server(f"stopped responding ({problem}) before")
 
@@ -751,7 +751,7 @@ class ActionlibClient(ActionClient, Member):
         if self._discovery is not None:
             self._discover(self._discovery)
         self._log_conflicts(_log)
-        self._jobs.add(self._watch)
+        self._jobs.add(self._check_server)
 
     def _discover(self, discovery: ActionDiscovery) -> None:
         types = discovery.types()
@@ -772,43 +772,43 @@ class ActionlibClient(ActionClient, Member):
             RESULT: self._on_result,
             FEEDBACK: self._on_feedback,
         }
-        ends = _ClientTopics(self._core, self._topics, self.name, types, callbacks)
+        endpoints = _ClientTopics(self._core, self._topics, self.name, types, callbacks)
         with self._lock:
             self.type = types.action
             closed = self._closed
             if not closed:
-                self._ends = ends
+                self._endpoints = endpoints
         if closed:
-            ends.close()
+            endpoints.close()
 
     def _server_conflicts(self) -> list[str]:
-        discovery, ends = self._discovery, self._ends
+        discovery, endpoints = self._discovery, self._endpoints
         if discovery is not None:
             return [discovery.problem] if discovery.problem else []
-        return [] if ends is None else ends.problems()
+        return [] if endpoints is None else endpoints.problems()
 
     def _unavailable_reason(self) -> str:
-        ends = self._ends
-        connecting = "" if ends is None else ends.unavailable_reason(self._heard)
+        endpoints = self._endpoints
+        connecting = "" if endpoints is None else endpoints.unavailable_reason(self._heard)
         if connecting:
             return connecting
         names = served_actions(self._core.graph)
         if self.name in names:
             return f"the server of {self.name} is not connected yet"
-        return self._no_server(names)
+        return self._no_server_message(names)
 
     # -- the end ---------------------------------------------------------------------------------
 
     def _withdraw(self) -> None:
         self._jobs.add(self._end)
-        for end in (self._ends, self._discovery):
+        for end in (self._endpoints, self._discovery):
             if end is not None:
                 end.close()
         self._core.remove(self)
 
     def _end(self) -> None:
-        for goal in self._live():
-            goal._lose(self._ended())
+        for goal in self._open_goals():
+            goal._end_as_lost(self._client_closed_error())
         reason = f"the client of {self.name} was closed before the server cancelled the goals"
         for request in self._bulk_cancels:
             request.answer.set_exception(NodeClosedError(reason))

@@ -116,11 +116,11 @@ class Ros2ClientGoal(ClientGoal):
         self._held: deque[Message] = deque(maxlen=FEEDBACK_DEPTH)
         self._early_status: tuple[GoalStatus, Time] | None = None
         self._sending: Call | None = None
-        self._asking: Call | None = None
+        self._result_call: Call | None = None
         self._servers: frozenset[bytes | str] = frozenset()
         self._queried: frozenset[bytes | str] = frozenset()
         self._lost_at: float | None = None
-        self._asked = 0.0
+        self._result_requested_at = 0.0
 
     @property
     def accepted(self) -> Time | None:
@@ -132,11 +132,11 @@ class Ros2ClientGoal(ClientGoal):
     def _send(self) -> None:
         """Send the goal as soon as a server is available; again if the type has changed."""
         left = None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
-        call = self._client._ask_goal(self, left)
+        call = self._client._send_goal_request(self, left)
         self._sending = call
         call.add_done_callback(lambda _: self._jobs.add(lambda: self._on_answer(call)))
 
-    def _take_back(self, service: ActionServiceClient) -> bool:
+    def _withdraw_request(self, service: ActionServiceClient) -> bool:
         """Withdraw the goal if its request was not sent yet; return whether that was so."""
         call, self._sending = self._sending, None  # the call's end must not end the goal
         if call is None or service.withdraw(call):
@@ -156,7 +156,7 @@ class Ros2ClientGoal(ClientGoal):
             self._lose_later(error)
 
     def _lose_later(self, error: Error) -> None:
-        self._jobs.add(lambda: self._lose(error))
+        self._jobs.add(lambda: self._end_as_lost(error))
 
     # -- sending ---------------------------------------------------------------------------------
 
@@ -167,15 +167,15 @@ class Ros2ClientGoal(ClientGoal):
         kind = self._client.type
         try:
             if kind is None:
-                raise self._client._ended()
+                raise self._client._client_closed_error()
             self.goal = kind.goal.create(self._given)
             self._send()
         except Error as error:
-            self._lose(self._closing(error))
+            self._end_as_lost(self._or_client_closed(error))
 
-    def _give_up(self) -> None:
+    def _on_timeout(self) -> None:
         if self.goal is None:
-            self._lose(self._client._unsent(self._timeout))
+            self._end_as_lost(self._client._not_sent_error(self._timeout))
 
     def _on_answer(self, call: Call) -> None:
         """Handle the response to the goal request."""
@@ -196,22 +196,22 @@ class Ros2ClientGoal(ClientGoal):
         elif self._early_status is not None:
             self._accept(self._early_status[1])  # the response was lost, but not the goal
         else:
-            self._lose(self._explain(error))
+            self._end_as_lost(self._explain(error))
 
     def _explain(self, error: BaseException) -> Error:
         name, seconds = self._client.name, self._timeout or 0.0
         if isinstance(error, ServiceUnavailableError):
-            return self._client._unsent(seconds)
+            return self._client._not_sent_error(seconds)
         if isinstance(error, (TimeoutError, ConnectionLostError)):
             # It may have been accepted, or be later: no goal may run without its client.
-            self._client._ask_cancel(self.id, Time(), Promise(cancellable=False), 10.0)
+            self._client._send_cancel_request(self.id, Time(), Promise(cancellable=False), 10.0)
         if isinstance(error, TimeoutError):
             return TimeoutError(
                 f"the server of {name} neither accepted nor rejected goal {self.id_text} within "
                 f"{seconds:g} s; it was asked to cancel it, should it accept it yet"
             )
         if isinstance(error, NodeClosedError) and not self._client.closed:
-            return self._client._replaced()
+            return self._client._server_replaced_error()
         return error if isinstance(error, Error) else ConnectionLostError(str(error))
 
     def _accept(self, stamp: Time) -> None:
@@ -224,11 +224,13 @@ class Ros2ClientGoal(ClientGoal):
             self._on_status(*early)
         while self._held:
             self._add_feedback(self._held.popleft())
-        self._ask_soon(0.0)
+        self._request_result_later(0.0)
         cancels, self._cancels = self._cancels, []
         for answer, deadline in cancels:
             left = None if deadline is None else max(0.0, deadline - time.monotonic())
-            self._later(0.0, partial(self._client._ask_cancel, self.id, Time(), answer, left))
+            self._after(
+                0.0, partial(self._client._send_cancel_request, self.id, Time(), answer, left)
+            )
 
     # -- while it runs ---------------------------------------------------------------------------
 
@@ -237,22 +239,22 @@ class Ros2ClientGoal(ClientGoal):
         if self._status is GoalStatus.PENDING:
             self._early_status = (status, accepted)
             return
-        self._alive()
+        self._on_server_back()
         known = self._status
         self._advance(status)
         if known.is_active and not status.is_active:
             # The server has sent the result, which can be lost with a link.
-            self._later(_RETRY_S, lambda: self._jobs.add(self._ask_again))
+            self._after(_RETRY_S, lambda: self._jobs.add(self._request_result_again))
 
     def _on_feedback(self, feedback: Message) -> None:
         """Handle feedback."""
         if self._status is GoalStatus.PENDING:
             self._held.append(feedback)
         elif not self._done.done():
-            self._alive()
+            self._on_server_back()
             self._add_feedback(feedback)
 
-    def _alive(self) -> None:
+    def _on_server_back(self) -> None:
         """Record that the goal has a server again, the former one or another."""
         if self._lost_at is not None:
             self._lost_at, self._servers = None, self._client._servers()
@@ -265,13 +267,13 @@ class Ros2ClientGoal(ClientGoal):
     def _cancel(self, answer: Promise[CancelAnswer], timeout: float | None) -> None:
         call = self._sending
         if not self._status.is_active:
-            answer.set_result(self._too_late())
+            answer.set_result(self._answer_after_end())
         elif self.goal is None:
             self._end(GoalStatus.CANCELED, self._without_result())
             answer.set_result(CancelAnswer((self.id,)))
         elif self._status is not GoalStatus.PENDING:
-            self._client._ask_cancel(self.id, Time(), answer, timeout)
-        elif call is not None and self._client._take_back(call):
+            self._client._send_cancel_request(self.id, Time(), answer, timeout)
+        elif call is not None and self._client._withdraw_request(call):
             answer.set_result(CancelAnswer((self.id,)))
         else:
             # Only an accepted goal can be cancelled: wait for the server's response.
@@ -281,26 +283,26 @@ class Ros2ClientGoal(ClientGoal):
             )
             self._add_cancel(answer, timeout, failure)
 
-    def _watch(self) -> None:
+    def _check_server(self) -> None:
         if self._status is GoalStatus.PENDING or self._done.done():
             return
         here = self._client._servers()
         now = time.monotonic()
         if not self._servers:
             self._servers = here
-        if not self._status.is_active and now - self._asked >= _OVERDUE_S:
-            self._ask_again()
+        if not self._status.is_active and now - self._result_requested_at >= _OVERDUE_S:
+            self._request_result_again()
         if self._servers & here:
             if self._lost_at is not None:
                 self._lost_at = None
-                self._ask_again()  # the request may have been lost with the link
+                self._request_result_again()  # the request may have been lost with the link
             return
         if self._lost_at is None:
             self._lost_at = now
         if here - self._queried:
             # A server that replaced the goal's server reports the goal as unknown.
             self._queried |= here
-            self._ask_again()
+            self._request_result_again()
         status = self._client._core.status()
         cut_off = not here and status.state is not ConnectionState.CONNECTED
         known = not self._status.is_active
@@ -312,30 +314,30 @@ class Ros2ClientGoal(ClientGoal):
                     f"{self._status.value}"
                 )
             lost = f"the server of {self._client.name} went away before {event}"
-            self._lose(ConnectionLostError(f"{lost} ({self._client._core.url}: {status})"))
+            self._end_as_lost(ConnectionLostError(f"{lost} ({self._client._core.url}: {status})"))
 
     # -- the result ------------------------------------------------------------------------------
 
-    def _ask_soon(self, delay: float) -> None:
+    def _request_result_later(self, delay: float) -> None:
         """Request the result after `delay` seconds, not on a thread of the middleware."""
-        self._later(delay, lambda: self._jobs.add(self._ask))
+        self._after(delay, lambda: self._jobs.add(self._request_result))
 
-    def _ask_again(self) -> None:
-        asking, self._asking = self._asking, None
+    def _request_result_again(self) -> None:
+        asking, self._result_call = self._result_call, None
         if asking is not None:
             asking.cancel()
         if not self._done.done():
-            self._ask_soon(0.0)
+            self._request_result_later(0.0)
 
-    def _ask(self) -> None:
-        if self._done.done() or self._asking is not None:
+    def _request_result(self) -> None:
+        if self._done.done() or self._result_call is not None:
             return
         try:
-            call = self._client._ask_result(self)
+            call = self._client._send_result_request(self)
         except Error as error:
-            self._lose(self._closing(error))
+            self._end_as_lost(self._or_client_closed(error))
             return
-        self._asking, self._asked = call, time.monotonic()
+        self._result_call, self._result_requested_at = call, time.monotonic()
         call.add_done_callback(lambda _: self._on_result(call))
 
     def _on_result(self, call: Call) -> None:
@@ -344,9 +346,9 @@ class Ros2ClientGoal(ClientGoal):
         self._jobs.add(lambda: self._take_result(call))
 
     def _take_result(self, call: Call) -> None:
-        if call is not self._asking:
+        if call is not self._result_call:
             return
-        self._asking = None
+        self._result_call = None
         error = call.exception(0)
         if error is None:
             response = call.result(0)
@@ -356,24 +358,24 @@ class Ros2ClientGoal(ClientGoal):
                     f"the server of {self._client.name} does not know goal {self.id_text} any "
                     "more: it was restarted, or did not keep the result for long enough"
                 )
-                self._lose(lost)
+                self._end_as_lost(lost)
             elif status.is_active:
-                self._ask_soon(_RETRY_S)  # the server does not wait for the end
+                self._request_result_later(_RETRY_S)  # the server does not wait for the end
             else:
                 self._end(status, ActionResult(status, response.result))
         elif isinstance(error, NodeClosedError) or isinstance(error.__cause__, DecodeError):
-            self._lose(self._closing(error))
+            self._end_as_lost(self._or_client_closed(error))
         else:
             _log.debug("%s: asking for its result failed, trying again: %s", self._label, error)
-            self._ask_soon(_RETRY_S)
+            self._request_result_later(_RETRY_S)
 
-    def _closing(self, error: BaseException) -> BaseException:
+    def _or_client_closed(self, error: BaseException) -> BaseException:
         """Return the goal's error: a request may fail before the client closes the goal."""
         if isinstance(error, NodeClosedError) and self._client.closed:
-            return self._client._ended()
+            return self._client._client_closed_error()
         return error
 
-    def _lose(self, error: BaseException) -> None:
+    def _end_as_lost(self, error: BaseException) -> None:
         """End the goal as LOST, unless it has ended."""
         self._end(GoalStatus.LOST, error)
 
@@ -381,12 +383,12 @@ class Ros2ClientGoal(ClientGoal):
         if self._done.done():
             return
         self._advance(status)
-        asking, self._asking = self._asking, None
+        asking, self._result_call = self._result_call, None
         if asking is not None:
             asking.cancel()
         self._finish(end)
 
-    def _later(self, delay: float, job: Callable[[], None]) -> None:
+    def _after(self, delay: float, job: Callable[[], None]) -> None:
         self._client._core.timers.after(delay, job)
 
 
@@ -406,7 +408,7 @@ class Ros2ActionClient(ActionClient, NodeMember):
     def __init__(self, core: Core, name: str, wanted: ActionType | str | None) -> None:
         super().__init__(core, name, _END_OF_TIME)
         self._version = ActionVersion(core, name, wanted)
-        self._ends: _ClientEndpoints | None = None
+        self._endpoints: _ClientEndpoints | None = None
         #: Jobs that wait for the type.
         self._held: list[Callable[[], None]] = []
         self._version.follow(retry=True)
@@ -416,8 +418,12 @@ class Ros2ActionClient(ActionClient, NodeMember):
 
     def _is_ready(self) -> bool:
         """Return whether all services of a server of this type are linked."""
-        ends = self._ends
-        return ends is not None and not self._closed and all(end.ready for end in ends.services)
+        endpoints = self._endpoints
+        return (
+            endpoints is not None
+            and not self._closed
+            and all(end.ready for end in endpoints.services)
+        )
 
     # -- sending and cancelling ------------------------------------------------------------------
 
@@ -429,34 +435,34 @@ class Ros2ActionClient(ActionClient, NodeMember):
             goal._send()
         else:
             goal._wait()
-            self._once_typed(lambda: goal._jobs.add(goal._on_type))
+            self._when_type_known(lambda: goal._jobs.add(goal._on_type))
 
     def _cancel_many(self, until: Time | None, timeout: float | None) -> Promise[CancelAnswer]:
         if until is None:
-            for goal in self._live():
+            for goal in self._open_goals():
                 if goal.accepted is None:
                     goal.cancel(timeout)
         text = f"{self.name} has not answered the request to cancel"
         answer: Promise[CancelAnswer] = Promise(text, self._core.dispatcher, cancellable=False)
-        self._ask_cancel(NO_ID, until or Time(), answer, timeout)
+        self._send_cancel_request(NO_ID, until or Time(), answer, timeout)
         return answer
 
-    def _ask_goal(self, goal: Ros2ClientGoal, timeout: float | None) -> Call:
+    def _send_goal_request(self, goal: Ros2ClientGoal, timeout: float | None) -> Call:
         """Send a goal."""
         request = {"goal_id": {"uuid": goal.id}, "goal": goal.goal}
         return self._open_ends().send_goal.call_async(request, timeout=timeout)
 
-    def _ask_result(self, goal: Ros2ClientGoal) -> Call:
+    def _send_result_request(self, goal: Ros2ClientGoal) -> Call:
         """Request a goal's result, without timeout."""
         request = {"goal_id": {"uuid": goal.id}}
         return self._open_ends().get_result.call_async(request, timeout=None)
 
-    def _ask_cancel(
+    def _send_cancel_request(
         self, goal_id: bytes, stamp: Time, answer: Promise[CancelAnswer], timeout: float | None
     ) -> None:
         """Request to cancel goals: one, those accepted until a time, or all."""
-        if self._ends is None and not self._closed:
-            self._ask_cancel_later(goal_id, stamp, answer, timeout)
+        if self._endpoints is None and not self._closed:
+            self._send_cancel_when_typed(goal_id, stamp, answer, timeout)
             return
         try:
             request = {"goal_info": goal_info(goal_id, stamp)}
@@ -466,7 +472,7 @@ class Ros2ActionClient(ActionClient, NodeMember):
             return
         call.add_done_callback(lambda _: self._on_cancel_answer(goal_id, call, answer, timeout))
 
-    def _ask_cancel_later(
+    def _send_cancel_when_typed(
         self, goal_id: bytes, stamp: Time, answer: Promise[CancelAnswer], timeout: float | None
     ) -> None:
         until = None if timeout is None else time.monotonic() + timeout
@@ -474,38 +480,38 @@ class Ros2ActionClient(ActionClient, NodeMember):
         def ask() -> None:
             if not answer.done():
                 left = None if until is None else max(0.0, until - time.monotonic())
-                self._ask_cancel(goal_id, stamp, answer, left)
+                self._send_cancel_request(goal_id, stamp, answer, left)
 
         def give_up() -> None:
-            if self._ends is None:
-                answer.set_exception(self._not_cancelled(timeout))
+            if self._endpoints is None:
+                answer.set_exception(self._not_cancelled_error(timeout))
 
         if timeout is not None:
             self._core.timers.after(timeout, give_up)
-        self._once_typed(ask)
+        self._when_type_known(ask)
 
-    def _take_back(self, call: Call) -> bool:
+    def _withdraw_request(self, call: Call) -> bool:
         """Withdraw a goal request that was not sent yet; return whether that was so."""
-        ends = self._ends
-        return ends is not None and ends.send_goal.withdraw(call)
+        endpoints = self._endpoints
+        return endpoints is not None and endpoints.send_goal.withdraw(call)
 
     def _flush(self) -> None:
         """Deliver waiting feedback and status."""
-        ends = self._ends
-        if ends is not None:
-            ends.flush()
+        endpoints = self._endpoints
+        if endpoints is not None:
+            endpoints.flush()
 
     def _servers(self) -> frozenset[bytes | str]:
         """Return the identities of the servers of this type."""
-        ends = self._ends
-        return frozenset() if ends is None else ends.send_goal.server_ids()
+        endpoints = self._endpoints
+        return frozenset() if endpoints is None else endpoints.send_goal.server_ids()
 
     def _empty_result(self) -> Message:
         """Return a result with the type's defaults."""
         assert self.type is not None  # goals exist only with a type
         return self.type.result.create()
 
-    def _replaced(self) -> ConnectionLostError:
+    def _server_replaced_error(self) -> ConnectionLostError:
         """Return the error of goals whose server was replaced by one of another version."""
         return ConnectionLostError(
             f"the server of {self.name} was replaced by one with another definition of the type; "
@@ -524,7 +530,7 @@ class Ros2ActionClient(ActionClient, NodeMember):
                 "all the same: watch the goal's status"
             )
         elif isinstance(error, ServiceUnavailableError):
-            error = self._not_cancelled(timeout)
+            error = self._not_cancelled_error(timeout)
         if error is not None:
             answer.set_exception(error)
             return
@@ -549,50 +555,52 @@ class Ros2ActionClient(ActionClient, NodeMember):
             self._replace_endpoints(self._version.types)
         self._log_conflicts(_log, logging.INFO if self._version.pending else logging.WARNING)
         self._readiness.update()
-        for goal in self._live():
-            goal._jobs.add(goal._watch)
+        for goal in self._open_goals():
+            goal._jobs.add(goal._check_server)
 
     def _replace_endpoints(self, types: ActionTypes) -> None:
         """Replace the endpoints with those for a version of the type."""
-        ends = _ClientEndpoints(self._core, self.name, types, self._goals)
+        endpoints = _ClientEndpoints(self._core, self.name, types, self._goals)
         with self._lock:
-            old, self._ends = self._ends, ends
+            old, self._endpoints = self._endpoints, endpoints
             self.type = types.action
             closed = self._closed
             goals = list(self._goals.values())
             held, self._held = self._held, []
         if closed:
-            ends.close()
+            endpoints.close()
         for job in held:
             job()
         if old is None:
             return
         for goal in goals:
-            if goal._take_back(old.send_goal):
+            if goal._withdraw_request(old.send_goal):
                 goal._send_again(types.action.goal)
             elif goal.accepted is not None:
-                goal._lose_later(self._replaced())
+                goal._lose_later(self._server_replaced_error())
         old.close()
 
-    def _once_typed(self, job: Callable[[], None]) -> None:
+    def _when_type_known(self, job: Callable[[], None]) -> None:
         """Run a job as soon as the type is known."""
         with self._lock:
-            if self._ends is None and not self._closed:
+            if self._endpoints is None and not self._closed:
                 self._held.append(job)
                 return
         job()
 
     def _server_conflicts(self) -> list[str]:
         problems = self._version.server_conflicts()
-        ends = self._ends
-        if not problems and ends is not None:
-            problems = [end.middleware_problem for end in ends.services if end.middleware_problem]
+        endpoints = self._endpoints
+        if not problems and endpoints is not None:
+            problems = [
+                end.middleware_problem for end in endpoints.services if end.middleware_problem
+            ]
         return list(dict.fromkeys(problems))
 
     def _unavailable_reason(self) -> str:
-        ends = self._ends
-        if ends is not None and any(end.server_ids() for end in ends.services):
-            missing = ", ".join(end.name for end in ends.services if not end.ready)
+        endpoints = self._endpoints
+        if endpoints is not None and any(end.server_ids() for end in endpoints.services):
+            missing = ", ".join(end.name for end in endpoints.services if not end.ready)
             return f"its server is incomplete, or not linked yet: {missing} does not answer"
         graph = self._core.graph
         offered = [
@@ -600,25 +608,25 @@ class Ros2ActionClient(ActionClient, NodeMember):
             for name in graph.actions()
             if graph.endpoints(EndpointKind.SERVICE_SERVER, part(name, SEND_GOAL))
         ]
-        return self._no_server(offered)
+        return self._no_server_message(offered)
 
     # -- closing ---------------------------------------------------------------------------------
 
     def _withdraw(self) -> None:
         with self._lock:
-            ends, held, self._held = self._ends, self._held, []
-        for goal in self._live():
-            goal._lose_later(self._ended())
+            endpoints, held, self._held = self._endpoints, self._held, []
+        for goal in self._open_goals():
+            goal._lose_later(self._client_closed_error())
         for job in held:
             job()  # fails, as the client is closed
-        if ends is not None:
-            ends.close()
+        if endpoints is not None:
+            endpoints.close()
         self._core.remove(self)
 
     def _open_ends(self) -> _ClientEndpoints:
         self._check_open()
-        assert self._ends is not None  # there is a type
-        return self._ends
+        assert self._endpoints is not None  # there is a type
+        return self._endpoints
 
 
 class _ClientEndpoints(Handle):
@@ -664,9 +672,9 @@ class _ClientEndpoints(Handle):
         endpoint = EndpointInfo(
             EndpointKind.SUBSCRIPTION, full, kind.name, core.name, _QOS, kind.rihs01
         )
-        return core.middleware.create_reader(endpoint, self._taker(topic, kind))
+        return core.middleware.create_reader(endpoint, self._sample_handler(topic, kind))
 
-    def _taker(self, topic: str, kind: MessageType) -> OnSample:
+    def _sample_handler(self, topic: str, kind: MessageType) -> OnSample:
         """Return the function that receives a topic's samples."""
         ours, repeats, feedback = kind.rihs01, Repeats(), topic == FEEDBACK
 
@@ -681,14 +689,14 @@ class _ClientEndpoints(Handle):
             try:
                 if hash not in ("", ours):
                     text = f"another definition of {kind.name} ({hash}, ours is {ours})"
-                    self._complain(topic, gid, text)
+                    self._log_ignored(topic, gid, text)
                 elif not repeats.seen(gid, sequence, sent):
                     if feedback:
                         self._take_feedback(kind, data)
                     else:
                         self._take_status(kind, data)
             except DecodeError as error:
-                self._complain(topic, gid, str(error))
+                self._log_ignored(topic, gid, str(error))
             except Exception:
                 _log.exception("%s: taking %s failed", self._name, topic)
 
@@ -711,7 +719,7 @@ class _ClientEndpoints(Handle):
                 stamp = stamp_of(entry.goal_info.stamp)
                 goal._jobs.add(partial(goal._on_status, status, stamp))
 
-    def _complain(self, topic: str, gid: bytes, reason: str) -> None:
+    def _log_ignored(self, topic: str, gid: bytes, reason: str) -> None:
         """Log an ignored sample, once for each publisher."""
         if not self._log_once.is_first((topic, gid)):
             return

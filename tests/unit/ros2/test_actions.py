@@ -683,7 +683,7 @@ def test_a_goal_whose_client_closes_while_it_asks_for_the_result_says_so(node, c
     assert goal.acceptance.result(30)
     # What a closing client's services answer may come before the goal hears of the end.
     client._closed = True
-    client._ends.get_result.close()
+    client._endpoints.get_result.close()
     with pytest.raises(rosglass.NodeClosedError, match="client of /fib was closed before the goal"):
         goal.result(30)
 
