@@ -113,13 +113,13 @@ class ApproximateTime(Generic[_T]):
                     self._queues[start].popleft()
                     self.dropped += 1
                     continue
-                self._keep()
+                self._make_candidate()
                 self._pivot, self._pivot_time = end, last
             elif self._is_better(first, last):
-                self._keep()
-            self._pass_over(start)
+                self._make_candidate()
+            self._move_front_to_past(start)
             if start == self._pivot or self._is_late(last) or self._is_best():
-                self._give(found)
+                self._publish_candidate(found)
 
     def _bounds(self) -> tuple[int, int]:
         assert self._candidate is not None
@@ -159,14 +159,14 @@ class ApproximateTime(Generic[_T]):
         assert newest is not None
         return newest
 
-    def _keep(self) -> None:
+    def _make_candidate(self) -> None:
         """Make the heads of the queues the candidate."""
         self._candidate = [queue[0] for queue in self._queues]
         for past in self._past:
             self.dropped += len(past)
             past.clear()
 
-    def _pass_over(self, index: int) -> None:
+    def _move_front_to_past(self, index: int) -> None:
         self._past[index].append(self._queues[index].popleft())
 
     def _recover(self) -> None:
@@ -174,7 +174,7 @@ class ApproximateTime(Generic[_T]):
             queue.extendleft(reversed(past))
             past.clear()
 
-    def _give(self, found: list[list[_T]]) -> None:
+    def _publish_candidate(self, found: list[list[_T]]) -> None:
         assert self._candidate is not None
         found.append([item for _, item in self._candidate])
         self._candidate = None

@@ -13,7 +13,7 @@ from contextlib import suppress
 from enum import Enum
 from typing import TYPE_CHECKING, NamedTuple
 
-from rosglass.comm.executor import RetryingExecutor, check_plain, let_exit
+from rosglass.comm.executor import RetryingExecutor, check_plain, reraise_exit
 from rosglass.comm.handle import Executor, Handle, Unique
 from rosglass.comm.listeners import Listeners
 from rosglass.comm.log_limits import FailureLog
@@ -343,7 +343,7 @@ class Timer(Handle):
             if not self._closed:
                 self._callback()
         except (Exception, SystemExit) as error:
-            let_exit(error)
+            reraise_exit(error)
             self._failures.exception("the callback of %s failed", self)
         finally:
             self._waiting = False

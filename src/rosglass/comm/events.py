@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from rosglass.wires.base import Middleware
 
 __all__ = [
-    "Appearances",
     "DeadlineMissed",
+    "EndpointListeners",
     "IncompatibleQoS",
     "LivelinessChanged",
     "LivelinessLost",
@@ -33,8 +33,8 @@ __all__ = [
     "SamplesLost",
     "TopicEndpoint",
     "conflict_events",
-    "conflicts",
-    "words",
+    "describe_conflicts",
+    "qos_conflicts",
 ]
 
 _E = TypeVar("_E")
@@ -128,7 +128,7 @@ class SamplesLost:
     total: int
 
 
-class _Known:
+class _NotifiedEndpoints:
     """The endpoints that one listener was notified of."""
 
     def __init__(self) -> None:
@@ -137,7 +137,7 @@ class _Known:
         self.total = 0
 
 
-class Appearances(Generic[_E]):
+class EndpointListeners(Generic[_E]):
     """Notifies each listener of endpoints that appear and leave, starting with the present ones.
 
     Args:
@@ -147,7 +147,7 @@ class Appearances(Generic[_E]):
     def __init__(self, where: str = "") -> None:
         self._listeners: Listeners[_E] = Listeners(where=where)
         #: Any thread adds; every use is atomic.
-        self._known: dict[Listener[_E], _Known] = {}
+        self._known: dict[Listener[_E], _NotifiedEndpoints] = {}
 
     def __bool__(self) -> bool:
         return bool(self._listeners)
@@ -155,7 +155,7 @@ class Appearances(Generic[_E]):
     def add(self, callback: Callable[[_E], None], executor: Executor) -> Handle:
         """Notify `callback` from the next :meth:`update` on, until the handle is closed."""
         listener = self._listeners.add(callback, executor)
-        self._known[listener] = _Known()
+        self._known[listener] = _NotifiedEndpoints()
         return listener
 
     def update(
@@ -233,8 +233,8 @@ class TopicEndpoint(Handle):
         self.topic = topic
         self._event_executor, self._log = executor, log
         self._problem = self._logged_problem = ""
-        self._matched_listeners: Appearances[Matched] = Appearances(topic)
-        self._incompatible_listeners: Appearances[IncompatibleQoS] = Appearances(topic)
+        self._matched_listeners: EndpointListeners[Matched] = EndpointListeners(topic)
+        self._incompatible_listeners: EndpointListeners[IncompatibleQoS] = EndpointListeners(topic)
         self._deadline_listeners: Listeners[DeadlineMissed] = Listeners(where=topic)
         self._problem_listeners: Listeners[str] = Listeners(where=topic)
 
@@ -295,7 +295,7 @@ class TopicEndpoint(Handle):
 
     def _listen(
         self,
-        listeners: Appearances[_E] | Listeners[_E],
+        listeners: EndpointListeners[_E] | Listeners[_E],
         callback: Callable[[_E], None],
         executor: Executor | None,
     ) -> Handle:
@@ -329,7 +329,7 @@ class TopicEndpoint(Handle):
         self._problem_listeners.clear()
 
 
-def conflicts(
+def qos_conflicts(
     middleware: Middleware, endpoint: EndpointInfo, requested: QoS, offered: QoS
 ) -> dict[str, str]:
     """Return the conflicts between a publisher and a subscription, in words for each QoS policy.
@@ -340,10 +340,10 @@ def conflicts(
         requested: The subscription's profile.
         offered: The publisher's profile.
     """
-    return {**requested.conflicts(offered), **middleware.conflicts(endpoint)}
+    return {**requested.conflicts(offered), **middleware.endpoint_conflicts(endpoint)}
 
 
-def words(found: Mapping[str, str]) -> str:
+def describe_conflicts(found: Mapping[str, str]) -> str:
     """Return conflicts as one line."""
     return "; ".join(f"{policy}: {reason}" for policy, reason in found.items())
 
@@ -351,7 +351,7 @@ def words(found: Mapping[str, str]) -> str:
 def conflict_events(
     found: Mapping[EndpointInfo, Mapping[str, str]],
 ) -> Callable[[EndpointInfo, int, int, int], IncompatibleQoS | None]:
-    """Return the `event` argument of :meth:`Appearances.update` for endpoints in conflict."""
+    """Return the `event` argument of :meth:`EndpointListeners.update` for endpoints in conflict."""
 
     def event(
         endpoint: EndpointInfo, change: int, _count: int, total: int
@@ -359,6 +359,6 @@ def conflict_events(
         if change < 0:
             return None
         policies = found[endpoint]
-        return IncompatibleQoS(endpoint, tuple(policies), words(policies), total)
+        return IncompatibleQoS(endpoint, tuple(policies), describe_conflicts(policies), total)
 
     return event

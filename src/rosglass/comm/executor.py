@@ -31,8 +31,8 @@ __all__ = [
     "check_plain",
     "executor_for",
     "is_coroutine_function",
-    "let_exit",
     "load_asyncio",
+    "reraise_exit",
     "run_job",
 ]
 
@@ -50,11 +50,11 @@ def run_job(job: Callable[[], None]) -> None:
     try:
         job()
     except (Exception, SystemExit) as error:
-        let_exit(error)
+        reraise_exit(error)
         _log.exception("a callback failed")
 
 
-def let_exit(error: BaseException) -> None:
+def reraise_exit(error: BaseException) -> None:
     """Raise `error` if it is a SystemExit in the main thread; it must not end other threads."""
     if isinstance(error, SystemExit) and threading.current_thread() is threading.main_thread():
         raise error

@@ -14,7 +14,7 @@ from contextlib import suppress
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rosglass.comm.executor import IMMEDIATE, RetryingExecutor, let_exit
+from rosglass.comm.executor import IMMEDIATE, RetryingExecutor, reraise_exit
 from rosglass.comm.log_limits import FailureLog
 from rosglass.comm.qos import History
 from rosglass.comm.statistics import LatencyEstimator, Statistics, fading_rate
@@ -344,7 +344,7 @@ class Inbox:
             try:
                 call(argument)
             except (Exception, SystemExit) as error:
-                let_exit(error)
+                reraise_exit(error)
                 self._log_failure()
 
     def _prepare(self, samples: Sequence[Sample]) -> tuple[Callable[[Any], None], Sequence[Any]]:

@@ -14,8 +14,8 @@ from rosglass.comm.events import (
     Matched,
     TopicEndpoint,
     conflict_events,
-    conflicts,
-    words,
+    describe_conflicts,
+    qos_conflicts,
 )
 from rosglass.comm.graph import EndpointInfo, EndpointKind, Graph
 from rosglass.comm.inbox import Sample
@@ -321,7 +321,7 @@ class Publisher(TopicEndpoint):
         if subscriptions == self._known:
             return
         self._known = subscriptions
-        matching, conflicting = self._matching(subscriptions), self._conflicts(subscriptions)
+        matching, conflicting = self._matching(subscriptions), self._qos_conflicts(subscriptions)
         self._writer.match(matching)
         self._set_problem("; ".join(self._problems(subscriptions, conflicting)))
         left = [self._left.popleft() for _ in range(len(self._left))]
@@ -346,15 +346,15 @@ class Publisher(TopicEndpoint):
         middleware = self._core.middleware
         if not middleware.matches_qos:
             return found
-        return [one for one in found if not conflicts(middleware, one, one.qos, self.qos)]
+        return [one for one in found if not qos_conflicts(middleware, one, one.qos, self.qos)]
 
-    def _conflicts(
+    def _qos_conflicts(
         self, subscriptions: Sequence[EndpointInfo]
     ) -> dict[EndpointInfo, dict[str, str]]:
         """Return the conflicting policies of subscriptions whose type matches ours."""
         middleware = self._core.middleware
         found = {
-            one: conflicts(middleware, one, one.qos, self.qos)
+            one: qos_conflicts(middleware, one, one.qos, self.qos)
             for one in subscriptions
             if self._receives(one)
         }
@@ -389,8 +389,8 @@ class Publisher(TopicEndpoint):
         for one, policies in conflicting.items():
             remedy = "; offer what it requests" if one.qos.conflicts(self.qos) else ""
             problems[
-                f"quality of service requested by {one.node} does not match ({words(policies)}): "
-                f"{effect}{remedy}"
+                f"quality of service requested by {one.node} does not match "
+                f"({describe_conflicts(policies)}): {effect}{remedy}"
             ] = None
         return list(problems)
 

@@ -208,7 +208,7 @@ class ServiceServer(Handle):
                 self.name,
                 self._replier.client_name(request),
                 error,
-                self._consequence,
+                self._failure_effect,
             )
             self._replier.fail(request, f"the server returned no valid response: {error}")
             return
@@ -223,7 +223,7 @@ class ServiceServer(Handle):
     # -- failures --------------------------------------------------------------------------------
 
     @property
-    def _consequence(self) -> str:
+    def _failure_effect(self) -> str:
         """The effect of a failure on the client, for log lines."""
         reported = self._replier.tells_failures
         return "it receives the error instead" if reported else "it gets no response, and waits"
@@ -241,7 +241,7 @@ class ServiceServer(Handle):
                 "%s: the callback failed on a request of %s; %s%s",
                 self.name,
                 client,
-                self._consequence,
+                self._failure_effect,
                 reason,
                 exc_info=None if reason else error,
             )

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.comm.core import NodeMember
 from rosglass.comm.events import (
-    Appearances,
     DeadlineMissed,
+    EndpointListeners,
     LivelinessChanged,
     Matched,
     SamplesLost,
@@ -95,7 +95,7 @@ class Subscription(TopicEndpoint):
         if not isinstance(executor, Executor):
             raise ArgumentError("executor", executor, "a rosglass.comm.Executor", topic)
         super().__init__(topic, executor, _log)
-        self._liveliness_listeners: Appearances[LivelinessChanged] = Appearances(topic)
+        self._liveliness_listeners: EndpointListeners[LivelinessChanged] = EndpointListeners(topic)
         self._lost_listeners: Listeners[SamplesLost] = Listeners(where=topic)
         self._qos, self._type = qos, message_type
         self._decodes = callback is not None

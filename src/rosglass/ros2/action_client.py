@@ -58,7 +58,7 @@ from rosglass.ros2.action_types import (
     stamp_of,
 )
 from rosglass.ros2.rmw_services import ActionServiceClient
-from rosglass.ros2.topic_matching import Repeats
+from rosglass.ros2.topic_matching import DuplicateFilter
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -676,7 +676,7 @@ class _ClientEndpoints(Handle):
 
     def _sample_handler(self, topic: str, kind: MessageType) -> OnSample:
         """Return the function that receives a topic's samples."""
-        ours, repeats, feedback = kind.rihs01, Repeats(), topic == FEEDBACK
+        ours, repeats, feedback = kind.rihs01, DuplicateFilter(), topic == FEEDBACK
 
         def receive(
             data: bytes | memoryview,
@@ -690,7 +690,7 @@ class _ClientEndpoints(Handle):
                 if hash not in ("", ours):
                     text = f"another definition of {kind.name} ({hash}, ours is {ours})"
                     self._log_ignored(topic, gid, text)
-                elif not repeats.seen(gid, sequence, sent):
+                elif not repeats.is_duplicate(gid, sequence, sent):
                     if feedback:
                         self._take_feedback(kind, data)
                     else:

@@ -15,7 +15,13 @@ from rosglass.interfaces import parse_message
 from rosglass.interfaces.definition import Definition, ServiceDefinition
 from rosglass.interfaces.derived import derive
 from rosglass.messages import ActionType, MessageType, ServiceType
-from rosglass.ros2.announced import Announced, choose, mismatches, missing, rivals
+from rosglass.ros2.announced import (
+    Announced,
+    choose_type_name,
+    duplicate_servers,
+    mismatches,
+    request_definition,
+)
 
 if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
@@ -232,8 +238,10 @@ class ActionVersion:
             for version, name in self._parts():
                 effect = "its feedback is lost" if name == FEEDBACK else "it gets no goals"
                 problems += mismatches(version, self._peers(name), "offers", effect)
-            servers = [peer for peer in self._peers(SEND_GOAL) if self._send_goal.fits(peer)]
-            problems += rivals(servers, self._name)
+            servers = [
+                peer for peer in self._peers(SEND_GOAL) if self._send_goal.is_compatible(peer)
+            ]
+            problems += duplicate_servers(servers, self._name)
         return problems
 
     def _discover(self) -> None:
@@ -241,14 +249,14 @@ class ActionVersion:
         names = [s.type.removesuffix("_SendGoal") for s in servers if s.type.endswith("_SendGoal")]
         current = "" if self.types is None else self.types.action.name
         example = f"create_action_client({self._name!r}, {{}})"
-        name, self._choice = choose(names, current, example)
+        name, self._choice = choose_type_name(names, current, example)
         if not name or name == current:
             self._missing, self._fetching = "", False
             return
         try:
             found = self._core.types.action(name)
         except Error as error:
-            self._missing, self._fetching = missing(self._core, name, "", servers, error)
+            self._missing, self._fetching = request_definition(self._core, name, "", servers, error)
         else:
             self._missing, self._fetching = "", False
             self._begin(found)

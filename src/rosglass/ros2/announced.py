@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Announced",
-    "choose",
-    "identity",
+    "choose_type_name",
+    "duplicate_servers",
+    "endpoint_id",
     "mismatches",
-    "missing",
     "nodes_of",
-    "rivals",
+    "request_definition",
 ]
 
 
@@ -93,20 +93,20 @@ class Announced(Generic[_T]):
             found = self._load(*wanted)
             self._check(found, peers)
         except Error as error:
-            self.failure, self.pending = missing(self._core, *wanted, peers, error)
+            self.failure, self.pending = request_definition(self._core, *wanted, peers, error)
             self._failed = None if self.pending else wanted
             return False
         self._clear()
         self._set(found)
         return True
 
-    def difference(self, peer: EndpointInfo) -> str:
+    def describe_difference(self, peer: EndpointInfo) -> str:
         """Return in words how a peer's version differs from ours, with both hashes."""
         if peer.type_hash in self.hashes and peer.response_hash:
             return f"of its response: {peer.response_hash}, ours is {self._response_hash}"
         return f"{peer.type_hash}, ours is {self.hash}"
 
-    def fits(self, peer: EndpointInfo) -> bool:
+    def is_compatible(self, peer: EndpointInfo) -> bool:
         """Return whether a peer uses this type in this version, as far as it announces them."""
         return (
             self.type is not None
@@ -139,7 +139,7 @@ class Announced(Generic[_T]):
         self._response_hash = hashes[-1]
 
 
-def missing(
+def request_definition(
     core: Core, name: str, hash: str, peers: Sequence[EndpointInfo], error: Error
 ) -> tuple[str, bool]:
     """Request a definition that the library does not have from peers.
@@ -165,7 +165,7 @@ def missing(
     ), False
 
 
-def choose(names: Iterable[str], current: str, example: str) -> tuple[str, str]:
+def choose_type_name(names: Iterable[str], current: str, example: str) -> tuple[str, str]:
     """Return the name of the type to use, and the problem if peers announce several.
 
     Args:
@@ -200,15 +200,16 @@ def mismatches(
     for peer in peers:
         if peer.type != name:
             problems[f"{peer.node} {verb} {peer.type} here, not {name}: {effect}"] = None
-        elif not announced.fits(peer):
+        elif not announced.is_compatible(peer):
             problems[
-                f"{peer.node} has another definition of {name} ({announced.difference(peer)}): "
-                f"{effect}; add the robot's definition to the library"
+                f"{peer.node} has another definition of {name} "
+                f"({announced.describe_difference(peer)}): {effect}; add the robot's definition "
+                "to the library"
             ] = None
     return list(problems)
 
 
-def rivals(servers: Sequence[EndpointInfo], name: str) -> list[str]:
+def duplicate_servers(servers: Sequence[EndpointInfo], name: str) -> list[str]:
     """Return the problem that several nodes offer the same service or action, if they do."""
     if len({server.node for server in servers}) < 2:
         return []
@@ -216,7 +217,7 @@ def rivals(servers: Sequence[EndpointInfo], name: str) -> list[str]:
     return [f"{nodes_of(servers)} all offer {name}: {effect}"]
 
 
-def identity(peer: EndpointInfo) -> bytes | str:
+def endpoint_id(peer: EndpointInfo) -> bytes | str:
     """Return the identity of a peer; its successor has a different one."""
     return peer.gid or peer.node.full
 

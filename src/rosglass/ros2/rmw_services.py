@@ -23,7 +23,14 @@ from rosglass.comm.names import similar
 from rosglass.comm.service_client import Call, PendingCall, ServiceClient, ServiceRequester
 from rosglass.comm.service_server import ServiceServer
 from rosglass.errors import Error, NodeClosedError, ServiceError
-from rosglass.ros2.announced import Announced, choose, identity, mismatches, nodes_of, rivals
+from rosglass.ros2.announced import (
+    Announced,
+    choose_type_name,
+    duplicate_servers,
+    endpoint_id,
+    mismatches,
+    nodes_of,
+)
 from rosglass.ros2.core import REQUEST_LIMIT, RequestWindow
 from rosglass.wires.base import SERVER_LEFT, Replier, RequestId
 
@@ -205,7 +212,7 @@ class Ros2Requester(ServiceRequester):
 
     def server_ids(self) -> frozenset[bytes | str]:
         """Return the identities of the servers of this type and version."""
-        return frozenset(map(identity, self._fitting(self._servers())))
+        return frozenset(map(endpoint_id, self._fitting(self._servers())))
 
     def server_name(self) -> str:
         """Return the names of the nodes that offer the service, for messages."""
@@ -215,7 +222,7 @@ class Ros2Requester(ServiceRequester):
         return self._core.graph.endpoints(EndpointKind.SERVICE_SERVER, self._name)
 
     def _fitting(self, servers: Sequence[EndpointInfo]) -> list[EndpointInfo]:
-        return [server for server in servers if self._announced.fits(server)]
+        return [server for server in servers if self._announced.is_compatible(server)]
 
     def server_conflicts(self) -> list[str]:
         """Return the conflicts with servers, one sentence each."""
@@ -225,7 +232,7 @@ class Ros2Requester(ServiceRequester):
             servers = self._servers()
             problems = mismatches(self._announced, servers, "offers", "it cannot be called")
             # The middleware's reason is more precise than the one about several servers.
-            others = rivals(self._fitting(servers), self._name)
+            others = duplicate_servers(self._fitting(servers), self._name)
             problem = self.middleware_problem
             problems += [problem] if problem and not problems else others
         return problems
@@ -388,7 +395,7 @@ class Ros2Requester(ServiceRequester):
         self._choice = ""
         if self._discovers:
             example = f"create_service_client({self._name!r}, {{}})"
-            name, self._choice = choose((s.type for s in servers), name, example)
+            name, self._choice = choose_type_name((s.type for s in servers), name, example)
         return bool(name) and self._announced.follow(name, servers, retry)
 
     def _connect(self, kind: ServiceType) -> None:

@@ -9,7 +9,7 @@ import time
 from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, Liveliness, Sample
-from rosglass.comm.events import conflicts, words
+from rosglass.comm.events import describe_conflicts, qos_conflicts
 from rosglass.comm.subscription import Problem, TopicMatching
 from rosglass.errors import Error
 from rosglass.interfaces import join_name
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rosglass.ros2.core import Core
     from rosglass.wires.base import OnSample, Reader
 
-__all__ = ["GraphMatching", "Repeats", "TopicTypes"]
+__all__ = ["DuplicateFilter", "GraphMatching", "TopicTypes"]
 
 _PUBLISHER = EndpointKind.PUBLISHER
 #: Number of publishers to remember; only a robot that restarts for days has more.
@@ -53,7 +53,7 @@ class GraphMatching(TopicMatching):
         ignored: AbstractSet[bytes],
     ) -> None:
         self._core, self._type, self._ignored = core, wanted, ignored
-        self._repeats = Repeats()
+        self._duplicates = DuplicateFilter()
         self._closed = False
         self._without_publisher = True
         self._lost_before = 0
@@ -63,7 +63,7 @@ class GraphMatching(TopicMatching):
     def open(self, feed: SubscriptionFeed, publishers: Sequence[EndpointInfo]) -> None:
         """Choose the profile, and start reading as soon as the type is known."""
         self._feed, self._topic, self._wanted = feed, feed.topic, feed.qos
-        self._liveness = Liveness(self._core.timers, self._repeats, feed.request_update)
+        self._liveness = Liveness(self._core.timers, self._duplicates, feed.request_update)
         self._types = TopicTypes(
             feed.topic,
             self._core.types,
@@ -88,8 +88,8 @@ class GraphMatching(TopicMatching):
                 self._feed.set_qos(profile)
                 self._read(ours)
             elif idle:
-                self._repeats.guarded = False
-            problems = problems + self._misfits(publishers)
+                self._duplicates.guarded = False
+            problems = problems + self._describe_qos_conflicts(publishers)
         return [Problem(text) for text in problems]
 
     def find_matching(self, publishers: Sequence[EndpointInfo]) -> list[EndpointInfo]:
@@ -98,7 +98,7 @@ class GraphMatching(TopicMatching):
         qos, middleware = self._feed.qos, self._core.middleware
         if not middleware.matches_qos:
             return understood
-        return [p for p in understood if not conflicts(middleware, p, qos, p.qos)]
+        return [p for p in understood if not qos_conflicts(middleware, p, qos, p.qos)]
 
     def find_conflicts(
         self, publishers: Sequence[EndpointInfo]
@@ -106,7 +106,9 @@ class GraphMatching(TopicMatching):
         """Return the incompatible policies of publishers of a known type."""
         qos, middleware = self._feed.qos, self._core.middleware
         found = {
-            p: conflicts(middleware, p, qos, p.qos) for p in publishers if self._types.accepts(p)
+            p: qos_conflicts(middleware, p, qos, p.qos)
+            for p in publishers
+            if self._types.accepts(p)
         }
         return {publisher: policies for publisher, policies in found.items() if policies}
 
@@ -118,7 +120,7 @@ class GraphMatching(TopicMatching):
         """Return how many samples were sent but not received."""
         reader = self.reader
         by_reader = 0 if reader is None else reader.lost()
-        return self._repeats.lost + self._lost_before + by_reader
+        return self._duplicates.lost + self._lost_before + by_reader
 
     def close(self) -> None:
         """Stop reading; safe to call twice."""
@@ -154,7 +156,7 @@ class GraphMatching(TopicMatching):
         ours = self._types.type
         return [p.qos for p in publishers if ours is None or p.type == ours.name]
 
-    def _misfits(self, publishers: Sequence[EndpointInfo]) -> list[str]:
+    def _describe_qos_conflicts(self, publishers: Sequence[EndpointInfo]) -> list[str]:
         effect = (
             "nothing is received from it"
             if self._core.middleware.matches_qos
@@ -165,8 +167,8 @@ class GraphMatching(TopicMatching):
         for publisher, found in self.find_conflicts(publishers).items():
             remedy = "; ask for no more than it offers" if qos.conflicts(publisher.qos) else ""
             problems.append(
-                f"quality of service offered by {publisher.node} does not match ({words(found)}): "
-                f"{effect}{remedy}"
+                f"quality of service offered by {publisher.node} does not match "
+                f"({describe_conflicts(found)}): {effect}{remedy}"
             )
         return problems
 
@@ -175,7 +177,7 @@ class GraphMatching(TopicMatching):
     def _read(self, message_type: MessageType) -> None:
         """Create a reader for `message_type` in place of the previous one."""
         self._feed.set_type(message_type)
-        self._repeats.guarded = self.reader is not None
+        self._duplicates.guarded = self.reader is not None
         endpoint = EndpointInfo(
             EndpointKind.SUBSCRIPTION,
             self._topic,
@@ -200,7 +202,7 @@ class GraphMatching(TopicMatching):
         """Return the function that takes samples: the hot path, each line runs per sample."""
         accepted, find_type = self._types.accepted, self._types.find_type
         ignored = self._ignored
-        seen, deliver = self._repeats.seen, self._feed.deliver
+        is_duplicate, deliver = self._duplicates.is_duplicate, self._feed.deliver
         wire = self._core.wire
         # As Sample(...) does, in half the time.
         make = tuple.__new__
@@ -214,7 +216,7 @@ class GraphMatching(TopicMatching):
             hash: str,
         ) -> None:
             kind = accepted.get(hash) or find_type(hash)
-            if kind is None or seen(gid, sequence, sent) or gid in ignored:
+            if kind is None or is_duplicate(gid, sequence, sent) or gid in ignored:
                 return
             deliver(make(Sample, (data, wire, kind, received, sent, gid, sequence)))
 
@@ -234,8 +236,8 @@ class Liveness:
         look: Called when :meth:`follow` is due.
     """
 
-    def __init__(self, timers: Timers, repeats: Repeats, look: Callable[[], None]) -> None:
-        self._timers, self._repeats, self._look = timers, repeats, look
+    def __init__(self, timers: Timers, repeats: DuplicateFilter, look: Callable[[], None]) -> None:
+        self._timers, self._duplicates, self._look = timers, repeats, look
         self._signs: dict[bytes, tuple[tuple[int, int], float]] = {}
         self._timer: Handle | None = None
 
@@ -251,8 +253,8 @@ class Liveness:
             self.close()
             return list(there)
         now = time.monotonic()
-        signs = {endpoint.gid: self._sign(endpoint.gid, now) for endpoint, _ in manual}
-        self._signs = {gid: (self._repeats.latest(gid), at) for gid, at in signs.items()}
+        signs = {endpoint.gid: self._last_sign(endpoint.gid, now) for endpoint, _ in manual}
+        self._signs = {gid: (self._duplicates.latest(gid), at) for gid, at in signs.items()}
         silent = [endpoint for endpoint, lease in manual if now - signs[endpoint.gid] > lease]
         alive = None if reader is None else reader.alive()
         if alive is not None:
@@ -270,15 +272,15 @@ class Liveness:
         if timer is not None:
             timer.close()
 
-    def _sign(self, gid: bytes, now: float) -> float:
+    def _last_sign(self, gid: bytes, now: float) -> float:
         """Return the monotonic time of a publisher's last sample, or of its discovery."""
         known = self._signs.get(gid)
-        if known is None or known[0] != self._repeats.latest(gid):
+        if known is None or known[0] != self._duplicates.latest(gid):
             return now
         return known[1]
 
 
-class Repeats:
+class DuplicateFilter:
     """Detects samples that were received before, by publisher, sequence number and time stamp.
 
     A sample can be received twice: over an old and a new route while links change, from a
@@ -299,7 +301,7 @@ class Repeats:
         self._last: dict[bytes, tuple[int, int]] = {}
         self._missing: dict[bytes, set[int]] = {}
 
-    def seen(self, gid: bytes, sequence: int, sent: int | None) -> bool:
+    def is_duplicate(self, gid: bytes, sequence: int, sent: int | None) -> bool:
         """Return whether a sample is a repeat, and record it.
 
         Samples without identity, number or time stamp are never repeats.
@@ -310,13 +312,15 @@ class Repeats:
         if sequence == last[0] + 1:
             self._last[gid] = (sequence, sent)
             return False
-        return self._judge(gid, sequence, sent, last)
+        return self._is_late_duplicate(gid, sequence, sent, last)
 
     def latest(self, gid: bytes) -> tuple[int, int]:
         """Return number and time stamp of a publisher's last sample."""
         return self._last.get(gid, _NO_SAMPLE)
 
-    def _judge(self, gid: bytes, sequence: int, sent: int, last: tuple[int, int]) -> bool:
+    def _is_late_duplicate(
+        self, gid: bytes, sequence: int, sent: int, last: tuple[int, int]
+    ) -> bool:
         """Return whether a sample that does not directly follow the last one is a repeat."""
         if sequence < 0:
             repeated = self.guarded and sent <= last[1]

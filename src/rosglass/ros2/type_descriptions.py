@@ -322,7 +322,7 @@ class TypeFetcher(NodeMember):
         if self._closed:
             return "the node is closed"
         key = name, hash, ""
-        self._put((key, tuple(endpoints), on_done, None))
+        self._add_request((key, tuple(endpoints), on_done, None))
         request = self._requests.get(key)
         if request is None or any(endpoint.node not in request.nodes for endpoint in endpoints):
             return ""  # the problem comes from nodes queried earlier
@@ -352,7 +352,7 @@ class TypeFetcher(NodeMember):
         if timeout is not None:
             timer = self._core.timers.after(timeout, lambda: self._expire(name, promise, timeout))
             promise.add_done_callback(lambda _: timer.close())
-        self._put(((name, hash, "" if hash else node), None, None, promise))
+        self._add_request(((name, hash, "" if hash else node), None, None, promise))
         return promise
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - time passes, too
@@ -382,7 +382,7 @@ class TypeFetcher(NodeMember):
                     NodeClosedError(f"node {self._core.name} is closed; connect again")
                 )
 
-    def _put(self, new: _NewRequest) -> None:
+    def _add_request(self, new: _NewRequest) -> None:
         self._new.append(new)
         if self._closed:
             self._fail_all()
@@ -459,9 +459,9 @@ class TypeFetcher(NodeMember):
             else:
                 self._on_definition(request, found)
         elif announced := self._find_hash(request, name, users, now):
-            self._continue_as(request, name, announced, users, now)
+            self._continue_with_version(request, name, announced, users, now)
 
-    def _continue_as(
+    def _continue_with_version(
         self, request: TypeRequest, name: str, announced: str, users: _Users, now: float
     ) -> None:
         """Continue with the request for the version in the graph."""
@@ -496,7 +496,11 @@ class TypeFetcher(NodeMember):
             versions = "; ".join(f"{key} of {', '.join(sorted(of))}" for key, of in known.items())
             problem = f"the graph has several versions ({versions}); choose one by its hash or node"
             self._settle(request, DefinitionConflictError(f"{name}: {problem}"), problem)
-        elif request.promises and now - self._started > _GRACE_S and self._fulfil(request, name):
+        elif (
+            request.promises
+            and now - self._started > _GRACE_S
+            and self._fulfil_promises(request, name)
+        ):
             pass  # no other version is announced: use the library's
         elif (name in users or request.endpoints) and not self._look_up(request, name, users):
             self._give_up(
@@ -536,7 +540,7 @@ class TypeFetcher(NodeMember):
             and now - self._started > _GRACE_S
             and name + ACTION_PARTS[0] not in users
         ):
-            self._fulfil(request, name)
+            self._fulfil_promises(request, name)
 
     # -- queries -----------------------------------------------------------------------------------
 
@@ -686,10 +690,10 @@ class TypeFetcher(NodeMember):
     def _on_definition(self, request: TypeRequest, found: InterfaceDefinition) -> None:
         """Complete a request whose definition is now in the library."""
         self._drop(request)
-        self._fulfil(request, found.name, rihs01(found))
+        self._fulfil_promises(request, found.name, rihs01(found))
         request.notify()
 
-    def _fulfil(self, request: TypeRequest, name: str, type_hash: str = "") -> bool:
+    def _fulfil_promises(self, request: TypeRequest, name: str, type_hash: str = "") -> bool:
         """Fulfil the promises if the library has the type; return whether it has."""
         try:
             found = self._load(name, type_hash)

@@ -322,7 +322,7 @@ class Middleware(ABC):
     def create_replier(self, endpoint: EndpointInfo, on_request: OnRequest) -> Replier:
         """Announce a service server, which delivers requests to `on_request`."""
 
-    def conflicts(self, endpoint: EndpointInfo) -> Mapping[str, str]:
+    def endpoint_conflicts(self, endpoint: EndpointInfo) -> Mapping[str, str]:
         """Return why a remote endpoint cannot match any of ours, apart from its profile.
 
         Returns:

@@ -14,7 +14,7 @@ from rosglass.comm import (
     NodeName,
     Subscription,
 )
-from rosglass.comm.events import Appearances
+from rosglass.comm.events import EndpointListeners
 
 
 def endpoint(node, gid=b""):
@@ -33,7 +33,7 @@ def told(appearances):
 
 
 def test_who_comes_and_goes_is_told_with_counts():
-    appearances = Appearances()
+    appearances = EndpointListeners()
     events, _ = told(appearances)
     for now in ([A], [A, B], [B], [B, A], []):
         appearances.update(now, Matched)
@@ -48,7 +48,7 @@ def test_who_comes_and_goes_is_told_with_counts():
 
 
 def test_who_came_and_went_since_the_last_look_is_told():
-    appearances = Appearances()
+    appearances = EndpointListeners()
     events, _ = told(appearances)
     known = endpoint("known", b"k")
     appearances.update([known], Matched, [A])
@@ -65,7 +65,7 @@ def test_who_came_and_went_since_the_last_look_is_told():
 
 
 def test_those_who_are_there_are_told_to_each_new_listener_once():
-    appearances = Appearances()
+    appearances = EndpointListeners()
     first, _ = told(appearances)
     appearances.update([A], Matched)
     second, _ = told(appearances)
@@ -75,7 +75,7 @@ def test_those_who_are_there_are_told_to_each_new_listener_once():
 
 
 def test_twins_are_counted():
-    appearances = Appearances()
+    appearances = EndpointListeners()
     events, _ = told(appearances)
     appearances.update([A, A], Matched)
     appearances.update([A], Matched)
@@ -83,7 +83,7 @@ def test_twins_are_counted():
 
 
 def test_closing_ends_it_and_frees_it():
-    appearances, known = Appearances(), endpoint("c")
+    appearances, known = EndpointListeners(), endpoint("c")
     references = sys.getrefcount(known)
     events, handle = told(appearances)
     assert appearances
@@ -96,7 +96,7 @@ def test_closing_ends_it_and_frees_it():
 
 
 def test_events_that_are_none_are_counted_and_not_told():
-    appearances = Appearances()
+    appearances = EndpointListeners()
     events, _ = told(appearances)
     appearances.update([A], Matched)
     appearances.update([], lambda *_: None)

@@ -18,7 +18,7 @@ from rosglass.comm import (
     Matched,
     NodeName,
 )
-from rosglass.comm.events import Appearances
+from rosglass.comm.events import EndpointListeners
 from rosglass.comm.listeners import ChangeListeners
 from rosglass.comm.log_limits import LogOnce
 
@@ -113,7 +113,7 @@ def in_threads(job, count=4):
 
 @pytest.mark.usefixtures("hasty_threads")
 def test_who_appears_is_told_to_listeners_that_come_and_go_in_several_threads():
-    appearances, rounds = Appearances(), 200
+    appearances, rounds = EndpointListeners(), 200
     there = EndpointInfo(EndpointKind.PUBLISHER, "/t", "p/msg/T", NodeName("/", "a"), gid=b"there")
     stayed, over = [], threading.Event()
 

@@ -2,15 +2,15 @@ from __future__ import annotations
 
 import pytest
 
-from rosglass.ros2.topic_matching import Repeats
+from rosglass.ros2.topic_matching import DuplicateFilter
 
 A, B = b"a" * 16, b"b" * 16
 
 
 def accepted(*samples):
     """Return the (gid, sequence, sent) that pass."""
-    repeats = Repeats()
-    return [sample for sample in samples if not repeats.seen(*sample)]
+    repeats = DuplicateFilter()
+    return [sample for sample in samples if not repeats.is_duplicate(*sample)]
 
 
 @pytest.mark.parametrize(
@@ -69,9 +69,9 @@ def test_samples_without_identity_are_never_repeats(sample):
 
 
 def test_memory_is_bounded():
-    repeats = Repeats()
+    repeats = DuplicateFilter()
     for number in range(5000):
-        repeats.seen(number.to_bytes(16, "big"), 1, 1)
-        repeats.seen(A, number * 100, number)
+        repeats.is_duplicate(number.to_bytes(16, "big"), 1, 1)
+        repeats.is_duplicate(A, number * 100, number)
     assert len(repeats._last) <= 1025
     assert sum(map(len, repeats._missing.values())) <= 200

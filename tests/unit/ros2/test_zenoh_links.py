@@ -126,13 +126,13 @@ def test_connections_that_leave_the_machine_end_when_nothing_is_acknowledged(
 
 def test_places():
     places = LocalRegistry()
-    assert places.at(("/t", "type")) == ()
+    assert places.find(("/t", "type")) == ()
     places.add(("/t", "type"), "a")
     places.add(("/t", "type"), "b")
     places.add(("/u", "type"), "c")
-    assert places.at(("/t", "type")) == ("a", "b")
+    assert places.find(("/t", "type")) == ("a", "b")
     places.remove(("/t", "type"), "a")
     places.remove(("/t", "type"), "a")
     places.remove(("/t", "type"), "b")
-    assert places.at(("/t", "type")) == ()
-    assert places.at(("/u", "type")) == ("c",)
+    assert places.find(("/t", "type")) == ()
+    assert places.find(("/u", "type")) == ("c",)

@@ -283,7 +283,7 @@ class DdsMiddleware(Middleware):
         self._show(endpoint, replier.gid)
         return replier
 
-    def conflicts(self, endpoint: EndpointInfo) -> Mapping[str, str]:
+    def endpoint_conflicts(self, endpoint: EndpointInfo) -> Mapping[str, str]:
         """Return the conflict with an endpoint that shares no encoding with ours."""
         if self._discovery is None or not self._discovery.is_foreign(endpoint.gid):
             return {}

@@ -426,7 +426,9 @@ class TcprosRequester(ServiceRequester):
 
 
 class ServiceLink:
-    """A connection to a server; in the loop's thread, except :meth:`send` and :meth:`has_nothing_to_read`.
+    """A connection to a server; in the loop's thread.
+
+    Except :meth:`send` and :meth:`has_nothing_to_read`, which any thread may call.
 
     Args:
         core: The node.

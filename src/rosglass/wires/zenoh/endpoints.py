@@ -43,7 +43,7 @@ __all__ = [
     "Pump",
     "SharedMemory",
     "ZenohWriter",
-    "direct",
+    "receive_directly",
 ]
 
 _T = TypeVar("_T")
@@ -82,7 +82,7 @@ class LocalRegistry(Generic[_T]):
             if left:
                 self._entries[place] = left
 
-    def at(self, place: tuple[str, str]) -> tuple[_T, ...]:
+    def find(self, place: tuple[str, str]) -> tuple[_T, ...]:
         """Return the entries for a topic or service, in order of appearance."""
         return self._entries.get(place, ())
 
@@ -266,7 +266,7 @@ class ZenohWriter(Declaration, Writer):
     def write_parts(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
         """Send a payload given in parts, with one copy less than by joining them."""
         now = time.time_ns()
-        kept = self._latched or bool(self._readers.at(self._place))
+        kept = self._latched or bool(self._readers.find(self._place))
         shared = None if kept or self._shared is None else self._shared.place(parts)
         if shared is not None:
             self._send(b"", shared, now)
@@ -306,8 +306,8 @@ class ZenohWriter(Declaration, Writer):
                 self._history.append((data, note, time.monotonic_ns()))
             for publisher in self._publishers:
                 publisher.put(payload, attachment=note)
-            for reader in self._readers.at(self._place):
-                reader.take_own(bytes(data), now, self.gid, number, self._type_hash)
+            for reader in self._readers.find(self._place):
+                reader.on_local_sample(bytes(data), now, self.gid, number, self._type_hash)
         except zenoh.ZError as error:
             raise self._error(error) from error
         finally:
@@ -380,7 +380,7 @@ class ZenohWriter(Declaration, Writer):
         )
 
 
-def _guarded(callback: Callable[[Any], None]) -> Callable[[Any], None]:
+def _log_exceptions(callback: Callable[[Any], None]) -> Callable[[Any], None]:
     """Log the exceptions of a callback; Zenoh would only print them."""
 
     def guarded(item: Any) -> None:
@@ -392,9 +392,9 @@ def _guarded(callback: Callable[[Any], None]) -> Callable[[Any], None]:
     return guarded
 
 
-def direct(callback: Callable[[Any], None]) -> Any:
+def receive_directly(callback: Callable[[Any], None]) -> Any:
     """Run a callback on the receiving thread; only for data of other sessions."""
-    return zenoh.handlers.Callback(_guarded(callback), indirect=False)
+    return zenoh.handlers.Callback(_log_exceptions(callback), indirect=False)
 
 
 class Pump:
@@ -412,7 +412,7 @@ class Pump:
     """
 
     def __init__(self, source: Any, callback: Callable[[Any], None], name: str) -> None:
-        self._source, self._callback = source, _guarded(callback)
+        self._source, self._callback = source, _log_exceptions(callback)
         # Not available any more once the source is undeclared.
         self._items = source.handler
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)

@@ -208,7 +208,7 @@ class ZenohMiddleware(Middleware):
         if self._retries_open:
             self._open()
         self._watch_links()
-        for declaration in self._of(Declaration):  # type: ignore[type-abstract]
+        for declaration in self._declared_of(Declaration):  # type: ignore[type-abstract]
             declaration.poll()
 
     def close(self) -> None:
@@ -376,7 +376,7 @@ class ZenohMiddleware(Middleware):
         if endpoint.kind is EndpointKind.SERVICE_SERVER:
             self._increase_version()
         if endpoint.kind is EndpointKind.SERVICE_CLIENT and not endpoint.type_hash:
-            for replier in self._of(ZenohReplier):
+            for replier in self._declared_of(ZenohReplier):
                 replier.on_client(endpoint)
 
     def _hide(self, key: str) -> None:
@@ -385,10 +385,10 @@ class ZenohMiddleware(Middleware):
         self._graph.remove(key)
         if key.split("/", 6)[5:6] == ["SS"]:
             self._increase_version()
-            for requester in self._of(ZenohRequester):
+            for requester in self._declared_of(ZenohRequester):
                 requester.on_server_left(gid_of(key))
 
-    def _of(self, kind: type[_Kind]) -> list[_Kind]:
+    def _declared_of(self, kind: type[_Kind]) -> list[_Kind]:
         with self._lock:
             declared = list(self._declared.values())
         return [one for one in declared if isinstance(one, kind)]

@@ -312,7 +312,9 @@ class ZenohReader(Declaration, Reader):
         self._marked, self._marked_at = count, now
         self._switch()
 
-    def take_own(self, data: bytes, sent: int, gid: bytes, sequence: int, type_hash: str) -> None:
+    def on_local_sample(
+        self, data: bytes, sent: int, gid: bytes, sequence: int, type_hash: str
+    ) -> None:
         """Handle a sample of the same node, in the sending thread."""
         if not self._closed:
             self._count += 1

@@ -33,7 +33,7 @@ from rosglass.wires.base import (
     Requester,
     RequestId,
 )
-from rosglass.wires.zenoh.endpoints import Declaration, Owner, direct
+from rosglass.wires.zenoh.endpoints import Declaration, Owner, receive_directly
 from rosglass.wires.zenoh.keys import (
     HUMBLE_HASH,
     NO_ATTACHMENT,
@@ -131,7 +131,7 @@ class _Call:
     cancel: zenoh.CancellationToken
     servers: set[bytes]
     lost: float | None = None
-    end: _End | None = None
+    end: _QueryEnd | None = None
 
 
 class _ReplyHandler:
@@ -149,7 +149,7 @@ class _ReplyHandler:
             _log.exception("handling a reply failed")
 
 
-class _End(weakref.ref[_ReplyHandler]):
+class _QueryEnd(weakref.ref[_ReplyHandler]):
     """A weak reference that records the end of a query, without running code on that thread."""
 
     number: int
@@ -204,11 +204,11 @@ class ZenohRequester(Declaration, Requester):
 
         False while the link is silent: a request would arrive late, if ever.
         """
-        return bool(self._own()) or bool(self._route()[1])
+        return bool(self._local_servers()) or bool(self._route()[1])
 
     def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:
         """Send a request; see :meth:`rosglass.wires.base.Requester.send`."""
-        own, (key, others) = self._own(), self._route()
+        own, (key, others) = self._local_servers(), self._route()
         servers = others | {replier.gid for replier in own}
         call = _Call(zenoh.CancellationToken(), servers)
         session = self._session
@@ -230,7 +230,7 @@ class ZenohRequester(Declaration, Requester):
                 partial(self.on_refusal, number, replier.gid),
                 lambda: None,  # the client notices that the server has left
             )
-            replier.take_own(RequestId(self._gid, number, request), bytes(data))
+            replier.on_local_request(RequestId(self._gid, number, request), bytes(data))
 
     def forget(self, number: int) -> None:
         """Cancel a call, and drop its reply."""
@@ -252,7 +252,7 @@ class ZenohRequester(Declaration, Requester):
             self._session.is_closed()  # entering Zenoh makes Python release dropped callbacks
         while self._ended:
             end = self._ended.popleft()
-            assert isinstance(end, _End)
+            assert isinstance(end, _QueryEnd)
             self._fail(end.number, CALL_DROPPED)
         now = time.monotonic()
         for number, call in tuple(self._calls.items()):
@@ -301,7 +301,7 @@ class ZenohRequester(Declaration, Requester):
     ) -> None:
         note = Attachment(number, time.time_ns(), self._gid).encode()
         handler = _ReplyHandler(self, number)
-        call.end = _End(handler, self._ended.append)
+        call.end = _QueryEnd(handler, self._ended.append)
         call.end.number = number
         callback = zenoh.handlers.Callback(handler, indirect=False)
 
@@ -330,9 +330,9 @@ class ZenohRequester(Declaration, Requester):
         if self._calls.pop(number, None) is not None:
             self._on_reply(number, None, error)
 
-    def _own(self) -> list[ZenohReplier]:
+    def _local_servers(self) -> list[ZenohReplier]:
         """Return the servers of the same node, which are called directly."""
-        found = self._own_servers.at(self._service.place)
+        found = self._own_servers.find(self._service.place)
         return [one for one in found if one.hash == self._service.hash]
 
     def _route(self) -> tuple[str, set[bytes]]:
@@ -348,7 +348,7 @@ class ZenohRequester(Declaration, Requester):
         if self._owner.status().state is not ConnectionState.CONNECTED:
             return "", set()
         servers = self._owner.graph.endpoints(EndpointKind.SERVICE_SERVER, self._service.name)
-        own = {replier.gid for replier in self._own()}
+        own = {replier.gid for replier in self._local_servers()}
         for name, key in self._service.keys.items():
             querier = self._queriers.get(name)
             listening = {
@@ -471,7 +471,7 @@ class ZenohReplier(Declaration, Replier):
         queryables = [
             session.declare_queryable(
                 key,
-                direct(self._on_query),
+                receive_directly(self._on_query),
                 complete=True,
                 allowed_origin=zenoh.Locality.REMOTE,
             )
@@ -496,7 +496,7 @@ class ZenohReplier(Declaration, Replier):
         with suppress(zenoh.ZError):  # the session is closed
             self._keep([self._session.liveliness().declare_token(self._second)])
 
-    def take_own(self, request: RequestId, data: bytes) -> None:
+    def on_local_request(self, request: RequestId, data: bytes) -> None:
         """Handle a request of the same node, in the sending thread."""
         if not self._closed and isinstance(request.handle, OpenRequest):
             self._waiting.add(request.handle)
