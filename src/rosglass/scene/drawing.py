@@ -268,6 +268,7 @@ class Colouring(NamedTuple):
         invert: Whether the rainbow is turned around.
         first, last: RGB at both ends of a gradient; `first` is the flat colour.
         axis: Four numbers; x, y, z of a point in its own frame and 1 are multiplied with these.
+        per_point_alpha: Whether points are as opaque as the channel's fourth byte says.
     """
 
     mode: str = "flat"
@@ -277,6 +278,7 @@ class Colouring(NamedTuple):
     first: tuple[float, float, float] = (1.0, 1.0, 1.0)
     last: tuple[float, float, float] = (1.0, 1.0, 1.0)
     axis: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 0.0)
+    per_point_alpha: bool = False
 
 
 class Points(Drawable):
@@ -350,7 +352,8 @@ class Points(Drawable):
         if colours is not None:
             rgba = rgba_bytes(colours, len(xyz))
             rows.view(np.uint8).reshape(-1, 16)[:, 12:] = rgba[:, (2, 1, 0, 3)]
-            self.colouring = self.colouring._replace(mode="bgra")
+            clear = bool((rgba[:, 3] < 255).any())
+            self.colouring = self.colouring._replace(mode="bgra", per_point_alpha=clear)
         self.set_data(
             rows.reshape(-1).view(np.uint8),
             len(xyz),
@@ -385,7 +388,8 @@ class Points(Drawable):
     @property
     def opaque(self) -> bool:
         """Whether nothing behind it shines through."""
-        return self.alpha >= OPAQUE
+        paint = self.colouring
+        return self.alpha >= OPAQUE and not (paint.mode == "bgra" and paint.per_point_alpha)
 
     def xyz(self) -> NDArray[np.float32]:
         """Return the positions, (n, 3), in their own frame; a view of the bytes."""

@@ -395,7 +395,8 @@ class _PointsOnDevice(_OnDevice):
         points = self.drawable
         paint = points.colouring
         block[0] = (1, 1, 1, points.alpha * alpha)
-        block[1] = (_MODES[paint.mode], paint.low, paint.high, paint.invert)
+        flag = paint.per_point_alpha if paint.mode == "bgra" else paint.invert
+        block[1] = (_MODES[paint.mode], paint.low, paint.high, flag)
         block[2] = (*paint.first, points.size)
         block[3] = (*paint.last, points.style != "points")
         block[4] = paint.axis

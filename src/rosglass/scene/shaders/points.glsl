@@ -1,26 +1,17 @@
-// Colours of points. a: mode, low, high, inverted; b: first colour and size; c: last colour and
-// style; d: axis.
-vec3 rainbow(float value)
+// Colours of points. a: mode, low, high, and whether the rainbow is inverted or, in mode bgra, points
+// have an opacity each; b: first colour and size; c: last colour and style; d: axis.
+vec3 rainbow(float part)
 {
-    // RViz's: from red (1) over yellow, green, cyan and blue to magenta (0).
-    value = clamp(value, 0.0, 1.0);
-    float h = value * 5.0 + 1.0;
-    float i = floor(h);
-    float f = h - i;
-    if (mod(i, 2.0) < 0.5) f = 1.0 - f;
-    float n = 1.0 - f;
-    if (i <= 1.0) return vec3(n, 0.0, 1.0);
-    if (i <= 2.0) return vec3(0.0, n, 1.0);
-    if (i <= 3.0) return vec3(0.0, 1.0, n);
-    if (i <= 4.0) return vec3(n, 1.0, 0.0);
-    return vec3(1.0, n, 0.0);
+    // RViz's: from magenta (0) over blue, cyan, green and yellow to red (1).
+    float h = 5.0 * part;
+    return clamp(vec3(max(1.0 - h, h - 3.0), min(h - 1.0, 5.0 - h), 3.0 - h), 0.0, 1.0);
 }
 
 vec4 point_colour(vec3 position, vec4 channel)
 {
     float mode = object.a.x;
     if (mode < 0.5) return vec4(object.b.rgb, object.colour.a);
-    if (mode < 1.5) return vec4(channel.bgr, object.colour.a);
+    if (mode < 1.5) return vec4(channel.bgr, object.colour.a * (object.a.w > 0.5 ? channel.a : 1.0));
     float value = mode < 3.5 ? channel.x : dot(object.d, vec4(position, 1.0));
     float span = object.a.z - object.a.y;
     float part = span != 0.0 ? (value - object.a.y) / span : 0.0;
