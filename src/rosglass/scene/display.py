@@ -220,6 +220,9 @@ class Display(Configurable, TopicElement):
     def reset(self) -> None:
         """Drop all data that was received, e.g. as time has jumped back."""
 
+    def _renew_preparer(self) -> None:
+        """Prepare further data by changed settings, or for another renderer."""
+
     def _is_old(self) -> bool:
         return False
 
@@ -434,6 +437,11 @@ class TopicDisplay(Display):
         write_topic(kept, TopicSetting(self.topic, self.depth, *policies), ros)
         return kept
 
+    def _on_enabled(self) -> None:
+        super()._on_enabled()
+        if not self.enabled:
+            self.reset()  # it would be old when the display is shown again
+
     # -- the subscription ------------------------------------------------------------------------
 
     def _on_topic(self) -> None:
@@ -520,7 +528,7 @@ class TopicDisplay(Display):
         return lambda message: message
 
     def _renew_preparer(self) -> None:
-        """Let further messages be decoded by changed settings."""
+        """Let further messages be decoded by changed settings, or for another renderer."""
         if self._intake is not None:
             self._intake.prepare = self.preparer()
 
@@ -554,7 +562,7 @@ class TopicDisplay(Display):
         if not self.KEEPS_ALL:
             # The newest that can be placed; older ones are of no use then.
             for at in range(len(self._waiting) - 1, -1, -1):
-                pose = self.place_of(self._waiting[at].frame, self._waiting[at].stamp)
+                pose = self._place(self._waiting[at])
                 if pose is not None:
                     item = self._waiting[at]
                     for _ in range(at + 1):
@@ -564,14 +572,19 @@ class TopicDisplay(Display):
             return
         for _ in range(len(self._waiting)):
             item = self._waiting.popleft()
-            pose = self.place_of(item.frame, item.stamp)
+            pose = self._place(item)
             if pose is None:
                 self._waiting.append(item)
             else:
                 self._show(item, pose)
 
+    def _place(self, item: _Item) -> NDArray[np.float64] | None:
+        """Return the pose of a message's frame at its time; None while it is not known."""
+        return self.place_of(item.frame, item.stamp)
+
     def _show(self, item: _Item, pose: NDArray[np.float64]) -> None:
         self._last = item
+        self.root.visible = self.enabled
         try:
             self.show(item.data, pose, item.frame, item.stamp)
         except Error as error:
@@ -603,7 +616,7 @@ class TopicDisplay(Display):
     def on_fixed_frame(self) -> None:
         """Show the last message in the new fixed frame."""
         if self._last is not None:
-            pose = self.place_of(self._last.frame, self._last.stamp)
+            pose = self._place(self._last)
             if pose is None:
                 # At its time it is not known any more: rather the newest than a wrong place.
                 pose = self.place_of(self._last.frame, 0)

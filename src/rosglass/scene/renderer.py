@@ -739,6 +739,11 @@ class SceneRenderer(QQuickRhiItemRenderer):
         except Exception as error:
             self._report(f"the 3D view cannot draw: {error}")
 
+    @property
+    def draws_in_software(self) -> bool:
+        """Whether the processor draws; False before the first picture."""
+        return self._device is not None and self._device.is_software
+
     def synchronize(self, item: QQuickRhiItem) -> None:  # noqa: ARG002 - Qt's signature
         """Take the next frame; the GUI thread waits."""
         try:

@@ -42,6 +42,7 @@ class Scene(Element):
 
     Attributes:
         root: All drawables, in the fixed frame.
+        draws_in_software: Whether the processor draws, as far as is known.
     """
 
     #: The picture has changed.
@@ -61,6 +62,7 @@ class Scene(Element):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         self.root = Group()
+        self.draws_in_software = False
         self._fixed_frame = "map"
         self._displays: list[Display] = []
         self._link: TfLink | None = None
@@ -155,6 +157,12 @@ class Scene(Element):
     def find(self, name: str) -> Display | None:
         """Return the first display of a name."""
         return next((one for one in self._displays if one.name == name), None)
+
+    def set_draws_in_software(self, draws_in_software: bool) -> None:
+        """Set whether the processor draws; displays then prepare data so that it is faster."""
+        if draws_in_software != self.draws_in_software:
+            self.draws_in_software = draws_in_software
+            self._each(lambda display: display._renew_preparer())
 
     # -- frames ----------------------------------------------------------------------------------
 

@@ -298,6 +298,8 @@ class SceneView(QQuickRhiItem):
 
     def _take_frame(self) -> Frame:
         window = self.window()
+        if any(one.draws_in_software for one in self._renderers) != self.scene.draws_in_software:
+            QtCore.QTimer.singleShot(0, self, self._report_device)
         return Frame(
             list(self.scene.root.drawables()),
             self.camera(),
@@ -305,6 +307,12 @@ class SceneView(QQuickRhiItem):
             window.effectiveDevicePixelRatio() if window is not None else 1.0,
             time.monotonic() - self._moved_at < _STILL_S,
         )
+
+    @Slot()
+    def _report_device(self) -> None:
+        self._renderers[:] = [one for one in self._renderers if Shiboken.isValid(one)]
+        in_software = any(one.draws_in_software for one in self._renderers)
+        self.scene.set_draws_in_software(in_software)
 
     def _on_problem(self, problem: str) -> None:
         # From the render thread, in the middle of drawing.

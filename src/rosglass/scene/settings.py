@@ -82,7 +82,13 @@ class Setting(Writable[Any]):
     def __set_name__(self, owner: type[Any], name: str) -> None:
         self.name = name
         super().__set_name__(owner, name)
-        owner.SETTINGS = {**getattr(owner, "SETTINGS", {}), self.path: self}
+        # One of a base class is replaced where it stands, even if its path is another.
+        before: dict[str, Setting] = getattr(owner, "SETTINGS", {})
+        owner.SETTINGS = {
+            self.path if setting.name == name else path: self if setting.name == name else setting
+            for path, setting in before.items()
+        }
+        owner.SETTINGS[self.path] = self
 
     def restore(self, saved: Any) -> Any:
         """Return the value that a ``.rviz`` file keeps.
