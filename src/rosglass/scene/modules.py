@@ -21,6 +21,15 @@ from rosglass.scene.displays.geometry import (
 from rosglass.scene.displays.grid import AxesDisplay, GridDisplay
 from rosglass.scene.displays.map import GridCellsDisplay, MapDisplay
 from rosglass.scene.displays.path import PathDisplay
+from rosglass.scene.displays.point_cloud import (
+    FluidPressureDisplay,
+    IlluminanceDisplay,
+    LaserScanDisplay,
+    PointCloud2Display,
+    PointCloudDisplay,
+    RelativeHumidityDisplay,
+    TemperatureDisplay,
+)
 from rosglass.scene.displays.pose import (
     OdometryDisplay,
     PoseArrayDisplay,
@@ -39,18 +48,25 @@ __all__ = ["DISPLAYS", "PANELS", "register"]
 DISPLAYS = (
     AccelStampedDisplay,
     AxesDisplay,
+    FluidPressureDisplay,
     GridCellsDisplay,
     GridDisplay,
+    IlluminanceDisplay,
+    LaserScanDisplay,
     MapDisplay,
     OdometryDisplay,
     PathDisplay,
+    PointCloud2Display,
+    PointCloudDisplay,
     PointStampedDisplay,
     PolygonDisplay,
     PoseArrayDisplay,
     PoseDisplay,
     PoseWithCovarianceDisplay,
     RangeDisplay,
+    RelativeHumidityDisplay,
     TFDisplay,
+    TemperatureDisplay,
     TwistStampedDisplay,
     WrenchStampedDisplay,
 )

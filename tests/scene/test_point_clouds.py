@@ -1,0 +1,371 @@
+"""The displays of point clouds: colors, styles, Decay Time, motion of a laser scanner."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conftest import SceneBench
+
+#: Seen from above, the middle of the picture is the origin, and 10 pixels are a metre.
+CENTER, PIXELS_PER_M = (150, 200), 10
+FLOAT32, UINT32 = 7, 6
+
+
+def cloud(
+    rows: Any, *names: str, types: dict[str, int] | None = None, **more: Any
+) -> dict[str, Any]:
+    """Return a PointCloud2 with float32 (or other) fields x, y, z and those named."""
+    fields = ("x", "y", "z", *names)
+    packed = np.zeros((len(rows), len(fields)), np.float32)
+    for column, name in enumerate(fields):
+        values = [row[column] for row in rows]
+        if (types or {}).get(name) == UINT32:
+            packed[:, column] = np.array(values, np.uint32).view(np.float32)
+        else:
+            packed[:, column] = values
+    return {
+        "header": {"frame_id": "map"},
+        "height": 1,
+        "width": len(rows),
+        "fields": [
+            {
+                "name": name,
+                "offset": 4 * column,
+                "datatype": (types or {}).get(name, FLOAT32),
+                "count": 1,
+            }
+            for column, name in enumerate(fields)
+        ],
+        "point_step": 4 * len(fields),
+        "row_step": 4 * len(fields) * len(rows),
+        "data": packed.tobytes(),
+        "is_dense": True,
+        **more,
+    }
+
+
+class Shown:
+    """A display, and the publisher of its topic."""
+
+    def __init__(self, bench: SceneBench, kind: str, settings: str = "") -> None:
+        self.bench = bench
+        body = f'view: "TopDownOrtho"; {kind}Display {{ topic: "/cloud"; size: 1; {settings} }}'
+        (self.display,) = bench.load(body).scene.displays
+        self.publisher = bench.robot.create_publisher("/cloud", self.display.MESSAGES[0])
+        bench.wait(self.publisher.subscription_count)
+
+    def send(self, message: dict[str, Any]) -> Any:
+        """Publish a message, and return the display once it has received it."""
+        display, before = self.display, self.display._intake.received
+        self.publisher.publish(message)
+        self.bench.wait(lambda: display._intake.received > before)
+        self.bench.wait.settled(self.bench.session)
+        return display
+
+    def at(self, x: float, y: float, picture: Any = None) -> tuple[int, ...]:
+        """Return the color of the picture at a place on the ground."""
+        picture = self.bench.picture() if picture is None else picture
+        row, column = round(CENTER[0] - y * PIXELS_PER_M), round(CENTER[1] + x * PIXELS_PER_M)
+        return tuple(int(part) for part in picture[row, column])
+
+
+@pytest.fixture
+def show(bench: SceneBench) -> Callable[..., Shown]:
+    return lambda kind, settings="": Shown(bench, kind, settings)
+
+
+BACKGROUND = (48, 48, 48)
+
+
+def near(color: tuple[int, ...], *wanted: int, tolerance: int = 2) -> bool:
+    return all(abs(a - b) <= tolerance for a, b in zip(color, wanted, strict=True))
+
+
+def test_points_have_rviz_rainbow_by_intensity(show: Callable[..., Shown]) -> None:
+    shown = show("PointCloud2")
+    rows = [(x, 0, 0, 10.0 + x) for x in range(-8, 9, 4)]
+    display = shown.send(cloud(rows, "intensity"))
+    assert display.statusLevel == "ok", display.statusText
+    assert "Points: Showing [5] points from [1] messages" in display.statusText
+    assert (display.minIntensity, display.maxIntensity) == (2.0, 18.0)
+    assert display.usedColorTransformer == "Intensity"
+    assert display.channels == ["intensity", "x", "y", "z"]
+    picture = shown.bench.picture()
+    # Red at the minimum, then yellow-green, cyan-green, blue, magenta.
+    wanted = [(255, 0, 0), (191, 255, 0), (0, 255, 128), (0, 64, 255), (255, 0, 255)]
+    for (x, *_), color in zip(rows, wanted, strict=True):
+        assert near(shown.at(x, 0, picture), *color), (x, shown.at(x, 0, picture))
+    display.invertRainbow = True
+    assert near(shown.at(8, 0), 255, 0, 0)
+    display.useRainbow = False
+    display.minColor, display.maxColor = "#00ff00", "#0000ff"
+    picture = shown.bench.picture()
+    assert near(shown.at(-8, 0, picture), 0, 255, 0)
+    assert near(shown.at(0, 0, picture), 0, 128, 128)
+    assert near(shown.at(8, 0, picture), 0, 0, 255)
+    display.autocomputeIntensityBounds = False
+    display.minIntensity, display.maxIntensity = 10.0, 14.0
+    picture = shown.bench.picture()
+    assert near(shown.at(0, 0, picture), 0, 255, 0)
+    assert near(shown.at(4, 0, picture), 0, 0, 255)
+
+
+def test_points_have_packed_colors_with_alpha(show: Callable[..., Shown]) -> None:
+    shown = show("PointCloud2")
+    types = {"rgb": UINT32, "rgba": UINT32}
+    display = shown.send(cloud([(-3, 0, 0, 0xFF8000), (3, 0, 0, 0x0080FF)], "rgb", types=types))
+    assert display.usedColorTransformer == "RGB8"
+    picture = shown.bench.picture()
+    assert shown.at(-3, 0, picture) == (255, 128, 0)
+    assert shown.at(3, 0, picture) == (0, 128, 255)
+    shown.send(cloud([(-3, 0, 0, 0xFFFF8000), (3, 0, 0, 0x800080FF)], "rgba", types=types))
+    picture = shown.bench.picture()
+    assert shown.at(-3, 0, picture) == (255, 128, 0)
+    assert near(shown.at(3, 0, picture), 24, 88, 152, tolerance=3)
+    display.colorTransformer = "MONO8"
+    red, green, blue = shown.at(-3, 0)
+    assert red == green == blue
+    display.colorTransformer = "FlatColor"
+    display.color = "#00ffff"
+    display.alpha = 0.5
+    assert near(shown.at(3, 0), 24, 152, 152, tolerance=3)
+
+
+def test_an_axis_is_that_of_the_fixed_frame(bench: SceneBench, show: Callable[..., Shown]) -> None:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    # The sensor lies on its side: its x is up.
+    turned = Transform((0, 0, 5), (0, -math.sqrt(0.5), 0, math.sqrt(0.5)), Time(), "map", "sensor")
+    StaticTransformBroadcaster(bench.robot).send_transform(turned)
+    shown = show("PointCloud2", 'colorTransformer: "AxisColor"')
+    bench.wait(lambda: "sensor" in bench.view.scene.frames())
+    rows = [(x, x * 4 - 4, 0) for x in (0, 1, 2)]
+    display = shown.send(cloud(rows, header={"frame_id": "sensor"}))
+    assert display.statusLevel == "ok", display.statusText
+    assert (display.minValue, display.maxValue) == pytest.approx((5.0, 7.0))
+    picture = bench.picture()
+    assert near(shown.at(0, -4, picture), 255, 0, 0)
+    assert near(shown.at(0, 0, picture), 0, 255, 128, tolerance=4)
+    assert near(shown.at(0, 4, picture), 255, 0, 255)
+    display.useFixedFrame = False
+    display.axis = "X"
+    assert (display.minValue, display.maxValue) == pytest.approx((0.0, 2.0))
+
+
+@pytest.mark.parametrize("style", ["Points", "Squares", "Flat Squares", "Spheres", "Boxes"])
+def test_styles_have_their_size(show: Callable[..., Shown], style: str) -> None:
+    shown = show("PointCloud2", f'style: "{style}"; sizePixels: 9; color: "#00ff00"')
+    display = shown.send(cloud([(0, 0, 0)]))
+    display.colorTransformer = "FlatColor"
+    display.size = 3
+    picture = shown.bench.picture()
+    green = int(((picture[..., 1] > 60) & (picture[..., 0] < 30)).sum())
+    wanted = {"Points": 81, "Spheres": 707}.get(style, 900)
+    assert wanted * 0.9 < green < wanted * 1.1
+
+
+def test_clouds_stay_for_the_decay_time(bench: SceneBench, show: Callable[..., Shown]) -> None:
+    shown = show("PointCloud2", 'decayTime: 1000; colorTransformer: "FlatColor"')
+    for x in (-3, 0, 3):
+        display = shown.send(cloud([(x, 0, 0)]))
+    assert "Showing [3] points from [3] messages" in display.statusText
+    picture = bench.picture()
+    assert [shown.at(x, 0, picture)[0] for x in (-3, 0, 3)] == [255] * 3
+    drawables = len(list(display.root))
+    display.decayTime = 0.3
+    bench.wait(lambda: display.points == 0)
+    assert shown.at(0, 0) == BACKGROUND
+    display.decayTime = 0
+    for x in (-3, 0):
+        shown.send(cloud([(x, 0, 0)]))
+    assert (drawables, len(list(display.root)), display.points) == (3, 1, 1)
+    picture = bench.picture()
+    assert shown.at(0, 0, picture) == (255, 255, 255)
+    assert shown.at(-3, 0, picture) == BACKGROUND
+    display.enabled = False
+    display.enabled = True
+    bench.wait.settled(bench.session)
+    assert shown.at(0, 0) == BACKGROUND, "what is old does not return"
+
+
+def test_points_without_a_position_are_counted_and_not_drawn(show: Callable[..., Shown]) -> None:
+    shown = show("PointCloud2", 'style: "Spheres"')
+    nan, inf = math.nan, math.inf
+    display = shown.send(cloud([(nan, 0, 0), (0, -inf, 0), (inf, nan, 0), (3, 0, 0)]))
+    assert "Showing [1] points from [1] messages; [3] have no finite" in display.statusText
+    assert (shown.bench.picture() != BACKGROUND).any(axis=2).sum() < 120
+    display = shown.send(cloud([]))
+    assert "Showing [0] points from [1] messages" in display.statusText
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"width": 3}, "row_step"),
+        ({"width": 4_000_000_000, "row_step": 4_000_000_000}, "row_step"),
+        ({"data": b""}, "data"),
+        ({"point_step": 0, "row_step": 0}, "point_step is 0"),
+        ({"fields": []}, "no field 'x'"),
+        ({"fields": [{"name": "x", "offset": 9, "datatype": 7, "count": 1}]}, "ends at byte 13"),
+        ({"fields": [{"name": "x", "offset": 0, "datatype": 99, "count": 1}]}, "'x' has datatype"),
+    ],
+)
+def test_a_cloud_that_lies_is_an_error_in_words(
+    show: Callable[..., Shown], change: dict[str, Any], text: str
+) -> None:
+    shown = show("PointCloud2")
+    shown.send(cloud([(0, 0, 0)]))
+    display = shown.send(cloud([(3, 0, 0)], **change))
+    assert display.statusLevel == "error"
+    assert text in display.statusText
+    assert shown.at(0, 0) == (255, 255, 255), "the last good cloud stays"
+
+
+def test_a_transformer_without_its_fields_says_so(show: Callable[..., Shown]) -> None:
+    shown = show("PointCloud2", 'colorTransformer: "RGB8"')
+    display = shown.send(cloud([(0, 0, 0, 1)], "ring"))
+    assert display.statusLevel == "warn"
+    assert "no fields for RGB8, so Intensity is used" in display.statusText
+    display.colorTransformer = "Intensity"
+    assert "no readable channel 'intensity'" in display.statusText
+    display.channelName = "ring"
+    assert display.statusLevel == "ok", display.statusText
+
+
+def test_a_picked_point_has_all_fields(bench: SceneBench, show: Callable[..., Shown]) -> None:
+    shown = show("PointCloud2")
+    bench.view.scene.set_draws_in_software(True)
+    random = np.random.default_rng(1).uniform(-9, 9, (500, 3))
+    rows = [(x, y, 0, number) for number, (x, y, _) in enumerate(random)]
+    display = shown.send(cloud(rows, "intensity"))
+    x, y = rows[321][:2]
+    hit = bench.view.pick(CENTER[1] + x * PIXELS_PER_M, CENTER[0] - y * PIXELS_PER_M, 0.0)
+    # Squares of one metre overlap: the nearest of those at the same height is any of them.
+    assert hit is not None
+    described = dict(hit.drawable.owner.describe(hit.number))
+    point = int(described["Point"])
+    assert described["3: intensity"] == str(point)
+    assert described["Position"] == "; ".join(
+        f"{float(np.float32(value)):.6g}" for value in rows[point][:3]
+    )
+    assert max(abs(rows[point][0] - x), abs(rows[point][1] - y)) <= 0.6
+    display.selectable = False
+    assert bench.view.pick(CENTER[1], CENTER[0], 50) is None
+
+
+def test_a_cloud_returns_with_its_frame(bench: SceneBench, show: Callable[..., Shown]) -> None:
+    shown = show("PointCloud2")
+    shown.send(cloud([(0, 0, 0)]))
+    bench.view.fixedFrame = "odom"
+    assert "no transform from [map]" in shown.display.statusText
+    assert shown.at(0, 0) == BACKGROUND
+    shown.send(cloud([(0, 0, 0)], header={"frame_id": "odom"}))
+    assert shown.at(0, 0) == (255, 255, 255)
+    assert "Showing [1] points from [1] messages" in shown.display.statusText
+
+
+def test_settings_of_a_subclass_stand_where_those_of_the_base_class_do() -> None:
+    from rosglass.scene.displays.point_cloud import PointCloud2Display, TemperatureDisplay
+
+    assert list(TemperatureDisplay.SETTINGS) == list(PointCloud2Display.SETTINGS)
+    assert TemperatureDisplay.SETTINGS["Max Intensity"].default == 100.0
+    assert PointCloud2Display.SETTINGS["Max Intensity"].default == 4096.0
+
+
+def scan(ranges: list[float], **more: Any) -> dict[str, Any]:
+    return {
+        "header": {"frame_id": "map"},
+        "angle_min": -math.pi / 2,
+        "angle_increment": math.pi / 2,
+        "range_min": 0.5,
+        "range_max": 30.0,
+        "ranges": ranges,
+        **more,
+    }
+
+
+def test_a_laser_scan_is_drawn(show: Callable[..., Shown]) -> None:
+    shown = show("LaserScan")
+    intensities = [1.0, 2.0, 3.0, 4.0]
+    display = shown.send(scan([5.0, 10.0, 5.0, math.inf], intensities=intensities))
+    assert display.statusLevel == "ok", display.statusText
+    assert "Showing [3] points from [1] messages" in display.statusText
+    picture = shown.bench.picture()
+    assert near(shown.at(0, -5, picture), 255, 0, 0)
+    assert near(shown.at(10, 0, picture), 0, 255, 128, tolerance=3)
+    assert near(shown.at(0, 5, picture), 255, 0, 255)
+    display = shown.send(scan([1.0], intensities=[1.0, 2.0]))
+    assert "2 intensities for 1 ranges" in display.statusText
+    display = shown.send(scan([1.0, 1.0], time_increment=-1.0))
+    assert "motion of the scanner is not corrected" in display.statusText
+    display = shown.send(scan([1.0], angle_min=math.nan))
+    assert "angle_min: expected a finite number" in display.statusText
+
+
+def test_a_laser_scan_is_corrected_by_the_motion_of_the_scanner(
+    bench: SceneBench, show: Callable[..., Shown]
+) -> None:
+    from rosglass import Time
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    shown = show("LaserScan")
+    broadcaster = TransformBroadcaster(bench.robot)
+
+    def move(seconds: int, x: float) -> None:
+        at = Transform((x, 0, 0), (0, 0, 0, 1), Time.from_parts(seconds, 0), "map", "laser")
+        broadcaster.send_transform(at)
+
+    move(10, 0.0)
+    bench.wait(lambda: "laser" in bench.view.scene.frames())
+    header = {"frame_id": "laser", "stamp": {"sec": 10, "nanosec": 0}}
+    # Two seconds from the first ray to the last one.
+    display = shown.send(scan([5.0, 5.0, 5.0], header=header, time_increment=1.0))
+    assert display.points == 0, "where the scanner was at the last ray is not known yet"
+    move(14, 12.0)
+    bench.wait(lambda: display.points == 3)
+    assert display.statusLevel == "ok", display.statusText
+    picture = bench.picture()
+    for x, y in ((0, -5), (3 + 5, 0), (6, 5)):
+        assert shown.at(x, y, picture) == (255, 255, 255), (x, y)
+
+
+def test_a_point_cloud_of_the_old_type_is_drawn(show: Callable[..., Shown]) -> None:
+    shown = show("PointCloud", 'channelName: "heat"')
+    points = [{"x": -3.0, "y": 0.0, "z": 0.0}, {"x": 3.0, "y": 0.0, "z": 0.0}]
+    display = shown.send(
+        {
+            "header": {"frame_id": "map"},
+            "points": points,
+            "channels": [{"name": "heat", "values": [1.0, 2.0]}, {"name": "b", "values": [1.0]}],
+        }
+    )
+    assert "channel 'b' has 1 values for 2 points and is left out" in display.statusText
+    picture = shown.bench.picture()
+    assert near(shown.at(-3, 0, picture), 255, 0, 0)
+    assert near(shown.at(3, 0, picture), 255, 0, 255)
+
+
+@pytest.mark.parametrize(
+    ("kind", "field", "value", "color"),
+    [
+        ("Temperature", "temperature", 100.0, (255, 0, 0)),
+        ("FluidPressure", "fluid_pressure", 98_000.0, (255, 0, 0)),
+        ("Illuminance", "illuminance", 1000.0, (255, 0, 255)),
+        ("RelativeHumidity", "relative_humidity", 0.5, (0, 255, 128)),
+    ],
+)
+def test_a_measured_value_is_a_point_of_its_color(
+    show: Callable[..., Shown], kind: str, field: str, value: float, color: tuple[int, int, int]
+) -> None:
+    shown = show(kind)
+    display = shown.send({"header": {"frame_id": "map"}, field: value})
+    assert display.statusLevel == "ok", display.statusText
+    assert near(shown.at(0, 0), *color, tolerance=3)
