@@ -20,6 +20,7 @@ from rosglass.scene.displays.geometry import (
 )
 from rosglass.scene.displays.grid import AxesDisplay, GridDisplay
 from rosglass.scene.displays.map import GridCellsDisplay, MapDisplay
+from rosglass.scene.displays.marker import MarkerArrayDisplay, MarkerDisplay
 from rosglass.scene.displays.path import PathDisplay
 from rosglass.scene.displays.point_cloud import (
     FluidPressureDisplay,
@@ -54,6 +55,8 @@ DISPLAYS = (
     IlluminanceDisplay,
     LaserScanDisplay,
     MapDisplay,
+    MarkerArrayDisplay,
+    MarkerDisplay,
     OdometryDisplay,
     PathDisplay,
     PointCloud2Display,

@@ -1,0 +1,190 @@
+"""The displays Marker and MarkerArray."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from rosglass.scene.drawing import BOX, Labels, Lines, Mesh, Points
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conftest import SceneBench
+
+ADD, DELETE, DELETE_ALL = 0, 2, 3
+RED = {"r": 1.0, "g": 0.0, "b": 0.0, "a": 1.0}
+
+
+def marker(kind: int, number: int = 0, **fields: Any) -> dict[str, Any]:
+    made = {
+        "header": {"frame_id": "map"},
+        "ns": "shapes",
+        "id": number,
+        "type": kind,
+        "action": ADD,
+        "pose": {"orientation": {"w": 1.0}},
+        "scale": {"x": 1.0, "y": 1.0, "z": 1.0},
+        "color": RED,
+    }
+    return {**made, **fields}
+
+
+def points(*places: tuple[float, float, float]) -> list[dict[str, float]]:
+    return [{"x": x, "y": y, "z": z} for x, y, z in places]
+
+
+@pytest.fixture
+def show(bench: SceneBench) -> Callable[..., Any]:
+    """Publishes markers, and returns the display once it has received them."""
+    view = bench.load('MarkerArrayDisplay { topic: "/markers" }')
+    (display,) = view.scene.displays
+    publisher = bench.robot.create_publisher("/markers", "visualization_msgs/MarkerArray")
+    bench.wait(publisher.subscription_count)
+
+    def send(*markers: dict[str, Any]) -> Any:
+        before = display.received
+        publisher.publish({"markers": list(markers)})
+        bench.wait(lambda: display.received > before)
+        bench.wait(lambda: not display._flushing)
+        return display
+
+    return send
+
+
+def drawables(display: Any) -> list[Any]:
+    return [one for one, _, _ in display.root.drawables()]
+
+
+SHAPES = [
+    (marker(0), 60),
+    (marker(0, points=points((0, 0, 0), (2, 0, 0)), scale={"x": 0.3, "y": 0.6, "z": 0.0}), 60),
+    (marker(1), 200),
+    (marker(2), 200),
+    (marker(3), 200),
+    (marker(4, points=points((-2, 0, 0), (2, 0, 0)), scale={"x": 0.3}), 100),
+    (marker(5, points=points((-2, 0, 0), (2, 0, 0)), scale={"x": 0.3}), 100),
+    (marker(6, points=points((-2, 0, 0), (2, 0, 0))), 200),
+    (marker(7, points=points((-2, 0, 0), (2, 0, 0))), 200),
+    (marker(8, points=points((-2, 0, 0), (2, 0, 0)), scale={"x": 0.5, "y": 0.5}), 60),
+    (marker(9, text="robot", scale={"z": 1.0}), 60),
+    (marker(11, points=points((0, 0, 0), (3, 0, 0), (0, 3, 0))), 200),
+    (marker(12, points=points((0, 0, 0), (2, 0, 0), (2, 2, 0)), scale={"x": 0.3, "y": 0.6}), 60),
+]
+
+
+@pytest.mark.parametrize(("shape", "pixels"), SHAPES)
+def test_each_type_is_drawn(
+    bench: SceneBench, show: Callable[..., Any], shape: dict[str, Any], pixels: int
+) -> None:
+    display = show(shape)
+    assert display.statusLevel == "ok", display.statusText
+    picture = bench.picture().astype(int)
+    red = (picture[..., 0] > 60) & (picture[..., 1] < 40) & (picture[..., 2] < 40)
+    assert red.sum() > pixels
+
+
+def test_boxes_are_instances_of_one_mesh(show: Callable[..., Any]) -> None:
+    display = show(*(marker(1, number) for number in range(50)))
+    (mesh,) = drawables(display)
+    assert isinstance(mesh, Mesh)
+    assert (mesh.shape, mesh.count) == (BOX, 50)
+    display = show(marker(1, 7, action=DELETE), marker(1, 49, action=DELETE))
+    assert mesh.count == 48
+    show(marker(1, action=DELETE_ALL, ns=""))
+    assert drawables(display) == []
+
+
+def test_a_marker_replaces_the_one_of_its_id(show: Callable[..., Any]) -> None:
+    display = show(marker(1), marker(9, 1, text="a", scale={"z": 1.0}))
+    show(marker(9, text="b", scale={"z": 1.0}))
+    assert [one.texts for one in drawables(display)] == [("a",), ("b",)]
+
+
+def test_colours_of_points_count(show: Callable[..., Any]) -> None:
+    line = points((0, 0, 0), (1, 0, 0))
+    two = [RED, {"r": 0.0, "g": 1.0, "b": 0.0, "a": 1.0}]
+    display = show(marker(4, points=line, colors=two), marker(8, 1, points=line, colors=two))
+    lines, cloud = drawables(display)
+    assert isinstance(lines, Lines)
+    assert lines.rows["first"].tolist() == [[255, 0, 0, 255]]
+    assert lines.rows["last"].tolist() == [[0, 255, 0, 255]]
+    assert isinstance(cloud, Points)
+    assert cloud.colouring.mode == "bgra"
+
+
+def test_a_lifetime_ends(bench: SceneBench, show: Callable[..., Any]) -> None:
+    display = show(marker(1, lifetime={"sec": 0, "nanosec": 200_000_000}), marker(2, 1))
+    assert len(drawables(display)) == 2
+    bench.wait(lambda: len(drawables(display)) == 1)
+
+
+def test_a_namespace_is_hidden(bench: SceneBench, show: Callable[..., Any]) -> None:
+    display = show(marker(1), marker(2, ns="other"))
+    assert display.namespaces == ["other", "shapes"]
+    display.setNamespaceEnabled("shapes", False)
+    assert len(drawables(display)) == 1
+    assert display.save_settings()["Namespaces"] == {"other": True, "shapes": False}
+
+
+def test_markers_wait_for_their_frame_and_locked_ones_follow_it(
+    bench: SceneBench, show: Callable[..., Any]
+) -> None:
+    from rosglass import Time
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    display = show(
+        marker(1, header={"frame_id": "arm"}, frame_locked=True),
+        marker(2, 1, header={"frame_id": "arm"}),
+    )
+    assert "no transform from [arm]" in display.statusText
+    assert drawables(display) == []
+    broadcaster = TransformBroadcaster(bench.robot)
+
+    def move(x: float, sec: int) -> None:
+        stamp = Time.from_parts(sec, 0)
+        broadcaster.send_transform(Transform((x, 0, 0), (0, 0, 0, 1), stamp, "map", "arm"))
+
+    def where() -> list[float]:
+        return [round(float(one.instances["matrix"][0][12]), 3) for one in drawables(display)]
+
+    move(1.0, 1)
+    bench.wait(lambda: where() == [1.0, 1.0])
+    assert display.statusLevel == "ok"
+    move(3.0, 2)
+    bench.wait(lambda: where() == [3.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("bad", "text"),
+    [
+        ({"type": 99}, "type 99: expected 0 to 12"),
+        ({"action": 7}, "action 7: expected"),
+        ({"scale": {"x": 0.0, "y": 1.0, "z": 1.0}}, "is 0 in a direction"),
+        ({"pose": {"position": {"x": float("nan")}}}, "is not finite"),
+        ({"type": 5, "points": points((0, 0, 0))}, "points: 1 are not pairs"),
+        ({"type": 11, "points": points((0, 0, 0))}, "are not triples"),
+        ({"type": 0, "points": points((0, 0, 0))}, "has none, or start and end"),
+    ],
+)
+def test_a_bad_marker_says_what_is_wrong_and_the_others_are_drawn(
+    show: Callable[..., Any], bad: dict[str, Any], text: str
+) -> None:
+    display = show({**marker(1), **bad}, marker(2, 1))
+    assert display.statusLevel == "error"
+    assert text in display.statusText
+    assert len(drawables(display)) == 1
+    # Mended, its line goes.
+    show(marker(1))
+    assert display.statusLevel == "ok"
+
+
+def test_labels_of_wild_texts_are_bounded(bench: SceneBench, show: Callable[..., Any]) -> None:
+    display = show(marker(9, text="wide " * 5000, scale={"z": 1e30}))
+    (labels,) = drawables(display)
+    assert isinstance(labels, Labels)
+    assert len(labels.texts[0]) == Labels.MAX_LENGTH
+    assert np.isfinite(bench.picture()).all()
+    assert bench.view.problem == ""
