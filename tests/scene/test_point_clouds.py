@@ -369,3 +369,131 @@ def test_a_measured_value_is_a_point_of_its_color(
     display = shown.send({"header": {"frame_id": "map"}, field: value})
     assert display.statusLevel == "ok", display.statusText
     assert near(shown.at(0, 0), *color, tolerance=3)
+
+
+DEPTH = {"height": 2, "width": 2, "encoding": "16UC1", "step": 4}
+COLOR = {"height": 2, "width": 2, "encoding": "rgb8", "step": 6}
+CAMERA = {"width": 2, "height": 2, "p": [1.0, 0, 0.5, 0, 0, 1.0, 0.5, 0, 0, 0, 1.0, 0]}
+
+
+class Camera:
+    """A display of depth images, and the publishers of a camera that looks down from above."""
+
+    def __init__(self, bench: SceneBench, settings: str = "") -> None:
+        from rosglass import Time
+        from rosglass.tf import StaticTransformBroadcaster, Transform
+
+        down = Transform((0, 0, 10), (1, 0, 0, 0), Time(), "map", "camera")
+        StaticTransformBroadcaster(bench.robot).send_transform(down)
+        self.bench = bench
+        body = f'DepthCloudDisplay {{ topic: "/camera/depth/image_raw"; {settings} }}'
+        (self.display,) = bench.load(f'view: "TopDownOrtho"; {body}').scene.displays
+        bench.wait(lambda: "camera" in bench.view.scene.frames())
+        names = {
+            "/camera/depth/image_raw": "Image",
+            "/camera/depth/camera_info": "CameraInfo",
+            "/camera/rgb/image_raw": "Image",
+        }
+        self.publishers = {
+            name: bench.robot.create_publisher(name, f"sensor_msgs/{kind}")
+            for name, kind in names.items()
+        }
+        bench.wait(self.publishers["/camera/depth/camera_info"].subscription_count)
+
+    def send(self, topic: str, message: dict[str, Any], second: int = 1) -> Any:
+        header = {"frame_id": "camera", "stamp": {"sec": second, "nanosec": 0}}
+        publisher, intake = self.publishers[topic], self.display._intake
+        before = intake.received
+        self.bench.wait(publisher.subscription_count)
+        publisher.publish({"header": header, **message})
+        self.bench.wait(lambda: intake.received > before)
+        self.bench.wait.settled(self.bench.session)
+        return self.display
+
+    def depth(self, values: list[int], second: int = 1, **more: Any) -> Any:
+        data = np.array(values, "<u2").tobytes()
+        return self.send("/camera/depth/image_raw", {**DEPTH, "data": data, **more}, second)
+
+    def color(self, value: tuple[int, int, int], second: int = 1, **more: Any) -> Any:
+        data = bytes(value) * 4
+        return self.send("/camera/rgb/image_raw", {**COLOR, "data": data, **more}, second)
+
+
+def test_a_depth_image_is_a_cloud_of_squares_of_its_pixels(bench: SceneBench) -> None:
+    camera = Camera(bench)
+    display = camera.depth([4000, 4000, 0, 8000])
+    assert "no camera info received; publish it on /camera/depth/camera_info" in display.statusText
+    camera.send("/camera/depth/camera_info", CAMERA)
+    camera.depth([4000, 4000, 0, 8000])
+    assert display.statusLevel == "ok", display.statusText
+    assert "Showing [3] points from [1] messages" in display.statusText
+    picture = bench.picture()
+    white = int((picture == 255).all(axis=2).sum())
+    # Pixels of 4 m at (-2, 2) and (2, 2), one of 8 m at (4, -4) below these.
+    assert white == pytest.approx((2 * 16 + 64) * PIXELS_PER_M**2, rel=0.03)
+    display.autoSize = False
+    display.size = 1.0
+    white = int((bench.picture() == 255).all(axis=2).sum())
+    assert white == pytest.approx(3 * PIXELS_PER_M**2, rel=0.03)
+    hit = bench.view.pick(CENTER[1] + 40, CENTER[0] + 40, 1.0)
+    assert hit is not None
+    assert hit.point == pytest.approx((4, -4, 2))
+
+
+def test_a_depth_image_has_the_color_of_its_time(bench: SceneBench) -> None:
+    camera = Camera(bench, 'colorTopic: "/camera/rgb/image_raw"')
+    camera.send("/camera/depth/camera_info", CAMERA)
+    camera.color((255, 0, 0), 1)
+    display = camera.depth([4000] * 4, 2)
+    assert display.points == 0, "a color image of a nearer time may follow"
+    camera.color((0, 255, 0), 2)
+    assert display.points == 4
+    assert tuple(bench.picture()[CENTER[0] - 20, CENTER[1] - 20]) == (0, 255, 0)
+    camera.color((0, 0, 255), 9)
+    camera.depth([4000] * 4, 3)
+    assert tuple(bench.picture()[CENTER[0] - 20, CENTER[1] - 20]) == (0, 255, 0)
+    display = camera.depth([4000] * 4, 8, header={"frame_id": "map"})
+    assert "the frame of the depth image is [map], that of the color image [camera]" in (
+        display.statusText
+    )
+
+
+@pytest.mark.parametrize(
+    ("camera_info", "change", "text"),
+    [
+        ({}, {"encoding": "rgb8"}, "a depth image is 16UC1, mono16, 32FC1, got 'rgb8'"),
+        ({}, {"data": b"12"}, "needs 8 bytes, data has 2"),
+        ({}, {"width": 3_000_000}, "3000000x2 pixels, the camera info 2x2"),
+        ({"width": 0, "height": 0}, {"width": 3_000_000}, "step"),
+        ({"p": [0.0] * 12}, {}, "the focal length is 0"),
+        ({"p": [math.nan] * 12}, {}, "expected 12 finite numbers"),
+    ],
+)
+def test_a_bad_depth_image_is_an_error_in_words(
+    bench: SceneBench, camera_info: dict[str, Any], change: dict[str, Any], text: str
+) -> None:
+    camera = Camera(bench)
+    camera.send("/camera/depth/camera_info", {**CAMERA, **camera_info})
+    display = camera.depth([4000] * 4, **change)
+    assert display.statusLevel == "error"
+    assert text in display.statusText
+
+
+def test_a_depth_cloud_keeps_its_topics_in_files() -> None:
+    from rosglass.scene.displays.point_cloud import DepthCloudDisplay
+
+    display = DepthCloudDisplay()
+    saved = {
+        "Class": "rviz/DepthCloud",
+        "Depth Map Topic": "/depth",
+        "Color Image Topic": "/rgb",
+        "Queue Size": 7,
+        "Auto Size": {"Auto Size Factor": 2, "Value": False},
+    }
+    assert display.load_settings(saved) == []
+    assert (display.topic, display.colorTopic, display.depth) == ("/depth", "/rgb", 7)
+    assert (display.autoSize, display.autoSizeFactor) == (False, 2.0)
+    for ros in (1, 2):
+        kept = display.save_settings(saved, ros)
+        assert {key: kept[key] for key in saved} == saved
+        assert "Topic" not in kept

@@ -340,7 +340,10 @@ class _Intake:
                 message = sample.type.decode_all(sample.data, wire=sample.wire)
             else:
                 message = sample.message()
-            item = _Item(self.prepare(message), *frame_and_stamp(message))
+            data = self.prepare(message)
+            if data is not None:
+                whole = getattr(data, "source", None)
+                item = _Item(data, *frame_and_stamp(message if whole is None else whole))
         except Error as reason:
             error = str(reason)
         except Exception as reason:  # what peers send never ends the thread
@@ -523,7 +526,9 @@ class TopicDisplay(Display):
     def preparer(self) -> Callable[[Message], Any]:
         """Return a function that decodes a message, for the node's thread.
 
-        It must not refer to the display, only to values of its settings.
+        It must not refer to the display, only to values of its settings. It returns None where
+        there is nothing to show yet. The attribute `source` of what it returns, if there is one, is
+        the message whose frame and time count.
         """
         return lambda message: message
 

@@ -292,6 +292,8 @@ class Points(Drawable):
         channel_is_bytes: Whether the channel is four bytes B, G, R, A; otherwise one float32.
         style: ``points`` (pixels), ``squares``, ``flat squares``, ``spheres``, ``boxes`` (metres).
         size: Pixels of the screen for ``points``, metres for the others.
+        size_by_depth: Whether metres are multiplied with z of each point, as the pixels of depth
+            images are as large as they are far away.
         colouring: How they get their colours.
         alpha: Opacity, 0 to 1.
     """
@@ -303,7 +305,7 @@ class Points(Drawable):
         self.data: NDArray[np.uint8] = np.zeros(0, np.uint8)
         self.stride, self.position, self.channel = 16, 0, -1
         self.channel_is_bytes = False
-        self.style, self.size = "points", 3.0
+        self.style, self.size, self.size_by_depth = "points", 3.0, False
         self.colouring = Colouring()
         self.alpha = 1.0
         self._box: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
@@ -367,6 +369,7 @@ class Points(Drawable):
         *,
         style: str | None = None,
         size: float | None = None,
+        size_by_depth: bool | None = None,
         colouring: Colouring | None = None,
         alpha: float | None = None,
     ) -> None:
@@ -377,12 +380,13 @@ class Points(Drawable):
         """
         if style is not None and style not in self.STYLES:
             raise Error(f"style {style!r} is none of {', '.join(self.STYLES)}")
-        before = (self.style, self.size, self.colouring, self.alpha)
+        before = (self.style, self.size, self.size_by_depth, self.colouring, self.alpha)
         self.style = self.style if style is None else style
         self.size = self.size if size is None else size
+        self.size_by_depth = self.size_by_depth if size_by_depth is None else size_by_depth
         self.colouring = self.colouring if colouring is None else colouring
         self.alpha = self.alpha if alpha is None else alpha
-        if before != (self.style, self.size, self.colouring, self.alpha):
+        if before != (self.style, self.size, self.size_by_depth, self.colouring, self.alpha):
             self.changed()
 
     @property

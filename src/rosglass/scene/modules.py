@@ -23,6 +23,7 @@ from rosglass.scene.displays.map import GridCellsDisplay, MapDisplay
 from rosglass.scene.displays.marker import MarkerArrayDisplay, MarkerDisplay
 from rosglass.scene.displays.path import PathDisplay
 from rosglass.scene.displays.point_cloud import (
+    DepthCloudDisplay,
     FluidPressureDisplay,
     IlluminanceDisplay,
     LaserScanDisplay,
@@ -49,6 +50,7 @@ __all__ = ["DISPLAYS", "PANELS", "register"]
 DISPLAYS = (
     AccelStampedDisplay,
     AxesDisplay,
+    DepthCloudDisplay,
     FluidPressureDisplay,
     GridCellsDisplay,
     GridDisplay,

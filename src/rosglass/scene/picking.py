@@ -153,7 +153,9 @@ def _pick_points(
 ) -> tuple[int, NDArray[np.float64]] | None:
     xyz = points.xyz()
     seen, far = _project(xyz, pose, camera)
-    half = points.size / 2
+    half: Any = points.size / 2
+    if points.size_by_depth and points.style != "points":
+        half = half * np.abs(xyz[:, 2])
     with np.errstate(invalid="ignore"):
         reach = radius + (
             half if points.style == "points" else half * _units_per_metre(camera, far)

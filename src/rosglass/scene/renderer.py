@@ -398,7 +398,8 @@ class _PointsOnDevice(_OnDevice):
         flag = paint.per_point_alpha if paint.mode == "bgra" else paint.invert
         block[1] = (_MODES[paint.mode], paint.low, paint.high, flag)
         block[2] = (*paint.first, points.size)
-        block[3] = (*paint.last, points.style != "points")
+        unit = 0 if points.style == "points" else 2 if points.size_by_depth else 1
+        block[3] = (*paint.last, unit)
         block[4] = paint.axis
 
     def draw(self, run: _Pass, blend: bool) -> None:

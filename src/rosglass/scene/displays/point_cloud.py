@@ -1,4 +1,4 @@
-"""The displays of point clouds: PointCloud2, PointCloud, LaserScan, and clouds of one point.
+"""The displays of point clouds: PointCloud2, PointCloud, LaserScan, DepthCloud, measured values.
 
 The node's thread reads a message as a :class:`~rosglass.scene.point_clouds.Cloud` and prepares its
 vertices; the GUI thread places it and sets a few numbers of the shader.
@@ -7,20 +7,23 @@ vertices; the GUI thread places it and sets a few numbers of the shader.
 
 from __future__ import annotations
 
+import threading
+from collections import deque
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 
 from rosglass.comm.time import Time
-from rosglass.errors import TransformException
+from rosglass.errors import Error, TransformException
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Slot
 from rosglass.scene.cloud_sources import (
     cloud_from_columns,
+    cloud_from_depth_image,
     cloud_from_laser_scan,
     cloud_from_point_cloud,
 )
-from rosglass.scene.display import TopicDisplay
+from rosglass.scene.display import TopicDisplay, frame_and_stamp
 from rosglass.scene.drawing import Colouring, Points
 from rosglass.scene.point_clouds import Cloud, CloudHistory, is_ordered, order_points
 from rosglass.scene.point_colors import (
@@ -39,7 +42,7 @@ from rosglass.scene.settings import Setting, rgb_of
 from rosglass.tf import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
 
     from numpy.typing import NDArray
 
@@ -50,6 +53,7 @@ if TYPE_CHECKING:
     from rosglass.scene.point_colors import ColorTransformer, PointColors
 
 __all__ = [
+    "DepthCloudDisplay",
     "FluidPressureDisplay",
     "IlluminanceDisplay",
     "LaserScanDisplay",
@@ -78,8 +82,9 @@ class _Prepared(NamedTuple):
         vertices: Its vertices, with the channel that the transformer needs.
         colors: Its colors, as if its frame was the fixed frame.
         is_translucent: Whether points have an opacity each, and not all are opaque.
-        scan: The laser scan that it is from, if the scanner may have moved during it.
-        duration_ns: Time from its first ray to its last one, nanoseconds.
+        source: The message that it is from, if others belong to it, or it is needed again.
+        duration_ns: Time from the first ray of a laser scan to its last one, nanoseconds.
+        pixel_m: Size of a pixel of a depth image at a depth of 1 m, metres.
     """
 
     cloud: Cloud
@@ -87,8 +92,9 @@ class _Prepared(NamedTuple):
     vertices: VertexData
     colors: PointColors
     is_translucent: bool
-    scan: Any = None
+    source: Any = None
     duration_ns: int = 0
+    pixel_m: float = 0.0
 
 
 class _ColorSettings(NamedTuple):
@@ -159,12 +165,14 @@ class _ShownCloud:
         name = choose_color_transformer(data.cloud.layout, settings.chosen)
         colors = settings.transformers[name].colors(data.cloud, self._pose)
         if name != data.transformer or colors.channel != data.colors.channel:
-            data = self._data = settings.prepare(data.cloud)
+            new = settings.prepare(data.cloud)
+            data = self._data = new._replace(source=data.source, pixel_m=data.pixel_m)
             self._set_vertices(data.vertices)
-        in_pixels = display.style == "Points"
+        size, by_depth = display._point_size(data)
         self.points.set_look(
             style=display.style.lower(),
-            size=display.sizePixels if in_pixels else display.size,
+            size=size,
+            size_by_depth=by_depth,
             alpha=display.alpha,
             colouring=Colouring(
                 colors.mode,
@@ -356,6 +364,10 @@ class CloudDisplay(TopicDisplay):
         self._set_warning("Cloud", data.cloud.warnings)
         self._count_points()
 
+    def _point_size(self, data: _Prepared) -> tuple[float, bool]:  # noqa: ARG002 - for subclasses
+        """Return the size of points, and whether it is multiplied with their depth."""
+        return (self.sizePixels if self.style == "Points" else self.size), False
+
     def _take_out(self, removed: Iterable[CloudEntry]) -> _ShownCloud | None:
         """Stop showing clouds, and return one of them."""
         last = None
@@ -509,7 +521,7 @@ class LaserScanDisplay(CloudDisplay):
         if data.duration_ns and stamp:
             motion = self._motion(frame, stamp, stamp + data.duration_ns)
             if motion is not None:
-                cloud = cloud_from_laser_scan(data.scan, Transform(), motion)
+                cloud = cloud_from_laser_scan(data.source, Transform(), motion)
                 data = self._current_settings().prepare(cloud)
         super().show(data, pose, frame, stamp)
 
@@ -539,7 +551,153 @@ def _prepare_scan(scan: Any, settings: _ColorSettings) -> _Prepared:
         )
         cloud.warnings = (*cloud.warnings, text)
         duration = 0.0
-    return settings.prepare(cloud)._replace(scan=scan, duration_ns=round(duration * 1e9))
+    return settings.prepare(cloud)._replace(source=scan, duration_ns=round(duration * 1e9))
+
+
+#: Encodings of depth images; others are color images.
+_DEPTH_ENCODINGS = ("16UC1", "mono16", "32FC1")
+
+
+class _DepthMatcher:
+    """Combines depth images with the camera's calibration, and with color images of the same time.
+
+    Used in the node's threads.
+
+    Args:
+        info_topic: Where the calibration is from, for errors.
+        color_topic: The same of color images; empty if depth images have no color.
+        size: How many images wait for others.
+    """
+
+    def __init__(self, info_topic: str, color_topic: str, size: int) -> None:
+        self._info_topic, self._color_topic = info_topic, color_topic
+        self._lock = threading.Lock()
+        self._info: Any = None
+        self._depths: deque[Any] = deque(maxlen=size)
+        self._colors: deque[Any] = deque(maxlen=size)
+
+    def match(self, message: Any) -> tuple[Any, Any, Any] | None:
+        """Take a message, and return a depth image, its calibration and color once all are there.
+
+        Raises:
+            Error: Something is missing; the text says what.
+        """
+        with self._lock:
+            if "encoding" not in message:
+                self._info = message
+                return None
+            is_depth = message.encoding in _DEPTH_ENCODINGS
+            if not is_depth and not self._color_topic:
+                raise Error(
+                    f"encoding: a depth image is {', '.join(_DEPTH_ENCODINGS)}, "
+                    f"got {message.encoding!r}"
+                )
+            (self._depths if is_depth else self._colors).append(message)
+            if self._info is None:
+                raise Error(f"no camera info received; publish it on {self._info_topic}")
+            if not self._color_topic:
+                return self._depths.pop(), self._info, None
+            return self._pair()
+
+    def _pair(self) -> tuple[Any, Any, Any] | None:
+        """Return the newest depth image whose color is known: that of the nearest time."""
+        colors = [(frame_and_stamp(color)[1], color) for color in self._colors]
+        if not colors:
+            if len(self._depths) == self._depths.maxlen:
+                raise Error(f"no color image received; publish it on {self._color_topic}")
+            return None
+        for at in range(len(self._depths) - 1, -1, -1):
+            depth = self._depths[at]
+            stamp = frame_and_stamp(depth)[1]
+            # Until one of this time or a later one is there, a nearer one may follow.
+            if max(time for time, _ in colors) >= stamp:
+                for _ in range(at + 1):
+                    self._depths.popleft()
+                return depth, self._info, min(colors, key=lambda one: abs(one[0] - stamp))[1]
+        return None
+
+
+def _prepare_depth(
+    message: Any, matcher: _DepthMatcher, settings: _ColorSettings
+) -> _Prepared | None:
+    found = matcher.match(message)
+    if found is None:
+        return None
+    depth, info, color = found
+    if info.width and (info.width, info.height) != (depth.width, depth.height):
+        raise Error(
+            f"the depth image is {depth.width}x{depth.height} pixels, the camera info "
+            f"{info.width}x{info.height}; use the camera info of the depth image"
+        )
+    cloud = cloud_from_depth_image(depth, info, color)
+    if color is not None and color.header.frame_id != depth.header.frame_id:
+        text = (
+            f"the frame of the depth image is [{depth.header.frame_id}], that of the color image "
+            f"[{color.header.frame_id}]; use a registered depth image"
+        )
+        cloud.warnings = (*cloud.warnings, text)
+    focal_px = float(info["p" if "p" in info else "P"][0]) / max(info.binning_x, 1)
+    pixel_m = min(1 / abs(focal_px), _MAX_SIZE_M)
+    return settings.prepare(cloud)._replace(source=depth, pixel_m=pixel_m)
+
+
+class DepthCloudDisplay(CloudDisplay):
+    """The points of a depth image, and their colors. See its page in ``docs/scene.md``."""
+
+    TYPE = "DepthCloud"
+    MESSAGES = ("sensor_msgs/Image", "sensor_msgs/CameraInfo")
+
+    colorTopic = Setting(
+        "Color Image Topic", "topic", "", "Color images of the same camera; empty for none.",
+        then="_on_topic",
+    )  # fmt: skip
+    autoSize = Setting("Auto Size", "bool", True, "Whether points are as large as their pixels.")
+    autoSizeFactor = Setting(
+        "Auto Size/Auto Size Factor", "float", 1.0, "What that size is multiplied with.",
+        min=0.0001, max=_MAX_SIZE_M,
+    )  # fmt: skip
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self._matcher = _DepthMatcher("", "", 1)
+        super().__init__(parent, runtime)
+
+    def further_topics(self, topic: str) -> tuple[str, ...]:
+        """Return the topics of the calibration, and of color images."""
+        color = self._resolve(self.colorTopic)
+        return (_info_topic(topic), *([color] if color else []))
+
+    def _factory(self, *wanted: Any) -> Callable[[], Any]:
+        (topic, info_topic, *color), depth = wanted[1], self.depth
+        del topic
+        self._matcher = _DepthMatcher(info_topic, color[0] if color else "", depth)
+        return super()._factory(*wanted)
+
+    def preparer(self) -> Callable[[Message], Any]:
+        """Return the function that waits for what belongs together, and makes a cloud of it."""
+        matcher, settings = self._matcher, self._color_settings()
+        return lambda message: _prepare_depth(message, matcher, settings)
+
+    def _point_size(self, data: _Prepared) -> tuple[float, bool]:
+        if self.autoSize and self.style != "Points":
+            return self.autoSizeFactor * data.pixel_m, True
+        return super()._point_size(data)
+
+    def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
+        """Take the settings of a file, in which the topic has another name."""
+        return super().load_settings({**saved, "Topic": saved.get("Depth Map Topic", "")})
+
+    def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:  # noqa: ARG002 - in both RViz the same
+        """Return the settings for a file of either RViz."""
+        kept = super().save_settings(older, 1)
+        kept["Depth Map Topic"] = kept.pop("Topic")
+        return kept
+
+
+def _info_topic(topic: str) -> str:
+    """Return where image_transport has the calibration of a camera's images."""
+    return f"{topic.rpartition('/')[0]}/camera_info"
 
 
 def _read_value(name: str) -> Callable[[Any], Cloud]:

@@ -19,6 +19,6 @@ void main()
     vec4 tint = point_colour(position, channel);
     v_colour = vec4(tint.rgb * (0.25 + 0.75 * abs(eye_normal.z)), tint.a);
     gl_Position = is_finite(position)
-        ? frame.projection * (frame.view * (object.model * vec4(position + offset * object.b.w, 1.0)))
+        ? frame.projection * (frame.view * (object.model * vec4(position + offset * size_in_metres(position), 1.0)))
         : NOWHERE;
 }

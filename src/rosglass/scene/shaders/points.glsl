@@ -1,5 +1,6 @@
 // Colours of points. a: mode, low, high, and whether the rainbow is inverted or, in mode bgra, points
-// have an opacity each; b: first colour and size; c: last colour and style; d: axis.
+// have an opacity each; b: first colour and size; c: last colour and unit of the size: 0 pixels, 1 metres, 2
+// metres at a depth of 1 m; d: axis.
 vec3 rainbow(float part)
 {
     // RViz's: from magenta (0) over blue, cyan, green and yellow to red (1).
@@ -19,6 +20,11 @@ vec4 point_colour(vec3 position, vec4 channel)
     part = clamp(part, 0.0, 1.0);
     if (mode > 2.5 && mode < 3.5) return vec4(mix(object.b.rgb, object.c.rgb, part), object.colour.a);
     return vec4(rainbow(object.a.w > 0.5 ? part : 1.0 - part), object.colour.a);
+}
+
+float size_in_metres(vec3 position)
+{
+    return object.c.w > 1.5 ? object.b.w * position.z : object.b.w;
 }
 
 bool is_finite(vec3 v)

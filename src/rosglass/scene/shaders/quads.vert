@@ -10,7 +10,7 @@ void main()
     v_corner = vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1) * 2.0 - 1.0;
     vec4 eye = frame.view * (object.model * vec4(position, 1.0));
     if (object.c.w > 0.5) {  // metres
-        eye.xy += v_corner * object.b.w * 0.5;
+        eye.xy += v_corner * size_in_metres(position) * 0.5;
         gl_Position = frame.projection * eye;
     } else {
         gl_Position = frame.projection * eye;
