@@ -53,6 +53,25 @@ def test_items_are_drawn_over_it_and_shine_through_from_below(bench: SceneBench)
     assert view.problem == ""
 
 
+def test_two_views_show_one_scene_from_two_sides(bench: SceneBench) -> None:
+    view = bench.load(
+        "id: main; AxesDisplay { length: 2 }\n"
+        'SceneView { objectName: "above"; width: 100; height: 100; scene: main.scene\n'
+        'view: "TopDownOrtho"; background: "#101010" }'
+    )
+    above = view.findChild(type(view), "above")
+    assert above.scene is view.scene
+    assert above.fixedFrame == "map"
+    picture = bench.picture()
+    part, rest = picture[:100, :100], picture[100:]
+    assert tuple(part[5, 5]) == (16, 16, 16)
+    assert has_colour(part, 255, 0, 0) > 20
+    assert has_colour(rest, 0, 0, 255) > 100
+    view.scene.displays[0].enabled = False
+    picture = bench.picture()
+    assert has_colour(picture, 255, 0, 0) + has_colour(picture, 0, 255, 0) == 0
+
+
 def test_a_display_in_a_frame_follows_it(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import Transform, TransformBroadcaster

@@ -58,6 +58,7 @@ class SceneView(QQuickRhiItem):
     cameraChanged = Signal()
     #: A picture was drawn.
     framePainted = Signal()
+    sceneChanged = Signal()
 
     def __init__(self, parent: Any = None, runtime: Runtime | None = None) -> None:
         super().__init__(parent)
@@ -66,11 +67,8 @@ class SceneView(QQuickRhiItem):
         self._problem = ""
         #: The renderers that C++ still has: letting go of one too early frees it twice.
         self._renderers: list[SceneRenderer] = []
-        #: What is shown.
-        self.scene = Scene(self, runtime)
-        self.scene.changed.connect(self.update)
-        self.scene.placed.connect(self._on_placed)
-        self.scene.fixedFrameChanged.connect(self.fixedFrameChanged)
+        self._scene = Scene(self, runtime)
+        self._watch_scene()
         #: The config that was loaded; None before.
         self.config: RvizConfig | None = None
         self._view: ViewController = create_view("Orbit")
@@ -91,7 +89,7 @@ class SceneView(QQuickRhiItem):
 
     def _clean_up_when_destroyed(self) -> None:
         # PySide never frees the Python half of an item that QML has made.
-        state, renderers, root = self.__dict__, self._renderers, self.scene.root
+        state, renderers, root = self.__dict__, self._renderers, self._scene.root
 
         def end() -> None:
             root.on_change = None
@@ -103,6 +101,41 @@ class SceneView(QQuickRhiItem):
             _drop_orphans()
 
         self.destroyed.connect(end)
+
+    # -- the scene -------------------------------------------------------------------------------
+
+    def _watch_scene(self) -> None:
+        self._scene.changed.connect(self.update)
+        self._scene.placed.connect(self._on_placed)
+        self._scene.fixedFrameChanged.connect(self.fixedFrameChanged)
+
+    def _get_scene(self) -> Scene:
+        return self._scene
+
+    def _set_scene(self, scene: Any) -> None:
+        before = self._scene
+        if scene is before or scene is None:
+            return
+        if not isinstance(scene, Scene):
+            before._refuse(f"SceneView: scene: expected that of another SceneView, got {scene!r}")
+            return
+        if is_alive(before):
+            before.changed.disconnect(self.update)
+            before.placed.disconnect(self._on_placed)
+            before.fixedFrameChanged.disconnect(self.fixedFrameChanged)
+            if before.parent() is self:
+                before.deleteLater()
+        self._scene = scene
+        self._watch_scene()
+        self.sceneChanged.emit()
+        self.fixedFrameChanged.emit()
+        self.update()
+
+    if TYPE_CHECKING:
+        scene: Scene
+    else:
+        #: What is shown: its own, or that of another view, which it shows from elsewhere.
+        scene = Property(QtCore.QObject, _get_scene, _set_scene, notify=sceneChanged)
 
     # -- properties ------------------------------------------------------------------------------
 
@@ -296,7 +329,9 @@ class SceneView(QQuickRhiItem):
         self._renderers.append(made)
         return made
 
-    def _take_frame(self) -> Frame:
+    def _take_frame(self) -> Frame | None:
+        if not is_alive(self._scene):
+            return None  # it was that of a view that is gone
         window = self.window()
         if any(one.draws_in_software for one in self._renderers) != self.scene.draws_in_software:
             QtCore.QTimer.singleShot(0, self, self._report_device)
