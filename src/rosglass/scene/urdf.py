@@ -721,10 +721,12 @@ def _origin(element: XmlElement) -> Matrix:
         matrix[:3, :3] = _rotation((axis[0] / scale, axis[1] / scale, axis[2] / scale), angle)
         return matrix
     roll, pitch, yaw = _numbers(origin, "rpy", 3, (0.0, 0.0, 0.0))
-    matrix[:3, :3] = (
-        _rotation((0.0, 0.0, 1.0), yaw)
-        @ _rotation((0.0, 1.0, 0.0), pitch)
-        @ _rotation((1.0, 0.0, 0.0), roll)
+    sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
+    sy, cy = math.sin(yaw), math.cos(yaw)
+    matrix[:3, :3] = (  # about x by roll, then y by pitch, then z by yaw
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
     )
     return matrix
 
