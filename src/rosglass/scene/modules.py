@@ -38,6 +38,7 @@ from rosglass.scene.displays.pose import (
     PoseDisplay,
     PoseWithCovarianceDisplay,
 )
+from rosglass.scene.displays.robot_model import RobotModelDisplay
 from rosglass.scene.displays.tf import TFDisplay
 from rosglass.scene.panel_models import DisplaysModel
 from rosglass.scene.scene import Scene
@@ -70,6 +71,7 @@ DISPLAYS = (
     PoseWithCovarianceDisplay,
     RangeDisplay,
     RelativeHumidityDisplay,
+    RobotModelDisplay,
     TFDisplay,
     TemperatureDisplay,
     TwistStampedDisplay,

@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from rosglass.comm.executor import Dispatcher
 from rosglass.comm.names import similar
 from rosglass.comm.time import Time
 from rosglass.errors import Error, LookupException, TransformException
@@ -67,6 +68,7 @@ class Scene(Element):
         self._displays: list[Display] = []
         self._link: TfLink | None = None
         self._watch: Any = None
+        self._loader: Dispatcher | None = None
         super().__init__(parent, runtime)
         self._timer = single_shot(self, self._follow)
         self._tree_changed = False
@@ -133,7 +135,12 @@ class Scene(Element):
                 displays.remove(display)
 
         display.destroyed.connect(forget)
-        display.join(self)
+        try:
+            display.join(self)
+        except Exception as error:
+            # The others are shown all the same.
+            _log.exception("%s", display.label)
+            display.set_status("Display", "error", repr(error))
         self.displayAdded.emit(display)
 
     def remove(self, display: Display) -> None:
@@ -214,6 +221,35 @@ class Scene(Element):
             raise LookupException("not connected yet")
         found = buffer.lookup_transform(target, frame, Time(stamp) if stamp else None)
         return instance_matrix(found.translation, found.rotation)
+
+    def load(self, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
+        """Run a job that takes long, such as reading meshes, in a thread of the scene.
+
+        Not on the session's worker, where the endpoints of the cockpit would wait for it.
+
+        Args:
+            work: The job.
+            done: Called in the GUI thread with its result, or with the error that it raised.
+        """
+        if self._session is None:
+            done(Error("not connected yet"))
+            return
+        if self._loader is None:
+            self._loader = Dispatcher("rosglass-scene")
+            self._cleanup["loader"] = self._loader.close
+        executor = self._executor
+
+        def run() -> None:
+            try:
+                result = work()
+            except Error as error:
+                result = error
+            except Exception as error:
+                _log.exception("loading failed")
+                result = Error(f"internal error: {error!r}")
+            executor.post(lambda: done(result))
+
+        self._loader.post(run)
 
     def now(self) -> int:
         """Return the robot's time in nanoseconds; 0 while there is no node."""

@@ -628,8 +628,8 @@ class Markers(TopicDisplay):
     # -- meshes ----------------------------------------------------------------------------------
 
     def _in_background(self, work: Callable[[], Any], then: Callable[[Any], None]) -> None:
-        if self._session is not None:
-            self._session.background(work, then)
+        if self.scene is not None:
+            self.scene.load(work, then)
 
     def _on_mesh(self, uri: str, problem: str) -> None:
         if not is_alive(self):

@@ -1,0 +1,506 @@
+"""The display RobotModel: the links of a robot description, where tf has them."""
+# ruff: noqa: N802, N815 - the names of slots and properties are QML's
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+
+from rosglass.comm.qos import Durability, QoS, Reliability
+from rosglass.errors import Error, TransformException, UnsupportedError
+from rosglass.qml.callbacks import weak_callback
+from rosglass.qml.element import single_shot
+from rosglass.qml.properties import ReadOnly, report
+from rosglass.qt import QtGui, Signal, Slot, is_alive
+from rosglass.scene.display import Display
+from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Group, Mesh, Shape
+from rosglass.scene.meshes import load_mesh_cached
+from rosglass.scene.resources import check_texture, locate_resource
+from rosglass.scene.rviz_formats import (
+    DescriptionSetting,
+    TopicSetting,
+    read_description,
+    write_description,
+)
+from rosglass.scene.settings import Setting
+from rosglass.scene.urdf import Box, Capsule, Cylinder, MeshFile, Robot, Sphere, parse_urdf
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
+
+    from rosglass.comm.inbox import Sample
+    from rosglass.comm.node import Node
+    from rosglass.qml.runtime import Runtime
+    from rosglass.qt import QtCore
+    from rosglass.scene.urdf import Visual
+
+__all__ = ["RobotModelDisplay", "link_drawables"]
+
+#: Milliseconds until a parameter that is not there is looked up again.
+_RETRY_MS = 2000
+#: RViz's colour of what has no material.
+_NO_MATERIAL = (1.0, 0.0, 0.0, 1.0)
+_GREY = (0.6, 0.6, 0.6, 1.0)
+#: Status lines of links without a transform, before the rest is counted.
+_MAX_LINK_LINES = 10
+_DESCRIPTION_KEYS = (
+    *("Description Source", "Description Topic", "Description File", "Robot Description"),
+)
+_AUTOMATIC, _TOPIC, _FILE, _PARAMETER = "Automatic", "Topic", "File", "Parameter"
+
+
+class _Source:
+    """Where a description comes from: reads or receives it, and hands its text on.
+
+    Args:
+        node: The node.
+        kind: ``Topic``, ``File`` or ``Parameter``.
+        name: Of the topic, file or parameter.
+        on_text: Called with each text, in any thread.
+    """
+
+    def __init__(self, node: Node, kind: str, name: str, on_text: Callable[[str], None]) -> None:
+        self._subscription: Any = None
+        self._on_text = on_text
+        if kind == _TOPIC:
+            self._subscription = node.create_subscription(
+                name,
+                "std_msgs/String",
+                qos=QoS(1, Reliability.RELIABLE, Durability.TRANSIENT_LOCAL),
+                raw_callback=self._receive,
+            )
+        elif kind == _FILE:
+            path = locate_resource(name)
+            try:
+                on_text(path.read_text(encoding="utf-8", errors="replace"))
+            except OSError as error:
+                raise Error(f"{path} cannot be read: {error.strerror}") from None
+        else:
+            server = getattr(node, "parameter_server", None)
+            if server is None:
+                raise UnsupportedError(
+                    "descriptions in parameters are ROS 1's; in ROS 2, robot_state_publisher "
+                    "publishes /robot_description: set Description Source to Topic"
+                )
+            on_text(str(server.get(name)))
+
+    def _receive(self, sample: Sample) -> None:
+        try:
+            self._on_text(sample.message().data)
+        except Error:
+            # The text says what is wrong with it.
+            self._on_text("")
+
+    def close(self) -> None:
+        """Stop receiving; safe to call twice."""
+        if self._subscription is not None:
+            self._subscription.close()
+
+
+class _Loaded(NamedTuple):
+    """A robot that is ready to be shown.
+
+    Attributes:
+        robot: Its description.
+        visuals: For each link, what its visuals draw.
+        collisions: The same of its collisions.
+        problems: What could not be loaded, in words, by the name of the mesh.
+    """
+
+    robot: Robot
+    visuals: dict[str, list[Mesh]]
+    collisions: dict[str, list[Mesh]]
+    problems: dict[str, str]
+
+
+def _matrix(*scale: float, along: float = 0.0) -> NDArray[np.float64]:
+    matrix = np.diag([*scale, 1.0])
+    matrix[2, 3] = along
+    return matrix
+
+
+def _texture(source: str | bytes, name: str) -> NDArray[np.uint8]:
+    """Return the pixels of a picture, (h, w, 4).
+
+    Raises:
+        Error: It is missing, too large, or no picture.
+    """
+    data = source if isinstance(source, bytes) else Path(locate_resource(source)).read_bytes()
+    check_texture(data, name)
+    image = QtGui.QImage.fromData(data)
+    if image.isNull():
+        raise Error(f"{name}: this is no picture that Qt can read")
+    image = image.convertToFormat(QtGui.QImage.Format.Format_RGBA8888)
+    rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
+    whole: NDArray[np.uint8] = rows[:, : 4 * image.width()].copy()
+    return whole.reshape(image.height(), image.width(), 4)
+
+
+def link_drawables(visual: Visual, problems: dict[str, str], *, plain: bool = False) -> list[Mesh]:
+    """Return what a visual or collision of a link draws, in the link's frame.
+
+    Reads mesh files: not for the GUI thread.
+
+    Args:
+        visual: The visual.
+        problems: What could not be loaded is added, by the name of the file.
+        plain: Whether materials of files do not count, as for collisions.
+    """
+    geometry = visual.geometry
+    material = visual.material
+    own = material.colour if material is not None else _NO_MATERIAL
+    simple: list[tuple[Shape, NDArray[np.float64]]] = []
+    if isinstance(geometry, Box):
+        simple.append((BOX, _matrix(*geometry.size)))
+    elif isinstance(geometry, Sphere):
+        simple.append((SPHERE, _matrix(*[2 * geometry.radius] * 3)))
+    elif isinstance(geometry, (Cylinder, Capsule)):
+        wide = 2 * geometry.radius
+        simple.append((CYLINDER, _matrix(wide, wide, geometry.length)))
+        if isinstance(geometry, Capsule):
+            simple += [
+                (SPHERE, _matrix(wide, wide, wide, along=side * geometry.length / 2))
+                for side in (-1, 1)
+            ]
+    made = []
+    for shape, local in simple:
+        mesh = Mesh(shape, own)
+        mesh.set_instances((visual.origin @ local)[np.newaxis])
+        made.append(mesh)
+    if isinstance(geometry, MeshFile):
+        made += _mesh_drawables(visual, geometry, own, problems, plain)
+    if (
+        material is not None
+        and material.texture
+        and not plain
+        and not isinstance(geometry, MeshFile)
+    ):
+        try:
+            pixels = _texture(material.texture, material.texture)
+            for mesh in made:
+                mesh.set_texture(pixels)
+        except (Error, OSError) as error:
+            problems[material.texture] = str(error)
+    return made
+
+
+def _mesh_drawables(
+    visual: Visual,
+    geometry: MeshFile,
+    own: tuple[float, float, float, float],
+    problems: dict[str, str],
+    plain: bool,
+) -> list[Mesh]:
+    try:
+        path = locate_resource(geometry.uri)
+        parts = load_mesh_cached(path, geometry.uri)
+    except (Error, OSError) as error:
+        problems[geometry.uri] = str(error)
+        return []
+    is_stl = path.suffix.lower() in (".stl", ".stlb")
+    made = []
+    for part in parts:
+        shape = Shape(part.positions, part.normals, part.indices, uv=part.uv)
+        colour = part.colour
+        if plain or colour is None:
+            colour = own if plain or is_stl or visual.material is not None else _GREY
+        mesh = Mesh(shape, colour)
+        mesh.set_instances((visual.origin @ _matrix(*geometry.scale))[np.newaxis])
+        if part.texture is not None and not plain:
+            try:
+                mesh.set_texture(_texture(part.texture, geometry.uri))
+            except (Error, OSError) as error:
+                problems[geometry.uri] = str(error)
+        made.append(mesh)
+    return made
+
+
+def _load(text: str, source: str) -> _Loaded:
+    """Read a description and its meshes; takes seconds for large ones."""
+    if not text.strip():
+        raise Error(f"{source}: the robot description is empty")
+    robot = parse_urdf(text, source)
+    problems: dict[str, str] = {}
+    visuals, collisions = {}, {}
+    for name, link in robot.links.items():
+        visuals[name] = [m for v in link.visuals for m in link_drawables(v, problems)]
+        collisions[name] = [
+            m for v in link.collisions for m in link_drawables(v, problems, plain=True)
+        ]
+    return _Loaded(robot, visuals, collisions, problems)
+
+
+class _Link:
+    """A link of the robot that is shown."""
+
+    def __init__(self, visuals: list[Mesh], collisions: list[Mesh], owner: Any) -> None:
+        self.visual, self.collision = Group(*visuals), Group(*collisions)
+        self.root = Group(self.visual, self.collision)
+        self.root.visible = False
+        for mesh in (*visuals, *collisions):
+            mesh.owner = owner
+
+
+class _Part:
+    """What a pick of a link finds.
+
+    Attributes:
+        display: The display.
+        name: Of the link.
+    """
+
+    def __init__(self, display: RobotModelDisplay, name: str) -> None:
+        self.display, self.name = display, name
+
+    def __repr__(self) -> str:
+        return f"link {self.name}"
+
+    def describe(self) -> list[tuple[str, str]]:
+        """Return the lines of the Selection panel."""
+        return [("Link", self.name), ("Robot", self.display.robotName)]
+
+
+class RobotModelDisplay(Display):
+    """A robot by its description (URDF). See its page in ``docs/scene.md``."""
+
+    TYPE = "RobotModel"
+
+    visualEnabled = Setting("Visual Enabled", "bool", True, "Whether visuals are shown.")
+    collisionEnabled = Setting("Collision Enabled", "bool", False, "Whether collisions are shown.")
+    updateInterval = Setting("Update Interval", "float", 0.0, "Seconds; 0 for each change.", min=0)
+    alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
+    descriptionSource = Setting(
+        "Description Source", "enum", _AUTOMATIC,
+        "Where the description is; automatic is the parameter in ROS 1 and the topic in ROS 2.",
+        choices=[_AUTOMATIC, _TOPIC, _FILE, _PARAMETER], then="_on_source",
+    )  # fmt: skip
+    descriptionTopic = Setting(
+        "Description Topic", "topic", "/robot_description", "Of std_msgs/String.",
+        then="_on_source",
+    )  # fmt: skip
+    descriptionFile = Setting(
+        "Description File", "path", "", "A URDF file; package:// as well.", then="_on_source"
+    )
+    robotDescription = Setting(
+        "Robot Description", "string", "robot_description", "The parameter's name in ROS 1.",
+        then="_on_source",
+    )  # fmt: skip
+    tfPrefix = Setting("TF Prefix", "string", "", "In front of the names of links, with a slash.")
+    allLinksEnabled = Setting("Links/All Links Enabled", "bool", True, "Whether links are shown.")
+
+    linksChanged = Signal()
+    robotChanged = Signal()
+    #: Names of the links.
+    links: ReadOnly[list[str]] = ReadOnly(cast("type[list[str]]", "QStringList"), [])
+    robotName = ReadOnly(str, "", notify="robotChanged")
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self._bodies: dict[str, _Link] = {}
+        self._switched: dict[str, bool] = {}
+        self._text: str | None = None
+        self._next = 0.0
+        super().__init__(parent, runtime)
+        self._again = single_shot(self, self._create_again)
+
+    # -- the description -------------------------------------------------------------------------
+
+    def _on_source(self) -> None:
+        self._text = None
+        self._clear()
+        self._schedule()
+
+    def _find_source(self, node: Node) -> tuple[str, str]:
+        kind = self.descriptionSource
+        if kind == _AUTOMATIC:
+            kind = _PARAMETER if hasattr(node, "parameter_server") else _TOPIC
+        name = {
+            _TOPIC: self.descriptionTopic,
+            _FILE: self.descriptionFile,
+            _PARAMETER: self.robotDescription,
+        }[kind]
+        return kind, name
+
+    def _wanted(self) -> tuple[Any, ...] | None:
+        node = self.node
+        if node is None or self.scene is None or not self.shown:
+            return None
+        kind, name = self._find_source(node)
+        return (node, kind, name) if name else None
+
+    def _factory(self, *wanted: Any) -> Callable[[], Any]:
+        node, kind, name = wanted
+        executor, take = self._executor, weak_callback(self._take_text)
+        self.set_status("URDF", "warn", f"waiting for the description: {kind.lower()} {name}")
+
+        def on_text(text: str) -> None:
+            executor.post(lambda: take(text, name))
+
+        return lambda: _Source(node, kind, name, on_text)
+
+    def _on_create_failed(self, error: Error) -> None:
+        self.set_status("URDF", "error", str(error))
+        if not isinstance(error, UnsupportedError):
+            self._again.start(_RETRY_MS)
+
+    def _take_text(self, text: str, source: str) -> None:
+        if not is_alive(self) or self.scene is None or text == self._text:
+            return
+        self._text = text
+        self.set_status("URDF", "warn", "loading the robot and its meshes")
+        self.scene.load(lambda: _load(text, source), lambda result: self._show(text, result))
+
+    def _show(self, text: str, result: _Loaded | Error) -> None:
+        if not is_alive(self) or text != self._text:
+            return
+        self._clear()
+        if isinstance(result, Error):
+            self.set_status("URDF", "error", str(result))
+            return
+        for name in result.robot.links:
+            part = _Part(self, name)
+            link = self._bodies[name] = _Link(result.visuals[name], result.collisions[name], part)
+            self.root.add(link.root)
+        report(self, links=sorted(self._bodies), robotName=result.robot.name)
+        self.set_status("URDF", "ok", "URDF parsed OK")
+        for number, warning in enumerate(result.robot.warnings[:_MAX_LINK_LINES]):
+            self.set_status(f"URDF {number + 1}", "warn", warning)
+        for name, problem in list(result.problems.items())[:_MAX_LINK_LINES]:
+            self.set_status(f"Mesh {name.rpartition('/')[2]}", "error", problem)
+        self._restyle()
+
+    def _clear(self) -> None:
+        self._bodies.clear()
+        self.root.clear()
+        self.clear_status()
+        report(self, links=[], robotName="")
+
+    # -- the links -------------------------------------------------------------------------------
+
+    @Slot(str, bool)
+    def setLinkEnabled(self, link: str, enabled: bool) -> None:
+        """Show or hide a link."""
+        self._switched[link] = enabled
+        self._follow()
+
+    def is_link_enabled(self, link: str) -> bool:
+        """Return whether a link is shown."""
+        return self._switched.get(link, bool(self.allLinksEnabled))
+
+    def _restyle(self) -> None:
+        self.root.alpha = self.alpha
+        for link in self._bodies.values():
+            link.visual.visible = self.visualEnabled
+            link.collision.visible = self.collisionEnabled
+        self._follow()
+
+    def on_transforms(self) -> None:
+        """Move the links."""
+        now = time.monotonic()
+        if now >= self._next:
+            self._next = now + self.updateInterval
+            self._follow()
+
+    def on_fixed_frame(self) -> None:
+        """Place the links in the new fixed frame."""
+        self._follow()
+
+    def _follow(self) -> None:
+        scene = self.scene
+        if scene is None or not self._bodies or not self.enabled:
+            return
+        prefix = self.tfPrefix.strip("/")
+        missing: list[tuple[str, str]] = []
+        for name, link in self._bodies.items():
+            try:
+                pose = scene.look_up(f"{prefix}/{name}" if prefix else name)
+            except TransformException as error:
+                missing.append((name, str(error)))
+                link.root.visible = False
+                continue
+            link.root.pose = pose
+            link.root.visible = self.is_link_enabled(name)
+        self._report_missing(missing)
+
+    def _report_missing(self, missing: list[tuple[str, str]]) -> None:
+        shown = {f"Link {name}": reason for name, reason in missing[:_MAX_LINK_LINES]}
+        for line in list(self.status_lines):
+            if line.startswith("Link ") and line not in shown:
+                self.delete_status(line)
+        for line, reason in shown.items():
+            self.set_status(line, "error", f"no transform: {reason}")
+        if len(missing) > _MAX_LINK_LINES:
+            text = f"{len(missing)} of {len(self._bodies)} links have no transform"
+            self.set_status("Links", "error", text)
+        else:
+            self.delete_status("Links")
+
+    # -- files -----------------------------------------------------------------------------------
+
+    def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
+        """Take the settings of a file of either RViz, and which links it shows."""
+        ours = {
+            key: value
+            for key, value in saved.items()
+            if key not in ("Description Topic", "Description Source", "Robot Description")
+        }
+        refused = super().load_settings(ours)
+        links = saved.get("Links")
+        for name, state in (links if isinstance(links, dict) else {}).items():
+            shown = state.get("Value") if isinstance(state, dict) else None
+            if isinstance(shown, bool):
+                self._switched[str(name)] = shown
+        if not {"Description Source", "Description Topic", "Robot Description"} & set(saved):
+            return refused
+        try:
+            found = read_description(saved)
+            name = {"topic": "descriptionTopic", "file": "descriptionFile"}
+            setattr(self, name.get(found.source, "robotDescription"), found.name)
+            self.descriptionSource = found.source.capitalize()
+        except Error as error:
+            refused.append(str(error))
+        return refused
+
+    def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
+        """Return the settings for a file of one RViz, with the links that are shown."""
+        old = dict(older or {})
+        kept = super().save_settings(old, ros)
+        for key in (
+            "Description Topic",
+            "Description Source",
+            "Description File",
+            "Robot Description",
+        ):
+            if key in old:
+                kept[key] = old[key]
+            else:
+                kept.pop(key, None)
+        source = self.descriptionSource
+        if source == _AUTOMATIC:
+            source = _PARAMETER if ros == 1 else _TOPIC
+        if source == _FILE:
+            description = DescriptionSetting("file", self.descriptionFile)
+        elif source == _TOPIC:
+            topic = TopicSetting(self.descriptionTopic)
+            description = DescriptionSetting("topic", self.descriptionTopic, topic)
+        else:
+            description = DescriptionSetting("parameter", self.robotDescription)
+        try:
+            write_description(kept, description, ros)
+        except Error:
+            # The other RViz has no such source: at least it is not lost.
+            kept.setdefault(
+                "Robot Description" if ros == 1 else "Description File", description.name
+            )
+        links = dict(kept.get("Links") or {})
+        for name, shown in self._switched.items():
+            inner = links.get(name)
+            links[name] = {**(inner if isinstance(inner, dict) else {}), "Value": shown}
+        kept["Links"] = links
+        return kept

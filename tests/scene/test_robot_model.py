@@ -1,0 +1,161 @@
+"""The display RobotModel."""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from rosglass.scene.drawing import BOX, CYLINDER, SPHERE
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import SceneBench
+
+URDF = """<robot name="rover">
+  <material name="blue"><color rgba="0 0 1 1"/></material>
+  <link name="base_link">
+    <visual><geometry><box size="2 1 0.5"/></geometry><material name="blue"/></visual>
+    <collision><geometry><sphere radius="1"/></geometry></collision>
+  </link>
+  <link name="mast">
+    <visual><origin xyz="0 0 1"/><geometry><cylinder radius="0.2" length="2"/></geometry></visual>
+  </link>
+  <joint name="j" type="fixed"><parent link="base_link"/><child link="mast"/></joint>
+</robot>"""
+
+
+def send_transforms(bench: SceneBench, *children: str, prefix: str = "") -> Any:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    broadcaster = StaticTransformBroadcaster(bench.robot)
+    for child in children:
+        broadcaster.send_transform(
+            Transform((0, 0, 0), (0, 0, 0, 1), Time(1), "map", f"{prefix}{child}")
+        )
+    return broadcaster
+
+
+def publish(bench: SceneBench, text: str, topic: str = "/robot_description") -> Any:
+    from rosglass.comm import Durability, QoS
+
+    qos = QoS(1, durability=Durability.TRANSIENT_LOCAL)
+    publisher = bench.robot.create_publisher(topic, "std_msgs/String", qos=qos)
+    publisher.publish({"data": text})
+    return publisher
+
+
+def shapes(display: Any) -> set[Any]:
+    return {one.shape for one, _, _ in display.root.drawables()}
+
+
+def test_a_robot_is_shown_where_tf_has_its_links(bench: SceneBench) -> None:
+    view = bench.load("RobotModelDisplay {}")
+    (robot,) = view.scene.displays
+    publish(bench, URDF)
+    bench.wait(lambda: robot.links == ["base_link", "mast"])
+    assert robot.robotName == "rover"
+    bench.wait(lambda: "Link mast: no transform" in robot.statusText)
+    assert shapes(robot) == set()
+    send_transforms(bench, "base_link", "mast")
+    bench.wait(lambda: shapes(robot) == {BOX, CYLINDER})
+    assert robot.statusLevel == "ok", robot.statusText
+    assert "URDF: URDF parsed OK" in robot.statusText
+    blue = (bench.picture().astype(int) - (0, 0, 255)).clip(0).max(axis=2) < 30
+    assert blue.sum() > 300
+    robot.collisionEnabled = True
+    assert shapes(robot) == {BOX, CYLINDER, SPHERE}
+    robot.visualEnabled = False
+    assert shapes(robot) == {SPHERE}
+    robot.visualEnabled, robot.collisionEnabled = True, False
+    robot.setLinkEnabled("mast", False)
+    assert shapes(robot) == {BOX}
+    middle = view.camera().project((0, 0, 0.25))
+    hit = view.pick(middle.x, middle.y)
+    assert hit.drawable.owner.describe() == [("Link", "base_link"), ("Robot", "rover")]
+
+
+def test_a_prefix_names_the_frames(bench: SceneBench) -> None:
+    view = bench.load('RobotModelDisplay { tfPrefix: "/r1/" }')
+    (robot,) = view.scene.displays
+    publish(bench, URDF)
+    send_transforms(bench, "base_link", "mast", prefix="r1/")
+    bench.wait(lambda: shapes(robot) == {BOX, CYLINDER})
+
+
+def test_a_new_description_replaces_the_old_one(bench: SceneBench) -> None:
+    view = bench.load("RobotModelDisplay {}")
+    (robot,) = view.scene.displays
+    publisher = publish(bench, URDF)
+    bench.wait(lambda: robot.robotName == "rover")
+    publisher.publish({"data": '<robot name="other"><link name="only"/></robot>'})
+    bench.wait(lambda: robot.robotName == "other")
+    assert robot.links == ["only"]
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("", "the robot description is empty"),
+        ("<robot", "robot_description:1"),
+        ('<robot name="a"><link name="l"/><link name="l"/></robot>', "robot_description"),
+    ],
+)
+def test_a_broken_description_is_an_error_in_words(
+    bench: SceneBench, text: str, error: str
+) -> None:
+    view = bench.load("RobotModelDisplay {}")
+    (robot,) = view.scene.displays
+    publish(bench, text)
+    bench.wait(lambda: robot.statusLevel == "error")
+    assert error in robot.statusText
+
+
+def test_meshes_come_from_files_and_missing_ones_are_named(
+    bench: SceneBench, tmp_path: Path
+) -> None:
+    corners = ((0, 0, 0), (2, 0, 0), (0, 2, 0))
+    triangle = struct.pack("<12fH", 0, 0, 1, *(n for corner in corners for n in corner), 0)
+    (tmp_path / "part.stl").write_bytes(bytes(80) + struct.pack("<I", 1) + triangle)
+    urdf = tmp_path / "robot.urdf"
+    urdf.write_text(
+        f"""<robot name="meshes"><link name="base_link">
+        <visual><geometry><mesh filename="file://{tmp_path}/part.stl"/></geometry>
+          <material name="m"><color rgba="0 1 0 1"/></material></visual>
+        <visual><geometry><mesh filename="package://nowhere/gone.stl"/></geometry></visual>
+        </link></robot>"""
+    )
+    send = send_transforms(bench, "base_link")
+    view = bench.load(
+        f'RobotModelDisplay {{ descriptionSource: "File"; descriptionFile: "{urdf}" }}'
+    )
+    (robot,) = view.scene.displays
+    bench.wait(lambda: len(list(robot.root.drawables())) == 1)
+    ((mesh, _, _),) = robot.root.drawables()
+    assert mesh.colour == (0, 1, 0, 1)
+    assert mesh.shape.rows["position"].tolist() == [list(map(float, c)) for c in corners]
+    assert robot.statusLevel == "error"
+    assert "package://nowhere/gone.stl" in robot.statusText
+    green = (bench.picture().astype(int) - (0, 255, 0)).clip(0).max(axis=2) < 30
+    assert green.sum() > 100
+    send.close()
+
+
+def test_settings_are_written_for_either_rviz(bench: SceneBench) -> None:
+    view = bench.load()
+    robot = view.scene.add("RobotModel", alpha=0.5)
+    assert robot.save_settings({"Class": "rviz/RobotModel"}, 1)["Robot Description"] == (
+        "robot_description"
+    )
+    saved = robot.save_settings({"Class": "rviz_default_plugins/RobotModel"}, 2)
+    assert saved["Description Source"] == "Topic"
+    assert saved["Description Topic"]["Value"] == "/robot_description"
+    assert saved["Alpha"] == 0.5
+    other = view.scene.add("RobotModel")
+    links = {"arm": {"Value": False}, "Link Tree Style": ""}
+    assert other.load_settings({**saved, "Links": links, "Description Source": "Topic"}) == []
+    assert (other.alpha, other.is_link_enabled("arm")) == (0.5, False)
+    assert other.save_settings(saved, 2)["Links"]["arm"] == {"Value": False}
