@@ -377,6 +377,24 @@ class Codec:
         source.line("return m")
         return source.compile("decode(b)", self._title("decode"))
 
+    def decode_checked(self, buffer: bytes | memoryview) -> tuple[Message, int]:
+        """Decode a message's own level and check all others; return it with its end."""
+        read = self.made("checked", self._checked)
+        try:
+            found: tuple[Message, int] = read(buffer)
+        except Exception as error:
+            raise self.explain(buffer, error) from None
+        return found
+
+    def _checked(self) -> Any:
+        source = Source()
+        reader = Reader(self, source, self._start())
+        source.line(f"m = {source.bind(self.cls, 'C')}()")
+        reader.fields(self.schema, "m", lazy=True)
+        reader.prove()
+        source.line(f"return m, {reader.cursor.at()}")
+        return source.compile("check(b)", self._title("check"))
+
     def end(self, buffer: bytes | memoryview) -> int:
         """Check every length, and return the offset after the last field."""
         scan = self.made("scan", self._scan)

@@ -259,7 +259,11 @@ class MessageType:
         return self._codec(name, big, _width(wide), type(data) is memoryview)
 
     def _codec(self, name: str, big: bool, wide: int, view: bool = False) -> Codec:
-        return codec_of(self._schema, _WIRES[name, big, wide, view])
+        key = name, big, wide, view
+        codec = self._codecs.get(key)
+        if codec is None:
+            codec = self._codecs[key] = codec_of(self._schema, _WIRES[key])
+        return codec
 
     def _plausible_width(self, data: bytes | memoryview, name: str, big: bool) -> int:
         """Return the wstring width that makes the message end where its bytes end.
@@ -320,9 +324,29 @@ class MessageType:
         """
         data = self._bytes(buffer)
         codec = self._codec_for(data, wire, wstring_width)
-        end = codec.end(data)
+        self._check_end(codec, data, codec.end(data))
+
+    def decode_checked(
+        self, buffer: Any, wire: str | None = None, *, wstring_width: int | None = None
+    ) -> Message:
+        """Do what :meth:`validate` and :meth:`decode` do, in one pass over the bytes.
+
+        The message's own fields are decoded; larger nested messages and arrays of messages are
+        checked, and decoded when they are read.
+
+        Raises:
+            DecodeError: As for :meth:`validate`.
+        """
+        data = self._bytes(buffer)
+        codec = self._codec_for(data, wire, wstring_width)
+        message, end = codec.decode_checked(data)
+        self._check_end(codec, data, end)
+        return message
+
+    def _check_end(self, codec: Codec, data: bytes | memoryview, end: int) -> None:
+        """Raise DecodeError if bytes are left over after the message."""
         left = len(data) - end
-        if left > (_PADDING if codec.wire.aligned else 0):
+        if left and left > (_PADDING if codec.wire.aligned else 0):
             raise DecodeError(self.name, f"{left} bytes left over after the message", "", end)
 
     def path(

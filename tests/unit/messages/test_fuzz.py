@@ -223,16 +223,22 @@ def test_mutants_are_decoded_alike_or_refused(name: str, ros: int) -> None:
     def validate(data: bytes) -> Any:
         return kind.validate(data, wire=wire)
 
+    def checked(data: bytes) -> Any:
+        return read(name, ros, kind.decode_checked(data, wire=wire))
+
     with limited_memory():
         for data in mutants(starts, random.Random(f"{SEED}/{name}/{ros}"), MUTANTS):
             try:
                 lazy_good, lazy = attempt(lazily, data)
                 eager_good, eager = attempt(eagerly, data)
                 valid, why = attempt(validate, data)
+                checked_good, at_once = attempt(checked, data)
                 reached, leaf = attempt(path, data)
             except Exception as error:
                 raise AssertionError(f"{type(error).__name__} from {data.hex()}") from error
             assert lazy_good == eager_good, f"lazy against eager: {data.hex()}: {lazy}, {eager}"
+            assert checked_good == valid, f"both at once: {data.hex()}: {at_once}, {why}"
+            assert str(at_once) == str(why) if why else repr(at_once) == repr(lazy), data.hex()
             if not lazy_good:
                 refused += 1
                 assert not valid, f"validate accepts what decode refuses: {data.hex()}: {lazy}"
@@ -259,6 +265,8 @@ def test_validate_and_decode_judge_wide_strings_alike(width: int | None) -> None
     for data in mutants(starts, random.Random(f"{SEED}/wide/{width}"), count):
         read, what = attempt(lambda data: kind.decode_all(data, wstring_width=width), data)
         valid, why = attempt(lambda data: kind.validate(data, wstring_width=width), data)
+        both, _ = attempt(lambda data: kind.decode_checked(data, wstring_width=width), data)
+        assert both == valid, data.hex()
         accepted += read
         if read != valid and "left over" not in str(why):
             differ.append(f"{data.hex()}: {what}, {why}")
@@ -310,10 +318,12 @@ def test_hostile_counts_allocate_nothing(name: str, ros: int) -> None:
         lambda data: read(name, ros, kind.decode(data, wire=wire)),
         lambda data: kind.decode_all(data, wire=wire),
         lambda data: kind.validate(data, wire=wire),
+        lambda data: kind.decode_checked(data, wire=wire),
         path,
     )
     for action in actions:
-        action(starts[-1])
+        for start in starts:  # compiles the code for both byte orders
+            action(start)
     tracemalloc.start()
     try:
         for index, data in enumerate(systematic(starts)):

@@ -32,6 +32,7 @@ def test_name_and_hash_are_known():
         lambda t: t.decode_all(b"\0\1\0\0data"),
         lambda t: t.validate(b"\0\1\0\0data"),
         lambda t: t.validate(b"????"),
+        lambda t: t.decode_checked(b"\0\1\0\0data"),
         lambda t: t.encode({"a": 1}),
         lambda t: t.create(a=1),
         lambda t: t(a=1),
