@@ -261,6 +261,22 @@ def test_messages_are_taken_one_by_one_or_the_latest(link, eventually):
     assert subscription.statistics().dropped == 6
 
 
+def test_an_event_loop_is_woken_once_for_what_it_takes(link, eventually):
+    publisher, subscription = link(qos=5)
+    woken = []
+    assert subscription.add_waiter(lambda: woken.append(subscription.take().message().data))
+    publisher.publish(data="a")
+    eventually(lambda: woken == ["a"], woken)
+    publisher.publish(data="b")
+    eventually(lambda: subscription.statistics().received == 2)
+    assert not subscription.add_waiter(lambda: woken.append("one is ready"))
+    assert subscription.take().message().data == "b"
+    assert subscription.add_waiter(lambda: woken.append("closed"))
+    subscription.close()
+    assert not subscription.add_waiter(lambda: woken.append("it is closed"))
+    assert woken == ["a", "closed"]
+
+
 def test_what_nobody_waits_for_is_there_when_somebody_looks(link):
     publisher, subscription = link(qos=1)
     began = time.monotonic()
@@ -629,6 +645,8 @@ def test_odd_arguments_of_a_subscription_are_refused(console, topic):
         rosglass.ConversionError, match=f"{topic}: batching: expected True or False"
     ):
         subscription.set_batching(1)
+    with pytest.raises(rosglass.ConversionError, match=f"{topic}: wake: expected"):
+        subscription.add_waiter(None)
 
 
 async def _coroutine(*_):

@@ -106,7 +106,8 @@ class Subscription(TopicEndpoint):
         self._last_wait = -math.inf
         self._batching = False
         call = raw_callback if callback is None else _decoding(callback)
-        self._has_callback = call is not None
+        #: Whether a callback or a waiter is called for each sample.
+        self._calls = call is not None
         if call is not None and executor is IMMEDIATE:
             self._inbox: Inbox = ImmediateInbox(topic, qos, call, callback)
         else:
@@ -192,6 +193,23 @@ class Subscription(TopicEndpoint):
                     self._inbox.remove_waiter(ready.release)
         finally:
             self._end_wait()
+
+    def add_waiter(self, wake: Callable[[], object]) -> bool:
+        """Register a one-shot wake-up; return False if a sample is ready, or after closing.
+
+        For event loops: `wake` runs at once in the thread that receives, or that closes, and has
+        the loop call :meth:`take`.
+
+        Raises:
+            ArgumentError: `wake` cannot be called.
+        """
+        if not callable(wake):
+            raise ArgumentError("wake", wake, "something that can be called", self.topic)
+        if not self._calls:
+            self._calls = True
+            if self._feed is not None:
+                self._feed.update_eagerness()
+        return self._inbox.add_waiter(wake)
 
     def __iter__(self) -> Iterator[Sample]:
         while (sample := self.wait()) is not None:
@@ -325,7 +343,7 @@ class Subscription(TopicEndpoint):
     def _awaited(self) -> bool:
         """Whether samples are awaited: by a callback, a current wait or one in the last second."""
         recent = time.monotonic() - self._last_wait < _AWAITED_S
-        return (self._has_callback and not self._batching) or bool(self._waits) or recent
+        return (self._calls and not self._batching) or bool(self._waits) or recent
 
     def _flush(self) -> None:
         if self._feed is not None:

@@ -78,6 +78,8 @@ class Element(QtCore.QObject):
     _config: tuple[Any, ...] | None = None
     #: The endpoint; None until it is created.
     _endpoint: Any = None
+    #: Returns the time in seconds by which ages are measured: the session's, once that is known.
+    _steady: Callable[[], float] = staticmethod(time.monotonic)
 
     problemChanged = Signal()  # noqa: N815 - QML's name
     #: Error text for the user; empty without a problem.
@@ -211,17 +213,13 @@ class Element(QtCore.QObject):
             return
         self._update()
 
-    def _steady(self) -> float:
-        """Return the time in seconds by which ages are measured."""
-        session = self._session
-        return session.steady() if session is not None else time.monotonic()
-
     def _find_session(self) -> bool:
         runtime = self._find_runtime()
         if runtime is None:
             self._set_problem(f"{type(self).__name__} cannot be used yet: {UNPREPARED}")
             return False
         session = self._session = runtime.session
+        self._steady = session.steady
         cleanup = self._cleanup
         cleanup["signals"] = session.attach(
             self,

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rosglass.comm.time import Duration, Time
     from rosglass.messages import Message
     from rosglass.messages.schema import Schema
-    from rosglass.qml.to_js import LongArray
+    from rosglass.qml.to_js import LongArray, MessageReader
 
 
 __all__ = ["UNPREPARED", "Host", "LongArrays", "Runtime", "own_runtime", "runtime_of"]
@@ -208,7 +208,7 @@ class Runtime(QtCore.QObject):
         engine.rootContext().setContextProperty(_NAME, self)
         self.session = session
         self._engine = engine
-        self._shapes: dict[tuple[Schema, Dialect], QJSValue] = {}
+        self._formats: dict[tuple[Schema, Dialect], tuple[MessageReader, QJSValue]] = {}
         self._kept: set[QtCore.QObject] = set()
         self._debt = 0
         self._host = Host(self)
@@ -313,13 +313,14 @@ class Runtime(QtCore.QObject):
             return QJSValue()
         schema = message._schema__
         arrays: list[LongArray] = []
-        text, marked = to_json(reader(schema, dialect)(message, arrays))
+        read, shape = self._format(schema, dialect)
+        text, marked = to_json(read(message, arrays))
         source = QJSValue()
         if arrays:
             source = engine.newQObject(self.keep(LongArrays(self, arrays, dialect)))
             self._charge(arrays)
         build = "buildWithNan" if marked else "build"
-        return self._call(build, [QJSValue(text), self._shape(schema, dialect), source])
+        return self._call(build, [QJSValue(text), shape, source])
 
     def promise(self) -> tuple[QJSValue, QJSValue, QJSValue]:
         """Return a JavaScript promise, and the functions that resolve and reject it."""
@@ -363,22 +364,23 @@ class Runtime(QtCore.QObject):
 
         return self._call("makeQos", [self.value(part) for part in qos_parts(qos)])
 
-    def _shape(self, schema: Schema, dialect: Dialect) -> QJSValue:
-        shape = self._shapes.get((schema, dialect))
-        if shape is None:
+    def _format(self, schema: Schema, dialect: Dialect) -> tuple[MessageReader, QJSValue]:
+        """Return a type's reader, and its shape for JavaScript."""
+        made = self._formats.get((schema, dialect))
+        if made is None:
             assert self.engine is not None
             found = describe(schema, dialect)
             fields = self.engine.newArray(len(found.fields))
             for index, (name, kind, inner) in enumerate(found.fields):
                 field = self.value([name, kind, 0])
                 if inner is not None:
-                    field.setProperty(2, self._shape(inner, dialect))
+                    field.setProperty(2, self._format(inner, dialect)[1])
                 fields.setProperty(index, field)
             number = self._host.know(schema, dialect)
             head = [QJSValue(found.name), QJSValue(found.time), fields]
             shape = self._call("shape", [*head, self.value(found.constants), self.value(number)])
-            self._shapes[schema, dialect] = shape
-        return shape
+            made = self._formats[schema, dialect] = reader(schema, dialect), shape
+        return made
 
     def _script(self, name: str) -> QJSValue:
         file = _FOLDER / name

@@ -8,7 +8,6 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm.handle import Executor
 from rosglass.comm.qos import Durability, History, QoS, Reliability
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
 from rosglass.qml.callbacks import Deferred, call_back, weak_callback
@@ -23,8 +22,9 @@ if TYPE_CHECKING:
 
     from rosglass.comm.inbox import Sample
     from rosglass.comm.node import Node
+    from rosglass.comm.subscription import Subscription as TopicSubscription
+    from rosglass.messages import Message
     from rosglass.qml.runtime import Runtime
-    from rosglass.qml.session import GuiExecutor
 
 
 __all__ = ["DEFAULT_QOS", "Subscriber", "Subscription", "next_message", "wait_for_message"]
@@ -35,54 +35,6 @@ _log = logging.getLogger("rosglass.qml")
 _MUCH_FASTER, _HARDLY_FASTER = 3.0, 1.5
 #: The profile of ``Ros2.QoS()``: matches every publisher, keeps only the newest message.
 DEFAULT_QOS = QoS(depth=1, reliability=Reliability.BEST_EFFORT)
-
-
-class _Feed(Executor):
-    """A subscription that queues its samples for the GUI thread.
-
-    The inbox posts one delivery job at a time, so that a fast topic costs one event per delivery,
-    not per message.
-
-    Args:
-        node: The node.
-        topic: Absolute topic name.
-        type_name: Message type; empty uses the published one.
-        qos: Requested profile.
-        executor: The executor of the GUI thread.
-        on_arrival: Called on the GUI thread with this object when samples have arrived.
-    """
-
-    def __init__(
-        self,
-        node: Node,
-        topic: str,
-        type_name: str,
-        qos: QoS,
-        executor: GuiExecutor,
-        on_arrival: Callable[[_Feed], None],
-    ) -> None:
-        self._executor, self._on_arrival = executor, on_arrival
-        self._job: Callable[[], None] | None = None
-        self._samples: list[Sample] = []
-        self.subscription = node.create_subscription(
-            topic, type_name or None, qos=qos, raw_callback=self._collect, executor=self
-        )
-        self.close = self.subscription.close
-
-    def post(self, job: Callable[[], None]) -> None:
-        self._job = job
-        self._executor.post(lambda: self._on_arrival(self))
-
-    def _collect(self, sample: Sample) -> None:
-        self._samples.append(sample)
-
-    def take(self) -> list[Sample]:
-        """Take the queued samples."""
-        job, self._job = self._job, None
-        if job is not None:
-            job()
-        samples, self._samples = self._samples, []
-        return samples
 
 
 class Subscription(TopicElement):
@@ -111,9 +63,10 @@ class Subscription(TopicElement):
     bandwidth = ReadOnly(float, 0.0, tolerance=0.01)
     dropped = ReadOnly(int, 0)
 
-    _HOLDS = ("_sample", "_value")
-    _endpoint: _Feed | None
+    _HOLDS = ("_sample", "_message", "_value")
+    _endpoint: TopicSubscription | None
     _timeout: int | None
+    _subscribed: bool
     _age: float
     _stale: bool
 
@@ -125,6 +78,8 @@ class Subscription(TopicElement):
         self._profile = DEFAULT_QOS
         self._wanted_queue_size: int | None = None
         self._sample: Sample | None = None
+        #: The sample's message.
+        self._message: Message | None = None
         #: Whether the sample is from the current subscription, and so from the current robot.
         self._current = False
         self._value: QJSValue | None = None
@@ -249,18 +204,18 @@ class Subscription(TopicElement):
         self._publishers = self._count_publishers()
         super()._create_endpoint(wanted)
 
-    def _factory(self, node: Node, topic: str, type_name: str, qos: QoS) -> Callable[[], _Feed]:
-        executor, on_arrival = self._executor, weak_callback(self._on_arrival)
-        return lambda: _Feed(node, topic, type_name, qos, executor, on_arrival)
+    def _factory(self, *wanted: Any) -> Callable[[], TopicSubscription]:
+        node, topic, type_name, qos = wanted
+        return lambda: node.create_subscription(topic, type_name or None, qos=qos)
 
-    def _on_created(self, endpoint: _Feed) -> None:  # noqa: ARG002 - the base's signature
+    def _on_created(self, endpoint: TopicSubscription) -> None:  # noqa: ARG002 - the base's
         self._set_problem("")
         if is_alive(self):
             self._expect_publishers()
             self._refresh()
             self._deliver()
 
-    def _on_closed(self, endpoint: _Feed | None) -> None:  # noqa: ARG002 - the base's signature
+    def _on_closed(self, endpoint: TopicSubscription | None) -> None:  # noqa: ARG002 - the base's
         self._timer.stop()
         self._no_publisher.stop()
         self._current, self._inner_problem = False, ""
@@ -269,7 +224,8 @@ class Subscription(TopicElement):
     def _clear_shown(self) -> None:
         """Clear the message, which belongs to another topic or type."""
         had = self._sample is not None
-        self._sample, self._value, self._age = None, None, -1.0
+        self._sample = self._message = self._value = None
+        self._age = -1.0
         if had:
             self.messageChanged.emit()
             self.ageChanged.emit()
@@ -277,8 +233,18 @@ class Subscription(TopicElement):
 
     # Receiving.
 
-    def _on_arrival(self, feed: _Feed) -> None:
-        if not is_alive(self) or feed is not self._endpoint or self._timer.isActive():
+    def _await_sample(self, endpoint: TopicSubscription) -> None:
+        """Have the next sample, or one that is waiting already, announced on the GUI thread."""
+        executor, on_arrival = self._executor, weak_callback(self._on_arrival)
+
+        def wake() -> None:
+            executor.post(lambda: on_arrival(endpoint))
+
+        if not endpoint.add_waiter(wake) and not endpoint.closed:
+            wake()
+
+    def _on_arrival(self, endpoint: TopicSubscription) -> None:
+        if not is_alive(self) or endpoint is not self._endpoint:
             return
         wait = 0.0
         if self.throttleRate:
@@ -290,28 +256,33 @@ class Subscription(TopicElement):
 
     @Slot()
     def _deliver(self) -> None:
-        feed = self._endpoint
-        if feed is None:
+        endpoint = self._endpoint
+        if endpoint is None:
             return
-        samples = feed.take()
+        samples = list(iter(endpoint.take, None))
+        # Not after showing them: a handler may wait in an event loop of its own.
+        self._await_sample(endpoint)
         for sample in samples if self.throttleRate == 0 else samples[-1:]:
             self._show(sample)
             # A handler may have changed the topic or destroyed this object.
-            if not is_alive(self) or feed is not self._endpoint:
+            if not is_alive(self) or endpoint is not self._endpoint:
                 return
 
     def _show(self, sample: Sample) -> None:
         try:
-            sample.type.validate(sample.data, wire=sample.wire)
+            message = sample.type.decode_checked(sample.data, sample.wire)
         except DecodeError as error:
             self._set_problem(f"{self._resolved}: a malformed message was refused: {error}")
             return
         except TypeNotFoundError:
             return  # unreadable without its type; the subscription reports the problem
-        name = self.DIALECT.type_name(sample.type.definition.name)
-        new_type = name != self._found_type and not self._wanted_type
-        self._found_type = name
-        self._sample, self._value, self._current = sample, None, True
+        before, new_type = self._sample, False
+        if before is None or sample.type is not before.type:
+            name = self.DIALECT.type_name(sample.type.definition.name)
+            new_type = name != self._found_type and not self._wanted_type
+            self._found_type = name
+        self._sample, self._message, self._value = sample, message, None
+        self._current = True
         self._shown_at = self._steady()
         self._late = self._lateness(sample)
         self._age = 0.0
@@ -323,17 +294,22 @@ class Subscription(TopicElement):
         self.messageChanged.emit()
         if not is_alive(self) or self._sample is not sample:
             return
-        self._set_problem("")
+        if self._problem:
+            self._set_problem("")
         self.ageChanged.emit()
         if was_stale != self._stale:
             self.staleChanged.emit()
-        if report(self, subscribed=True) and self._has_listeners():
+        if not self._subscribed:
+            report(self, subscribed=True)
+        if is_alive(self) and self._has_listeners():
             self.newMessage.emit(self._get_message())
 
     def _lateness(self, sample: Sample) -> float:
         """Return the excess delay of a message over others, in seconds."""
-        feed = self._endpoint
-        return 0.0 if feed is None else feed.subscription.lateness(sample).seconds
+        endpoint = self._endpoint
+        if endpoint is None or sample.sent_ns is None:
+            return 0.0
+        return endpoint.lateness(sample).seconds
 
     def _has_listeners(self) -> bool:
         """Return whether newMessage is connected, so that its value is needed."""
@@ -341,12 +317,11 @@ class Subscription(TopicElement):
         return self.isSignalConnected(meta.method(meta.indexOfSignal("newMessage(QJSValue)")))
 
     def _build(self) -> QJSValue:
-        sample = self._sample
-        runtime = self._find_runtime()
-        if sample is None or runtime is None:
+        message, runtime = self._message, self._runtime
+        if message is None or runtime is None:
             return QJSValue()
         try:
-            return runtime.message(sample.message(), self.DIALECT)
+            return runtime.message(message, self.DIALECT)
         except Error as error:
             _log.error("%s: %s", self._resolved, error)
             return QJSValue()
@@ -389,11 +364,10 @@ class Subscription(TopicElement):
 
     def _refresh(self) -> None:
         """Report the subscription's current statistics and problem."""
-        feed = self._endpoint
-        if feed is None:
+        subscription, throttle = self._endpoint, self.throttleRate
+        if subscription is None:
             report(self, frequency=0.0, bandwidth=0.0)
             return
-        subscription, throttle = feed.subscription, self.throttleRate
         statistics = subscription.statistics()
         enough = _HARDLY_FASTER if subscription.batching else _MUCH_FASTER
         fast = statistics.frequency > enough * throttle

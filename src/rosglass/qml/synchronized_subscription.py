@@ -7,7 +7,7 @@ import math
 import threading
 import time
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.approximate_time import ApproximateTime
 from rosglass.comm.executor import Dispatcher
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from rosglass.comm.inbox import Sample
     from rosglass.comm.node import Node
     from rosglass.comm.qos import QoS
-    from rosglass.comm.subscription import Subscription as Received
+    from rosglass.comm.subscription import Subscription as TopicSubscription
+    from rosglass.messages import Message
     from rosglass.qml.runtime import Runtime
     from rosglass.qml.session import GuiExecutor
 
@@ -36,6 +37,13 @@ __all__ = ["RosSynchronizedSubscription", "SynchronizedSubscription"]
 _MAX_SLOP_MS = 3_600_000
 #: Number of sets over which the frequency is measured.
 _MARKS = 30
+
+
+class _Received(NamedTuple):
+    """A received message."""
+
+    sample: Sample
+    message: Message
 
 
 class _Matcher:
@@ -64,14 +72,14 @@ class _Matcher:
         arrived: Callable[[_Matcher], None],
         executor: GuiExecutor,
     ) -> None:
-        self._match: ApproximateTime[Sample] = ApproximateTime(len(wanted), queue_size, slop)
+        self._match: ApproximateTime[_Received] = ApproximateTime(len(wanted), queue_size, slop)
         self._headerless, self._arrived, self._executor = headerless, arrived, executor
         self._lock = threading.Lock()
-        self._sets: deque[list[Sample]] = deque()
+        self._sets: deque[list[_Received]] = deque()
         self._size, self._lost = queue_size, 0
         self._bad: dict[int, str] = {}
         self._worker = Dispatcher("rosglass-synchronizer")
-        self.subscriptions: list[Received] = []
+        self.subscriptions: list[TopicSubscription] = []
         try:
             for index, (topic, type_name, qos) in enumerate(wanted):
                 self.subscriptions.append(self._subscribe(node, index, topic, type_name, qos))
@@ -93,16 +101,16 @@ class _Matcher:
                 return f"{subscription.topic}: {problem}"
         return ""
 
-    def take(self) -> list[list[Sample]]:
+    def take(self) -> list[list[_Received]]:
         """Take the waiting sets."""
         with self._lock:
             sets, self._sets = list(self._sets), deque()
         return sets
 
-    def lateness(self, samples: list[Sample]) -> float:
+    def lateness(self, received: list[_Received]) -> float:
         """Return the delay of a set in transit, in seconds."""
-        pairs = zip(self.subscriptions, samples, strict=True)
-        return max(subscription.lateness(sample).seconds for subscription, sample in pairs)
+        pairs = zip(self.subscriptions, received, strict=True)
+        return max(subscription.lateness(one.sample).seconds for subscription, one in pairs)
 
     def close(self) -> None:
         """Stop receiving."""
@@ -110,7 +118,9 @@ class _Matcher:
             subscription.close()
         self._worker.close()
 
-    def _subscribe(self, node: Node, index: int, topic: str, type_name: str, qos: QoS) -> Received:
+    def _subscribe(
+        self, node: Node, index: int, topic: str, type_name: str, qos: QoS
+    ) -> TopicSubscription:
         return node.create_subscription(
             topic,
             type_name or None,
@@ -120,10 +130,18 @@ class _Matcher:
         )
 
     def _receive(self, index: int, sample: Sample) -> None:
-        stamp = self._stamp_of(index, sample)
+        try:
+            message = sample.type.decode_checked(sample.data, sample.wire)
+            stamp = self._stamp_of(index, sample, message)
+        except DecodeError as error:
+            self._bad[index] = f"a malformed message was refused: {error}"
+            return
+        except TypeNotFoundError as error:
+            self._bad[index] = str(error)
+            return
         if stamp is None:
             return
-        found = self._match.add(index, stamp, sample)
+        found = self._match.add(index, stamp, _Received(sample, message))
         if not found:
             return
         with self._lock:
@@ -134,17 +152,8 @@ class _Matcher:
         if first:
             self._executor.post(lambda: self._arrived(self))
 
-    def _stamp_of(self, index: int, sample: Sample) -> int | None:
-        try:
-            sample.type.validate(sample.data, wire=sample.wire)
-            header = getattr(sample.message(), "header", None)
-        except DecodeError as error:
-            self._bad[index] = f"a malformed message was refused: {error}"
-            return None
-        except TypeNotFoundError as error:
-            self._bad[index] = str(error)
-            return None
-        stamp = getattr(header, "stamp", None)
+    def _stamp_of(self, index: int, sample: Sample, message: Message) -> int | None:
+        stamp = getattr(getattr(message, "header", None), "stamp", None)
         if stamp is None and not self._headerless:
             self._bad[index] = (
                 f"{sample.type.name} has no header.stamp to go by; "
@@ -175,7 +184,7 @@ class SynchronizedSubscription(Element):
     frequency = ReadOnly(float, 0.0, tolerance=0.01)
     dropped = ReadOnly(int, 0)
 
-    _HOLDS = ("_topics", "_subscriptions", "_samples", "_value")
+    _HOLDS = ("_topics", "_subscriptions", "_received", "_value")
     _endpoint: _Matcher | None
     _stale: bool
 
@@ -183,7 +192,7 @@ class SynchronizedSubscription(Element):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         super().__init__(parent, runtime)
-        self._samples: list[Sample] | None = None
+        self._received: list[_Received] | None = None
         self._value: QJSValue | None = None
         #: When the set was shown, and the seconds by which it was delayed before.
         self._shown_at = self._late = 0.0
@@ -256,11 +265,11 @@ class SynchronizedSubscription(Element):
     def _on_sets(self, matcher: _Matcher) -> None:
         if not is_alive(self) or matcher is not self._endpoint:
             return
-        for samples in matcher.take():
-            self._samples, self._value = samples, None
+        for received in matcher.take():
+            self._received, self._value = received, None
             note_time(self._times, time.monotonic())
             self._shown_at = self._steady()
-            self._late, self._outdated = matcher.lateness(samples), False
+            self._late, self._outdated = matcher.lateness(received), False
             was_stale, self._stale = self._stale, self._is_old()
             self.messagesChanged.emit()
             if not is_alive(self) or matcher is not self._endpoint:
@@ -274,11 +283,11 @@ class SynchronizedSubscription(Element):
     def _build(self) -> QJSValue:
         runtime = self._find_runtime()
         engine = runtime.engine if runtime is not None else None
-        if self._samples is None or runtime is None or engine is None:
+        if self._received is None or runtime is None or engine is None:
             return QJSValue()
-        made = engine.newArray(len(self._samples))
-        for index, sample in enumerate(self._samples):
-            made.setProperty(index, runtime.message(sample.message(), self.DIALECT))
+        made = engine.newArray(len(self._received))
+        for index, one in enumerate(self._received):
+            made.setProperty(index, runtime.message(one.message, self.DIALECT))
         return made
 
     # Judging.

@@ -39,6 +39,9 @@ _HEADER = "std_msgs/msg/Header"
 
 #: A long array: its member and its values.
 LongArray = tuple["Member", Any]
+if TYPE_CHECKING:
+    #: Returns a message's short values, and appends its long arrays.
+    MessageReader = Callable[[Message, list[LongArray]], dict[str, Any]]
 
 
 def exact(value: int) -> int | str:
@@ -46,19 +49,15 @@ def exact(value: int) -> int | str:
     return value if -_EXACT < value < _EXACT else str(value)
 
 
-def reader(
-    schema: Schema, dialect: Dialect = Dialect.ROS2
-) -> Callable[[Message, list[LongArray]], dict[str, Any]]:
+def reader(schema: Schema, dialect: Dialect = Dialect.ROS2) -> MessageReader:
     """Return a function that reads a message's short values and collects its long arrays."""
-    made: Callable[[Message, list[LongArray]], dict[str, Any]] = schema.cached(
+    made: MessageReader = schema.cached(
         ("qml reader", dialect), lambda: _make_reader(schema, dialect)
     )
     return made
 
 
-def _make_reader(
-    schema: Schema, dialect: Dialect
-) -> Callable[[Message, list[LongArray]], dict[str, Any]]:
+def _make_reader(schema: Schema, dialect: Dialect) -> MessageReader:
     members = schema.members
     if not members:
         return lambda message, arrays: {}  # noqa: ARG005 - the signature is shared
