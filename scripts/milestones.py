@@ -4,8 +4,8 @@
 
 The first figures are read off the sources, of any checkout. ``--trace`` also runs this one: a
 publisher in another process sends, and the files are counted that each message passes through,
-from the socket to a subscription's callback. Over ROS 1 that needs Debian's rosmaster; Zenoh calls
-from threads that are not Python's, which no profile sees.
+from the socket to a subscription's callback, and to a binding in QML. Over ROS 1 that needs
+Debian's rosmaster; Zenoh calls from threads that are not Python's, which no profile sees.
 """
 
 from __future__ import annotations
@@ -54,6 +54,8 @@ _OF_GENPY = {
     "_slot_types",
 }
 _MESSAGES = 300
+#: How long a trace may take.
+_TRACE_TIMEOUT_S = 60
 
 
 class Source:
@@ -236,49 +238,131 @@ _PUBLISHER = """
 import sys, time, rosglass
 with rosglass.connect(sys.argv[1], name="milestones_talker") as node:
     publisher = node.create_publisher("/milestones", "std_msgs/msg/String", qos=1000)
+    number = 0
     while True:
-        publisher.publish({"data": "x"})
+        number += 1
+        publisher.publish({"data": str(number)})
         time.sleep(0.01)
+"""
+_INTERFACE = """
+import QtQml
+import Ros2 1.0
+QtObject {
+    property QtObject source: Subscription {
+        topic: "/milestones"; messageType: "std_msgs/msg/String"; queueSize: 1000; throttleRate: 0
+    }
+    property string shown: source && source.message ? source.message.data : ""
+    onShownChanged: tracer.arrived()
+}
 """
 
 
-def trace(url: str) -> list[str]:
-    """Return the files of rosglass that every message runs through, in the order of their names."""
+class Tracer:
+    """Counts the files of rosglass that every message runs through.
+
+    Attributes:
+        enough: Set once enough messages have come.
+    """
+
+    def __init__(self) -> None:
+        import rosglass  # noqa: PLC0415 - of this checkout, not the one that is counted
+
+        self.enough = threading.Event()
+        self._package = str(Path(rosglass.__file__).parent) + os.sep
+        self._messages_of: Counter[str] = Counter()
+        #: The files called since the last message.
+        self._called: set[str] = set()
+        self._came = 0
+
+    def profile(self, frame: Any, event: str, _: object) -> None:
+        """Note a call; for ``sys.setprofile``."""
+        if event == "call":
+            self._called.add(frame.f_code.co_filename)
+
+    def arrived(self) -> None:
+        """Count a message; the first 50 settle types, links and buffers."""
+        called, self._called = self._called, set()
+        self._came += 1
+        if 50 < self._came <= 50 + _MESSAGES:
+            self._messages_of.update(called)
+        elif self._came > 50 + _MESSAGES:
+            self.enough.set()
+
+    def files(self) -> list[str]:
+        """Return the files, in the order of their names."""
+        if not self.enough.is_set():
+            raise SystemExit(f"{self._came} messages came in {_TRACE_TIMEOUT_S} s")
+        often = [file for file, count in self._messages_of.items() if count >= 0.9 * _MESSAGES]
+        return sorted(
+            file.removeprefix(self._package) for file in often if file.startswith(self._package)
+        )
+
+
+@contextlib.contextmanager
+def talker(url: str) -> Iterator[None]:
+    """Publish 100 messages a second, in another process."""
+    process = subprocess.Popen([sys.executable, "-c", _PUBLISHER, url])
+    try:
+        yield
+    finally:
+        process.kill()
+        process.wait()
+
+
+def trace_callback(url: str) -> list[str]:
+    """Return the files between the socket and a subscription's callback."""
     import rosglass  # noqa: PLC0415 - of this checkout, not the one that is counted
 
-    package = str(Path(rosglass.__file__).parent) + os.sep
-    calls: Counter[str] = Counter()
-    came = 0
-    enough = threading.Event()
-    counting = False
-
-    def profile(frame: Any, event: str, _: object) -> None:
-        if counting and event == "call" and frame.f_code.co_filename.startswith(package):
-            calls[frame.f_code.co_filename.removeprefix(package)] += 1
+    tracer = Tracer()
 
     def on_message(message: rosglass.Message) -> None:
-        nonlocal came, counting
-        came += 1
-        if came == 50:  # types, links and buffers are settled
-            counting = True
-        elif came == 50 + _MESSAGES:
-            counting = False
-            enough.set()
+        tracer.arrived()
         message.data  # noqa: B018 - what a user does
 
-    threading.setprofile(profile)
-    command = [sys.executable, "-c", _PUBLISHER, url]
-    with rosglass.connect(url, name="milestones_listener") as node:
-        threading.setprofile(None)
-        talker = subprocess.Popen(command)
-        try:
-            node.create_subscription("/milestones", "std_msgs/msg/String", on_message, qos=1000)
-            if not enough.wait(60):
-                raise SystemExit(f"{url}: {came} messages came in 60 s")
-        finally:
-            talker.kill()
-            talker.wait()
-    return sorted(file for file, count in calls.items() if count >= 0.9 * _MESSAGES)
+    threading.setprofile(tracer.profile)
+    with rosglass.connect(url, name="milestones_listener") as node, talker(url):
+        node.create_subscription("/milestones", "std_msgs/msg/String", on_message, qos=1000)
+        tracer.enough.wait(_TRACE_TIMEOUT_S)
+    threading.setprofile(None)
+    return tracer.files()
+
+
+def trace_binding(url: str) -> list[str]:
+    """Return the files between the socket and a binding to a Subscription's message in QML."""
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    # Of this checkout, not the one that is counted.
+    from rosglass.qml import Session, install  # noqa: PLC0415
+    from rosglass.qt import QtCore, QtGui, QtQml, Slot, run_event_loop  # noqa: PLC0415
+
+    tracer = Tracer()
+
+    class Arrivals(QtCore.QObject):
+        @Slot()
+        def arrived(self) -> None:
+            tracer.arrived()
+            if tracer.enough.is_set():
+                loop.quit()
+
+    app = QtGui.QGuiApplication.instance() or QtGui.QGuiApplication([])
+    loop, arrivals, engine = QtCore.QEventLoop(), Arrivals(), QtQml.QQmlEngine()
+    engine.rootContext().setContextProperty("tracer", arrivals)
+    threading.setprofile(tracer.profile)
+    session = install(engine, Session(url))
+    session.init("milestones_interface")
+    component = QtQml.QQmlComponent(engine)
+    component.setData(_INTERFACE.encode(), QtCore.QUrl("file:///milestones.qml"))
+    root = component.create()
+    if root is None:
+        raise SystemExit(component.errorString())
+    QtCore.QTimer.singleShot(1000 * _TRACE_TIMEOUT_S, loop.quit)
+    sys.setprofile(tracer.profile)
+    with talker(url):
+        run_event_loop(loop)
+    sys.setprofile(None)
+    threading.setprofile(None)
+    session.close()
+    del root, component, engine, app
+    return tracer.files()
 
 
 @contextlib.contextmanager
@@ -300,11 +384,15 @@ def ros1_master() -> Iterator[str]:
             server.wait()
 
 
-def traces() -> Iterator[tuple[str, list[str]]]:
-    yield "DDS", trace("dds://?domain=77")
-    if shutil.which("/usr/bin/rosmaster"):
-        with ros1_master() as url:
-            yield "TCPROS", trace(url)
+def traces() -> Iterator[tuple[str, str, list[str]]]:
+    """Yield wire, end and files of each path."""
+    with contextlib.ExitStack() as stack:
+        urls = {"DDS": "dds://?domain=77"}
+        if shutil.which("/usr/bin/rosmaster"):
+            urls["TCPROS"] = stack.enter_context(ros1_master())
+        for wire, url in urls.items():
+            yield wire, "callback", trace_callback(url)
+            yield wire, "QML binding", trace_binding(url)
 
 
 def main() -> None:
@@ -345,9 +433,10 @@ def main() -> None:
         ("words of the glossary's left column", glossary_words([package, root / "docs"]), "0"),
     ]
     if options.trace:
-        for wire, files in traces():
-            rows.append((f"files from socket to callback, {wire}", len(files), "8"))
-            print(f"{wire}: {', '.join(files)}", file=sys.stderr)
+        for wire, end, files in traces():
+            limit = "8" if end == "callback" else "11"
+            rows.append((f"files from socket to {end}, {wire}", len(files), limit))
+            print(f"{wire} to {end}: {', '.join(files)}", file=sys.stderr)
     width = max(len(row[0]) for row in rows)
     print(f"{'':{width}}  {'now':>16}  reach")
     for what, now, reach in rows:
