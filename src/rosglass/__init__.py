@@ -9,6 +9,9 @@ from __future__ import annotations
 # No imports before the command can handle Ctrl-C; type checkers know this name.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from rosglass import bags as bags
+    from rosglass import images as images
+    from rosglass import tf as tf
     from rosglass.comm import Duration, Node, QoS, Time
     from rosglass.connection import connect
     from rosglass.errors import (

@@ -39,13 +39,12 @@ def convert(bench: Any, type_name: str, script: str, *, module: int = 2, ros: in
 
 def converted(value: Any, type_name: Any, *, module: int = 2, ros: int = 2) -> dict:
     """Return the message that a JavaScript value is, as a dict; of a type, or of its name."""
-    from rosglass.messages.schema import schema_of
     from rosglass.qml.dialect import Dialect
     from rosglass.qml.from_js import fields_from_js
 
     kind = rosglass.load(type_name, ros=ros) if isinstance(type_name, str) else type_name
     dialect = Dialect.ROS1 if module == 1 else Dialect.ROS2
-    fields = fields_from_js(value, schema_of(kind.definition), dialect=dialect)
+    fields = fields_from_js(value, kind, dialect=dialect)
     return kind.decode(kind.encode(fields)).to_dict()
 
 

@@ -13,7 +13,7 @@ from rosglass.qml.callbacks import Deferred, call_back
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import CONNECTION_TIMEOUT_MS, ClientElement
 from rosglass.qml.goal_handle import GoalCallbacks, GoalHandle, RosGoalHandle, tell_cancelling
-from rosglass.qml.js_values import null, properties_of
+from rosglass.qml.js_values import null, properties_of, time_from_js
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.properties import ReadOnly, Writable, at_least, report
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
@@ -69,8 +69,6 @@ class GoalSender(ClientElement):
 
     def _cancel_until(self, value: QJSValue) -> None:
         """Ask the server to cancel the goals that it accepted at or before a time."""
-        from rosglass.qml.js_values import time_from_js  # noqa: PLC0415 - few interfaces ask
-
         try:
             time = time_from_js(value)
             self._ask_cancel(lambda client: client.cancel_before(time))

@@ -12,6 +12,7 @@ from rosglass.errors import Error
 from rosglass.qml.callbacks import Answers, call_back, weak_callback
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import Element
+from rosglass.qml.goal_handle import ServerGoalHandle
 from rosglass.qml.js_values import properties_of
 from rosglass.qml.properties import ReadOnly, Writable, function, report
 from rosglass.qml.singleton import full_type
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from rosglass.comm.action_server import ServerGoal
     from rosglass.comm.node import Node
     from rosglass.messages import Message
-    from rosglass.qml.goal_handle import ServerGoalHandle
 
 __all__ = ["ActionServer", "RosActionServer", "action_type", "server_functions"]
 
@@ -171,8 +171,6 @@ class ActionServer(Element):
     ) -> Future[Any]:
         runtime = self._runtime
         assert runtime is not None
-
-        from rosglass.qml.goal_handle import ServerGoalHandle  # noqa: PLC0415 - few have actions
 
         def forget(handle: ServerGoalHandle) -> None:
             if goals.handles.pop(goal.id, None) is handle and is_alive(self):

@@ -6,6 +6,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from rosglass.errors import Error
+from rosglass.interfaces.names import spelled_ros1
 
 if TYPE_CHECKING:
     from rosglass.comm.node import Node
@@ -56,8 +57,6 @@ class Dialect(Enum):
         """Return a text with its type names in the module's spelling."""
         if self is Dialect.ROS2 or not text:
             return text
-        from rosglass.interfaces.names import spelled_ros1  # noqa: PLC0415 - not at start-up
-
         return spelled_ros1(text)
 
     def names(self, schema: Schema) -> dict[str, str]:

@@ -12,6 +12,7 @@ from rosglass.comm.names import similar
 from rosglass.errors import Error, TypeNotFoundError
 from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.dialect import Dialect, resolve_namespace, within_namespace
+from rosglass.qml.from_js import fields_from_js
 from rosglass.qml.log import Caller, RateLimit, log_from_qml, plain_path
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qml.runtime import UNPREPARED, runtime_of
@@ -526,12 +527,9 @@ def named(name: str, error: BaseException) -> str:
 
 def given_fields(value: QJSValue, type: MessageType, dialect: Dialect) -> dict[str, object]:
     """Return the fields of a request or goal from QML; raises like :func:`fields_from_js`."""
-    from rosglass.messages.schema import schema_of  # noqa: PLC0415 - loaded by now
-    from rosglass.qml.from_js import fields_from_js  # noqa: PLC0415
-
     if value.isUndefined() or value.isNull():
         return {}
-    return fields_from_js(value, schema_of(type.definition), dialect=dialect)
+    return fields_from_js(value, type, dialect=dialect)
 
 
 def _later(job: Callable[[], None]) -> None:

@@ -34,12 +34,14 @@ from rosglass.qml.js_values import (
 from rosglass.qt import QJSValue, QtCore, QtGui
 
 if TYPE_CHECKING:
+    from rosglass.messages import MessageType
     from rosglass.messages.schema import Member, Number, Schema
 
 
 __all__ = [
     "elements_from_js",
     "fields_from_js",
+    "numpy",
     "plain_from_js",
     "scalar_from_python",
     "typed_array",
@@ -64,14 +66,14 @@ _HEADER = "std_msgs/msg/Header"
 
 
 def fields_from_js(
-    value: QJSValue, schema: Schema, path: str = "", dialect: Dialect = Dialect.ROS2
+    value: QJSValue, type: MessageType, path: str = "", dialect: Dialect = Dialect.ROS2
 ) -> dict[str, Any]:
     """Return the message fields in a JavaScript value, without undefined ones.
 
     Args:
         value: An object, a received message, a QML object whose properties have the fields' names,
             or a vector or quaternion.
-        schema: The message type.
+        type: The message type.
         path: Field path of the message, for errors.
         dialect: The module that the value is from. ``Ros2 1.0`` also converts texts to numbers and
             numbers to texts where nothing is lost.
@@ -79,7 +81,7 @@ def fields_from_js(
     Raises:
         ConversionError: The value is not a message of this type.
     """
-    return _Conversion(dialect).fields(value, schema, path)
+    return _Conversion(dialect).fields(value, type._schema, path)
 
 
 def elements_from_js(values: QJSValue, kind: str) -> list[Any]:
@@ -99,6 +101,13 @@ def elements_from_js(values: QJSValue, kind: str) -> list[Any]:
             raise ConversionError(f"[{index}]", value, f"an integer ({kind})")
         found.append(whole)
     return found
+
+
+def numpy() -> Any:
+    """Return numpy; importing it takes longer than all of QML's elements, and few need it."""
+    import numpy  # noqa: PLC0415
+
+    return numpy
 
 
 def _renamed_time(given: dict[str, Any], schema: Schema) -> dict[str, Any]:
@@ -359,8 +368,7 @@ def typed_array(value: QJSValue) -> Any:
     kind = _TYPED.get(value.property("constructor").property("name").toString())
     if kind is None or not value.isObject():
         return None
-    import numpy as np  # noqa: PLC0415 - few programs send typed arrays
-
+    np = numpy()
     held = value.property("buffer").toVariant()
     data = bytes(held.data()) if isinstance(held, QtCore.QByteArray) else b""
     count, offset = value.property("length").toInt(), value.property("byteOffset").toInt()
@@ -390,8 +398,7 @@ def _buffer(value: QJSValue, member: Member, path: str) -> Any:
     if len(data) % size:
         wanted = f"a multiple of {size} bytes ({member.field.type})"
         raise ConversionError(path, Shown(f"an ArrayBuffer of {len(data)} bytes"), wanted)
-    import numpy as np  # noqa: PLC0415 - few programs send buffers
-
+    np = numpy()
     return _as_bools(np.frombuffer(data, np.dtype(member.number.dtype)), member.number)
 
 

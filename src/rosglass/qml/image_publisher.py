@@ -14,7 +14,7 @@ from rosglass.comm.statistics import note_time, rate_of
 from rosglass.errors import Error
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import Element
-from rosglass.qml.from_js import fields_from_js
+from rosglass.qml.from_js import fields_from_js, numpy
 from rosglass.qml.image_sinks import window_of
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.properties import ReadOnly, Writable, one_of, report, within
@@ -115,8 +115,7 @@ def pixels_of(image: QtGui.QImage, size: tuple[int, int], encoding: str) -> NDAr
     Returns:
         Rows x columns (x channels) of bytes, top row first.
     """
-    import numpy as np  # noqa: PLC0415 - only once a picture is wanted
-
+    np = numpy()
     formats = QtGui.QImage.Format
     if (image.width(), image.height()) != size:
         modes = QtCore.Qt.AspectRatioMode.IgnoreAspectRatio
@@ -132,9 +131,11 @@ def pixels_of(image: QtGui.QImage, size: tuple[int, int], encoding: str) -> NDAr
     rows = np.frombuffer(image.constBits(), np.uint8, image.bytesPerLine() * height)
     held = 4 if encoding == "rgba8" else 3
     pixels = rows.reshape(height, -1)[:, : width * held].reshape(height, width, held)
-    if channels > 1:
-        return np.array(pixels)
-    return np.rint(pixels.astype(np.float32) @ np.array(_GREY, np.float32)).astype(np.uint8)
+    if channels == 1:
+        grey = pixels.astype(np.float32) @ np.array(_GREY, np.float32)
+        pixels = np.rint(grey).astype(np.uint8)
+    made: NDArray[Any] = np.array(pixels)
+    return made
 
 
 _IMAGE, _COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
@@ -356,10 +357,8 @@ class ImagePublisher(Element):
 
     def _info(self, publisher: Publisher) -> dict[str, Any]:
         if self._info_fields is None:
-            from rosglass.messages.schema import schema_of  # noqa: PLC0415 - loaded by now
-
-            schema = schema_of(publisher.type.definition)
-            self._info_fields = dict(fields_from_js(self.cameraInfo, schema, dialect=self.DIALECT))
+            kind = publisher.type
+            self._info_fields = dict(fields_from_js(self.cameraInfo, kind, dialect=self.DIALECT))
         return self._info_fields
 
     def _on_published(self, endpoint: _Publishers, problem: str) -> None:

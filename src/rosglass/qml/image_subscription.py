@@ -8,6 +8,7 @@ import math
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
+import rosglass
 from rosglass.errors import Error
 from rosglass.qml.callbacks import Deferred
 from rosglass.qml.dialect import Dialect
@@ -167,27 +168,23 @@ class LookElement(TopicElement):
         Raises:
             UnsupportedError: The colour map is unknown, or the depths are not a valid range.
         """
-        # These import numpy, which interfaces without a camera do not need.
-        from rosglass.images import DepthColors, View  # noqa: PLC0415
-        from rosglass.qml.image_rendering import Look  # noqa: PLC0415
-
         box = self.regionOfInterest
         region = None
         if box.width() or box.height():
             region = (round(box.x()), round(box.y()), round(box.width()), round(box.height()))
-        view = View(self.rotation, self.mirrored, self.flipped, region, self.zoom)
+        view = rosglass.images.View(self.rotation, self.mirrored, self.flipped, region, self.zoom)
         colors = None
         if self.colorMap:
             near, far = (
                 None if depth < 0 else depth for depth in (self.minimumDepth, self.maximumDepth)
             )
             colors = (self.colorMap, near, far)
-            DepthColors(*colors)
+            rosglass.images.DepthColors(*colors)
         if room is not None and self.rotation % 180:
             room = (room[1], room[0])
-        return Look(
-            video, view, colors, self._interval, None if self.fullResolution else room, painted
-        )
+        room = None if self.fullResolution else room
+        made: Look = _rendering().Look(video, view, colors, self._interval, room, painted)
+        return made
 
     @property
     def _interval(self) -> float:
@@ -198,6 +195,13 @@ class LookElement(TopicElement):
     def label(self) -> str:
         """The element's name in error messages."""
         return f"{type(self).__name__} {self._topic!r}"
+
+
+def _rendering() -> Any:
+    """Return the module of looks, which imports numpy: interfaces without a camera need neither."""
+    from rosglass.qml import image_rendering  # noqa: PLC0415
+
+    return image_rendering
 
 
 #: Not imported on the GUI thread: it imports numpy, which would freeze the screen for 0.1 s.
@@ -362,11 +366,8 @@ class ImageTransportSubscription(LookElement):
             return promise.promise
 
         def work() -> Path:
-            from rosglass.images import save  # noqa: PLC0415 - brings numpy
-            from rosglass.qml.image_rendering import whole_frame  # noqa: PLC0415
-
             # Keep the picture, not only its frame, until then: its video may own the memory.
-            return save(whole_frame(picture, look), plain_path(path))
+            return rosglass.images.save(_rendering().whole_frame(picture, look), plain_path(path))
 
         runtime.session.background(work, done)
         return promise.promise
@@ -447,8 +448,6 @@ class ImageTransportSubscription(LookElement):
 
     def _best_look(self) -> Look:
         """Return the look that the properties describe; the previous one if they are invalid."""
-        from rosglass.qml.image_rendering import Look  # noqa: PLC0415 - brings numpy
-
         assert self._sink is not None
         video, painted = self._sink.takes_video, self._sink.is_painted()
         try:
@@ -457,8 +456,11 @@ class ImageTransportSubscription(LookElement):
             self._set_problem(f"{self.label}: {error}")
             before = self._shown_look
             fits = before is not None and (before.video, before.painted) == (video, painted)
-            return before if before is not None and fits else Look(video, painted=painted)
-        self._set_problem("")
+            if before is not None and fits:
+                return before
+            look = _rendering().Look(video, painted=painted)
+        else:
+            self._set_problem("")
         return look
 
     def show_picture(self, picture: Picture) -> None:

@@ -124,13 +124,18 @@ _SECONDS, _NANOSECONDS = ("sec", "secs"), ("nanosec", "nsec", "nsecs")
 _NS = 1_000_000_000
 
 
-def number_from_text(text: str) -> Fraction:
-    """Return the exact number of a decimal text; raises ConversionError."""
+def fraction(value: float | str) -> Fraction:
+    """Return the exact value of a number, or of its text."""
     from fractions import Fraction  # noqa: PLC0415 - takes milliseconds at start-up
 
+    return Fraction(value)
+
+
+def number_from_text(text: str) -> Fraction:
+    """Return the exact number of a decimal text; raises ConversionError."""
     if not DECIMAL.match(text.strip()):
         raise ConversionError("", text, "a decimal number")
-    return Fraction(text.strip())
+    return fraction(text.strip())
 
 
 def time_from_js(value: QJSValue, name: str = "time") -> Time:

@@ -7,6 +7,7 @@ import itertools
 import logging
 from typing import TYPE_CHECKING, Any
 
+import rosglass
 from rosglass.errors import ConversionError, Error, InvalidNameError
 from rosglass.qml.from_js import fields_from_js, scalar_from_python
 from rosglass.qml.js_values import integral
@@ -286,7 +287,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
                 self._waiting = value
                 return
             kind = self._find(name)
-            fields = fields_from_js(value, kind.create()._schema__)
+            fields = fields_from_js(value, kind)
             self._show(kind, plain_tree(kind.create(fields)))
         except Error as error:
             self._complain(f"the message is not shown: {error}")
@@ -313,12 +314,10 @@ class MessageItemModel(QtCore.QAbstractItemModel):
     messageType = Property(str, _get_type, _set_type, notify=messageTypeChanged)
 
     def _find(self, name: str) -> MessageType:
-        from rosglass.messages import MessageType, load  # noqa: PLC0415 - brings in the definitions
-
         if self._type is not None and name in {self._type.name, self._type_name}:
             return self._type
-        kind = load(name, ros=2)
-        if not isinstance(kind, MessageType):
+        kind = rosglass.load(name, ros=2)
+        if not isinstance(kind, rosglass.MessageType):
             raise InvalidNameError(f"{name} is not a message type")
         return kind
 

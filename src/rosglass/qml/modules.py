@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error, QmlError
+from rosglass.interfaces.provider import workspace
 from rosglass.qml import ros1, ros2
 from rosglass.qml.runtime import Runtime, runtime_of
 from rosglass.qt import QT6, QtQml
@@ -49,8 +50,6 @@ def locate(place: str | os.PathLike[str]) -> Path:
     package, _, rest = text.removeprefix(_PACKAGE).partition("/")
     if not package:
         raise QmlError(f"{text}: expected package://name/path")
-    from rosglass.interfaces.provider import workspace  # noqa: PLC0415 - few need it
-
     folder = workspace(os.environ).package(package)
     if not folder:
         raise QmlError(

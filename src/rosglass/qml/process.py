@@ -78,8 +78,6 @@ def _wayland_answers() -> bool:
     name = os.environ.get("WAYLAND_DISPLAY", "")
     if not name:
         return False
-    import socket  # noqa: PLC0415 - where there is no Wayland, starting up need not wait for it
-
     path = Path(os.environ.get("XDG_RUNTIME_DIR", "/")) / name
     try:
         with socket.socket(socket.AF_UNIX) as probe:

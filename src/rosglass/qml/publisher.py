@@ -10,6 +10,8 @@ from collections import deque
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+import rosglass
+from rosglass import connection
 from rosglass.comm.names import similar
 from rosglass.comm.qos import Durability, History, QoS
 from rosglass.errors import ConversionError, Error, UnsupportedError
@@ -30,7 +32,6 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Node
     from rosglass.comm.publisher import Publisher as Sender
     from rosglass.messages import Message, MessageType
-    from rosglass.messages.schema import Schema
     from rosglass.qml.runtime import Runtime
 
 __all__ = ["Publisher", "RosPublisher"]
@@ -72,7 +73,6 @@ class Publisher(Element):
         super().__init__(None, runtime)
         self._topic, self._type, self._qos = topic, type_name, qos
         self._resolved = ""
-        self._schema: Schema | None = None
         #: Held messages, each with its deadline by :func:`time.monotonic`.
         self._held: deque[tuple[Message, float]] = deque()
         #: Keeps JavaScript from collecting this publisher while it holds messages.
@@ -109,7 +109,7 @@ class Publisher(Element):
             while there is no node and none is connecting, while the topic cannot be advertised, and
             while the connection is lost or was not established in time.
         """
-        sender, schema = self._endpoint, self._schema
+        sender = self._endpoint
         kind = self._early_type() if sender is None else sender.type
         if kind is None:
             why = self._problem.removeprefix(f"{self._topic}: ")
@@ -121,12 +121,8 @@ class Publisher(Element):
                 reason = "the node was shut down" if ended else f"{reason}; {NOT_INITIALIZED}"
             self._complain(f"nothing was published on {self._topic}: {reason}", logging.WARNING)
             return False
-        if schema is None:
-            from rosglass.messages.schema import schema_of  # noqa: PLC0415 - loaded by now
-
-            schema = schema_of(kind.definition)
         try:
-            fields = fields_from_js(message, schema, dialect=self.DIALECT)
+            fields = fields_from_js(message, kind, dialect=self.DIALECT)
             if self._held:
                 self._send_held()
             if sender is None or self._held or not self._may_send(sender):
@@ -169,19 +165,16 @@ class Publisher(Element):
             return None
         if self._unreachable and session.state != "connected":
             return None
-        from rosglass.connection import default_url  # noqa: PLC0415 - few publish this early
-        from rosglass.messages import MessageType, load  # noqa: PLC0415 - brings in definitions
-
         try:
             if session.node is not None:
                 ros = 1 if session.node.wire == "ros1" else 2
             else:
-                url = session.url or default_url(os.environ)
+                url = session.url or connection.default_url(os.environ)
                 ros = 1 if url.lower().startswith("ros1:") else 2
-            found = load(self._type, ros=ros)
+            found = rosglass.load(self._type, ros=ros)
         except Error:
             return None
-        return found if isinstance(found, MessageType) else None
+        return found if isinstance(found, rosglass.MessageType) else None
 
     def _is_connected(self) -> bool:
         return self._session is not None and self._session.state == "connected"
@@ -270,10 +263,7 @@ class Publisher(Element):
         return lambda: node.create_publisher(self._topic, self._type, self._qos)
 
     def _on_created(self, endpoint: Sender) -> None:
-        from rosglass.messages.schema import schema_of  # noqa: PLC0415 - loaded by now
-
         self._resolved = endpoint.topic
-        self._schema = schema_of(endpoint.type.definition)
         self._ready_at, self._settled = None, False
         self._no_subscriber.start(NO_PEER_MS)
         self._set_problem("")

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import rosglass
 from rosglass.errors import Error
 from rosglass.qml.element import Element
 from rosglass.qml.properties import ReadOnly, Writable, report
@@ -253,10 +254,9 @@ class Replay(Element):
 
     def _factory(self, node: Node, file: str, topics: tuple[str, ...]) -> Callable[[], Playback]:
         def create() -> Playback:
-            from rosglass.bags import Playback, open_bag  # noqa: PLC0415 - few ever need it
-
+            bag = rosglass.bags.open_bag(file)
             # Send nothing to a robot before QML calls play().
-            return Playback(node, open_bag(file), topics=topics, paused=True)
+            return rosglass.bags.Playback(node, bag, topics=topics, paused=True)
 
         return create
 

@@ -9,9 +9,12 @@ import shlex
 import threading
 from typing import TYPE_CHECKING, TypeVar
 
+from rosglass.comm.names import anonymous_name
 from rosglass.comm.qos import History
 from rosglass.comm.time import Time as Moment
 from rosglass.errors import Error, InvalidNameError, UnsupportedError
+from rosglass.interfaces.provider import workspace, workspace_variables
+from rosglass.qml.action_client import RosActionClient
 from rosglass.qml.action_server import RosActionServer, server_functions
 from rosglass.qml.dialect import Dialect, within_namespace
 from rosglass.qml.enums import ActionCommStates, ActionGoalStatus, ActionTerminalStates
@@ -127,11 +130,6 @@ class Package(QtCore.QObject):
 
     def _look(self, search: Callable[[Folders], _T], otherwise: _T, *, again: bool = False) -> _T:
         """Search the package folders; re-read them if `again` or if the environment changed."""
-        from rosglass.interfaces.provider import (  # noqa: PLC0415 - few need it
-            workspace,
-            workspace_variables,
-        )
-
         paths = workspace_variables(os.environ)
 
         def look() -> _T:
@@ -287,8 +285,6 @@ class Ros(ValueFunctions):
 
     def _init(self, name: str, options: int, args: Sequence[str]) -> None:
         if options & InitOptions.Option.AnonymousName:
-            from rosglass.comm.names import anonymous_name  # noqa: PLC0415 - few ask for it
-
             name = anonymous_name(name)
         if options & InitOptions.Option.NoRosout:
             self._log(logging.WARNING, "Ros.init: NoRosout has no effect: every node has its log")
@@ -396,8 +392,6 @@ class Ros(ValueFunctions):
         except Error as error:
             self._runtime.throw(f"Ros.createActionClient: {error}")
             return None
-        from rosglass.qml.action_client import RosActionClient  # noqa: PLC0415 - few have any
-
         return self._runtime.keep(RosActionClient(self._runtime, name, texts[-2]))
 
     @Slot(str, str, QJSValue, result=QtCore.QObject)
@@ -419,7 +413,7 @@ class Ros(ValueFunctions):
 
     def _check_topic(self, topic: str) -> None:
         """Raise InvalidNameError unless `topic` is a valid name in ROS 1."""
-        from rosglass.ros1.names import expand  # noqa: PLC0415 - not needed at start-up
+        from rosglass.ros1.names import expand  # noqa: PLC0415 - brings in the ROS 1 client
 
         expand(topic, "node", "/")
 

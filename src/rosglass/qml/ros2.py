@@ -7,9 +7,11 @@ import logging
 import os
 from typing import TYPE_CHECKING, TypeVar
 
+from rosglass.comm.names import expand
 from rosglass.comm.qos import QoS
 from rosglass.comm.time import Time
 from rosglass.errors import Error, InvalidNameError
+from rosglass.qml.action_client import ActionClient
 from rosglass.qml.action_server import ActionServer, server_functions
 from rosglass.qml.enums import ActionGoalStatus, ClockTypes
 from rosglass.qml.image_publisher import ImagePublisher
@@ -310,8 +312,6 @@ class Ros2(ValueFunctions):
         except Error as error:
             self._runtime.throw(f"Ros2.createActionClient: {error}")
             return None
-        from rosglass.qml.action_client import ActionClient  # noqa: PLC0415 - few have actions
-
         client = ActionClient(self._runtime, name, full_type(type_name, "action"))
         return self._runtime.keep(client)
 
@@ -357,8 +357,6 @@ class Ros2(ValueFunctions):
 
     def _check_topic(self, topic: str) -> None:
         """Raise InvalidNameError unless `topic` is a valid name in ROS 2."""
-        from rosglass.comm.names import expand  # noqa: PLC0415 - not needed at start-up
-
         session = self._session
         expand(topic, session.name or "node", session.namespace or "/")
 

@@ -11,8 +11,8 @@ from rosglass.comm.names import similar
 from rosglass.errors import ConversionError, Error
 from rosglass.qml.callbacks import JsCalls
 from rosglass.qml.dialect import Dialect
-from rosglass.qml.from_js import elements_from_js
-from rosglass.qml.js_values import number_from_text
+from rosglass.qml.from_js import elements_from_js, numpy
+from rosglass.qml.js_values import fraction, number_from_text, qos_parts
 from rosglass.qml.log import Caller, explain, log_from_qml, plain_path
 from rosglass.qml.session import Session
 from rosglass.qml.to_js import describe, exact, is_duration, milliseconds, reader, to_json
@@ -125,9 +125,7 @@ class Host(QtCore.QObject):
     @Slot(float, float, float, result=QJSValue)
     def multiply(self, sec: float, nanosec: float, factor: float) -> QJSValue:
         """Return a duration times a number, rounded to nanoseconds, as seconds and nanoseconds."""
-        from fractions import Fraction  # noqa: PLC0415 - takes milliseconds at start-up
-
-        total = round(Fraction(factor) * (int(sec) * _NS + int(nanosec)))
+        total = round(fraction(factor) * (int(sec) * _NS + int(nanosec)))
         return self._runtime.value(list(divmod(total, _NS)))
 
     @Slot(str, int, result=QJSValue)
@@ -150,8 +148,7 @@ class Host(QtCore.QObject):
     @Slot(str, QJSValue, result="QVariant")
     def pack(self, kind: str, values: QJSValue) -> QtCore.QByteArray | None:
         """Pack 64-bit integers, given as numbers or decimal text, into bytes."""
-        import numpy as np  # noqa: PLC0415 - few programs ask for them
-
+        np = numpy()
         try:
             whole: list[Any] = elements_from_js(values, kind)
             packed = np.array(whole, np.dtype(kind)).tobytes()
@@ -360,8 +357,6 @@ class Runtime(QtCore.QObject):
 
     def qos(self, qos: QoS) -> QJSValue:
         """Return a profile that QML can change and pass to publishers and subscriptions."""
-        from rosglass.qml.js_values import qos_parts  # noqa: PLC0415 - few are made at start-up
-
         return self._call("makeQos", [self.value(part) for part in qos_parts(qos)])
 
     def _format(self, schema: Schema, dialect: Dialect) -> tuple[MessageReader, QJSValue]:

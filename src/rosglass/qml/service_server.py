@@ -97,13 +97,11 @@ class ServiceServer(Element):
         kind = server.type.response
 
         def take(value: QJSValue) -> Any:
-            from rosglass.messages.schema import schema_of  # noqa: PLC0415 - loaded by now
-
             if value.isBool() and not value.toBool():
                 raise ServiceError(f"the handler of {self.label} returned false")
             if value.isUndefined() or value.isNull() or value.isBool():
                 return None
-            return fields_from_js(value, schema_of(kind.definition), dialect=self.DIALECT)
+            return fields_from_js(value, kind, dialect=self.DIALECT)
 
         return answers.ask(self.handler, [runtime.message(request, self.DIALECT)], take)
 

@@ -15,9 +15,11 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, overload
 
+from rosglass import connection
 from rosglass.comm.executor import Dispatcher
 from rosglass.comm.graph import ConnectionState, Status
 from rosglass.comm.handle import Executor
+from rosglass.comm.names import validate_namespace, validate_node_name
 from rosglass.errors import ConnectionLostError, Error, InvalidNameError
 from rosglass.qml.log import QmlRosout, logger_name
 from rosglass.qt import QtCore, Signal, Slot, is_alive
@@ -172,9 +174,7 @@ _CLOSE_TIMEOUT_S = 1.2
 
 
 def _connect(url: str | None, name: str, namespace: str, arguments: Sequence[str] = ()) -> Node:
-    from rosglass.connection import connect  # noqa: PLC0415 - not before someone connects
-
-    return connect(url, name, namespace, arguments=arguments)
+    return connection.connect(url, name, namespace, arguments=arguments)
 
 
 def _parse(arguments: Sequence[str], url: str) -> Arguments | None:
@@ -369,8 +369,6 @@ class Session(QtCore.QObject):
             RosArgumentError: One of `arguments` is not valid.
             UnsupportedError: A domain is given, and the environment names an unknown middleware.
         """
-        from rosglass.comm.names import validate_namespace, validate_node_name  # noqa: PLC0415
-
         name = self._forced_name or name
         parsed = _parse((*self._arguments, *arguments), self._url)
         if parsed is not None:
@@ -553,12 +551,10 @@ class Session(QtCore.QObject):
             return
 
         def work() -> Node:
-            from rosglass.connection import explain_missing  # noqa: PLC0415 - as in _connect()
-
             try:
                 return connect(url, name, namespace)
             except ModuleNotFoundError as error:
-                missing = explain_missing(error)
+                missing = connection.explain_missing(error)
                 if not missing:
                     raise
                 raise Error(missing) from None
@@ -704,9 +700,7 @@ def _call_all(handlers: dict[int, tuple[QtCore.QObject, Callable[[], None]]]) ->
 def _with_domain(url: str, domain: int) -> str:
     """Return `url` with a ``domain`` option; an empty `url` becomes the default URL."""
     if not url:
-        from rosglass.connection import default_url  # noqa: PLC0415 - not before someone connects
-
-        url = default_url({**os.environ, "ROS_DOMAIN_ID": str(domain)})
+        url = connection.default_url({**os.environ, "ROS_DOMAIN_ID": str(domain)})
     base, _, query = url.partition("?")
     if base.partition(":")[0].lower() not in ("dds", "zenoh"):
         _log.warning("setDomainId(%d) is ignored: %s has no domains", domain, url)

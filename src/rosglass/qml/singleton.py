@@ -6,14 +6,19 @@ from __future__ import annotations
 import logging
 import os
 import re
+import socket
 from abc import abstractmethod
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import rosglass
 from rosglass.errors import Error, InvalidNameError, TypeNotFoundError
+from rosglass.interfaces.names import split_name
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.runtime import Runtime, own_runtime
+from rosglass.qml.to_js import constants_of
+from rosglass.qml.yaml_io import Io
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
@@ -123,9 +128,7 @@ class RosSingleton(QtCore.QObject):
         self._session.url = url
 
     def _get_hostname(self) -> str:
-        import platform  # noqa: PLC0415 - few interfaces ask
-
-        return platform.node()
+        return socket.gethostname()
 
     url = Property(str, lambda self: self._session.url, _set_url, notify=urlChanged)
     connectionState = Property(str, lambda self: self._session.state, notify=connectionChanged)
@@ -206,8 +209,6 @@ def check_type(type_name: str, name: str) -> None:
         type_name: The argument for the type.
         name: The argument for the name of the topic, service or action.
     """
-    from rosglass.interfaces.names import split_name  # noqa: PLC0415 - not needed at start-up
-
     if not type_name:
         return
     try:
@@ -435,8 +436,6 @@ class ValueFunctions(GraphSingleton):
         For services and actions, they are grouped as ``request``, ``response``, ``goal``,
         ``result`` and ``feedback``; an unknown type throws.
         """
-        from rosglass.qml.to_js import constants_of  # noqa: PLC0415 - brings in the messages
-
         return self._parts("constants", type_name, lambda kind: constants_of(kind.definition))
 
     @Slot(str, result=QJSValue)
@@ -448,8 +447,6 @@ class ValueFunctions(GraphSingleton):
         return self._parts("documentation", type_name, self._document)
 
     def _document(self, kind: MessageType) -> dict[str, Any]:
-        from rosglass.qml.to_js import constants_of  # noqa: PLC0415 - brings in the messages
-
         definition = kind.definition
         values = constants_of(definition)
         return {
@@ -487,15 +484,13 @@ class ValueFunctions(GraphSingleton):
 
     def _load(self, name: str, action: bool = False) -> MessageType | ServiceType | ActionType:
         """Return a type from the module's ROS version if it exists there, otherwise the other."""
-        from rosglass.messages import load  # noqa: PLC0415 - brings in the definitions
-
         # ROS 1 names actions after their message, pkg/DoAction.
         names = [name.removesuffix("Action"), name] if action else [name]
         tries = [(ros, one) for ros in (self.DIALECT.ros, 3 - self.DIALECT.ros) for one in names]
         for ros, one in tries:
             with suppress(TypeNotFoundError):
-                return load(one, ros=ros)
-        return load(name, ros=self.DIALECT.ros)
+                return rosglass.load(one, ros=ros)
+        return rosglass.load(name, ros=self.DIALECT.ros)
 
     # Times.
 
@@ -524,8 +519,6 @@ class ValueFunctions(GraphSingleton):
     def _get_io(self) -> QtCore.QObject:
         found: QtCore.QObject | None = getattr(self, "_io", None)
         if found is None:
-            from rosglass.qml.yaml_io import Io  # noqa: PLC0415 - few interfaces have files
-
             found = self._io = Io(self._runtime, self.DIALECT, self)
         return found
 

@@ -8,6 +8,8 @@ from concurrent.futures import CancelledError
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import rosglass
+from rosglass.comm.names import expand
 from rosglass.comm.time import Time
 from rosglass.errors import ConversionError, Error, TransformException
 from rosglass.qml.callbacks import weak_callback
@@ -42,8 +44,6 @@ _USAGE = "(target, source, time, timeout) or (target, time, source, time, fixedF
 
 
 def _checked_namespace(namespace: str) -> str:
-    from rosglass.comm.names import expand  # noqa: PLC0415 - not needed at start-up
-
     namespace = namespace.rstrip("/")
     if namespace:
         try:
@@ -65,16 +65,12 @@ class TfLink:
         self._users: set[Any] = set()
         self._listener: TransformListener | None = None
         self._closed = False
-        from rosglass.tf import TransformBuffer  # noqa: PLC0415 - brings in the transforms
-
-        self.buffer = TransformBuffer()
+        self.buffer = rosglass.tf.TransformBuffer()
         self._topic, self._failure = "", ""
 
         def work() -> None:
-            from rosglass.tf import TransformListener  # noqa: PLC0415 - loaded with the buffer
-
             # Not on the GUI thread: the next job on this thread may be the one that closes it.
-            self._listener = TransformListener(node, self.buffer, namespace)
+            self._listener = rosglass.tf.TransformListener(node, self.buffer, namespace)
 
         session.background(work, self._opened)
 
@@ -273,8 +269,6 @@ class _Query:
     """
 
     def __init__(self, given: Sequence[QJSValue]) -> None:
-        from rosglass.tf import Transform  # noqa: PLC0415 - not needed at start-up
-
         self.full = len(given) > 4
         places = (0, 2, 4) if self.full else (0, 1)
         if not all(given[place].isString() for place in places):
@@ -293,7 +287,7 @@ class _Query:
         #: Seconds to wait.
         self.timeout = milliseconds / 1000
         #: The requested frames.
-        self.frames = Transform(frame_id=self.target, child_frame_id=self.source)
+        self.frames = rosglass.tf.Transform(frame_id=self.target, child_frame_id=self.source)
 
     def look_up(self, buffer: TransformBuffer) -> Transform:
         """Return the transform, or raise one of tf2's exceptions."""
@@ -340,9 +334,7 @@ def shown_transform(
         why: Text of the exception.
         element: The element whose module determines the format.
     """
-    from rosglass.messages import load  # noqa: PLC0415 - brings in the definitions
-
-    kind: Any = load("geometry_msgs/msg/TransformStamped", ros=2)
+    kind: Any = rosglass.load("geometry_msgs/msg/TransformStamped", ros=2)
     value = runtime.message(kind.create(transform.to_dict(2)), element.DIALECT)
     value.setProperty("valid", runtime.value(not exception))
     if exception:
@@ -352,9 +344,7 @@ def shown_transform(
 
 
 def _described(buffer: TransformBuffer, info: FrameInfo) -> dict[str, Any]:
-    from rosglass.tf import Transform  # noqa: PLC0415 - loaded by now
-
-    placed = Transform()
+    placed = rosglass.tf.Transform()
     if info.parent:
         with suppress(TransformException):
             placed = buffer.lookup_transform(info.parent, info.name)

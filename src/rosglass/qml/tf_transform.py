@@ -7,6 +7,8 @@ import math
 import time
 from typing import TYPE_CHECKING, Any
 
+import rosglass
+from rosglass.comm.time import Time
 from rosglass.errors import Error, TransformException
 from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.dialect import Dialect
@@ -120,11 +122,9 @@ class TfTransform(Element):
         return self._shown
 
     def _known(self) -> Transform:
-        from rosglass.tf import Transform  # noqa: PLC0415 - brings in the transforms
-
         if self._transform is not None:
             return self._transform
-        return Transform(frame_id=self.targetFrame, child_frame_id=self.sourceFrame)
+        return rosglass.tf.Transform(frame_id=self.targetFrame, child_frame_id=self.sourceFrame)
 
     def _get_part(self, name: str) -> QJSValue:
         message: QJSValue = self._get_message()
@@ -345,28 +345,23 @@ class TfBroadcaster(Element):
         return self._send(made)
 
     def _given(self, value: QJSValue) -> list[Transform]:
-        from rosglass.messages import load  # noqa: PLC0415 - brings in the definitions
-        from rosglass.messages.schema import schema_of  # noqa: PLC0415 - the same
-        from rosglass.tf import Transform  # noqa: PLC0415 - the same
-
-        kind: Any = load("geometry_msgs/msg/TransformStamped", ros=2)
-        schema = schema_of(kind.definition)
+        kind: Any = rosglass.load("geometry_msgs/msg/TransformStamped", ros=2)
         count = value.property("length").toInt() if value.isArray() else None
         items = [value] if count is None else [value.property(at) for at in range(count)]
         return [
-            Transform.from_message(kind.create(fields_from_js(item, schema, "", self.DIALECT)))
+            rosglass.tf.Transform.from_message(
+                kind.create(fields_from_js(item, kind, "", self.DIALECT))
+            )
             for item in items
         ]
 
     def _current(self) -> Transform:
-        from rosglass.comm.time import Time  # noqa: PLC0415 - loaded by now
-        from rosglass.tf import Transform  # noqa: PLC0415 - brings in the transforms
-
         node = self.node
         now = Time() if node is None else node.now()
         x, y, z = self._translation
         qx, qy, qz, qw = self._rotation
-        return Transform((x, y, z), (qx, qy, qz, qw), now, self.frameId, self.childFrameId)
+        frames = self.frameId, self.childFrameId
+        return rosglass.tf.Transform((x, y, z), (qx, qy, qz, qw), now, *frames)
 
     def _send(self, transforms: list[Transform]) -> bool:
         sender = self._endpoint
@@ -400,10 +395,9 @@ class TfBroadcaster(Element):
 
     def _factory(self, node: Node, namespace: str, static: bool) -> Callable[[], Any]:
         def create() -> TransformBroadcaster | StaticTransformBroadcaster:
-            from rosglass import tf  # noqa: PLC0415 - brings in the transforms
-
-            kind = tf.StaticTransformBroadcaster if static else tf.TransformBroadcaster
-            return kind(node, namespace)
+            if static:
+                return rosglass.tf.StaticTransformBroadcaster(node, namespace)
+            return rosglass.tf.TransformBroadcaster(node, namespace)
 
         return create
 
@@ -424,11 +418,8 @@ class TfBroadcaster(Element):
 
 def _numbers(value: QJSValue, type_name: str, what: str, names: str) -> tuple[float, ...]:
     """Return the components of a vector from QML; raises Error."""
-    from rosglass.messages import load  # noqa: PLC0415 - brings in the definitions
-    from rosglass.messages.schema import schema_of  # noqa: PLC0415 - the same
-
-    kind: Any = load(type_name, ros=2)
-    given = kind.create(fields_from_js(value, schema_of(kind.definition), what))
+    kind: Any = rosglass.load(type_name, ros=2)
+    given = kind.create(fields_from_js(value, kind, what))
     return tuple(float(getattr(given, name)) for name in names)
 
 

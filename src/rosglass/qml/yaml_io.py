@@ -142,8 +142,8 @@ class _Moment(NamedTuple):
 
 
 @cache
-def _yaml() -> tuple[Any, Any]:
-    """Return a loader and a dumper with our own rules for plain scalars.
+def _yaml() -> tuple[Any, Any, Any]:
+    """Return PyYAML, and a loader and a dumper with our own rules for plain scalars.
 
     PyYAML reads ``12:30`` as 750 and ``1e3`` as text; otherwise, YAML 1.1 applies.
     """
@@ -196,14 +196,13 @@ def _yaml() -> tuple[Any, Any]:
         _Moment,
         lambda dumper, moment: dumper.represent_scalar("tag:yaml.org,2002:timestamp", moment.text),
     )
-    return Loader, Dumper
+    return yaml, Loader, Dumper
 
 
 def _load(text: str, file: Path) -> Any:
-    import yaml  # noqa: PLC0415 - few interfaces have files
-
+    yaml, loader, _ = _yaml()
     try:
-        documents = load_yaml(text, _yaml()[0])
+        documents = load_yaml(text, loader)
     except yaml.YAMLError as error:
         raise UnsupportedError(f"{file}: {error}") from None
     if len(documents) > 1:
@@ -285,12 +284,11 @@ def _qt(found: _Moment | bytes) -> QtCore.QDateTime | QtCore.QByteArray:
 
 
 def _dump(value: Any, dialect: Dialect) -> str:
-    import yaml  # noqa: PLC0415 - few interfaces have files
-
+    yaml, _, dumper = _yaml()
     try:
         text: str = yaml.dump(
             _writable(value, dialect),
-            Dumper=_yaml()[1],
+            Dumper=dumper,
             sort_keys=False,
             default_flow_style=False,
             allow_unicode=True,
