@@ -21,6 +21,7 @@ from rosglass.qml.enums import (
     terminal_state_of,
 )
 from rosglass.qml.log import log_from_qml
+from rosglass.qml.properties import ReadOnly
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
@@ -92,6 +93,14 @@ class GoalHandle(QtCore.QObject):
     #: Cancelling failed, for this reason; as far as is known, the goal continues.
     cancelFailed = Signal(str)
 
+    status = ReadOnly(int, read=lambda self: int(status_code(self._status)))
+    isActive = ReadOnly(bool, read="_is_active", notify="statusChanged")
+    goalId = ReadOnly(str, read="_get_id")
+    goalStamp = ReadOnly(QJSValue, read="_get_stamp", notify="statusChanged")
+    feedback = ReadOnly(QJSValue, read=lambda self: self._show("feedback", self._feedback))
+    result = ReadOnly(QJSValue, read=lambda self: self._show("result", self._result))
+    reason = ReadOnly(str, read=lambda self: self._reason, notify="resultChanged")
+
     def __init__(
         self,
         runtime: Runtime,
@@ -133,26 +142,12 @@ class GoalHandle(QtCore.QObject):
     def _is_active(self) -> bool:
         return not self._over and self._status.is_active
 
-    def _get_feedback(self) -> QJSValue:
-        return self._show("feedback", self._feedback)
-
-    def _get_result(self) -> QJSValue:
-        return self._show("result", self._result)
-
     def _show(self, what: str, message: Message | None) -> QJSValue:
         if message is None:
             return QJSValue()
         if what not in self._shown:
             self._shown[what] = self._runtime.message(message, self._dialect)
         return self._shown[what]
-
-    status = Property(int, lambda self: int(status_code(self._status)), notify=statusChanged)
-    isActive = Property(bool, _is_active, notify=statusChanged)
-    goalId = Property(str, _get_id, notify=goalIdChanged)
-    goalStamp = Property(QJSValue, _get_stamp, notify=statusChanged)
-    feedback = Property(QJSValue, _get_feedback, notify=feedbackChanged)
-    result = Property(QJSValue, _get_result, notify=resultChanged)
-    reason = Property(str, lambda self: self._reason, notify=resultChanged)
 
     @Slot()
     def cancel(self) -> None:
@@ -247,7 +242,7 @@ class GoalHandle(QtCore.QObject):
         runtime = self._runtime
         parts = {"goalId": self._get_id(), "code": int(status_code(self._status))}
         made = runtime.value({**parts, "reason": self._reason})
-        result = runtime.value({}) if self._result is None else self._get_result()
+        result = runtime.value({}) if self._result is None else self.result
         made.setProperty("result", result)
         return made
 
@@ -303,7 +298,7 @@ class GoalHandle(QtCore.QObject):
             self._feedback = feedback
             self._shown.pop("feedback", None)
             self.feedbackChanged.emit()
-            self._callbacks.feedback(self._get_feedback())
+            self._callbacks.feedback(self.feedback)
 
     def _on_done(self, goal: ClientGoal) -> None:
         if not is_alive(self) or self._over:
@@ -366,8 +361,12 @@ class RosGoalHandle(GoalHandle):
     terminalStateChanged = Signal()
     expiredChanged = Signal()
 
+    commState = ReadOnly(int, read=lambda self: int(self._comm))
+    terminalState = ReadOnly(QJSValue, read="_get_terminal")
+    expired = ReadOnly(bool, False)
+
     _comm = _Comm.WAITING_FOR_GOAL_ACK
-    _expired = False
+    _expired: bool
     #: Whether the robot reports the states itself, as in ROS 1.
     _native = False
 
@@ -383,14 +382,10 @@ class RosGoalHandle(GoalHandle):
             return _Terminal[known.name]
         return terminal_state_of(self._status, self._executed)
 
-    commState = Property(int, lambda self: int(self._comm), notify=commStateChanged)
-    terminalState = Property(QJSValue, _get_terminal, notify=terminalStateChanged)
-    expired = Property(bool, lambda self: self._expired, notify=expiredChanged)
-
     @Slot(result=QJSValue)
     def getResult(self) -> QJSValue:
         """Return the result; undefined while there is none."""
-        return self._get_result()
+        return self.result
 
     @Slot()
     def cancel(self) -> None:
@@ -404,7 +399,7 @@ class RosGoalHandle(GoalHandle):
     def resend(self) -> None:
         """Send the goal again, for servers that may have missed it; supported by ROS 1 only."""
         send: Any = getattr(self._goal, "resend", None)
-        if self._expired:
+        if self.expired:
             self._warn("resend", "it has expired: its client is gone")
         elif send is None:
             self._warn("resend", "ROS 2 sends goals reliably, and once")
@@ -473,6 +468,14 @@ class ServerGoalHandle(QtCore.QObject):
     statusChanged = Signal(int)
     cancelRequestedChanged = Signal()
 
+    status = ReadOnly(int, read=lambda self: int(status_code(self._goal.status)))
+    isActive = ReadOnly(bool, read=lambda self: self._goal.status.is_active, notify="statusChanged")
+    goalId = Property(str, lambda self: self._goal.id_text, constant=True)
+    goalStamp = Property(
+        QJSValue, lambda self: self._runtime.time(self._goal.accepted, self._dialect), constant=True
+    )
+    isCancelRequested = ReadOnly(bool, read="_is_requested", notify="cancelRequestedChanged")
+
     def __init__(
         self,
         runtime: Runtime,
@@ -506,19 +509,11 @@ class ServerGoalHandle(QtCore.QObject):
             self._asked = self._runtime.message(self._goal.goal, self._dialect)
         return self._asked
 
-    def _get_stamp(self) -> QJSValue:
-        return self._runtime.time(self._goal.accepted, self._dialect)
+    goal = Property(QJSValue, _get_goal, constant=True)
 
     def _is_requested(self) -> bool:
         live = self._goal.status.is_active and self._goal.is_cancel_requested
         return self._requested or live
-
-    status = Property(int, lambda self: int(status_code(self._goal.status)), notify=statusChanged)
-    isActive = Property(bool, lambda self: self._goal.status.is_active, notify=statusChanged)
-    goalId = Property(str, lambda self: self._goal.id_text, constant=True)
-    goal = Property(QJSValue, _get_goal, constant=True)
-    goalStamp = Property(QJSValue, _get_stamp, constant=True)
-    isCancelRequested = Property(bool, _is_requested, notify=cancelRequestedChanged)
 
     @Slot(QJSValue)
     def publishFeedback(self, feedback: QJSValue) -> None:

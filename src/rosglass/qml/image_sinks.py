@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import UnsupportedError
+from rosglass.qml.properties import ReadOnly, Writable, report
 from rosglass.qt import QT6, Property, QtCore, QtGui, QtQml, QtQuick, Signal, is_alive, optional
 
 if TYPE_CHECKING:
@@ -225,8 +226,6 @@ class ImageItem(QtQuick.QQuickPaintedItem):
     """
 
     sourceChanged = Signal()
-    fillModeChanged = Signal()
-    hasFrameChanged = Signal()
 
     @QtCore.QEnum
     class FillMode(IntEnum):
@@ -236,10 +235,16 @@ class ImageItem(QtQuick.QQuickPaintedItem):
         PreserveAspectFit = 1
         PreserveAspectCrop = 2
 
+    videoSink = Property(QtCore.QObject, lambda self: self, constant=True)
+    source = Writable(QtCore.QObject, read=lambda self: self._source, write="_set_source")
+    fillMode = Writable(int, 1, then="update")  # PreserveAspectFit
+    hasFrame = ReadOnly(bool, False)
+
+    _fillMode: int
+
     def __init__(self, parent: QtQuick.QQuickItem | None = None) -> None:
         super().__init__(parent)
         self._image: QtGui.QImage | None = None
-        self._fill = int(self.FillMode.PreserveAspectFit)
         self._source: QtCore.QObject | None = None
         # PySide 6.11 never frees the Python half of an object created by QML.
         state = self.__dict__
@@ -247,11 +252,9 @@ class ImageItem(QtQuick.QQuickPaintedItem):
 
     def present(self, image: QtGui.QImage | None) -> None:
         """Show an image, or clear the item with None; on the GUI thread only."""
-        had = self._image is not None
         self._image = image
-        if had != (image is not None):
-            self.hasFrameChanged.emit()
-        self.update()
+        if report(self, hasFrame=image is not None):
+            self.update()
 
     def paint(self, painter: QtGui.QPainter) -> None:
         """Paint the picture; Qt calls it on the render thread while the GUI thread waits."""
@@ -267,10 +270,10 @@ class ImageItem(QtQuick.QQuickPaintedItem):
         width, height = self.width(), self.height()
         whole = QtCore.QRectF(0, 0, image.width(), image.height())
         target = QtCore.QRectF(0, 0, width, height)
-        if self._fill == self.FillMode.Stretch or not width or not height:
+        if self._fillMode == self.FillMode.Stretch or not width or not height:
             return target, whole
         ratios = (width / image.width(), height / image.height())
-        scale = min(ratios) if self._fill == self.FillMode.PreserveAspectFit else max(ratios)
+        scale = min(ratios) if self._fillMode == self.FillMode.PreserveAspectFit else max(ratios)
         shown = QtCore.QSizeF(
             min(width, image.width() * scale), min(height, image.height() * scale)
         )
@@ -279,12 +282,6 @@ class ImageItem(QtQuick.QQuickPaintedItem):
         part = QtCore.QRectF(QtCore.QPointF(0, 0), shown / scale)
         part.moveCenter(whole.center())
         return target, part
-
-    def _get_sink(self) -> QtCore.QObject:
-        return self
-
-    def _get_source(self) -> QtCore.QObject | None:
-        return self._source
 
     def _set_source(self, source: QtCore.QObject | None) -> None:
         if source is self._source:
@@ -297,14 +294,3 @@ class ImageItem(QtQuick.QQuickPaintedItem):
         if source is not None:
             source.setProperty("videoSink", self)
         self.sourceChanged.emit()
-
-    def _set_fill(self, mode: int) -> None:
-        if mode != self._fill:
-            self._fill = mode
-            self.fillModeChanged.emit()
-            self.update()
-
-    videoSink = Property(QtCore.QObject, _get_sink, constant=True)
-    source = Property(QtCore.QObject, _get_source, _set_source, notify=sourceChanged)
-    fillMode = Property(int, lambda self: self._fill, _set_fill, notify=fillModeChanged)
-    hasFrame = Property(bool, lambda self: self._image is not None, notify=hasFrameChanged)

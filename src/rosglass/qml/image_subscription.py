@@ -17,7 +17,7 @@ from rosglass.qml.image_sinks import Sink
 from rosglass.qml.log import plain_path
 from rosglass.qml.properties import ReadOnly, Writable, at_least, report
 from rosglass.qml.runtime import own_runtime
-from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive, optional
+from rosglass.qt import QJSValue, QtCore, Signal, Slot, is_alive, optional
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -568,12 +568,13 @@ class ImageTransportManager(QtCore.QObject):
 
     loadBalancingEnabledChanged = Signal()
 
+    loadBalancingEnabled = Writable(
+        bool, read=lambda self: self._balancer.enabled, write="setLoadBalancingEnabled"
+    )
+
     @property
     def _balancer(self) -> LoadBalancer:
         return LoadBalancer.of(own_runtime(self).session)
-
-    def _is_enabled(self) -> bool:
-        return self._balancer.enabled
 
     @Slot(bool)
     def setLoadBalancingEnabled(self, enabled: bool) -> None:
@@ -584,7 +585,3 @@ class ImageTransportManager(QtCore.QObject):
         if enabled != self._balancer.enabled:
             self._balancer.enabled = enabled
             self.loadBalancingEnabledChanged.emit()
-
-    loadBalancingEnabled = Property(
-        bool, _is_enabled, setLoadBalancingEnabled, notify=loadBalancingEnabledChanged
-    )

@@ -12,9 +12,10 @@ from rosglass.errors import ConversionError, Error, InvalidNameError
 from rosglass.qml.from_js import fields_from_js, scalar_from_python
 from rosglass.qml.js_values import integral
 from rosglass.qml.log import Caller, log_from_qml
+from rosglass.qml.properties import Writable
 from rosglass.qml.runtime import Runtime, runtime_of
 from rosglass.qml.to_js import exact, is_duration
-from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
+from rosglass.qt import QJSValue, QtCore, Signal, Slot
 
 if TYPE_CHECKING:
     from rosglass.messages import Message, MessageType
@@ -247,6 +248,9 @@ class MessageItemModel(QtCore.QAbstractItemModel):
     #: The message was edited in a view.
     modified = Signal()
 
+    message = Writable(QJSValue, read="_get_message", write="_set_message")
+    messageType = Writable(str, read=lambda self: self._type_name, write="_set_type")
+
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
         self._type_name = ""
@@ -297,9 +301,6 @@ class MessageItemModel(QtCore.QAbstractItemModel):
             self.messageTypeChanged.emit()
         self.messageChanged.emit()
 
-    def _get_type(self) -> str:
-        return self._type_name
-
     def _set_type(self, name: str) -> None:
         if name == self._type_name:
             return
@@ -309,9 +310,6 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         self.messageTypeChanged.emit()
         if waiting is not None:
             self._set_message(waiting)
-
-    message = Property(QJSValue, _get_message, _set_message, notify=messageChanged)
-    messageType = Property(str, _get_type, _set_type, notify=messageTypeChanged)
 
     def _find(self, name: str) -> MessageType:
         if self._type is not None and name in {self._type.name, self._type_name}:

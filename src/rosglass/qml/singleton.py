@@ -16,6 +16,7 @@ from rosglass.errors import Error, InvalidNameError, TypeNotFoundError
 from rosglass.interfaces.names import split_name
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.log import log_from_qml
+from rosglass.qml.properties import ReadOnly, Writable
 from rosglass.qml.runtime import Runtime, own_runtime
 from rosglass.qml.to_js import constants_of
 from rosglass.qml.yaml_io import Io
@@ -127,13 +128,14 @@ class RosSingleton(QtCore.QObject):
     def _set_url(self, url: str) -> None:
         self._session.url = url
 
-    def _get_hostname(self) -> str:
-        return socket.gethostname()
-
-    url = Property(str, lambda self: self._session.url, _set_url, notify=urlChanged)
-    connectionState = Property(str, lambda self: self._session.state, notify=connectionChanged)
-    connectionDetail = Property(str, lambda self: self._session.detail, notify=connectionChanged)
-    hostname = Property(str, _get_hostname, constant=True)
+    url = Writable(str, read=lambda self: self._session.url, write="_set_url")
+    connectionState = ReadOnly(
+        str, read=lambda self: self._session.state, notify="connectionChanged"
+    )
+    connectionDetail = ReadOnly(
+        str, read=lambda self: self._session.detail, notify="connectionChanged"
+    )
+    hostname = Property(str, lambda _: socket.gethostname(), constant=True)
 
     # Logging.
 
