@@ -249,7 +249,7 @@ def test_what_is_taken_while_it_is_received_does_not_stay(start_services, node, 
     kept = [cyclone_identity._readers[new] for new in cyclone_identity._readers.keys() - before]
     assert len(kept) >= 2
     eventually(
-        lambda: len(taken) >= 600 and not any(each._noted for each in kept), what="the taking"
+        lambda: len(taken) >= 600 and not any(each._recorded for each in kept), what="the taking"
     )
     assert taken.count(True) > 100
     peer.end()
