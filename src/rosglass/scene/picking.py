@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Hit", "Selected", "pick", "select"]
 
+#: How far beside a triangle counts as on it, as a share of its sides.
+_EDGE = 1e-6
 _Placed = tuple["Drawable", NDArray[np.float64], float]
 _Place = tuple[float, float]
 
@@ -240,7 +242,8 @@ def _meet_triangles(mesh: Mesh, start: NDArray[np.float64], way: NDArray[np.floa
         q = np.cross(s, ab)
         v = (q @ way) * scale
         far = (ac * q).sum(axis=1) * scale
-        met = (u >= 0) & (v >= 0) & (u + v <= 1) & (far >= 0)
+        # A ray along the edge of two triangles must not pass between them.
+        met = (u >= -_EDGE) & (v >= -_EDGE) & (u + v <= 1 + _EDGE) & (far >= 0)
     return float(far[met].min()) if met.any() else np.inf
 
 
