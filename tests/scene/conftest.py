@@ -15,7 +15,7 @@ import pytest
 os.environ.setdefault("QSG_RENDER_LOOP", "basic")
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
     from qt_waiting import QtWaiting
@@ -67,14 +67,14 @@ class SceneBench:
         robot: The robot's node.
     """
 
-    def __init__(self, wait: QtWaiting, folder: Path) -> None:
+    def __init__(self, wait: QtWaiting, folder: Path, url: str = "") -> None:
         from PySide6.QtQuick import QQuickView
 
         import rosglass
         from rosglass.qml import Session, install
 
         self.wait, self._folder, self._count = wait, folder, 0
-        url = f"local://scene-{uuid.uuid4().hex}"
+        url = url or f"local://scene-{uuid.uuid4().hex}"
         self.robot = rosglass.connect(url, "robot")
         self.session = Session(url)
         self.window = QQuickView()
@@ -127,7 +127,13 @@ class SceneBench:
 
 
 @pytest.fixture
-def bench(wait: QtWaiting, tmp_path: Path) -> Iterator[SceneBench]:
-    made = SceneBench(wait, tmp_path)
+def make_bench(wait: QtWaiting, tmp_path: Path) -> Callable[[str], SceneBench]:
+    """Makes a bench for the URL of a robot, which the caller closes."""
+    return lambda url: SceneBench(wait, tmp_path, url)
+
+
+@pytest.fixture
+def bench(make_bench: Callable[[str], SceneBench]) -> Iterator[SceneBench]:
+    made = make_bench("")
     yield made
     made.close()

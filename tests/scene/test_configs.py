@@ -29,7 +29,7 @@ def test_published_configs_are_shown_and_come_back(
     bench.picture()
     assert view.problem == ""
     for note in notes:
-        assert note.startswith(("display '", "view ", str(file))), note
+        assert note.startswith(("display '", "tool '", "view ", str(file))), note
     saved = tmp_path / "saved.rviz"
     view.save_config(saved)
     after = RvizConfig.load(saved)

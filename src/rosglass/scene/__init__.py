@@ -14,13 +14,16 @@ if TYPE_CHECKING:
     from rosglass.scene.modules import register
     from rosglass.scene.scene import Scene
     from rosglass.scene.scene_view import SceneView
+    from rosglass.scene.tools import PointerEvent, Tool
 
-__all__ = ["Display", "Scene", "SceneView", "TopicDisplay", "register"]
+__all__ = ["Display", "PointerEvent", "Scene", "SceneView", "Tool", "TopicDisplay", "register"]
 
 _HOMES = {
     "Display": "display",
+    "PointerEvent": "tools",
     "Scene": "scene",
     "SceneView": "scene_view",
+    "Tool": "tools",
     "TopicDisplay": "display",
     "register": "modules",
 }

@@ -41,11 +41,25 @@ from rosglass.scene.displays.pose import (
 from rosglass.scene.displays.robot_model import RobotModelDisplay
 from rosglass.scene.displays.tf import TFDisplay
 from rosglass.scene.panel_models import DisplaysModel
+from rosglass.scene.publishing_tools import (
+    Nav2GoalTool,
+    PublishPointTool,
+    SetGoalTool,
+    SetInitialPoseTool,
+)
 from rosglass.scene.scene import Scene
 from rosglass.scene.scene_view import SceneView
+from rosglass.scene.tools import Tool, Tools
 from rosglass.scene.view_config import GroupDisplay
+from rosglass.scene.view_tools import (
+    FocusCameraTool,
+    InteractTool,
+    MeasureTool,
+    MoveCameraTool,
+    SelectTool,
+)
 
-__all__ = ["DISPLAYS", "PANELS", "register"]
+__all__ = ["DISPLAYS", "PANELS", "TOOLS", "register"]
 
 #: The displays; in QML, each has the name of its class.
 DISPLAYS = (
@@ -80,6 +94,19 @@ DISPLAYS = (
 #: Panels written in QML.
 PANELS = ("DisplaysPanel", "ViewsPanel")
 Scene.TYPES.update({display.TYPE: display for display in (*DISPLAYS, GroupDisplay)})
+#: The tools, likewise; ``Tool`` is the base of own ones.
+TOOLS = (
+    FocusCameraTool,
+    InteractTool,
+    MeasureTool,
+    MoveCameraTool,
+    Nav2GoalTool,
+    PublishPointTool,
+    SelectTool,
+    SetGoalTool,
+    SetInitialPoseTool,
+)
+Tools.TYPES.update({tool.TYPE: tool for tool in TOOLS})
 
 
 @cache
@@ -92,7 +119,7 @@ def register() -> None:
     os.environ.setdefault("QSG_RENDER_LOOP", "basic")
     # PySide takes texts for names, which its hints do not say.
     register_type: Any = qmlRegisterType
-    for kind in (SceneView, DisplaysModel, *DISPLAYS):
+    for kind in (SceneView, Tool, DisplaysModel, *DISPLAYS, *TOOLS):
         register_type(kind, "RosScene", 1, 0, kind.__name__)
     for name in PANELS:
         file = Path(__file__).with_name("panels") / f"{name}.qml"

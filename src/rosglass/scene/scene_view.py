@@ -6,22 +6,29 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QEventPoint
 from PySide6.QtQuick import QQuickRhiItem, QQuickWindow, QSGRendererInterface
 from shiboken6 import Shiboken
 
 from rosglass.errors import Error
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
-from rosglass.scene.events import Button, Drag, Modifier, Touch, Wheel
+from rosglass.rviz.orbit import ease
+from rosglass.scene.camera import interpolate
+from rosglass.scene.drawing import SPHERE, Group, Mesh, instance_matrix
+from rosglass.scene.events import Button, Modifier, Touch, Wheel
 from rosglass.scene.picking import pick
 from rosglass.scene.renderer import Frame, SceneRenderer
 from rosglass.scene.scene import Scene
+from rosglass.scene.selection import Selection
+from rosglass.scene.tools import PointerEvent, Tool, Tools
 from rosglass.scene.view_config import collect_config, load_config
 from rosglass.scene.views import VIEWS, create_view
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Callable
 
     from rosglass.qml.runtime import Runtime
     from rosglass.scene.camera import Camera
@@ -39,6 +46,8 @@ NO_GPU = (
 )
 #: Seconds after its last move at which a camera counts as still.
 _STILL_S = 0.2
+#: Seconds that the camera takes to what it is to look at, and milliseconds between two pictures.
+_TURN_S, _TURN_MS = 0.4, 16
 #: RViz's background.
 _BACKGROUND = QColor(48, 48, 48)
 
@@ -54,6 +63,8 @@ class SceneView(QQuickRhiItem):
     backgroundChanged = Signal()
     problemChanged = Signal()
     viewChanged = Signal()
+    toolChanged = Signal()
+    statusTextChanged = Signal()
     #: The camera was moved, or the size changed.
     cameraChanged = Signal()
     #: A picture was drawn.
@@ -67,6 +78,11 @@ class SceneView(QQuickRhiItem):
         self._problem = ""
         #: The renderers that C++ still has: letting go of one too early frees it twice.
         self._renderers: list[SceneRenderer] = []
+        #: What the view itself draws into the scene: its tools, the marks of what is selected.
+        self.overlay = Group()
+        #: What is selected.
+        self._selection = Selection(self)
+        self.sceneChanged.connect(self._selection.clear)
         self._scene = Scene(self, runtime)
         self._watch_scene()
         #: The config that was loaded; None before.
@@ -85,14 +101,34 @@ class SceneView(QQuickRhiItem):
         self.setAcceptTouchEvents(True)
         self._pointed = QtCore.QPointF()
         self._fingers: dict[int, QtCore.QPointF] = {}
+        #: Whether a finger is the left button of a tool.
+        self._finger_is_button = False
+        #: From where the camera turns to what it is to look at, and since when; None while it does
+        #: not.
+        self._turn: tuple[Camera, float] | None = None
+        self._turning = QtCore.QTimer(self)
+        self._turning.setInterval(_TURN_MS)
+        self._turning.timeout.connect(self._on_turning)
+        #: RViz's flat ball at the focal point, while the camera is dragged.
+        self._focal = Mesh(SPHERE, lit=True)
+        self._focal.visible = False
+        self.overlay.add(self._focal)
+        #: The tools, and the one that has the mouse.
+        self._tools = Tools(self)
+        self._tools.currentChanged.connect(self.toolChanged)
+        self._tools.statusTextChanged.connect(self.statusTextChanged)
+        #: The tool that QML wants, which may be declared further down.
+        self._wanted_tool = ""
         self._clean_up_when_destroyed()
 
     def _clean_up_when_destroyed(self) -> None:
         # PySide never frees the Python half of an item that QML has made.
         state, renderers, root = self.__dict__, self._renderers, self._scene.root
+        overlay = self.overlay
 
         def end() -> None:
             root.on_change = None
+            overlay.remove()
             root.clear()
             # C++ deletes them a little later, with the scene graph.
             kept = list(renderers)
@@ -104,10 +140,16 @@ class SceneView(QQuickRhiItem):
 
     # -- the scene -------------------------------------------------------------------------------
 
+    @Slot()
+    def _on_scene(self) -> None:
+        self.update()
+        self._selection.on_scene()
+
     def _watch_scene(self) -> None:
-        self._scene.changed.connect(self.update)
+        self._scene.changed.connect(self._on_scene)
         self._scene.placed.connect(self._on_placed)
         self._scene.fixedFrameChanged.connect(self.fixedFrameChanged)
+        self._scene.root.add(self.overlay)
 
     def _get_scene(self) -> Scene:
         return self._scene
@@ -120,7 +162,7 @@ class SceneView(QQuickRhiItem):
             before._refuse(f"SceneView: scene: expected that of another SceneView, got {scene!r}")
             return
         if is_alive(before):
-            before.changed.disconnect(self.update)
+            before.changed.disconnect(self._on_scene)
             before.placed.disconnect(self._on_placed)
             before.fixedFrameChanged.disconnect(self.fixedFrameChanged)
             if before.parent() is self:
@@ -180,7 +222,46 @@ class SceneView(QQuickRhiItem):
     #: ``ThirdPersonFollower``.
     view = Property(str, _get_view_name, _set_view_name, notify=viewChanged)
 
-    # -- displays --------------------------------------------------------------------------------
+    #: What is selected.
+    selection: Any = Property(QtCore.QObject, lambda self: self._selection, constant=True)
+
+    #: The tools: a list, and the current one.
+    tools: Any = Property(QtCore.QObject, lambda self: self._tools, constant=True)
+
+    def _get_tool(self) -> str:
+        tool = self._tools._current
+        return "" if tool is None else tool.TYPE or tool.name
+
+    def _set_tool(self, name: str) -> None:
+        if not self.isComponentComplete():
+            self._wanted_tool = name
+            return
+        try:
+            self._tools.select(name)
+        except Error as error:
+            self.scene._refuse(f"SceneView: tool: {error}")
+
+    #: The current tool: its type, e.g. ``Measure``; of an own tool, its name.
+    tool = Property(str, _get_tool, _set_tool, notify=toolChanged)
+
+    #: What the current tool says for a status bar, and what tools have done; bold as in HTML.
+    statusText = Property(str, lambda self: self._tools.statusText, notify=statusTextChanged)
+
+    # -- displays and tools ----------------------------------------------------------------------
+
+    def componentComplete(self) -> None:
+        """Take the tools that were declared, and select the one that is wanted."""
+        super().componentComplete()
+        for child in self.children():
+            if isinstance(child, Tool):
+                self.adopt_tool(child)
+        wanted, self._wanted_tool = self._wanted_tool, ""
+        if wanted:
+            self._set_tool(wanted)
+
+    def adopt_tool(self, tool: Tool) -> None:
+        """Take a tool that QML has declared inside this view."""
+        self._tools.adopt(tool, declared=True)
 
     def adopt_display(self, display: Display) -> None:
         """Show a display that QML has declared inside this view."""
@@ -279,12 +360,45 @@ class SceneView(QQuickRhiItem):
 
     def camera(self) -> Camera:
         """Return the camera of the next picture; its pixels are units of this item."""
-        return self._view.camera(self.width(), self.height())
+        goal = self._view.camera(self.width(), self.height())
+        if self._turn is None:
+            return goal
+        start, since = self._turn
+        return interpolate(start, goal, ease((time.monotonic() - since) / _TURN_S))
+
+    def move_camera(self, change: Callable[[ViewController], bool | None]) -> bool:
+        """Change the view, and turn the camera there instead of jumping.
+
+        Args:
+            change: Called with the view controller, e.g. to look at a point; may return False for
+                no change.
+
+        Returns:
+            Whether there was a change.
+        """
+        start = self.camera()
+        if change(self._view) is False:
+            return False
+        self._turn = (start, time.monotonic())
+        self._turning.start()
+        self.camera_moved()
+        return True
+
+    @Slot()
+    def _on_turning(self) -> None:
+        if self._turn is not None and time.monotonic() - self._turn[1] >= _TURN_S:
+            self._stop_turning()
+        self.camera_moved()
+
+    def _stop_turning(self) -> None:
+        self._turn = None
+        self._turning.stop()
 
     def camera_moved(self) -> None:
         """Draw from where the camera is now."""
         self._moved_at = time.monotonic()
         self._still.start()
+        self._show_focal_shape()
         self.cameraChanged.emit()
         self.update()
 
@@ -368,64 +482,137 @@ class SceneView(QQuickRhiItem):
 
     # -- mouse, touch, keys ----------------------------------------------------------------------
 
+    def _event(self, event: Any) -> PointerEvent:
+        """Return an event of the mouse, and remember where it is."""
+        at, before = event.position(), self._pointed
+        self._pointed = at
+        return PointerEvent(
+            self,
+            (at.x(), at.y()),
+            (at.x() - before.x(), at.y() - before.y()),
+            Button(event.button().value & _BUTTONS),
+            Button(event.buttons().value & _BUTTONS),
+            Modifier(event.modifiers().value & _MODIFIERS),
+        )
+
+    def _event_at(self, at: QtCore.QPointF, event: Any, *, finger: bool = False) -> PointerEvent:
+        """Return an event that is none of the mouse's."""
+        held = Modifier(event.modifiers().value & _MODIFIERS)
+        before, self._pointed = self._pointed, at
+        moved = (at.x() - before.x(), at.y() - before.y()) if finger else (0.0, 0.0)
+        return PointerEvent(self, (at.x(), at.y()), moved, modifiers=held)
+
     def mousePressEvent(self, event: Any) -> None:
-        """Start a drag."""
+        """Give a press to the tool, or start to drag the camera."""
         self.forceActiveFocus(Qt.FocusReason.MouseFocusReason)
-        self._pointed = event.position()
+        self._stop_turning()
+        self._tools.on_press(self._event(event))
+        self._show_focal_shape()
         event.accept()
 
     def mouseMoveEvent(self, event: Any) -> None:
-        """Drag the camera."""
-        at, before = event.position(), self._pointed
-        self._pointed = at
-        moved = at - before
-        drag = Drag(
-            at.x(),
-            at.y(),
-            moved.x(),
-            moved.y(),
-            Button(event.buttons().value & _BUTTONS),
-            Modifier(event.modifiers().value & _MODIFIERS),
-            (self.width(), self.height()),
-        )
-        self._view.on_drag(drag)
-        self.camera_moved()
+        """Give a drag to the tool, or drag the camera."""
+        self._tools.on_move(self._event(event))
         event.accept()
 
+    def mouseReleaseEvent(self, event: Any) -> None:
+        """End a drag."""
+        self._tools.on_release(self._event(event))
+        self._show_focal_shape()
+        event.accept()
+
+    def mouseUngrabEvent(self) -> None:
+        """Drop a drag that another item has taken over."""
+        if is_alive(self):
+            self._tools.cancel()
+            self._show_focal_shape()
+
     def hoverMoveEvent(self, event: Any) -> None:
-        """Remember what is pointed at, for keys."""
-        self._pointed = event.position()
+        """Show what is under the mouse."""
+        self._tools.on_move(self._event_at(event.position(), event))
 
     def wheelEvent(self, event: Any) -> None:
         """Zoom."""
-        held = Modifier(event.modifiers().value & _MODIFIERS)
-        self._view.on_wheel(Wheel(event.angleDelta().y() / 120, held))
-        self.camera_moved()
+        self._stop_turning()
+        at = self._event_at(event.position(), event)
+        self._tools.on_wheel(at, Wheel(event.angleDelta().y() / 120, at.modifiers))
         event.accept()
 
     def touchEvent(self, event: Any) -> None:
-        """Rotate by one finger; move, zoom and turn by two."""
-        now = {point.id(): point.position() for point in event.points()}
+        """Let one finger be the tool's left button; otherwise rotate, move and zoom by fingers."""
+        event.accept()
+        self._stop_turning()
+        points = event.points()
+        released = any(point.state() == QEventPoint.State.Released for point in points)
+        now = {point.id(): point.position() for point in points}
+        if self._finger_is_button and len(now) > 1:
+            self._finger_is_button = False
+            self._tools.cancel()
+        elif len(now) == 1:
+            (at,) = now.values()
+            pointer = self._event_at(at, event, finger=True)
+            if not self._fingers and not released:
+                pointer.button = pointer.buttons = Button.LEFT
+                self._finger_is_button = self._tools.on_press(pointer)
+                if not self._finger_is_button:
+                    self._tools.cancel()
+            elif self._finger_is_button:
+                if released:
+                    pointer.button = Button.LEFT
+                    self._tools.on_release(pointer)
+                    self._finger_is_button = False
+                else:
+                    pointer.buttons = Button.LEFT
+                    self._tools.on_move(pointer)
+                self._fingers = {} if released else now
+                return
+        self._drag_by_fingers(now)
+        self._fingers = {} if released else now
+
+    def _drag_by_fingers(self, now: dict[int, QtCore.QPointF]) -> None:
         ids = [one for one in now if one in self._fingers]
         if ids and len(now) == len(self._fingers):
             before = [(self._fingers[one].x(), self._fingers[one].y()) for one in ids]
             after = [(now[one].x(), now[one].y()) for one in ids]
-            self._view.on_touch(Touch.between(before, after, (self.width(), self.height())))
-            self.camera_moved()
-        released = event.touchPointStates() & Qt.TouchPointState.TouchPointReleased
-        self._fingers = {} if released else now
-        event.accept()
+            self._tools.on_touch(Touch.between(before, after, (self.width(), self.height())))
+
+    def touchUngrabEvent(self) -> None:
+        """Drop what another item has taken over."""
+        if is_alive(self):
+            self._fingers, self._finger_is_button = {}, False
+            self._tools.cancel()
 
     def keyPressEvent(self, event: Any) -> None:
-        """Look at what is under the mouse (F), or return to the start (Z)."""
-        point = self.pick(self._pointed.x(), self._pointed.y()) if event.text() in "fF" else None
-        if event.text() and self._view.on_key(event.text(), None if point is None else point.point):
-            self.camera_moved()
-            event.accept()
-        else:
-            event.ignore()
+        """Handle the keys of tools, F and Z, and Escape."""
+        self._tools.on_modifiers(Modifier(event.modifiers().value & _MODIFIERS))
+        used = False
+        if event.key() == Qt.Key.Key_Escape:
+            used = self._tools.on_escape()
+        elif event.text() and not (event.isAutoRepeat() or event.modifiers() & _COMMAND_KEYS):
+            used = self._tools.on_key(event.text(), self._event_at(self._pointed, event))
+        event.setAccepted(used)
+
+    def keyReleaseEvent(self, event: Any) -> None:
+        """Follow keys like Shift."""
+        self._tools.on_modifiers(Modifier(event.modifiers().value & _MODIFIERS))
+        event.ignore()
+
+    def _show_focal_shape(self) -> None:
+        """Show what the camera turns around, while it is dragged."""
+        shape = self._view.focal_shape() if self._tools.moves_camera else None
+        if shape is not None:
+            self._focal.pose = shape.pose
+            size = instance_matrix(scale=shape.size)[np.newaxis]
+            self._focal.set_instances(size, shape.colour)
+        self._focal.visible = shape is not None
 
 
+#: With these, a key is a command of the program and no tool's.
+_COMMAND_KEYS = (
+    Qt.KeyboardModifier.ControlModifier
+    | Qt.KeyboardModifier.AltModifier
+    | Qt.KeyboardModifier.MetaModifier
+)
 _BUTTONS = int(Button.LEFT | Button.RIGHT | Button.MIDDLE)
 _MODIFIERS = int(Modifier.SHIFT | Modifier.CTRL | Modifier.ALT)
 

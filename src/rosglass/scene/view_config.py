@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import Error
 from rosglass.qt import QtGui
 from rosglass.scene.display import Display
-from rosglass.scene.rviz_config import DisplayConfig, RvizConfig, ViewConfig
+from rosglass.scene.rviz_config import DisplayConfig, RvizConfig, ToolConfig, ViewConfig
 from rosglass.scene.rviz_formats import DISPLAYS, class_id_of, ros_of, view_type
 from rosglass.scene.views import VIEWS, create_view
 
@@ -90,6 +90,8 @@ def apply_config(view: SceneView, config: RvizConfig) -> list[str]:
     view.setProperty("background", QtGui.QColor.fromRgbF(red, green, blue))
     for one in config.displays:
         _add(scene, one, None, notes)
+    if config.tools:
+        notes += view.tools.load_configs(one.settings for one in config.tools)
     if config.current_view is not None:
         _show_view(view, config.current_view, notes)
     return notes
@@ -142,6 +144,7 @@ def collect_config(view: SceneView, ros: int = 2) -> RvizConfig:
     config.background_color = view.property("background").getRgbF()
     del config.displays[:]
     config.displays.extend(_collect(scene, None, config.ros))
+    config.tools[:] = [ToolConfig(one) for one in view.tools.save_configs(config.ros)]
     state = view.controller.state()
     current = config.current_view
     if current is None:

@@ -1,0 +1,657 @@
+"""Tools of a view: by real events of mouse, touch and keys, and what the robot receives."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from conftest import SceneBench
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+
+class Hand:
+    """Moves the mouse in the window of a bench, by events that Qt gets."""
+
+    def __init__(self, bench: SceneBench) -> None:
+        from PySide6.QtCore import QPoint, Qt
+        from PySide6.QtTest import QTest
+
+        self.bench, self.window = bench, bench.window
+        self._test, self._point = QTest, QPoint
+        self.LEFT, self.RIGHT = Qt.MouseButton.LeftButton, Qt.MouseButton.RightButton
+        self.SHIFT, self.CTRL = (
+            Qt.KeyboardModifier.ShiftModifier,
+            Qt.KeyboardModifier.ControlModifier,
+        )
+        self.NONE = Qt.KeyboardModifier.NoModifier
+        self.keys = Qt.Key
+
+    def at(self, point: Any) -> tuple[int, int]:
+        """Return the pixel of a point of the fixed frame."""
+        seen = self.bench.view.camera().project(point)
+        return round(seen.x), round(seen.y)
+
+    def press(self, at: Any, button: Any = None, keys: Any = None) -> None:
+        self._test.mousePress(self.window, button or self.LEFT, keys or self.NONE, self._point(*at))
+
+    def move(self, at: Any) -> None:
+        self._test.mouseMove(self.window, self._point(*at))
+
+    def release(self, at: Any, button: Any = None, keys: Any = None) -> None:
+        self._test.mouseRelease(
+            self.window, button or self.LEFT, keys or self.NONE, self._point(*at)
+        )
+
+    def click(self, at: Any, button: Any = None, keys: Any = None) -> None:
+        self.move(at)
+        self.press(at, button, keys)
+        self.release(at, button, keys)
+
+    def drag(self, start: Any, end: Any, button: Any = None, keys: Any = None) -> None:
+        self.press(start, button, keys)
+        self.move(((start[0] + end[0]) // 2, (start[1] + end[1]) // 2))
+        self.move(end)
+        self.release(end, button, keys)
+
+    def key(self, key: Any, keys: Any = None) -> None:
+        self._test.keyClick(self.window, key, keys or self.NONE)
+
+
+@pytest.fixture
+def hand(bench: SceneBench) -> Hand:
+    return Hand(bench)
+
+
+def listen(bench: SceneBench, topic: str, message_type: str) -> list[Any]:
+    received: list[Any] = []
+    bench.robot.create_subscription(topic, message_type, received.append)
+    return received
+
+
+def add_box(view: Any, position: Any = (0, 0, 0), owner: Any = "box") -> Any:
+    from rosglass.scene.drawing import BOX, Mesh, instance_matrix
+
+    box = Mesh(BOX, (1, 0, 0, 1))
+    box.owner = owner
+    box.pose = instance_matrix(position)
+    view.scene.root.add(box)
+    return box
+
+
+def has_colour(picture: Any, red: int, green: int, blue: int, tolerance: int = 60) -> int:
+    off = np.abs(picture.astype(int) - (red, green, blue)).max(axis=2)
+    return int((off <= tolerance).sum())
+
+
+# -- the list ------------------------------------------------------------------------------------
+
+
+def test_a_view_has_the_tools_of_rviz(bench: SceneBench) -> None:
+    view = bench.load()
+    tools = view.tools
+    assert [tool.TYPE for tool in tools] == [
+        "Interact", "MoveCamera", "Select", "FocusCamera", "Measure", "SetInitialPose", "SetGoal",
+        "PublishPoint",
+    ]  # fmt: skip
+    assert view.tool == "Interact"
+    assert tools.default is tools.current
+    assert tools.current.selected
+    assert "Rotate" in view.statusText
+    for name in ("Measure", "rviz/Measure", "rviz_default_plugins/Measure"):
+        assert tools.find(name) is tools.all[4]
+    assert tools.find("2D Goal Pose") is tools.all[6]
+    assert tools.find_key("G") is tools.all[6]
+    tools.select("Measure")
+    assert view.tool == "Measure"
+    assert not tools.default.selected
+
+
+def test_unknown_tools_and_settings_are_errors(bench: SceneBench) -> None:
+    from rosglass.errors import Error
+
+    tools = bench.load().tools
+    count = len(tools)
+    with pytest.raises(Error, match="there is no tool 'Mesure' in this view; did you mean Measure"):
+        tools.select("Mesure")
+    with pytest.raises(Error, match="there is no tool 'rviz/Nothing'"):
+        tools.add("rviz/Nothing")
+    with pytest.raises(Error, match="has no property 'topik'; did you mean topic"):
+        tools.add("SetGoal", topik="/goal")
+    with pytest.raises(Error, match="Topic: expected the name of a topic"):
+        tools.add("SetGoal", topic="/no topic")
+    with pytest.raises(Error, match="a Tool, a class of it or the name of one"):
+        tools.add(3)
+    assert len(tools) == count
+
+
+def test_tools_are_added_and_removed(bench: SceneBench) -> None:
+    view = bench.load()
+    changes: list[int] = []
+    view.tools.changed.connect(lambda: changes.append(len(view.tools)))
+    goal = view.tools.add("rviz/SetGoal", "Dock", topic="/dock", shortcutKey="d")
+    assert (goal.name, goal.topic, goal.class_id) == ("Dock", "/dock", "rviz/SetGoal")
+    assert view.tools.find("Dock") is goal
+    view.tools.select("Dock")
+    view.tools.remove(goal)
+    assert view.tool == "Interact"
+    view.tools.clear()
+    assert view.tools.current is None
+    assert view.tool == ""
+    assert changes[:2] == [9, 8]
+
+
+def test_qml_selects_and_declares_tools(bench: SceneBench, caplog: Any) -> None:
+    view = bench.load(
+        'tool: "Mark"; property var marks: []\n'
+        'SetGoalTool { topic: "/robot1/goal_pose" }\n'
+        'Tool { name: "Mark"; shortcutKey: "k"; onReleased: (event) => marks.push(event.point) }\n'
+        "property int count: tools.all.length; property string now: tools.current.name"
+    )
+    assert view.tool == "Mark"
+    assert view.tools.find("SetGoal").topic == "/robot1/goal_pose"
+    assert [tool.TYPE for tool in view.tools].count("SetGoal") == 1
+    assert view.property("count") == 9
+    assert view.property("now") == "Mark"
+    view.setProperty("tool", "Mesure")
+    assert "SceneView: tool: there is no tool 'Mesure' in this view; did you mean" in caplog.text
+
+
+def test_keys_select_tools(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load()
+    view.forceActiveFocus()
+    hand.key(hand.keys.Key_M)
+    assert view.tool == "MoveCamera"
+    hand.key(hand.keys.Key_M)
+    assert view.tool == "Interact"
+    hand.key(hand.keys.Key_S, hand.CTRL)
+    assert view.tool == "Interact"
+    hand.key(hand.keys.Key_P)
+    assert view.tool == "SetInitialPose"
+    assert "Click and drag" in view.statusText
+    hand.key(hand.keys.Key_Escape)
+    assert view.tool == "Interact"
+
+
+# -- the camera ----------------------------------------------------------------------------------
+
+
+def test_the_mouse_moves_the_camera(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load("GridDisplay {}")
+    yaw, distance = view.controller.yaw, view.controller.distance
+    hand.press((200, 150))
+    hand.move((240, 150))
+    assert view._focal.visible
+    assert has_colour(bench.picture(), 255, 255, 0, 130) > 0
+    hand.release((240, 150))
+    assert not view._focal.visible
+    assert view.controller.yaw == pytest.approx(yaw - 0.2)
+    hand.drag((200, 150), (200, 170), hand.RIGHT)
+    assert view.controller.distance > distance
+
+
+def test_a_change_of_the_view_draws(bench: SceneBench) -> None:
+    view = bench.load("GridDisplay {}")
+    bench.picture()
+    before = bench.drawn()
+    view.controller.yaw = 2.0
+    bench.wait(lambda: bench.drawn() > before)
+
+
+def test_f_and_focus_camera_turn_the_camera(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load()
+    add_box(view, (1, 1, 0))
+    hand.move(hand.at((1, 1, 0)))
+    view.forceActiveFocus()
+    start = view.camera().focus
+    hand.key(hand.keys.Key_F)
+    # It turns, and does not jump.
+    assert np.linalg.norm(np.array(view.camera().focus) - start) < 0.5
+    bench.wait(lambda: view._turn is None)
+    assert np.array(view.camera().focus) == pytest.approx(np.array((1, 1, 0)), abs=0.9)
+    hand.key(hand.keys.Key_Z)
+    bench.wait(lambda: view._turn is None)
+    assert view.camera().focus == pytest.approx((0, 0, 0))
+    view.tool = "FocusCamera"
+    hand.move(hand.at((1, 1, 0)))
+    assert "Focus on this point. [" in view.statusText
+    hand.click(hand.at((1, 1, 0)))
+    assert view.tool == "Interact"
+    bench.wait(lambda: view._turn is None)
+    assert np.array(view.camera().focus) == pytest.approx(np.array((1, 1, 0)), abs=0.9)
+
+
+# -- poses ---------------------------------------------------------------------------------------
+
+
+def test_a_goal_is_published(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load("GridDisplay {}")
+    goals = listen(bench, "/goal_pose", "geometry_msgs/PoseStamped")
+    set_poses: list[Any] = []
+    view.tools.find("SetGoal").poseSet.connect(lambda *pose: set_poses.append(pose))
+    view.tool = "SetGoal"
+    start, end = hand.at((1, 0.5, 0)), hand.at((1, 2.5, 0))
+    before = bench.robot.now().nanoseconds
+    hand.press(start)
+    hand.move(end)
+    assert has_colour(bench.picture(), 0, 200, 0, 80) > 50
+    assert "degrees" in view.statusText
+    hand.release(end)
+    assert view.tool == "Interact"
+    bench.wait(lambda: goals)
+    goal = goals[0]
+    assert goal.header.frame_id == "map"
+    stamp = goal.header.stamp.sec * 10**9 + goal.header.stamp.nanosec
+    assert before <= stamp <= bench.robot.now().nanoseconds
+    position, turn = goal.pose.position, goal.pose.orientation
+    assert (position.x, position.y, position.z) == pytest.approx((1, 0.5, 0), abs=0.05)
+    assert 2 * math.atan2(turn.z, turn.w) == pytest.approx(math.pi / 2, abs=0.05)
+    assert set_poses[0] == pytest.approx((position.x, position.y, 2 * math.atan2(turn.z, turn.w)))
+    bench.wait(lambda: "sent on /goal_pose" in view.statusText)
+    assert has_colour(bench.picture(), 0, 200, 0, 80) == 0
+
+
+def test_an_initial_pose_has_the_covariance(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load('tool: "SetInitialPose"; SetInitialPoseTool { xDeviation: 0.1 }')
+    poses = listen(bench, "/initialpose", "geometry_msgs/PoseWithCovarianceStamped")
+    hand.drag(hand.at((0, 0, 0)), hand.at((-1, 0, 0)))
+    bench.wait(lambda: poses)
+    covariance = poses[0].pose.covariance
+    assert covariance[0] == pytest.approx(0.01)
+    assert covariance[7] == pytest.approx(0.25)
+    assert covariance[35] == pytest.approx(0.06853892)
+    assert sum(covariance) == pytest.approx(0.01 + 0.25 + 0.06853892)
+    turn = poses[0].pose.pose.orientation
+    assert abs(2 * math.atan2(turn.z, turn.w)) == pytest.approx(math.pi, abs=0.05)
+    assert view.tool == "Interact"
+
+
+def test_escape_and_another_button_cancel_a_goal(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load()
+    goals = listen(bench, "/goal_pose", "geometry_msgs/PoseStamped")
+    view.tool = "SetGoal"
+    for cancel in (lambda: hand.key(hand.keys.Key_Escape), lambda: hand.press((9, 9), hand.RIGHT)):
+        hand.press((200, 150))
+        hand.move((250, 150))
+        cancel()
+        hand.move((260, 150))
+        hand.release((260, 150), hand.RIGHT)
+        hand.release((260, 150))
+        assert view.tool == "SetGoal"
+    bench.wait.settled(bench.session)
+    assert goals == []
+
+
+def test_one_finger_sets_a_goal_and_two_move_the_camera(bench: SceneBench, hand: Hand) -> None:
+    from PySide6.QtCore import QPoint
+    from PySide6.QtTest import QTest
+
+    view = bench.load()
+    goals = listen(bench, "/goal_pose", "geometry_msgs/PoseStamped")
+    device = QTest.createTouchDevice()
+    view.tool = "SetGoal"
+    start, end = QPoint(*hand.at((0, 0, 0))), QPoint(*hand.at((2, 0, 0)))
+    yaw = view.controller.yaw
+    QTest.touchEvent(bench.window, device).press(0, start, bench.window).commit()
+    QTest.touchEvent(bench.window, device).move(0, end, bench.window).commit()
+    QTest.touchEvent(bench.window, device).release(0, end, bench.window).commit()
+    bench.wait(lambda: goals)
+    assert goals[0].pose.orientation.w == pytest.approx(1, abs=0.02)
+    assert view.controller.yaw == yaw
+    # A second finger drops the goal.
+    view.tool = "SetGoal"
+    focus, distance = view.camera().focus, view.controller.distance
+    other = QPoint(50, 50)
+    QTest.touchEvent(bench.window, device).press(0, start, bench.window).commit()
+    QTest.touchEvent(bench.window, device).stationary(0).press(1, other, bench.window).commit()
+    QTest.touchEvent(bench.window, device).move(0, end, bench.window).move(
+        1, QPoint(20, 20), bench.window
+    ).commit()
+    QTest.touchEvent(bench.window, device).release(0, end, bench.window).release(
+        1, QPoint(20, 20), bench.window
+    ).commit()
+    assert view.controller.distance != distance
+    assert view.camera().focus != focus
+    bench.wait.settled(bench.session)
+    assert len(goals) == 1
+    # One finger rotates where the tool does not take it.
+    view.tool = "MoveCamera"
+    QTest.touchEvent(bench.window, device).press(0, start, bench.window).commit()
+    QTest.touchEvent(bench.window, device).move(0, end, bench.window).commit()
+    QTest.touchEvent(bench.window, device).release(0, end, bench.window).commit()
+    assert view.controller.yaw != yaw
+
+
+def test_a_goal_without_subscribers_says_so(bench: SceneBench, hand: Hand, caplog: Any) -> None:
+    view = bench.load('SetGoalTool { topic: "/gaol_pose" }')
+    listen(bench, "/goal_pose", "geometry_msgs/PoseStamped")
+    view.tool = "SetGoal"
+    goal = view.tools.current
+    hand.drag(hand.at((0, 0, 0)), hand.at((1, 0, 0)))
+    bench.wait(lambda: "has no subscriber; did you mean /goal_pose" in view.statusText)
+    assert "sent on /gaol_pose, which has no subscriber" in goal.problem
+    assert "tool '2D Goal Pose': Goal at [" in caplog.text
+
+
+def test_a_goal_while_disconnected_is_not_sent(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load()
+    view.tool = "SetGoal"
+    goal = view.tools.current
+    bench.wait(lambda: goal._endpoint is not None)
+    bench.session.shutdown()
+    bench.wait(lambda: goal._endpoint is None)
+    hand.drag(hand.at((0, 0, 0)), hand.at((1, 0, 0)))
+    assert "not sent, for the robot is not connected" in view.statusText
+    assert "not connected" in goal.problem
+
+
+def test_a_goal_is_sent_to_an_action(bench: SceneBench, hand: Hand, tmp_path: Path) -> None:
+    import rosglass
+    from rosglass.interfaces import Library
+
+    view = bench.load('Nav2GoalTool { name: "Go" }\ntool: "Go"')
+    poses: list[Any] = []
+
+    def execute(goal: Any) -> dict[str, Any]:
+        poses.append(goal.goal.pose)
+        return {}
+
+    file = tmp_path / "nav2_msgs" / "action" / "NavigateToPose.action"
+    file.parent.mkdir(parents=True)
+    file.write_text("geometry_msgs/PoseStamped pose\nstring behavior_tree\n---\n---\n")
+    library = Library()
+    library.add_path(tmp_path)
+    nav2 = rosglass.connect(bench.session.url, "nav2", library=library)
+    nav2.create_action_server("/navigate_to_pose", "nav2_msgs/action/NavigateToPose", execute)
+    hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
+    bench.wait(lambda: "Goal: succeeded" in view.statusText, lambda: view.statusText)
+    assert poses[0].header.frame_id == "map"
+    assert poses[0].pose.orientation.z == pytest.approx(math.sqrt(0.5), abs=0.05)
+    assert view.tool == "Interact"
+    nav2.close()
+
+
+def test_a_goal_to_an_action_without_server_says_so(bench: SceneBench, hand: Hand) -> None:
+    from rosglass.scene import publishing_tools
+
+    view = bench.load('Nav2GoalTool { name: "Go" }\ntool: "Go"')
+    goal = view.tools.current
+    bench.wait(lambda: goal._endpoint is not None)
+    before, publishing_tools._GOAL_TIMEOUT_S = publishing_tools._GOAL_TIMEOUT_S, 0.2
+    try:
+        hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
+    finally:
+        publishing_tools._GOAL_TIMEOUT_S = before
+    bench.wait(lambda: "navigate_to_pose" in goal.problem, lambda: goal.problem)
+
+
+# -- points, distances, selections ---------------------------------------------------------------
+
+
+def test_a_clicked_point_is_published(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load('tool: "PublishPoint"')
+    points = listen(bench, "/clicked_point", "geometry_msgs/PointStamped")
+    add_box(view)
+    hand.move((5, 5))
+    assert "Move over an object" in view.statusText
+    hand.click((5, 5))
+    assert view.tool == "PublishPoint"
+    hand.click(hand.at((0, 0, 0.5)))
+    bench.wait(lambda: points)
+    assert points[0].header.frame_id == "map"
+    point = points[0].point
+    assert (point.x, point.y, point.z) == pytest.approx((0, 0, 0.5), abs=0.05)
+    assert view.tool == "Interact"
+    view.tools.find("PublishPoint").singleClick = False
+    view.tool = "PublishPoint"
+    hand.click(hand.at((0, 0, 0.5)))
+    assert view.tool == "PublishPoint"
+
+
+def test_a_distance_is_measured(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load('tool: "Measure"')
+    add_box(view, (-2, 0, -0.5))
+    add_box(view, (2, 0, -0.5))
+    measure = view.tools.current
+    measured: list[float] = []
+    measure.measured.connect(measured.append)
+    hand.click(hand.at((-2, 0, 0)))
+    hand.move(hand.at((2, 0, 0)))
+    assert "Length: 4" in view.statusText or "Length: 3.9" in view.statusText
+    hand.click(hand.at((2, 0, 0)))
+    assert measured == [pytest.approx(4, abs=0.1)]
+    assert measure.length == measured[0]
+    assert has_colour(bench.picture(), 255, 213, 0) > 100
+    hand.click((200, 150), hand.RIGHT)
+    assert measure.length == -1
+    assert has_colour(bench.picture(), 255, 213, 0) == 0
+
+
+def test_a_rectangle_selects(bench: SceneBench, hand: Hand) -> None:
+    from rosglass.scene.drawing import Points, instance_matrix
+
+    view = bench.load('tool: "Select"; property int count: selection.count')
+
+    class Part:
+        name = "arm_link"
+        display = view.scene.add("Axes", "Robot", alpha=0.0)
+
+        def describe(self) -> list[tuple[str, str]]:
+            return [("Mass", "3 kg")]
+
+    box = add_box(view, (-2, 0, 0), Part())
+    cloud = Points()
+    cloud.owner = view.scene.add("Grid", "Cloud", alpha=0.0)
+    cloud.set_points([[2, 0, 0], [2.2, 0, 0], [3, 3, 5]])
+    view.scene.root.add(cloud)
+    selection = view.selection
+    x, y = hand.at((2, 0, 0))
+    hand.press((x - 40, y - 40))
+    hand.move((x + 60, y + 40))
+    bench.picture()
+    assert has_colour(bench.picture(), 0x60, 0xA0, 0xFF) > 100
+    hand.release((x + 60, y + 40))
+    assert has_colour(bench.picture(), 0x60, 0xA0, 0xFF, 20) == 0
+    assert selection.count == 2
+    assert view.property("count") == 2
+    first = selection.items()[0]
+    assert (first.display, first.part) == ("Cloud", "0")
+    assert first.lines[0] == ("Position", "2; 0; 0")
+    hand.click(hand.at((-2, 0, 0)), keys=hand.SHIFT)
+    assert selection.count == 3
+    part = selection.items()[-1]
+    assert (part.display, part.part, part.lines[-1]) == ("Robot", "arm_link", ("Mass", "3 kg"))
+    assert "3 selected" in view.statusText
+    assert selection.parts[-1]["lines"][-1]["value"] == "3 kg"
+    assert has_colour(bench.picture(), 153, 204, 255, 30) > 20
+    hand.drag((x - 40, y - 40), (x + 60, y + 40), keys=hand.CTRL)
+    assert selection.count == 1
+    # The box is followed, and forgotten with the drawable.
+    before = selection.middle()
+    box.pose = instance_matrix((-2, 1, 0))
+    bench.wait(lambda: selection._root.pose[1, 3] == pytest.approx(1))
+    assert before.y == pytest.approx(0)
+    box.remove()
+    bench.wait(lambda: selection.count == 0)
+    assert len(selection._lines.rows) == 0
+
+
+def test_selected_points_are_dropped_with_their_cloud(bench: SceneBench) -> None:
+    from rosglass.scene.drawing import Points
+
+    view = bench.load()
+    cloud = Points()
+    cloud.owner = "cloud"
+    cloud.set_points([[0, 0, 0]])
+    view.scene.root.add(cloud)
+    view.selection.select_between((0, 0), (400, 300))
+    assert view.selection.count == 1
+    cloud.set_points([[0, 0, 1]])
+    bench.wait(lambda: view.selection.count == 0)
+
+
+def test_what_is_interactive_gets_the_mouse(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load()
+    seen: list[str] = []
+
+    class Marker:
+        def handle_pointer(self, what: str, event: Any) -> bool:
+            seen.append(what)
+            return True
+
+    add_box(view, (0, 0, 0), Marker())
+    yaw = view.controller.yaw
+    middle = hand.at((0, 0, 0))
+    hand.move(middle)
+    hand.drag(middle, (middle[0] + 100, middle[1]))
+    hand.move((5, 5))
+    assert seen == ["enter", "move", "press", "move", "move", "release", "leave"]
+    assert view.controller.yaw == yaw
+    hand.drag((5, 5), (50, 5))
+    assert view.controller.yaw != yaw
+
+
+# -- own tools -----------------------------------------------------------------------------------
+
+
+def test_an_own_tool_in_qml_gets_points(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load(
+        'tool: "Mark"; property var seen: []; property string keys\n'
+        'Tool { name: "Mark"\n'
+        " onPressed: (event) => seen.push(event.ground.x)\n"
+        " onMoved: (event) => { if (event.buttons) seen.push(event.point) }\n"
+        " onReleased: (event) => { seen.push(event.point.z); seen.push(event.display) }\n"
+        " onKeyPressed: (event) => { keys += event.key } }"
+    )
+    yaw = view.controller.yaw
+    add_box(view, (0, 0, 0), view.scene.add("Grid", "Tower", alpha=0.0))
+    hand.press(hand.at((3, 0, 0)))
+    hand.move((5, 5))
+    hand.release(hand.at((0, 0, 0.5)))
+    seen = view.property("seen").toVariant()
+    assert seen[0] == pytest.approx(3, abs=0.05)
+    assert seen[1] is None
+    assert seen[-2] == pytest.approx(0.5, abs=0.05)
+    assert seen[-1] == "Tower"
+    hand.key(hand.keys.Key_X)
+    assert view.property("keys") == "x"
+    assert view.controller.yaw == yaw
+
+
+def test_an_own_tool_in_python_may_fail(bench: SceneBench, hand: Hand, caplog: Any) -> None:
+    from rosglass.scene.tools import Tool
+
+    class Broken(Tool):
+        NAME = "Broken"
+
+        def on_press(self, event: Any) -> bool:
+            raise ValueError("a mistake")
+
+    view = bench.load()
+    view.tools.add(Broken)
+    view.tools.select("Broken")
+    hand.click((200, 150))
+    assert "ValueError('a mistake')" in view.statusText
+    assert "a mistake" in caplog.text
+    assert view.tool == "Broken"
+
+
+def test_a_destroyed_tool_is_forgotten(bench: SceneBench) -> None:
+    view = bench.load(
+        'id: top; tool: "Mark"; property bool wanted: true\n'
+        "Loader { active: top.wanted; sourceComponent: Item { \n"
+        '  SetGoalTool { name: "Inner"; topic: "/inner" } } }\n'
+        'Tool { name: "Mark" }'
+    )
+    bench.wait(lambda: view.tools.find("Inner") is not None)
+    view.tools.select("Inner")
+    view.setProperty("wanted", False)
+    bench.wait(lambda: view.tools.find("Inner") is None)
+    bench.wait(lambda: view.tool == "Interact")
+
+
+# -- files ---------------------------------------------------------------------------------------
+
+
+def test_tools_of_config_files(bench: SceneBench) -> None:
+    tools = bench.load().tools
+    notes = tools.load_configs(
+        [
+            {"Class": "rviz/MoveCamera"},
+            {"Class": "rviz/SetInitialPose", "Topic": "/pose", "X std deviation": 0.2, "Own": 1},
+            {
+                "Class": "rviz_default_plugins/SetInitialPose",
+                "Topic": {"Value": "/pose2", "Depth": 5},
+                "Covariance x": 0.25,
+                "Covariance y": 4.0,
+                "Covariance yaw": 0.01,
+            },
+            {"Class": "rviz_default_plugins/SetGoal"},
+            {"Class": "rviz/SetGoal", "Topic": "goal"},
+            {"Class": "jsk_rviz_plugin/CloseAll", "Name": "Close"},
+        ]
+    )
+    assert len(notes) == 1
+    assert "tool 'jsk_rviz_plugin/CloseAll': rosglass has no such tool; it is kept" in notes[0]
+    assert tools.current is tools.all[0]
+    first, second = tools.all[1:3]
+    assert (first.topic, first.xDeviation, first.yDeviation) == ("/pose", 0.2, 0.5)
+    assert (second.topic, second.xDeviation, second.yDeviation) == ("/pose2", 0.5, 2.0)
+    assert tools.save_configs(2)[2]["Covariance y"] == 4.0
+    second.yDeviation = 3.0
+    saved = tools.save_configs(1)
+    assert saved[1] == {
+        "Class": "rviz/SetInitialPose",
+        "Topic": "/pose",
+        "X std deviation": 0.2,
+        "Own": 1,
+    }
+    assert saved[4] == {"Class": "rviz/SetGoal", "Topic": "goal"}
+    assert saved[5] == {"Class": "jsk_rviz_plugin/CloseAll", "Name": "Close"}
+    saved = tools.save_configs(2)
+    assert saved[2]["Covariance y"] == pytest.approx(9)
+    assert "Y std deviation" not in saved[2]
+    assert saved[2]["Topic"] == {"Value": "/pose2", "Depth": 5}
+    assert saved[3] == {"Class": "rviz_default_plugins/SetGoal"}
+    assert saved[4]["Class"] == "rviz_default_plugins/SetGoal"
+    assert saved[4]["Topic"] == {"Value": "goal"}
+    tools.find("SetGoal").topic = "/dock"
+    assert tools.save_configs(2)[3]["Topic"]["Value"] == "/dock"
+
+
+# -- ROS 1 ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def ros1_bench(make_bench: Any, tmp_path: Path) -> Iterator[SceneBench]:
+    from rosmaster import RosMaster
+
+    with RosMaster(tmp_path / "ros") as master:
+        made = make_bench(master.url)
+        yield made
+        # Before the master, which its nodes unregister from.
+        made.close()
+
+
+def test_ros_1_has_topics_of_its_own(ros1_bench: SceneBench) -> None:
+    bench = ros1_bench
+    hand, view = Hand(bench), bench.load()
+    add_box(view, (0, 0, 0))
+    goals = listen(bench, "/move_base_simple/goal", "geometry_msgs/PoseStamped")
+    poses = listen(bench, "/initialpose", "geometry_msgs/PoseWithCovarianceStamped")
+    points = listen(bench, "/clicked_point", "geometry_msgs/PointStamped")
+    start, end = hand.at((0, 0, 0)), hand.at((2, 0, 0))
+    for tool, received in (("SetGoal", goals), ("SetInitialPose", poses), ("PublishPoint", points)):
+        view.tool = tool
+        hand.drag(start, end) if received is not points else hand.click(start)
+        bench.wait(lambda received=received: received)
+        assert received[0].header.frame_id == "map"
+        assert received[0].header.stamp.secs > 1e9
+    assert goals[0].pose.orientation.w == pytest.approx(1, abs=0.01)
