@@ -172,6 +172,33 @@ def test_styles_have_their_size(show: Callable[..., Shown], style: str) -> None:
     assert wanted * 0.9 < green < wanted * 1.1
 
 
+def test_boxes_and_spheres_have_the_light_of_rviz(show: Callable[..., Shown]) -> None:
+    shown = show("PointCloud2", 'style: "Boxes"; colorTransformer: "FlatColor"')
+    display = shown.send(cloud([(0, 0, 0)]))
+    display.size = 4
+    picture = shown.bench.picture()
+    assert near(shown.at(0, 0, picture), 230, 230, 230)
+    assert near(shown.at(1.9, 0, picture), 115, 115, 115, tolerance=10)
+    display.style = "Spheres"
+    picture = shown.bench.picture()
+    assert near(shown.at(0, 0, picture), 255, 255, 255)
+    assert near(shown.at(1, 0, picture), 242, 242, 242)
+    assert near(shown.at(1.9, 0, picture), 207, 207, 207, tolerance=3)
+
+
+def test_a_square_faces_the_eye_across_to_y(bench: SceneBench) -> None:
+    view = bench.load('PointCloud2Display { topic: "/cloud"; size: 3 }')
+    (display,) = view.scene.displays
+    publisher = bench.robot.create_publisher("/cloud", "sensor_msgs/PointCloud2")
+    bench.wait(publisher.subscription_count)
+    publisher.publish(cloud([(0, 0, 0)]))
+    bench.wait(lambda: display.points == 1)
+    # RViz's first view looks from (-x, -y) down at it: the square is seen turned by 35 degrees.
+    rows, columns = np.nonzero((bench.picture() == 255).all(axis=2))
+    box = (np.ptp(rows) + 1) * (np.ptp(columns) + 1)
+    assert 0.4 < len(rows) / box < 0.7
+
+
 def test_clouds_stay_for_the_decay_time(bench: SceneBench, show: Callable[..., Shown]) -> None:
     shown = show("PointCloud2", 'decayTime: 1000; colorTransformer: "FlatColor"')
     for x in (-3, 0, 3):

@@ -406,7 +406,7 @@ class _PointsOnDevice(_OnDevice):
         points = self.drawable
         native = points.style == "points" and self.device.has_point_size
         vertex = "points" if native else "boxes" if points.style == "boxes" else "quads"
-        fragment = "spheres" if points.style == "spheres" else "flat"
+        fragment = points.style if points.style in ("spheres", "boxes") else "flat"
         channel = points.channel if points.channel >= 0 else points.position
         layout = (
             ((points.stride * run.thin, not native),),

@@ -2,6 +2,10 @@
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec4 channel;
 layout(location = 0) out vec4 v_colour;
+layout(location = 1) out vec2 v_corner;
+
+// RViz's light: of the sides towards -x, x, -y, y, -z and z.
+const float LIGHT[6] = float[](0.6, 0.6, 1.0, 0.4, 0.5, 0.9);
 
 void main()
 {
@@ -14,10 +18,9 @@ void main()
     float w = (face & 1) == 0 ? -0.5 : 0.5;
     int axis = face >> 1;
     vec3 offset = axis == 0 ? vec3(w, u, v) : (axis == 1 ? vec3(v, w, u) : vec3(u, v, w));
-    vec3 normal = axis == 0 ? vec3(w, 0, 0) : (axis == 1 ? vec3(0, w, 0) : vec3(0, 0, w));
-    vec3 eye_normal = normalize(mat3(frame.view) * (mat3(object.model) * normal));
     vec4 tint = point_colour(position, channel);
-    v_colour = vec4(tint.rgb * (0.25 + 0.75 * abs(eye_normal.z)), tint.a);
+    v_colour = vec4(tint.rgb * LIGHT[face], tint.a);
+    v_corner = vec2(u, v) * 2.0;
     gl_Position = is_finite(position)
         ? frame.projection * (frame.view * (object.model * vec4(position + offset * size_in_metres(position), 1.0)))
         : NOWHERE;

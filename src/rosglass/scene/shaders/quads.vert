@@ -10,7 +10,12 @@ void main()
     v_corner = vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1) * 2.0 - 1.0;
     vec4 eye = frame.view * (object.model * vec4(position, 1.0));
     if (object.c.w > 0.5) {  // metres
-        eye.xy += v_corner * size_in_metres(position) * 0.5;
+        // As in RViz, they face the eye, and one side is across to the y axis of their frame.
+        vec3 at = frame.viewport.w > 0.5 ? vec3(0.0, 0.0, 1.0) : normalize(-eye.xyz);
+        vec3 right = cross((frame.view * object.model[1]).xyz, at);
+        right = dot(right, right) > 1e-12 ? normalize(right) : vec3(1.0, 0.0, 0.0);
+        vec3 up = cross(at, right);
+        eye.xyz += (v_corner.x * right + v_corner.y * up) * size_in_metres(position) * 0.5;
         gl_Position = frame.projection * eye;
     } else {
         gl_Position = frame.projection * eye;
