@@ -5,7 +5,7 @@ SHELL := /bin/bash
 BIN := .venv/bin
 export PYTHON
 
-.PHONY: help demo rviz-demo check test setup dev lint types docs wheel coverage bench clean
+.PHONY: help demo rviz-demo view-demo check test setup dev lint types docs wheel coverage bench clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -17,6 +17,10 @@ demo: ## open the demo cockpit on a simulated robot (20 s on a virtual screen wh
 rviz-demo: ## open RViz with a dashboard on a simulated robot (20 s on a virtual screen where there is no display)
 	@scripts/setup.sh rviz-demo
 	@ROSGLASS_QT=pyside2 .venv-system/bin/python -m rosglass.demo.rviz
+
+view-demo: ## open the 3D view of a simulated ROS 2 robot, without RViz (20 s on a virtual screen where there is no display)
+	@scripts/setup.sh demo
+	@$(BIN)/python -m rosglass.demo.view
 
 check: dev ## run lint, types and the quick unit tests, for between two edits
 	@scripts/check.sh
@@ -52,4 +56,4 @@ bench: ## run every benchmark (an hour, half of it watching memory)
 	@scripts/bench.sh
 
 clean: ## remove everything that set-up and builds made
-	@rm -rf .venv .venv-system .venv-rclpy .stamps site dist build demo.png rviz-demo.png htmlcov .coverage* coverage.xml
+	@rm -rf .venv .venv-system .venv-rclpy .stamps site dist build demo.png rviz-demo.png view-demo.png htmlcov .coverage* coverage.xml

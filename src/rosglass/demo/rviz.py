@@ -12,11 +12,15 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rosglass.demo.processes import LEASH, Child, VirtualScreen, start_robot
 from rosglass.errors import Error
 
-__all__ = ["main"]
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+__all__ = ["main", "run_station"]
 
 _FOLDER = Path(__file__).parents[3] / "examples/rviz"
 _SIZE = (1280, 800)
@@ -36,31 +40,59 @@ def main(seconds: float | None = None, picture: Path | None = None) -> int:
     Raises:
         Error: ROS's master is missing, or does not start.
     """
+    files = (str(_FOLDER / "figure1.rviz"), "--overlay", str(_FOLDER / "Dashboard.qml"))
+    command = ["rviz", *files, "--bare"]
+    return run_station("RViz", command, _start_master, seconds, picture, Path("rviz-demo.png"))
+
+
+def run_station(
+    name: str,
+    command: Sequence[str],
+    start_graph: Callable[[ExitStack], str],
+    seconds: float | None,
+    picture: Path | None,
+    default_picture: Path,
+) -> int:
+    """Run a robot and a program that shows it, until that is closed.
+
+    Args:
+        name: Of the program, in messages.
+        command: Of rosglass, without ``--url``.
+        start_graph: Starts what both connect to; returns its URL.
+        seconds: Seconds until it ends by itself; None to run until it is closed.
+        picture: File for a screenshot at that time.
+        default_picture: That file where there is no display.
+
+    Returns:
+        The program's exit code.
+
+    Raises:
+        Error: Something that is needed is missing, or does not start.
+    """
     headless = not os.environ.get("DISPLAY")
     if headless:
-        seconds, picture = seconds or 20.0, picture or Path("rviz-demo.png")
+        seconds, picture = seconds or 20.0, picture or default_picture
     with ExitStack() as stack:
         received = _note_signals(stack)
         if headless:
             screen = VirtualScreen(*_SIZE)
             stack.callback(screen.close)
             os.environ.update(DISPLAY=screen.display, QT_QPA_PLATFORM="xcb")
-            print(f"no display: RViz runs {seconds:g} s on a virtual screen", flush=True)
-        url = _start_master(stack)
+            print(f"no display: {name} runs {seconds:g} s on a virtual screen", flush=True)
+        url = start_graph(stack)
         mode = ("--mode", "autonomous") if headless else ()
         robot = start_robot(url, ("--equipped", "--fps", "15", *mode))
         stack.callback(robot.close)
-        files = (str(_FOLDER / "figure1.rviz"), "--overlay", str(_FOLDER / "Dashboard.qml"))
         ending = []
         if seconds is not None:
-            ending = ["--screenshot", str(picture or "rviz-demo.png"), "--after", str(seconds)]
-        command = ["-m", "rosglass", "rviz", *files, "--bare", "--url", url, *ending]
-        rviz = Child([*LEASH, sys.executable, *command], "RViz")
-        # Both at once: the user has closed RViz, and waits.
-        stack.callback(_close, rviz, robot)
-        code = _wait(rviz, received)
-        if ending and code == 0:  # RViz fails without a picture
-            print(f"picture of RViz: {Path(ending[1]).resolve()}")
+            ending = ["--screenshot", str(picture or default_picture), "--after", str(seconds)]
+        whole = [*LEASH, sys.executable, "-m", "rosglass", *command, "--url", url, *ending]
+        program = Child(whole, name)
+        # Both at once: the user has closed the program, and waits.
+        stack.callback(_close, program, robot)
+        code = _wait(program, received)
+        if ending and code == 0:  # it fails without a picture
+            print(f"picture of {name}: {Path(ending[1]).resolve()}")
         return code
 
 
@@ -113,9 +145,9 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-def _wait(rviz: Child, received: list[int]) -> int:
-    """Wait for RViz, or for a signal to end."""
-    while (code := rviz.poll()) is None and not received:
+def _wait(program: Child, received: list[int]) -> int:
+    """Wait for the program, or for a signal to end."""
+    while (code := program.poll()) is None and not received:
         time.sleep(0.05)
     return 128 + received[0] if received else int(code or 0)
 

@@ -1,0 +1,52 @@
+"""The 3D view as one command: a Zenoh router, a simulated ROS 2 robot, and ``rosglass view``."""
+
+from __future__ import annotations
+
+import socket
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rosglass.demo.rviz import run_station
+from rosglass.errors import Error
+from rosglass.wires.zenoh.router import Router
+
+if TYPE_CHECKING:
+    from contextlib import ExitStack
+
+__all__ = ["main"]
+
+_CONFIG = Path(__file__).parents[3] / "examples/view/robot.rviz"
+
+
+def main(seconds: float | None = None, picture: Path | None = None) -> int:
+    """Run it until the view is closed; without a display, for 20 s and with a picture.
+
+    Args:
+        seconds: Seconds until it ends by itself; None to run until the view is closed.
+        picture: File for a screenshot at that time.
+
+    Returns:
+        The exit code of ``rosglass view``.
+
+    Raises:
+        Error: The router does not start.
+    """
+    command = ["view", str(_CONFIG)]
+    return run_station("the view", command, _start_router, seconds, picture, Path("view-demo.png"))
+
+
+def _start_router(stack: ExitStack) -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    router = stack.enter_context(Router(f"tcp/127.0.0.1:{port}"))
+    print(f"started a Zenoh router on port {port}", flush=True)
+    return router.url
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except Error as error:
+        sys.exit(f"rosglass: {error}")
