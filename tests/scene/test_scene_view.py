@@ -198,3 +198,37 @@ def test_picking_finds_the_nearest_drawable(bench: SceneBench) -> None:
     assert view.pick(2, 2) is None
     box.pose = instance_matrix((50, 50, 0))
     assert view.pick(middle.x, middle.y) is None
+
+
+def test_data_that_is_ahead_of_its_transform_is_no_error_for_a_second(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    view = bench.load('PathDisplay { topic: "/plan" }')
+    (path,) = view.scene.displays
+    publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
+    broadcaster = TransformBroadcaster(bench.robot)
+    bench.wait(publisher.subscription_count)
+
+    def send(sec: int) -> None:
+        before = path.received
+        header = {"frame_id": "odom", "stamp": {"sec": sec, "nanosec": 0}}
+        publisher.publish({"header": header})
+        bench.wait(lambda: path.received > before)
+
+    def move(sec: int) -> None:
+        broadcaster.send_transform(
+            Transform((0, 0, 0), (0, 0, 0, 1), Time.from_parts(sec, 0), "map", "odom")
+        )
+
+    send(5)
+    assert "no transform from [odom]" in path.statusText
+    move(5)
+    bench.wait(lambda: path.statusLevel == "ok")
+    send(6)
+    assert path.statusLevel == "ok"
+    move(6)
+    bench.wait(lambda: not path._waiting)
+    path._placed_at -= 2
+    send(7)
+    assert path.statusLevel == "error"

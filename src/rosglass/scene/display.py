@@ -9,6 +9,7 @@ from :class:`TopicDisplay` and implements :meth:`TopicDisplay.show`.
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections import deque
@@ -72,6 +73,8 @@ _DURABILITY = {
 }
 #: Messages that wait for the GUI thread or their transforms, of displays that show each.
 _MOST_WAITING = 1000
+#: Seconds for which data may wait for its transform before that is an error.
+_LATE_S = 1.0
 #: Opacity of data whose publisher or connection is gone.
 OUTDATED_ALPHA = 0.35
 
@@ -146,6 +149,8 @@ class Display(Configurable, TopicElement):
         self._name = ""
         #: What a ``.rviz`` file had for it.
         self.saved: dict[str, Any] = {}
+        #: When a frame was found last, by the clock of :func:`time.monotonic`.
+        self._placed_at = -math.inf
         #: The group that it is in; None for none.
         self.group: Display | None = None
         super().__init__(parent, runtime)
@@ -281,8 +286,11 @@ class Display(Configurable, TopicElement):
         try:
             found = self.scene.look_up(frame, stamp)
         except TransformException as error:
-            self.set_status(status, "error", f"no transform from [{frame}]: {error}")
+            # Transforms of a moment often come after the data: only a delay is an error.
+            if not stamp or time.monotonic() - self._placed_at > _LATE_S:
+                self.set_status(status, "error", f"no transform from [{frame}]: {error}")
             return None
+        self._placed_at = time.monotonic()
         self.set_status(status, "ok", "Transform OK")
         return found
 
