@@ -28,11 +28,14 @@ from rosglass.scene.views import VIEWS, create_view
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import NDArray
 
     from rosglass.qml.runtime import Runtime
     from rosglass.scene.camera import Camera
     from rosglass.scene.display import Display
+    from rosglass.scene.drawing import Drawable
     from rosglass.scene.picking import Hit
     from rosglass.scene.rviz_config import RvizConfig
     from rosglass.scene.views import ViewController
@@ -81,7 +84,7 @@ class SceneView(QQuickRhiItem):
         #: What the view itself draws into the scene: its tools, the marks of what is selected.
         self.overlay = Group()
         #: What is selected.
-        self._selection = Selection(self)
+        self._selection = Selection(self, self.overlay, self._drawables, self.camera)
         self.sceneChanged.connect(self._selection.clear)
         self._scene = Scene(self, runtime)
         self._watch_scene()
@@ -114,7 +117,7 @@ class SceneView(QQuickRhiItem):
         self._focal.visible = False
         self.overlay.add(self._focal)
         #: The tools, and the one that has the mouse.
-        self._tools = Tools(self)
+        self._tools = Tools(self, runtime)
         self._tools.currentChanged.connect(self.toolChanged)
         self._tools.statusTextChanged.connect(self.statusTextChanged)
         #: The tool that QML wants, which may be declared further down.
@@ -425,7 +428,10 @@ class SceneView(QQuickRhiItem):
             y: The same, from its upper edge.
             radius: How far from there points and lines may be.
         """
-        return pick(self.scene.root.drawables(), self.camera(), x, y, radius)
+        return pick(self._drawables(), self.camera(), x, y, radius)
+
+    def _drawables(self) -> Iterator[tuple[Drawable, NDArray[np.float64], float]]:
+        return self.scene.root.drawables()
 
     def geometryChange(self, new: Any, old: Any) -> None:
         """Draw in the new size."""
@@ -450,7 +456,7 @@ class SceneView(QQuickRhiItem):
         if any(one.draws_in_software for one in self._renderers) != self.scene.draws_in_software:
             QtCore.QTimer.singleShot(0, self, self._report_device)
         return Frame(
-            list(self.scene.root.drawables()),
+            list(self._drawables()),
             self.camera(),
             self._background,
             window.effectiveDevicePixelRatio() if window is not None else 1.0,

@@ -15,12 +15,12 @@ from rosglass.scene.picking import Selected, pick, select
 from rosglass.scene.settings import Configurable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from numpy.typing import NDArray
 
+    from rosglass.scene.camera import Camera
     from rosglass.scene.drawing import Drawable
-    from rosglass.scene.scene_view import SceneView
 
 __all__ = ["Change", "SelectedPart", "Selection"]
 
@@ -43,6 +43,9 @@ _CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)],
 _EDGES = np.array(
     [(a, b) for a in range(8) for b in range(a + 1, 8) if bin(a ^ b).count("1") == 1], np.intp
 )
+
+
+_Placed = tuple["Drawable", "NDArray[np.float64]", float]
 
 
 class SelectedPart(NamedTuple):
@@ -76,6 +79,9 @@ class Selection(QtCore.QObject):
 
     Args:
         view: The view.
+        overlay: Where the boxes are drawn.
+        drawables: Returns what is drawn, see :meth:`rosglass.scene.drawing.Group.drawables`.
+        camera: Returns the view's camera.
     """
 
     changed = Signal()
@@ -85,13 +91,19 @@ class Selection(QtCore.QObject):
     #: What is selected, at most 200 parts: ``display``, ``part`` and ``lines`` of name and value.
     parts = Property(_LIST, lambda self: self._for_qml(), notify=changed)
 
-    def __init__(self, view: SceneView) -> None:
+    def __init__(
+        self,
+        view: QtCore.QObject,
+        overlay: Group,
+        drawables: Callable[[], Iterable[_Placed]],
+        camera: Callable[[], Camera],
+    ) -> None:
         super().__init__(view)
-        self._view = view
+        self._drawables, self._camera = drawables, camera
         self._marked: dict[Drawable, _Marked] = {}
         self._lines = Lines(1.5)
         self._root = Group(self._lines)
-        view.overlay.add(self._root)
+        overlay.add(self._root)
         self._timer = single_shot(self, self._follow)
 
     def __len__(self) -> int:
@@ -107,7 +119,7 @@ class Selection(QtCore.QObject):
             y: The same, from its upper edge.
             change: Whether it replaces the selection, is added or removed.
         """
-        hit = pick(self._view.scene.root.drawables(), self._view.camera(), x, y)
+        hit = pick(self._drawables(), self._camera(), x, y)
         found = [] if hit is None else [Selected(hit.drawable, np.array([hit.number]))]
         self.apply(found, change)
 
@@ -121,8 +133,7 @@ class Selection(QtCore.QObject):
             opposite: The corner across.
             change: Whether it replaces the selection, is added or removed.
         """
-        drawables = self._view.scene.root.drawables()
-        self.apply(select(drawables, self._view.camera(), corner, opposite), change)
+        self.apply(select(self._drawables(), self._camera(), corner, opposite), change)
 
     def apply(self, found: Iterable[Selected], change: Change = "replace") -> None:
         """Replace the selection, add to it or remove from it."""
@@ -146,7 +157,7 @@ class Selection(QtCore.QObject):
 
     def items(self) -> list[SelectedPart]:
         """Return what is selected, at most 200 parts."""
-        poses = {drawable: pose for drawable, pose, _ in self._view.scene.root.drawables()}
+        poses = {drawable: pose for drawable, pose, _ in self._drawables()}
         found: list[SelectedPart] = []
         for drawable, marked in self._marked.items():
             indices = marked.indices[: _MAX_DESCRIBED - len(found)]
@@ -186,7 +197,7 @@ class Selection(QtCore.QObject):
         """Return the corners of the boxes, (n, 8, 3), in the fixed frame."""
         found = [np.zeros((0, 8, 3))]
         left = _MAX_BOXES
-        for drawable, pose, _ in self._view.scene.root.drawables():
+        for drawable, pose, _ in self._drawables():
             marked = self._marked.get(drawable)
             if marked is not None and left > 0:
                 local = _boxes(drawable, marked.indices[:left])
@@ -219,10 +230,10 @@ class Selection(QtCore.QObject):
     @Slot()
     def _follow(self) -> None:
         """Drop what is gone, and move the boxes with the rest."""
-        if not is_alive(self) or not is_alive(self._view):
+        if not is_alive(self):
             return
         before = len(self)
-        drawn = {drawable for drawable, _, _ in self._view.scene.root.drawables()}
+        drawn = {drawable for drawable, _, _ in self._drawables()}
         for drawable, marked in list(self._marked.items()):
             gone = drawable not in drawn
             if isinstance(drawable, (Points, MapImage)):

@@ -11,7 +11,7 @@ from __future__ import annotations
 import logging
 import time
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -29,13 +29,16 @@ from rosglass.scene.rviz_formats import TOOLS, ros_of, tool_type
 from rosglass.scene.settings import Configurable, Setting
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from rosglass.qml.runtime import Runtime
+    from rosglass.scene.camera import Camera
     from rosglass.scene.picking import Hit
-    from rosglass.scene.scene_view import SceneView
+    from rosglass.scene.scene import Scene
+    from rosglass.scene.selection import Selection
+    from rosglass.scene.views import ViewController
 
-__all__ = ["DEFAULT_TOOLS", "PointerEvent", "Tool", "Tools"]
+__all__ = ["DEFAULT_TOOLS", "PointerEvent", "Tool", "ToolView", "Tools"]
 
 _log = logging.getLogger("rosglass.scene")
 
@@ -68,6 +71,42 @@ _CURSORS = {
 }
 
 
+class ToolView(Protocol):
+    """What tools use of their view, a ``SceneView``; see there."""
+
+    scene: Scene
+    overlay: Group
+
+    @property
+    def controller(self) -> ViewController:
+        """What moves the camera."""
+
+    @property
+    def selection(self) -> Selection:
+        """What is selected."""
+
+    def camera(self) -> Camera:
+        """Return the camera of the next picture."""
+
+    def pick(self, x: float, y: float) -> Hit | None:
+        """Return what is nearest to the camera at a point of the view."""
+
+    def move_camera(self, change: Callable[[ViewController], bool | None]) -> bool:
+        """Turn the camera to another view; return whether there was a change."""
+
+    def width(self) -> float:
+        """Return its width."""
+
+    def height(self) -> float:
+        """Return its height."""
+
+    def cursor(self) -> QtGui.QCursor:
+        """Return the cursor of the mouse."""
+
+    def setCursor(self, cursor: QtCore.Qt.CursorShape, /) -> None:  # noqa: N802 - Qt's name
+        """Change the cursor of the mouse."""
+
+
 class PointerEvent:
     """An event of the mouse, or of one finger as its left button.
 
@@ -84,7 +123,7 @@ class PointerEvent:
 
     def __init__(
         self,
-        view: SceneView,
+        view: ToolView,
         at: tuple[float, float],
         moved: tuple[float, float] = (0.0, 0.0),
         button: Button = Button.NONE,
@@ -192,7 +231,7 @@ class Tool(Configurable, Element):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         self.root = Group()
-        self.view: SceneView | None = None
+        self.view: ToolView | None = None
         self._tools: Tools | None = None
         self._name = ""
         self._key: str | None = None
@@ -248,7 +287,8 @@ class Tool(Configurable, Element):
 
     def _find_runtime(self) -> Runtime | None:
         if self._runtime is None and self.view is not None:
-            self._runtime = runtime_of(self) or runtime_of(self.view)
+            view: Any = self.view
+            self._runtime = runtime_of(self) or runtime_of(view)
         return self._runtime or super()._find_runtime()
 
     @Slot()
@@ -329,7 +369,7 @@ class Tool(Configurable, Element):
         """Return the text for the status bar."""
         return self.statusText
 
-    def join(self, view: SceneView, tools: Tools) -> None:
+    def join(self, view: ToolView, tools: Tools) -> None:
         """Belong to a view; called by its list of tools."""
         self.view, self._tools = view, tools
         view.overlay.add(self.root)
@@ -362,6 +402,7 @@ class Tools(QtCore.QObject):
 
     Args:
         view: The view.
+        runtime: The engine's runtime, if the view was made for one.
     """
 
     #: Another tool is the current one.
@@ -380,9 +421,10 @@ class Tools(QtCore.QObject):
     #: What the current tool says, or for some seconds what one has done.
     statusText = ReadOnly(str, "")
 
-    def __init__(self, view: SceneView) -> None:
+    def __init__(self, view: Any, runtime: Runtime | None = None) -> None:
         super().__init__(view)
-        self._view = view
+        self._view: ToolView = view
+        self._runtime = runtime
         self._items: list[Tool] = []
         self._current: Tool | None = None
         #: Who has the drag in progress: "tool", "camera", or "none" after it was cancelled.
@@ -454,7 +496,7 @@ class Tools(QtCore.QObject):
                 raise Error(f"there is no tool {shown(tool)}{hint}")
         if kind is None:
             raise ArgumentError("tool", tool, "a Tool, a class of it or the name of one")
-        made = kind(self._view, self._view._runtime)
+        made = kind(self.parent(), self._runtime)
         if isinstance(tool, str) and "/" in tool:
             made.class_id = tool
         return made

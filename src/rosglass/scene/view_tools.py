@@ -342,9 +342,9 @@ class SelectTool(Tool):
         return view.move_camera(lambda controller: controller.look_at(middle))
 
     def _make_rectangle(self) -> Any:
-        view = self.view
+        view: Any = self.view
         engine = None if view is None else QtQml.qmlEngine(view)
-        if view is None or engine is None:
+        if engine is None:
             return None  # a view without QML; the selection works all the same
         component = QtQml.QQmlComponent(engine)
         component.setData(self._RECTANGLE, QtCore.QUrl())
