@@ -61,6 +61,17 @@ class Hand:
         self.move(end)
         self.release(end, button, keys)
 
+    def wheel(self, at: Any, steps: int) -> None:
+        from PySide6.QtCore import QCoreApplication, QPointF, Qt
+        from PySide6.QtGui import QWheelEvent
+
+        point, turn = QPointF(*at), self._point(0, 120 * steps)
+        event = QWheelEvent(
+            point, point, self._point(), turn, Qt.MouseButton.NoButton, self.NONE,
+            Qt.ScrollPhase.NoScrollPhase, False,
+        )  # fmt: skip
+        QCoreApplication.sendEvent(self.window, event)
+
     def key(self, key: Any, keys: Any = None) -> None:
         self._test.keyClick(self.window, key, keys or self.NONE)
 
@@ -195,6 +206,13 @@ def test_the_mouse_moves_the_camera(bench: SceneBench, hand: Hand) -> None:
     assert view.controller.yaw == pytest.approx(yaw - 0.2)
     hand.drag((200, 150), (200, 170), hand.RIGHT)
     assert view.controller.distance > distance
+
+
+def test_the_wheel_zooms(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load()
+    distance = view.controller.distance
+    hand.wheel((200, 150), 1)
+    assert view.controller.distance == pytest.approx(distance * 0.88)
 
 
 def test_a_change_of_the_view_draws(bench: SceneBench) -> None:
@@ -350,6 +368,30 @@ def test_a_goal_while_disconnected_is_not_sent(bench: SceneBench, hand: Hand) ->
     hand.drag(hand.at((0, 0, 0)), hand.at((1, 0, 0)))
     assert "not sent, for the robot is not connected" in view.statusText
     assert "not connected" in goal.problem
+
+
+def test_a_goal_has_simulated_time(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load()
+    goals = listen(bench, "/goal_pose", "geometry_msgs/PoseStamped")
+    clock = bench.robot.create_publisher("/clock", "rosgraph_msgs/msg/Clock")
+    node = bench.session.node
+    node.parameters.set({"use_sim_time": True})
+
+    def tick() -> bool:
+        clock.publish({"clock": {"sec": 42, "nanosec": 7}})
+        return bool(node.now().nanoseconds == 42_000_000_007)
+
+    bench.wait(tick)
+    view.tool = "SetGoal"
+    hand.drag(hand.at((0, 0, 0)), hand.at((1, 0, 0)))
+    bench.wait(lambda: goals)
+    assert (goals[0].header.stamp.sec, goals[0].header.stamp.nanosec) == (42, 7)
+
+
+def test_the_status_has_no_tags_of_the_robot(bench: SceneBench) -> None:
+    view = bench.load()
+    view.tools.announce('<img src="http://robot/x">')
+    assert view.statusText == '&lt;img src="http://robot/x"&gt;'
 
 
 def test_a_goal_is_sent_to_an_action(bench: SceneBench, hand: Hand, tmp_path: Path) -> None:
@@ -514,6 +556,14 @@ def test_what_is_interactive_gets_the_mouse(bench: SceneBench, hand: Hand) -> No
     hand.move((5, 5))
     assert seen == ["enter", "move", "press", "move", "move", "release", "leave"]
     assert view.controller.yaw == yaw
+    del seen[:]
+    distance = view.controller.distance
+    hand.move(middle)
+    hand.wheel(middle, 1)
+    view.tool = "Measure"
+    assert seen == ["enter", "move", "wheel", "leave"]
+    assert view.controller.distance == distance
+    view.tool = "Interact"
     hand.drag((5, 5), (50, 5))
     assert view.controller.yaw != yaw
 
@@ -581,7 +631,7 @@ def test_a_destroyed_tool_is_forgotten(bench: SceneBench) -> None:
 
 
 def test_tools_of_config_files(bench: SceneBench) -> None:
-    tools = bench.load().tools
+    tools = bench.load('Tool { name: "Mark" }').tools
     notes = tools.load_configs(
         [
             {"Class": "rviz/MoveCamera"},
@@ -601,6 +651,7 @@ def test_tools_of_config_files(bench: SceneBench) -> None:
     assert len(notes) == 1
     assert "tool 'jsk_rviz_plugin/CloseAll': rosglass has no such tool; it is kept" in notes[0]
     assert tools.current is tools.all[0]
+    assert [tool.name for tool in tools][-2:] == ["2D Goal Pose", "Mark"]
     first, second = tools.all[1:3]
     assert (first.topic, first.xDeviation, first.yDeviation) == ("/pose", 0.2, 0.5)
     assert (second.topic, second.xDeviation, second.yDeviation) == ("/pose2", 0.5, 2.0)

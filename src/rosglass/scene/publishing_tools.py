@@ -147,10 +147,10 @@ class PublishingTool(Tool):
             text: What it is, for the status bar, e.g. ``Goal at [1, 2]``.
         """
         self._drop("another one followed")
-        node = self.node
-        if node is None or self._session is None or self._session.state != "connected":
-            why = self._session.detail if self._session is not None else ""
-            self._complain(f"{text}: not sent, for the robot is not connected. {why}".rstrip())
+        sender, why = self._endpoint, self._disconnected()
+        # In ROS 1, subscribers stay connected without the master.
+        if why and (sender is None or not self._subscribers()):
+            self._complain(f"{text}: not sent, for {why}")
             return
         self._waiting = (fields, text, time.monotonic() + _MATCH_TIMEOUT_S)
         self._send_waiting()
@@ -166,7 +166,7 @@ class PublishingTool(Tool):
                 self._drop(self.problem or "the topic could not be advertised in time")
             return
         try:
-            count = sender.subscription_count()
+            count = self._subscribers()
             if not count and now < self._created_at + _MATCH_TIMEOUT_S:
                 return
             self._waiting = None
@@ -175,11 +175,28 @@ class PublishingTool(Tool):
             self._waiting = None
             self._complain(f"{text}: not sent: {error}")
             return
-        if count:
+        why = self._disconnected()
+        if why:
+            self._complain(f"{text}: sent on {sender.topic}, but {why}")
+        elif count:
             self._set_problem("")
             self.announce(f"{text}: sent on {sender.topic}")
         else:
             self._complain(f"{text}: sent on {sender.topic}, which has no subscriber{self._hint()}")
+
+    def _subscribers(self) -> int:
+        try:
+            return int(self._endpoint.subscription_count())
+        except Error:
+            return 0
+
+    def _disconnected(self) -> str:
+        """Return in words that the robot is not connected; empty if it is."""
+        session = self._session
+        if session is not None and self.node is not None and session.state == "connected":
+            return ""
+        detail = session.detail if session is not None else ""
+        return f"the robot is not connected{f': {detail}' if detail else ''}"
 
     def _hint(self) -> str:
         node, sender = self.node, self._endpoint

@@ -512,9 +512,10 @@ class SceneView(QQuickRhiItem):
         """Give a press to the tool, or start to drag the camera."""
         self.forceActiveFocus(Qt.FocusReason.MouseFocusReason)
         self._stop_turning()
-        self._tools.on_press(self._event(event))
-        self._show_focal_shape()
         event.accept()
+        self._tools.on_press(self._event(event))
+        if is_alive(self):
+            self._show_focal_shape()
 
     def mouseMoveEvent(self, event: Any) -> None:
         """Give a drag to the tool, or drag the camera."""
@@ -523,9 +524,10 @@ class SceneView(QQuickRhiItem):
 
     def mouseReleaseEvent(self, event: Any) -> None:
         """End a drag."""
-        self._tools.on_release(self._event(event))
-        self._show_focal_shape()
         event.accept()
+        self._tools.on_release(self._event(event))
+        if is_alive(self):
+            self._show_focal_shape()
 
     def mouseUngrabEvent(self) -> None:
         """Drop a drag that another item has taken over."""
@@ -536,6 +538,12 @@ class SceneView(QQuickRhiItem):
     def hoverMoveEvent(self, event: Any) -> None:
         """Show what is under the mouse."""
         self._tools.on_move(self._event_at(event.position(), event))
+
+    def hoverLeaveEvent(self, event: Any) -> None:
+        """Show nothing any more of what was under the mouse."""
+        super().hoverLeaveEvent(event)
+        if is_alive(self):
+            self._tools.on_leave()
 
     def wheelEvent(self, event: Any) -> None:
         """Zoom."""

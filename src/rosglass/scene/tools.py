@@ -11,6 +11,7 @@ from __future__ import annotations
 import logging
 import time
 from functools import cached_property
+from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
@@ -320,6 +321,9 @@ class Tool(Configurable, Element):
     def on_cancel(self) -> None:
         """Drop what was begun by a press: another button, Escape, or a second finger."""
 
+    def on_leave(self) -> None:
+        """Follow the mouse out of the view."""
+
     def on_wheel(self, event: PointerEvent, wheel: Wheel) -> bool:  # noqa: ARG002 - for subclasses
         """Handle the wheel; return whether it was used, and does not move the camera."""
         return False
@@ -600,7 +604,7 @@ class Tools(QtCore.QObject):
         self._show_status()
 
     def load_configs(self, configs: Iterable[Mapping[str, Any]]) -> list[str]:
-        """Replace all tools by those of a ``.rviz`` file.
+        """Replace RViz's tools by those of a ``.rviz`` file; own tools stay, after them.
 
         Args:
             configs: The settings of each, with ``Class``.
@@ -609,7 +613,10 @@ class Tools(QtCore.QObject):
             What was left out, a line each.
         """
         notes = []
-        self.clear()
+        self._make_current(None)
+        for tool in list(self._items):
+            if tool.class_id:
+                self.remove(tool)
         self._unknown = {}
         for number, settings in enumerate(configs):
             class_id = settings.get("Class")
@@ -622,6 +629,9 @@ class Tools(QtCore.QObject):
             notes += [f"tool {tool.name!r}: {text}" for text in tool.load_settings(settings)]
             tool.saved, tool.loaded = dict(settings), tool.values()
             self.adopt(tool)
+        self._items.sort(key=lambda tool: not tool.class_id)
+        self._make_current(self.default)
+        self.changed.emit()
         return notes
 
     def save_configs(self, ros: int) -> list[dict[str, Any]]:
@@ -655,8 +665,9 @@ class Tools(QtCore.QObject):
             self.announce(outcome)
 
     def announce(self, outcome: str) -> None:
-        """Show for some seconds what a tool has done."""
-        self._outcome, self._outcome_at = outcome, time.monotonic()
+        """Show for some seconds what a tool has done, as plain text."""
+        # Names and errors are the robot's: they must not become tags.
+        self._outcome, self._outcome_at = escape(outcome, quote=False), time.monotonic()
         self._outcome_end.start(int(_OUTCOME_S * 1000) + 50)
         self._show_status()
 
@@ -715,6 +726,12 @@ class Tools(QtCore.QObject):
             self._grab = ""
         self._follow(event)
 
+    def on_leave(self) -> None:
+        """Handle that the mouse has left the view."""
+        tool = self._current
+        if tool is not None and not self._grab:
+            self._call(tool, tool.on_leave)
+
     def on_wheel(self, event: PointerEvent, wheel: Wheel) -> None:
         """Handle the wheel."""
         tool = self._current
@@ -771,6 +788,8 @@ class Tools(QtCore.QObject):
 
     def _follow(self, event: PointerEvent) -> None:
         """Show the cursor and the status."""
+        if not is_alive(self):
+            return  # a handler has destroyed the view
         self.on_modifiers(event.modifiers)
         tool, controller = self._current, self._view.controller
         if self._grab == "camera" or tool is None:
@@ -785,11 +804,13 @@ class Tools(QtCore.QObject):
         try:
             return handler(*arguments)
         except Error as error:
-            self.announce(f"{tool.label}: {error}")
-            tool._log(f"{tool.label}: {error}", logging.ERROR)
+            text = f"{tool.label}: {error}"
+            tool._log(text, logging.ERROR)
         except Exception as error:
+            text = f"{tool.label}: {error!r}"
             _log.exception("%s", tool.label)
-            self.announce(f"{tool.label}: {error!r}")
+        if is_alive(self):
+            self.announce(text)
         return None
 
 

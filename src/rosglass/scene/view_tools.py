@@ -88,7 +88,10 @@ class InteractTool(MoveCameraTool):
         return self._focused
 
     def _focus(self, event: PointerEvent) -> None:
-        owner = None if event.hit is None else event.hit.drawable.owner
+        # Picking takes milliseconds: not at every move over a scene without such objects.
+        drawables = [one for one, _, _ in event.view.scene.root.drawables()]
+        is_any = any(hasattr(one.owner, "handle_pointer") for one in drawables)
+        owner = event.hit.drawable.owner if is_any and event.hit is not None else None
         found = owner if hasattr(owner, "handle_pointer") else None
         if found is not self._focused:
             before, self._focused = self._focused, found
@@ -125,6 +128,10 @@ class InteractTool(MoveCameraTool):
             focused.handle_pointer("cancel", PointerEvent(self.view, (0.0, 0.0)))
 
     def deactivate(self) -> None:
+        """Leave what was under the mouse."""
+        self.on_leave()
+
+    def on_leave(self) -> None:
         """Leave what was under the mouse."""
         focused, self._focused = self._focused, None
         if focused is not None and self.view is not None:
