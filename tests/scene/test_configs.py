@@ -98,15 +98,13 @@ Visualization Manager:
 
 
 def test_a_new_view_is_written_for_either_rviz(bench: SceneBench, tmp_path: Path) -> None:
-    from rosglass.scene.view_config import collect_config
-
     view = bench.load()
     view.scene.add("Grid")
     view.scene.add("MarkerArray" if "MarkerArray" in view.scene.TYPES else "Path", topic="/m")
     with pytest.raises(Error, match="no config file is loaded; say where to save it"):
         view.save_config()
     for ros, package in ((1, "rviz"), (2, "rviz_default_plugins")):
-        config = collect_config(view, ros)
+        config = view.collect_config(ros)
         assert [one.class_id.partition("/")[0] for one in config.displays] == [package] * 2
         file = tmp_path / f"new{ros}.rviz"
         config.save(file)

@@ -10,6 +10,7 @@ from typing import Any
 from PySide6.QtCore import QUrl
 from PySide6.QtQml import qmlRegisterType
 
+from rosglass.scene.display_configs import GroupDisplay
 from rosglass.scene.displays.geometry import (
     AccelStampedDisplay,
     PointStampedDisplay,
@@ -50,7 +51,6 @@ from rosglass.scene.publishing_tools import (
 from rosglass.scene.scene import Scene
 from rosglass.scene.scene_view import SceneView
 from rosglass.scene.tools import Tool, Tools
-from rosglass.scene.view_config import GroupDisplay
 from rosglass.scene.view_tools import (
     FocusCameraTool,
     InteractTool,

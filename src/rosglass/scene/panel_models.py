@@ -12,8 +12,8 @@ from rosglass.errors import Error
 from rosglass.interfaces.names import ros1_name
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.scene.display import TopicDisplay
+from rosglass.scene.display_configs import GroupDisplay, UnknownDisplay
 from rosglass.scene.scene_view import SceneView
-from rosglass.scene.view_config import GroupDisplay, UnknownDisplay
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

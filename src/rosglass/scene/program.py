@@ -14,7 +14,6 @@ from rosglass.qml.properties import ReadOnly, report
 from rosglass.qml.runtime import runtime_of
 from rosglass.qt import QtCore, Slot, is_alive
 from rosglass.scene.rviz_config import RvizConfig
-from rosglass.scene.view_config import apply_config, collect_config
 
 if TYPE_CHECKING:
     import os
@@ -124,8 +123,7 @@ class ViewProgram(QtCore.QObject):
 
     def _show(self, config: RvizConfig) -> None:
         assert self._view is not None
-        notes = apply_config(self._view, config)
-        self._view.config = config
+        notes = self._view.show_config(config)
         for note in notes:
             _log.warning("%s: %s", config.source, note)
         report(self, configName=Path(config.source).name)
@@ -144,7 +142,7 @@ class ViewProgram(QtCore.QObject):
         """Return the config as it would be saved, for a look at whether it has changed."""
         if self._view is None:
             return ""
-        config = collect_config(self._view)
+        config = self._view.collect_config()
         views = config.manager.get("Views", {})
         # Where the camera stands is no change worth a question.
         current = views.pop("Current", None)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from PySide6.QtCore import Qt
@@ -16,14 +16,19 @@ from rosglass.errors import Error
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.rviz.orbit import ease
 from rosglass.scene.camera import interpolate
+from rosglass.scene.display_configs import (
+    collect_displays,
+    create_saved_view,
+    show_displays,
+)
 from rosglass.scene.drawing import SPHERE, Group, Mesh, instance_matrix
 from rosglass.scene.events import Button, Modifier, Touch, Wheel
 from rosglass.scene.picking import pick
 from rosglass.scene.renderer import Frame, SceneRenderer
+from rosglass.scene.rviz_config import RvizConfig, ToolConfig, ViewConfig
 from rosglass.scene.scene import Scene
 from rosglass.scene.selection import Selection
 from rosglass.scene.tools import PointerEvent, Tool, Tools
-from rosglass.scene.view_config import collect_config, load_config
 from rosglass.scene.views import VIEWS, create_view
 
 if TYPE_CHECKING:
@@ -37,7 +42,6 @@ if TYPE_CHECKING:
     from rosglass.scene.display import Display
     from rosglass.scene.drawing import Drawable
     from rosglass.scene.picking import Hit
-    from rosglass.scene.rviz_config import RvizConfig
     from rosglass.scene.views import ViewController
 
 __all__ = ["NO_GPU", "SceneView"]
@@ -343,7 +347,38 @@ class SceneView(QQuickRhiItem):
         Raises:
             Error: It cannot be read; nothing has changed then.
         """
-        return load_config(self, path)
+        return self.show_config(RvizConfig.load(path))
+
+    def show_config(self, config: RvizConfig) -> list[str]:
+        """Replace what is shown by a config; return what was left out, a line each."""
+        notes = show_displays(self.scene, config)
+        red, green, blue, _ = config.background_color
+        self.setProperty("background", QColor.fromRgbF(red, green, blue))
+        if config.tools:
+            notes += self.tools.load_configs(one.settings for one in config.tools)
+        saved = config.current_view
+        made = None if saved is None else create_saved_view(saved, notes)
+        if made is not None:
+            self.show_view(made)
+        self.config = config
+        return notes
+
+    def collect_config(self, ros: int = 2) -> RvizConfig:
+        """Return the config of what is shown, with what its file had beside that.
+
+        Args:
+            ros: The RViz that a new config is for, 1 or 2.
+        """
+        config = self.config or RvizConfig(ros)
+        config.fixed_frame = self.scene.fixed_frame
+        config.background_color = cast("tuple[float, ...]", self._background.getRgbF())
+        config.displays[:] = collect_displays(self.scene, config.ros)
+        config.tools[:] = [ToolConfig(one) for one in self.tools.save_configs(config.ros)]
+        state = self._view.state()
+        current = config.current_view
+        before = {} if current is None else current.settings
+        config.current_view = ViewConfig({**before, **state})
+        return config
 
     def save_config(self, path: str | os.PathLike[str] = "") -> None:
         """Write what is shown into an RViz config.
@@ -354,7 +389,7 @@ class SceneView(QQuickRhiItem):
         Raises:
             Error: It cannot be written, or none was loaded.
         """
-        config = collect_config(self)
+        config = self.collect_config()
         if not (path or config.source):
             raise Error("no config file is loaded; say where to save it")
         config.save(path or config.source)

@@ -1,4 +1,4 @@
-"""Takes RViz's config files (``.rviz``) into a view, and writes a view into one.
+"""Makes the displays and views of RViz's config files (``.rviz``), and writes them into one.
 
 What rosglass does not know is kept and written back: displays of other plugins become displays that
 say so (:class:`UnknownDisplay`), settings stay beside those that are known.
@@ -9,19 +9,23 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
-from rosglass.qt import QtGui
 from rosglass.scene.display import Display
-from rosglass.scene.rviz_config import DisplayConfig, RvizConfig, ToolConfig, ViewConfig
+from rosglass.scene.rviz_config import DisplayConfig
 from rosglass.scene.rviz_formats import DISPLAYS, class_id_of, ros_of, view_type
 from rosglass.scene.views import VIEWS, create_view
 
 if TYPE_CHECKING:
-    import os
-
+    from rosglass.scene.rviz_config import RvizConfig, ViewConfig
     from rosglass.scene.scene import Scene
-    from rosglass.scene.scene_view import SceneView
+    from rosglass.scene.views import ViewController
 
-__all__ = ["GroupDisplay", "UnknownDisplay", "apply_config", "collect_config", "load_config"]
+__all__ = [
+    "GroupDisplay",
+    "UnknownDisplay",
+    "collect_displays",
+    "create_saved_view",
+    "show_displays",
+]
 
 
 class UnknownDisplay(Display):
@@ -57,43 +61,21 @@ class GroupDisplay(Display):
                     display.on_group_enabled()
 
 
-def load_config(view: SceneView, path: str | os.PathLike[str]) -> list[str]:
-    """Replace what a view shows by a config.
-
-    Args:
-        view: The view.
-        path: The file.
+def show_displays(scene: Scene, config: RvizConfig) -> list[str]:
+    """Replace the displays and the fixed frame of a scene by those of a config.
 
     Returns:
         What was left out, a line each.
-
-    Raises:
-        Error: It cannot be read; nothing has changed then.
     """
-    config = RvizConfig.load(path)
-    notes = apply_config(view, config)
-    view.config = config
-    return notes
-
-
-def apply_config(view: SceneView, config: RvizConfig) -> list[str]:
-    """Replace what a view shows; see :func:`load_config`."""
     notes = list(config.warnings)
-    scene = view.scene
     for display in scene.displays:
         scene.remove(display)
     try:
         scene.fixed_frame = config.fixed_frame or "map"
     except Error as error:
         notes.append(f"Fixed Frame: {error}")
-    red, green, blue, _ = config.background_color
-    view.setProperty("background", QtGui.QColor.fromRgbF(red, green, blue))
     for one in config.displays:
         _add(scene, one, None, notes)
-    if config.tools:
-        notes += view.tools.load_configs(one.settings for one in config.tools)
-    if config.current_view is not None:
-        _show_view(view, config.current_view, notes)
     return notes
 
 
@@ -121,41 +103,25 @@ def _add(scene: Scene, one: DisplayConfig, group: GroupDisplay | None, notes: li
             _add(scene, inner, display, notes)
 
 
-def _show_view(view: SceneView, saved: ViewConfig, notes: list[str]) -> None:
+def create_saved_view(saved: ViewConfig, notes: list[str]) -> ViewController | None:
+    """Return the view that a config has; None, with a note, for one that rosglass does not have."""
     kind = view_type(saved.class_id)
     if kind not in VIEWS:
-        notes.append(f"view {saved.class_id}: rosglass has none; Orbit is used")
-        return
+        notes.append(f"view {saved.class_id}: rosglass has none; the view stays as it is")
+        return None
     made = create_view(saved.class_id)
     notes += [f"view {kind}: {text}" for text in made.restore(saved.settings)]
-    view.show_view(made)
+    return made
 
 
-def collect_config(view: SceneView, ros: int = 2) -> RvizConfig:
-    """Return the config of what a view shows, with what its file had beside that.
+def collect_displays(scene: Scene, ros: int, group: Display | None = None) -> list[DisplayConfig]:
+    """Return the displays of a scene for a config, with what its file had beside that.
 
     Args:
-        view: The view.
-        ros: The RViz that a new file is for, 1 or 2; the file's own if there is one.
+        scene: The scene.
+        ros: The RViz that the config is for, 1 or 2.
+        group: The group whose displays are wanted; None for those in no group.
     """
-    config = view.config or RvizConfig(ros)
-    scene = view.scene
-    config.fixed_frame = scene.fixed_frame
-    config.background_color = view.property("background").getRgbF()
-    del config.displays[:]
-    config.displays.extend(_collect(scene, None, config.ros))
-    config.tools[:] = [ToolConfig(one) for one in view.tools.save_configs(config.ros)]
-    state = view.controller.state()
-    current = config.current_view
-    if current is None:
-        config.current_view = ViewConfig(state)
-    else:
-        current.settings = {**current.settings, **state}
-        config.current_view = current
-    return config
-
-
-def _collect(scene: Scene, group: Display | None, ros: int) -> list[DisplayConfig]:
     found = []
     for display in scene.displays:
         if display.group is not group:
@@ -173,6 +139,6 @@ def _collect(scene: Scene, group: Display | None, ros: int) -> list[DisplayConfi
             one.settings = display.save_settings(one.settings, ros)
         one.name, one.enabled = display.name, display.enabled
         if isinstance(display, GroupDisplay):
-            one.settings["Displays"] = _collect(scene, display, ros)
+            one.settings["Displays"] = collect_displays(scene, ros, display)
         found.append(one)
     return found
