@@ -280,7 +280,7 @@ def test_a_picked_point_has_all_fields(bench: SceneBench, show: Callable[..., Sh
     described = dict(hit.drawable.owner.describe(hit.number))
     point = int(described["Point"])
     assert described["3: intensity"] == str(point)
-    assert described["Position"] == "; ".join(
+    assert described["Position in map"] == "; ".join(
         f"{float(np.float32(value)):.6g}" for value in rows[point][:3]
     )
     assert max(abs(rows[point][0] - x), abs(rows[point][1] - y)) <= 0.6
@@ -458,8 +458,12 @@ def test_a_depth_image_is_a_cloud_of_squares_of_its_pixels(bench: SceneBench) ->
     white = int((picture == 255).all(axis=2).sum())
     # Pixels of 4 m at (-2, 2) and (2, 2), one of 8 m at (4, -4) below these.
     assert white == pytest.approx((2 * 16 + 64) * PIXELS_PER_M**2, rel=0.03)
+    corner = bench.view.pick(CENTER[1] + 70, CENTER[0] + 70, 0.0)
+    assert corner is not None
+    assert corner.point == pytest.approx((4, -4, 2))
     display.autoSize = False
     display.size = 1.0
+    assert bench.view.pick(CENTER[1] + 70, CENTER[0] + 70, 0.0) is None
     white = int((bench.picture() == 255).all(axis=2).sum())
     assert white == pytest.approx(3 * PIXELS_PER_M**2, rel=0.03)
     hit = bench.view.pick(CENTER[1] + 40, CENTER[0] + 40, 1.0)
@@ -524,3 +528,21 @@ def test_a_depth_cloud_keeps_its_topics_in_files() -> None:
         kept = display.save_settings(saved, ros)
         assert {key: kept[key] for key in saved} == saved
         assert "Topic" not in kept
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_a_depth_image_of_either_ros_is_a_cloud(ros: int) -> None:
+    from rosglass.messages import load
+    from rosglass.scene.displays.point_cloud import DepthCloudDisplay
+
+    def received(name: str, value: dict[str, Any]) -> Any:
+        kind = load(f"sensor_msgs/msg/{name}", ros=ros)
+        return kind.decode(kind.encode(value))
+
+    prepare = DepthCloudDisplay().preparer()
+    camera = {"P" if ros == 1 and name == "p" else name: value for name, value in CAMERA.items()}
+    assert prepare(received("CameraInfo", {**camera, "binning_x": 2})) is None
+    data = np.array([1000, 0, 0, 2000], "<u2").tobytes()
+    found = prepare(received("Image", {**DEPTH, "data": data}))
+    assert found.cloud.point_count == 2
+    assert found.pixel_m == 2.0

@@ -405,6 +405,12 @@ class Points(Drawable):
         )
         return rows
 
+    def sizes(self, xyz: NDArray[Any]) -> Any:
+        """Return the size of points at these positions, in metres: one for all, or for each."""
+        if self.style == "points":
+            return 0.0
+        return self.size * np.abs(xyz[:, 2]) if self.size_by_depth else self.size
+
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         """Return the corners of the box around it in its own frame; None for nothing finite."""
         if self._boxed != self.geometry:

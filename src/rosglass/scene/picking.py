@@ -155,12 +155,11 @@ def _pick_points(
 ) -> tuple[int, NDArray[np.float64]] | None:
     xyz = points.xyz()
     seen, far = _project(xyz, pose, camera)
-    half: Any = points.size / 2
-    if points.size_by_depth and points.style != "points":
-        half = half * np.abs(xyz[:, 2])
     with np.errstate(invalid="ignore"):
         reach = radius + (
-            half if points.style == "points" else half * _units_per_metre(camera, far)
+            points.size / 2
+            if points.style == "points"
+            else points.sizes(xyz) / 2 * _units_per_metre(camera, far)
         )
         near = (far > 0) & (np.abs(seen[:, 0] - x) <= reach) & (np.abs(seen[:, 1] - y) <= reach)
     indices = np.flatnonzero(near)

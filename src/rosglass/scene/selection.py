@@ -265,7 +265,7 @@ def _boxes(drawable: Drawable, indices: NDArray[np.intp]) -> NDArray[np.float64]
         return turned
     if isinstance(drawable, Points):
         at = drawable.xyz()[indices].astype(np.float64)
-        size = _LEAST_M if drawable.style == "points" else max(drawable.size, _LEAST_M)
+        size = np.reshape(np.maximum(drawable.sizes(at), _LEAST_M), (-1, 1))
         low, high = at - size / 2, at + size / 2
     elif isinstance(drawable, Lines):
         rows = drawable.rows[indices]

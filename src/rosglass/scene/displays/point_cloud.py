@@ -140,10 +140,11 @@ class _ShownCloud:
         self.points, self.display = Points(), display
         self._data: _Prepared | None = None
         self._pose: NDArray[np.float64] = np.eye(4)
+        self._frame = ""
 
-    def set_cloud(self, data: _Prepared, pose: NDArray[np.float64]) -> None:
-        """Take a cloud and its pose in the fixed frame."""
-        self._data, self._pose = data, pose
+    def set_cloud(self, data: _Prepared, pose: NDArray[np.float64], frame: str) -> None:
+        """Take a cloud, its pose in the fixed frame, and its frame."""
+        self._data, self._pose, self._frame = data, pose, frame
         self.points.pose = pose
         self._set_vertices(data.vertices)
 
@@ -206,8 +207,10 @@ class _ShownCloud:
             names = ", ".join(data.cloud.layout.channels)
             return [("Points", str(data.cloud.finite_count)), ("Fields", names)]
         point = data.vertices.point_index(number)
-        values = data.cloud.describe_point(point)
-        return [("Point", str(point)), *((name, _text_of(value)) for name, value in values)]
+        (_, position), *values = data.cloud.describe_point(point)
+        # The place in the fixed frame is known to who has selected it.
+        found = [("Point", point), (f"Position in {self._frame or 'its frame'}", position), *values]
+        return [(name, _text_of(value)) for name, value in found]
 
 
 def _text_of(value: Any) -> str:
@@ -349,7 +352,7 @@ class CloudDisplay(TopicDisplay):
         # One that is not shown any more lends its buffer.
         shown = self._take_out(removed) or _ShownCloud(self)
         self._shown[entry] = shown
-        shown.set_cloud(data, pose)
+        shown.set_cloud(data, pose, frame)
         self.root.add(shown.points)
         colors = shown.restyle(self._current_settings())
         layout = data.cloud.layout
