@@ -85,7 +85,7 @@ def goes_on(app: Any, show: Any, grab: Any, wait: Any) -> Callable[[], None]:
         ("Item { nothing: 1 }", r"Ui\.qml:4:8: .*non-existent property"),
         ("QtObject {}", "must be an Item, but is a QtObject: put its content into an Item"),
         ("Timer {}", "must be an Item, but is a Timer"),
-        ("Window { visible: true }", "is a window; overlays are shown in RViz's window"),
+        ("Window { visible: true }", "is a window; overlays are shown in the 3D view's window"),
         ("ApplicationWindow { visible: true }", "is a window; overlays are shown"),
         ("Popup { }", "must be an Item, but is a Popup"),
         ("", r"Ui\.qml:4:"),

@@ -14,7 +14,7 @@ from rosglass.rviz.displays import Displays
 from rosglass.rviz.host import Hook
 from rosglass.rviz.tools import Tools
 from rosglass.rviz.trackers import Frames, Trackers
-from rosglass.rviz.view import CurrentView, RvizViews, View, Views
+from rosglass.rviz.view import RvizCurrentView, RvizViews, View, Views
 from rosglass.rviz.window import config_file
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ class Access(QtCore.QObject):
     def view(self) -> View:
         """The camera."""
         window = self.window
-        view = View(CurrentView(window), self.frames, window.before_frame)
+        view = View(RvizCurrentView(window), self.frames, window.before_frame)
         window.config_loading.connect(view.end_motion)
         window.closing.connect(view.close)
         return view

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from rosglass.rviz.window import Window
 
-__all__ = ["Display", "Displays", "Status", "status_of"]
+__all__ = ["Display", "Displays", "Status", "plain_name", "status_of"]
 
 
 #: Milliseconds between checks for changes that RViz does not signal.
@@ -97,7 +97,7 @@ class Display:
 
     @name.setter
     def name(self, name: str) -> None:
-        self.require().setName(_plain_name(name))
+        self.require().setName(plain_name(name))
         self._owner.emit_changes()
 
     @property
@@ -270,7 +270,7 @@ class Displays(PluginList):
             Error: The class does not exist, or could not be loaded.
         """
         class_id = require_class_id(class_id, DISPLAY)
-        shown = _plain_name(name) if name else class_id.rpartition("/")[2]
+        shown = plain_name(name) if name else class_id.rpartition("/")[2]
         handle = self._window.manager.createDisplay(class_id, shown, enabled)
         text = loading_error(handle, class_id, DISPLAY)
         if text:
@@ -335,7 +335,12 @@ def _walk(group: Any) -> Iterator[tuple[Any, bool]]:
             yield group.getDisplayAt(index), False
 
 
-def _plain_name(name: object) -> str:
+def plain_name(name: object) -> str:
+    """Return the name of a display unchanged.
+
+    Raises:
+        Error: It is not a line of text of at most 1000 characters.
+    """
     if (
         isinstance(name, str)
         and name.strip()

@@ -5,12 +5,8 @@ from __future__ import annotations
 import logging
 import time
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rosglass.errors import QmlError
-from rosglass.qml.live_file import ERRORS, ERRORS_BELOW, PANEL, SCRIPT_ENDED, ErrorView, LiveFile
-from rosglass.qml.modules import interface_file
 from rosglass.qml.renderer_choice import need_in_file, need_in_items
 from rosglass.qt import QtCore, Signal, is_alive
 from rosglass.rviz.input import (
@@ -24,11 +20,10 @@ from rosglass.rviz.input import (
     releases,
     scaled,
 )
-from rosglass.rviz.overlay import Overlay
+from rosglass.rviz.live_overlay import LiveOverlay
 from rosglass.rviz.qt5 import QtCore as Qt5Core
 from rosglass.rviz.qt5 import QtGui, QtQuick, shiboken
 from rosglass.rviz.rendering import choice
-from rosglass.rviz.rviz_object import RvizObject
 
 if TYPE_CHECKING:
     import os
@@ -37,7 +32,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rosglass.qml.live_file import Made
     from rosglass.qml.session import Session
     from rosglass.rviz.rendering import Renderer
     from rosglass.rviz.window import Window
@@ -395,169 +389,61 @@ def _accepts_touch(window: Any, at: Any) -> bool:
 
 
 _log = logging.getLogger("rosglass.rviz")
-_IMPORTS = Path(__file__).with_name("imports")
 #: Key in `Session.shared` of the list of overlays that use the session.
 _OVERLAYS = "overlays"
 #: Milliseconds between drawing and :meth:`QmlOverlay._on_idle`.
 _IDLE_DELAY_MS = 1000
 
 
-class QmlOverlay(QmlInput, Overlay):
+class QmlOverlay(QmlInput, LiveOverlay):
     """A QML file shown over RViz's 3D view.
 
     Args:
         file: The QML file; its root must be an Item.
         session: The session that its QML uses.
         name: Its name; by default that of the file.
-        watch: Whether to reload when a file in its folder or in `import_paths` is saved.
-        import_paths: Additional folders with QML modules, also as ``package://`` URLs.
-        options: Options of :class:`Overlay`.
+        options: Options of :class:`LiveOverlay`.
 
     Raises:
         QmlError: A file or folder does not exist.
         UnsupportedError: Neither OpenGL nor Qt's software renderer is available.
     """
 
-    properties: RvizObject
+    #: What of the file the renderer cannot draw.
+    _undrawable = ""
 
     def __init__(
-        self,
-        file: str | os.PathLike[str],
-        session: Session,
-        name: str = "",
-        *,
-        watch: bool = False,
-        import_paths: Sequence[str | os.PathLike[str]] = (),
-        **options: Any,
+        self, file: str | os.PathLike[str], session: Session, name: str = "", **options: Any
     ) -> None:
-        self.file = interface_file(file)
-        super().__init__(name or self.file.stem, **options)
-        self.session = session
-        self._live = LiveFile(file, session, watch=watch, import_paths=import_paths)
-        self.engine = self._live.engine
-        self.engine.addImportPath(str(_IMPORTS))
-        self.engine.quit.connect(self._quit)
-        self.engine.exit.connect(self._exit)
+        super().__init__(file, session, name, **options)
         choice.expect(self.file)
         try:
             self._scene = Scene(choice.make(self.engine.importPathList()))
         except Exception:
-            self._live.close()
+            super().close()
             raise
-        #: The object ``rviz`` in QML.
-        self.properties = RvizObject(self, self.engine)
-        self.engine.rootContext().setContextProperty("rviz", self.properties)
         self._window = self._scene.window
         self._scene.changed.connect(self.changed)
         self._rviz_window: Window | None = None
-        self._root: Any = None
-        self._error = self._undrawable = ""
         self._idle_timer = Qt5Core.QTimer()
         self._idle_timer.setSingleShot(True)
         self._idle_timer.setInterval(_IDLE_DELAY_MS)
         self._idle_timer.timeout.connect(self._on_idle)
-        self._errors = ErrorView(self.engine, PANEL)
         self.arranged.connect(self._fit_errors)
-        self._closed = self._loading = False
         self._session_overlays: list[QmlOverlay] = session.shared.setdefault(_OVERLAYS, [])
         self._session_overlays.append(self)
-        self._live.due.connect(self.reload)
-        self._live.script_ended.connect(self._on_script_ended)
 
-    @property
-    def root(self) -> Any:
-        """The root item; None before the file was loaded."""
-        return self._root
-
-    @property
-    def loaded(self) -> bool:
-        """Whether it shows the file, in its current or its last valid version."""
-        return self._root is not None
-
-    @property
-    def watch(self) -> bool:
-        """Whether it reloads when a file is saved."""
-        return self._live.watch
-
-    @watch.setter
-    def watch(self, watch: bool) -> None:
-        self._live.watch = watch
-
-    def load(self) -> None:
-        """Load and show the file; show its errors instead if it has any.
-
-        A watched file is reloaded when its errors are fixed.
-
-        Raises:
-            QmlError: The file has errors and is not watched.
-        """
-        self.session.defer_connecting()
-        try:
-            self._load()
-        except QmlError as error:
-            self.session.go_on()
-            if not self.watch:
-                raise
-            _log.error("%s", error)
-
-    def reload(self) -> bool:
-        """Reload the file; if it has errors, show them over the previous version.
-
-        Deferred while a call from QML is waiting, which would return into deleted objects.
-
-        Returns:
-            Whether the new version is shown.
-        """
-        if self._loading or not self._live.is_ready():
-            return False
-        started = time.perf_counter()
-        try:
-            self._load()
-        except QmlError as error:
-            _log.error("%s", error)
-            return False
-        _log.info("%s reloaded in %.0f ms", self.file, (time.perf_counter() - started) * 1000)
-        return not self._closed
-
-    def _load(self) -> None:
-        self._loading = True
-        self.properties.begin_load()
-        try:
-            made = self._live.create()
-            self._check(made)
-        except QmlError as error:
-            self._show_error(str(error))
-            raise
-        finally:
-            self._loading = False
-        if self._closed:
-            # Code in the file has removed the overlay.
-            self._live.drop(made)
-            return
-        self._show_error("")
-        self._live.replace(made, lambda: self._show(made.root))
-
-    def _check(self, made: Made) -> None:
-        root = made.root
-        if isinstance(root, QtQuick.QQuickItem):
-            return
-        if isinstance(root, QtQuick.QQuickWindow):
-            root.setVisible(False)
-            what = "a window; overlays are shown in RViz's window: use Item { } instead"
-        else:
-            what = f"a {_qml_type_name(root)}: put its content into an Item {{ }}"
-        self._live.drop(made)
-        raise QmlError(f"{self.file}: the root of an overlay must be an Item, but is {what}")
-
-    def _show(self, root: Any) -> None:
-        # Release mouse and focus of the items that are about to be deleted.
-        self.renewed.emit(self)
-        self._root = root
+    def _place(self, root: Any) -> None:
         self._scene.show_item(root)
         self._undrawable = ""
-        self.tell_problem("")
         # MediaPlayer and ImagePublisher are not items, so look for them in the file.
         self._warn_not_drawn(root, lambda: need_in_file(self.file, self.engine.importPathList()))
+
+    def _windows(self) -> list[Any]:
+        return [self._window]
+
+    def _standing_problem(self) -> str:
+        return self._undrawable
 
     def _on_idle(self) -> None:
         """Release the picture, and warn of items created since that the renderer cannot draw."""
@@ -574,45 +460,14 @@ class QmlOverlay(QmlInput, Overlay):
             _log.warning("overlay %s: %s", self.name, self._undrawable)
             self.tell_problem(self.problem)
 
-    def tell_problem(self, problem: str) -> None:
-        """Set the problem; if empty, errors of the file remain."""
-        super().tell_problem(problem or self._error or self._undrawable)
-
-    def _show_error(self, error: str) -> None:
-        self._error = error
-        self.tell_problem(error)
-        if self._closed:
-            return
-        if error:
-            self._errors.show(error, [self._window], ERRORS_BELOW if self.loaded else ERRORS)
-            self._fit_errors()
-        else:
-            self._errors.hide()
-        self.changed.emit()
-
-    def _on_script_ended(self, text: str) -> None:
-        if self._closed or self._error:
-            return
-        self.tell_problem(text)
-        self._errors.show(text, [self._window], SCRIPT_ENDED)
-        self._fit_errors()
-        self.changed.emit()
-
     def _fit_errors(self) -> None:
         for item in self._errors.items:
             item.setProperty("unit", 1 / self.scale)
 
-    def _quit(self, *_: Any) -> None:
-        # Later, because RViz may open a dialog about unsaved changes.
-        Qt5Core.QTimer.singleShot(0, self._close_rviz)
-
-    def _close_rviz(self) -> None:
+    def _close_view(self) -> None:
         window = self._rviz_window
         if window is not None and is_alive(window.widget):
             window.widget.close()
-
-    def _exit(self, code: int) -> None:
-        Qt5Core.QTimer.singleShot(0, lambda: Qt5Core.QCoreApplication.exit(code))
 
     def attach(self, window: Window) -> None:
         """Connect to RViz's window."""
@@ -634,28 +489,13 @@ class QmlOverlay(QmlInput, Overlay):
             self._idle_timer.start()
         return pixels
 
-    def close(self) -> None:
+    def close(self, *, hold: bool = False) -> None:
         """Delete the scene and the QML engine; safe to call twice."""
         if self._closed:
             return
-        self._closed = True
         self._idle_timer.stop()
-        self.properties.close()
         self._scene.changed.disconnect(self.changed)
         self._session_overlays.remove(self)
-        self._errors.hide()
-        # QML uses it until the engine is deleted.
-        self.properties.setParent(self.engine)
         # Only the last overlay of the session may shut its node down.
-        self._live.close(hold=bool(self._session_overlays))
+        super().close(hold=hold or bool(self._session_overlays))
         self._scene.close()
-        self._root = None
-
-
-def _qml_type_name(root: Any) -> str:
-    """Return the QML type name of an object."""
-    kind = root.metaObject()
-    while "_QML" in kind.className():
-        kind = kind.superClass()
-    name = str(kind.className())
-    return "QtObject" if name == "QObject" else name.removeprefix("QQuick").removeprefix("QQml")

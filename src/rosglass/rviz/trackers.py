@@ -43,13 +43,17 @@ class Frames(QtCore.QObject):
     Args:
         session: The session of the overlays.
         fixed_frame: Returns the fixed frame.
+        namespace: Namespace of ``tf``; empty for that of the node.
     """
 
     #: Transforms start or stop being received.
     available_changed = Signal()
 
-    def __init__(self, session: Session, fixed_frame: Callable[[], str]) -> None:
+    def __init__(
+        self, session: Session, fixed_frame: Callable[[], str], namespace: str = "/"
+    ) -> None:
         super().__init__()
+        self._namespace = namespace
         self._session, self._fixed_frame = session, fixed_frame
         self._tf_link: TfLink | None = None
         self._node: Node | None = None
@@ -136,7 +140,7 @@ class Frames(QtCore.QObject):
         self.close()
         self._node = node
         if node is not None:
-            self._tf_link = TfLink.join(self._session, node, "/", self)
+            self._tf_link = TfLink.join(self._session, node, self._namespace, self)
         self.available_changed.emit()
 
 

@@ -44,6 +44,7 @@ __all__ = [
     "ORBIT",
     "TOP_DOWN",
     "CurrentView",
+    "RvizCurrentView",
     "RvizViews",
     "View",
     "ViewMode",
@@ -253,29 +254,22 @@ _DEFAULT_FIELD_OF_VIEW_RAD = math.pi / 4
 
 
 class CurrentView(QtCore.QObject):
-    """RViz's current view, of any type, converted from and to an `Orbit`."""
+    """The current view, of any type, converted from and to an `Orbit`; base class of RViz's."""
 
-    #: RViz has switched views. Argument: whether :meth:`write` did it.
+    #: Another view is shown. Argument: whether :meth:`write` did it.
     changed = Signal(bool)
 
-    def __init__(self, window: Window) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._window = window
-        self._manager: Any = window.manager.getViewManager()
-        self._properties: dict[str, Any] = {}
         self._switching = False
         #: Height of the last 3D focus, because the 2D view has none.
         self._height = 0.0
         self._field_of_view = _DEFAULT_FIELD_OF_VIEW_RAD
-        wrapped = as_pyside(self._manager, QtCore.QObject)
-        Qt5Core.QObject.connect(
-            wrapped, Qt5Core.SIGNAL("currentChanged()"), self._on_current_changed
-        )
 
     @property
     def kind(self) -> str:
         """RViz's class id of the view."""
-        return str(self._manager.getCurrent().getClassId())
+        raise NotImplementedError
 
     @property
     def state(self) -> tuple[Any, ...]:
@@ -306,7 +300,11 @@ class CurrentView(QtCore.QObject):
     def write(self, where: Orbit, kind: str) -> None:
         """Move the camera, in the view with class id `kind`: :data:`ORBIT` or :data:`TOP_DOWN`."""
         if self.kind != kind:
-            self._switch_view(kind)
+            self._switching = True
+            try:
+                self._switch_view(kind)
+            finally:
+                self._switching = False
         if self._get(_TARGET_FRAME) != FIXED_FRAME:
             self._set(_TARGET_FRAME, FIXED_FRAME)
         if kind == TOP_DOWN:
@@ -319,17 +317,74 @@ class CurrentView(QtCore.QObject):
             yaw, pitch = _normalized(sign * where.yaw), sign * where.pitch
             self._set_all(ORBIT, *where.focus, where.distance, yaw, pitch)
 
+    def request_frame(self) -> None:
+        """Have another frame drawn, in a view that does not draw all the time."""
+
     def close(self) -> None:
-        """Release the references to RViz's properties."""
-        self._properties.clear()
+        """Release the view; safe to call twice."""
 
     def _orbit_from_above(self, x: float, y: float) -> Orbit:
         distance = self._pixels_at_one_metre() / max(self._get("Scale"), 1e-9)
         yaw = self._get("Angle") - math.pi / 2
         return Orbit(Point(x, y, self._height), distance, yaw, STEEPEST)
 
+    def _on_current_changed(self) -> None:
+        if not self._switching:
+            self._height = 0.0
+        self.changed.emit(self._switching)
+
+    def _pixels_at_one_metre(self) -> float:
+        """Return the pixels per metre of the 3D camera at a distance of one metre."""
+        return max(self._height_px(), 1) / (2 * math.tan(self._field_of_view / 2))
+
+    def _set_all(self, kind: str, *values: float) -> None:
+        for name, value in zip(_PROPERTY_NAMES[kind], values, strict=False):
+            self._set(name, value)
+
+    # Of each 3D view.
+
     def _read_camera(self, kind: str) -> Orbit:
-        """Return the orbit read from the Ogre camera, for views of any type and target frame."""
+        """Return the orbit of the camera, for views of any type and target frame."""
+        raise NotImplementedError
+
+    def _switch_view(self, kind: str) -> None:
+        raise NotImplementedError
+
+    def _height_px(self) -> float:
+        """Return the height of the view, in the pixels of the property Scale."""
+        raise NotImplementedError
+
+    def _get(self, name: str) -> Any:
+        """Return the value of a property of the view, e.g. ``Focal Point/X``."""
+        raise NotImplementedError
+
+    def _set(self, name: str, value: Any) -> None:
+        raise NotImplementedError
+
+
+class RvizCurrentView(CurrentView):
+    """RViz's current view."""
+
+    def __init__(self, window: Window) -> None:
+        super().__init__()
+        self._window = window
+        self._manager: Any = window.manager.getViewManager()
+        self._properties: dict[str, Any] = {}
+        wrapped = as_pyside(self._manager, QtCore.QObject)
+        Qt5Core.QObject.connect(
+            wrapped, Qt5Core.SIGNAL("currentChanged()"), self._on_current_changed
+        )
+
+    @property
+    def kind(self) -> str:
+        """RViz's class id of the view."""
+        return str(self._manager.getCurrent().getClassId())
+
+    def close(self) -> None:
+        """Release the references to RViz's properties."""
+        self._properties.clear()
+
+    def _read_camera(self, kind: str) -> Orbit:
         camera = Camera(self._window)
         eye = Point(*camera.eye)
         if kind == TOP_DOWN:
@@ -347,22 +402,15 @@ class CurrentView(QtCore.QObject):
         return Orbit.between(eye, eye.towards(ahead, part))
 
     def _switch_view(self, kind: str) -> None:
-        self._switching = True
-        try:
-            self._manager.setCurrentViewControllerType(kind)
-        finally:
-            self._switching = False
+        self._manager.setCurrentViewControllerType(kind)
 
     def _on_current_changed(self) -> None:
         self._properties.clear()
         self._window.flush_panels()
-        if not self._switching:
-            self._height = 0.0
-        self.changed.emit(self._switching)
+        super()._on_current_changed()
 
-    def _pixels_at_one_metre(self) -> float:
-        """Return the pixels per metre of the 3D camera at a distance of one metre."""
-        return max(self._window.view_size()[1], 1) / (2 * math.tan(self._field_of_view / 2))
+    def _height_px(self) -> float:
+        return float(self._window.view_size()[1])
 
     def _property(self, name: str) -> Any:
         found = self._properties.get(name)
@@ -379,10 +427,6 @@ class CurrentView(QtCore.QObject):
     def _set(self, name: str, value: Any) -> None:
         self._property(name).setValue(value)
 
-    def _set_all(self, kind: str, *values: float) -> None:
-        for name, value in zip(_PROPERTY_NAMES[kind], values, strict=False):
-            self._set(name, value)
-
 
 def _normalized(angle: float) -> float:
     """Return an angle in the range 0 to 2 pi, which RViz uses as well."""
@@ -394,6 +438,8 @@ _RESET_ORBIT = Orbit.between(Point(4.0, 0.0, 3.0), Point(0.0, 0.0, 0.0))
 #: Maximum distance from the fixed frame's origin. RViz uses 32-bit floats, and its renderer
 #: crashes on infinite ones.
 _MAX_DISTANCE_M = 1e8
+#: Seconds that the camera follows a frame by at once, as a view at rest may not draw for long.
+_MAX_STEP_S = 0.1
 
 
 class ViewMode(enum.IntEnum):
@@ -591,6 +637,7 @@ class View(QtCore.QObject):
         self._tracked, self._frame_pose = frame, None
         self._offset = Point(0.0, 0.0, 0.0)
         self._set_problem("")
+        self._current.request_frame()
         self.tracked_frame_changed.emit()
 
     def reset(self) -> None:
@@ -642,6 +689,7 @@ class View(QtCore.QObject):
             self._write(start, ORBIT)
         self._movement = _Movement(start, goal, time.monotonic(), in_2d)
         self._expected_state, self._fixed_frame = self._current.state, self._frames.fixed
+        self._current.request_frame()
         self._emit_mode()
 
     def _finish(self, goal: Orbit, *, in_2d: bool) -> None:
@@ -656,7 +704,7 @@ class View(QtCore.QObject):
 
     def _step(self) -> None:
         now = time.monotonic()
-        passed, self._last_frame = now - self._last_frame, now
+        passed, self._last_frame = min(now - self._last_frame, _MAX_STEP_S), now
         if self._closed or (self._movement is None and not self._tracked):
             self._expected_state = None
             return
@@ -822,6 +870,7 @@ class Views(QtCore.QObject):
 
     @kind.setter
     def kind(self, kind: str) -> None:
+        kind = self._known_id(kind)
         # RViz crashes on an unknown type.
         if kind not in self.kinds:
             raise Error(
@@ -905,6 +954,10 @@ class Views(QtCore.QObject):
 
     # Of each 3D view.
 
+    def _known_id(self, kind: Any) -> Any:
+        """Return the class id in :attr:`kinds` of a type that has several; others unchanged."""
+        return kind
+
     def _current_kind(self) -> str:
         raise NotImplementedError
 
@@ -929,7 +982,7 @@ class RvizViews(Views):
     """RViz's view types and saved views."""
 
     def __init__(self, window: Window) -> None:
-        self._manager = window.manager.getViewManager()
+        self._window, self._manager = window, window.manager.getViewManager()
         super().__init__()
         self._hook = Hook(self._on_change)
         self._hook.watch(self._manager, "currentChanged()", "configChanged()")
