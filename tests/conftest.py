@@ -14,6 +14,8 @@ import ports
 import pytest
 import waiting
 
+pytest.register_assert_rewrite("overlay_contract")
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
 

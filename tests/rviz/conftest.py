@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from overlay_contract import Qml
 from rosmaster import RosMaster
 
 from rosglass.demo.processes import VirtualScreen
@@ -401,42 +402,6 @@ def error_panels(app: Any) -> Callable[[], list[Any]]:
         return [item for item in items if item.property("heading")]
 
     return error_panels
-
-
-class Qml:
-    """An overlay, and JavaScript that runs in its context."""
-
-    def __init__(self, overlay: Any, wait: Callable[..., None]) -> None:
-        from rosglass.rviz.qt5 import QtCore
-
-        self.overlay, self.wait, self._core = overlay, wait, QtCore
-        self.root = overlay.root
-
-    def run(self, script: str) -> Any:
-        """Return the result of a script as a Python value; raise JavaScript's errors."""
-        engine = self.overlay.engine
-        scope = engine.newQObject(self.root)
-        engine.globalObject().setProperty("root", scope)
-        engine.globalObject().setProperty("rviz", engine.newQObject(self.overlay.properties))
-        text = (
-            f"(function () {{ try {{ return JSON.stringify({{ v: (function () {{ {script} }})() }})"
-        )
-        text += "} catch (e) { return JSON.stringify({ e: '' + e }) } })()"
-        answer = json.loads(engine.evaluate(text).toString())
-        if "e" in answer:
-            raise AssertionError(answer["e"])
-        return answer.get("v")
-
-    def fails(self, script: str) -> str:
-        """Return the error that a script throws."""
-        with pytest.raises(AssertionError) as caught:
-            self.run(script)
-        return str(caught.value)
-
-    def refuses(self, mistakes: dict[str, str]) -> None:
-        """Check that each script throws an error with a text in it."""
-        said = {script: self.fails(script) for script in mistakes}
-        assert {s: said[s] for s, text in mistakes.items() if text not in said[s]} == {}
 
 
 @pytest.fixture

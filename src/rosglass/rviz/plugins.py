@@ -118,6 +118,8 @@ class PluginList(QtCore.QObject):
                 self.removed.emit(item)
         for item in self._known:
             if item not in before:
+                # RViz names a display only after it has announced it.
+                item.refresh()
                 self.added.emit(item)
             elif item.refresh():
                 self.changed.emit(item)

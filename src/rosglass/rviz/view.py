@@ -1012,4 +1012,6 @@ class RvizViews(Views):
         self._manager.setCurrentFrom(self._manager.getViewAt(index))
 
     def _take(self, index: int) -> None:
+        # The trees of the panels crash on queued events for a removed view.
+        self._window.flush_panels()
         self._manager.takeAt(index).deleteLater()
