@@ -12,19 +12,32 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rosglass.scene.display import Display, TopicDisplay
     from rosglass.scene.modules import register
+    from rosglass.scene.overlay import SceneOverlay, add_overlay
     from rosglass.scene.scene import Scene
     from rosglass.scene.scene_view import SceneView
     from rosglass.scene.tools import PointerEvent, Tool
 
-__all__ = ["Display", "PointerEvent", "Scene", "SceneView", "Tool", "TopicDisplay", "register"]
+__all__ = [
+    "Display",
+    "PointerEvent",
+    "Scene",
+    "SceneOverlay",
+    "SceneView",
+    "Tool",
+    "TopicDisplay",
+    "add_overlay",
+    "register",
+]
 
 _HOMES = {
     "Display": "display",
     "PointerEvent": "tools",
     "Scene": "scene",
+    "SceneOverlay": "overlay",
     "SceneView": "scene_view",
     "Tool": "tools",
     "TopicDisplay": "display",
+    "add_overlay": "overlay",
     "register": "modules",
 }
 

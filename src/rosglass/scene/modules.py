@@ -41,6 +41,7 @@ from rosglass.scene.displays.pose import (
 )
 from rosglass.scene.displays.robot_model import RobotModelDisplay
 from rosglass.scene.displays.tf import TFDisplay
+from rosglass.scene.overlay import OverlayElement
 from rosglass.scene.panel_models import DisplaysModel
 from rosglass.scene.publishing_tools import (
     Nav2GoalTool,
@@ -121,6 +122,7 @@ def register() -> None:
     register_type: Any = qmlRegisterType
     for kind in (SceneView, Tool, DisplaysModel, *DISPLAYS, *TOOLS):
         register_type(kind, "RosScene", 1, 0, kind.__name__)
+    register_type(OverlayElement, "RosScene", 1, 0, "SceneOverlay")
     for name in PANELS:
         file = Path(__file__).with_name("panels") / f"{name}.qml"
         register_type(QUrl.fromLocalFile(str(file)), "RosScene", 1, 0, name)

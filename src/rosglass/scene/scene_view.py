@@ -77,6 +77,10 @@ class SceneView(QQuickRhiItem):
     #: A picture was drawn.
     framePainted = Signal()
     sceneChanged = Signal()
+    #: A config is about to replace what is shown.
+    configLoading = Signal()
+    #: A config was shown: its file, if any.
+    configLoaded = Signal(str)
 
     def __init__(self, parent: Any = None, runtime: Runtime | None = None) -> None:
         super().__init__(parent)
@@ -92,6 +96,7 @@ class SceneView(QQuickRhiItem):
         self.sceneChanged.connect(self._selection.clear)
         self._scene = Scene(self, runtime)
         self._watch_scene()
+        self._painted = 0
         #: The config that was loaded; None before.
         self.config: RvizConfig | None = None
         self._view: ViewController = create_view("Orbit")
@@ -351,6 +356,7 @@ class SceneView(QQuickRhiItem):
 
     def show_config(self, config: RvizConfig) -> list[str]:
         """Replace what is shown by a config; return what was left out, a line each."""
+        self.configLoading.emit()
         notes = show_displays(self.scene, config)
         red, green, blue, _ = config.background_color
         self.setProperty("background", QColor.fromRgbF(red, green, blue))
@@ -361,6 +367,7 @@ class SceneView(QQuickRhiItem):
         if made is not None:
             self.show_view(made)
         self.config = config
+        self.configLoaded.emit(config.source)
         return notes
 
     def collect_config(self, ros: int = 2) -> RvizConfig:
@@ -432,6 +439,11 @@ class SceneView(QQuickRhiItem):
         self._turn = None
         self._turning.stop()
 
+    @property
+    def frames_drawn(self) -> int:
+        """How many pictures were drawn."""
+        return self._painted
+
     def camera_moved(self) -> None:
         """Draw from where the camera is now."""
         self._moved_at = time.monotonic()
@@ -490,6 +502,7 @@ class SceneView(QQuickRhiItem):
         window = self.window()
         if any(one.draws_in_software for one in self._renderers) != self.scene.draws_in_software:
             QtCore.QTimer.singleShot(0, self, self._report_device)
+        self._painted += 1
         return Frame(
             list(self._drawables()),
             self.camera(),

@@ -119,7 +119,7 @@ class AxesDisplay(_InFrame):
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
-        self._axes = AxesShapes()
+        self._axes = AxesShapes(self)
         super().__init__(parent, runtime)
         self._body.add(self._axes)
 

@@ -1,0 +1,105 @@
+"""Overlays over a ``SceneView``: declared in QML, added from Python, drawn, removed."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import rosglass.scene
+from rosglass.errors import Error, QmlError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+RED = 'import QtQuick 2.15\nRectangle { objectName: "panel"; color: "#ff0000" }\n'
+
+
+@pytest.fixture
+def panel(tmp_path: Path) -> Path:
+    """A file with an overlay that is red all over."""
+    file = tmp_path / "overlays" / "Panel.qml"
+    file.parent.mkdir()
+    file.write_text(RED)
+    return file
+
+
+def test_an_overlay_is_declared(bench: Any, panel: Path) -> None:
+    bench.load(f'SceneOverlay {{ objectName: "o"; source: "{panel.as_uri()}"; scale: 2 }}')
+    from rosglass.qt import QtCore
+
+    element = bench.view.findChild(QtCore.QObject, "o")
+    bench.wait(lambda: element.property("loaded"))
+    root = element.overlay.root
+    assert (root.width(), root.height()) == (bench.view.width() / 2, bench.view.height() / 2)
+    assert tuple(bench.picture()[100, 100]) == (255, 0, 0)
+    element.setProperty("visible", False)
+    bench.wait(lambda: tuple(bench.picture()[100, 100]) == (48, 48, 48))
+    element.setProperty("visible", True)
+    element.setProperty("opacity", 0.5)
+    bench.wait(lambda: bench.picture()[100, 100][0] == pytest.approx(152, abs=2))
+
+
+def test_overlays_fit_the_view_and_have_an_order(bench: Any, panel: Path) -> None:
+    view = bench.load()
+    low = rosglass.scene.add_overlay(view, panel, z=1)
+    other = panel.with_name("Other.qml")
+    other.write_text(RED.replace("ff0000", "00ff00"))
+    high = rosglass.scene.add_overlay(view, other, "High", z=2)
+    bench.wait(lambda: tuple(bench.picture()[100, 100]) == (0, 255, 0))
+    low.z = 3
+    bench.wait(lambda: tuple(bench.picture()[100, 100]) == (255, 0, 0))
+    bench.window.resize(500, 350)
+    bench.wait(lambda: low.root.width() == view.width() == 500)
+    low.close()
+    bench.wait(lambda: tuple(bench.picture()[100, 100]) == (0, 255, 0))
+    assert (low.root, high.loaded) == (None, True)
+    low.close()
+
+
+def test_the_view_at_rest_is_not_drawn_for_an_overlay(bench: Any, panel: Path) -> None:
+    view = bench.load()
+    panel.write_text(
+        "import QtQuick 2.15\nRectangle { property var t: rviz.createPositionTracker(0, 0, 0)\n"
+        "property int frames: 0\nNumberAnimation on x { from: 0; to: 100; duration: 500\n"
+        "loops: Animation.Infinite } onXChanged: frames++ }"
+    )
+    overlay = rosglass.scene.add_overlay(view, panel)
+    bench.wait(lambda: overlay.root.property("frames") > 3)
+    bench.wait(lambda: view._still.isActive() is False)
+    drawn, frames = view.frames_drawn, overlay.root.property("frames")
+    bench.wait(lambda: overlay.root.property("frames") > frames + 10)
+    assert view.frames_drawn <= drawn + 1
+
+
+def test_wrong_files_are_refused(bench: Any, panel: Path, caplog: Any) -> None:
+    view = bench.load()
+    with pytest.raises(QmlError, match=r"Nothing\.qml"):
+        rosglass.scene.add_overlay(view, panel.with_name("Nothing.qml"))
+    panel.write_text("import QtQuick 2.15\nItem { nothing: 1 }")
+    with pytest.raises(QmlError, match=r"Panel\.qml:2:\d+: .*nothing"):
+        rosglass.scene.add_overlay(view, panel)
+    panel.write_text("import QtQuick 2.15\nQtObject { }")
+    with pytest.raises(QmlError, match="must be an Item"):
+        rosglass.scene.add_overlay(view, panel)
+    panel.write_text(RED)
+    with pytest.raises(Error, match="scale 99 is not a number from"):
+        rosglass.scene.add_overlay(view, panel, scale=99)
+    with caplog.at_level(logging.WARNING):
+        bench.load('SceneOverlay { source: "file:///nowhere/x.qml" }')
+        bench.wait(lambda: "SceneOverlay" in caplog.text)
+    assert "/nowhere/x.qml" in caplog.text
+
+
+def test_views_with_overlays_come_and_go(bench: Any, panel: Path) -> None:
+    panel.write_text(
+        "import QtQuick 2.15\nItem { property var all: [rviz.view, rviz.displays,\n"
+        "rviz.toolManager, rviz.createPositionTracker(0, 0, 0), rviz.status] }"
+    )
+    for _ in range(3):
+        view = bench.load("GridDisplay { }")
+        overlay = rosglass.scene.add_overlay(view, panel)
+        assert overlay.loaded
+    bench.load()
+    bench.wait(lambda: overlay.root is None)
