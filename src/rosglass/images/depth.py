@@ -1,9 +1,10 @@
-"""Depth images in colors, black where the depth is unknown."""
+"""Depth images in colors, black where the depth is unknown; images of numbers in greys."""
 
 from __future__ import annotations
 
+from collections import deque
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from rosglass.comm.time import Time
     from rosglass.images.encodings import RawImage
 
-__all__ = ["COLOR_MAPS", "DEPTH_ENCODINGS", "DepthColors"]
+__all__ = ["COLOR_MAPS", "DEPTH_ENCODINGS", "DepthColors", "GreyLevels", "GreyRange"]
 
 #: Color maps, from near to far.
 COLOR_MAPS = ("turbo", "viridis", "jet", "gray")
@@ -136,6 +137,7 @@ class DepthColors:
             image.encoding,
             image.stamp,
             received,
+            image.frame_id,
         )
 
     def _update_range(self, depths: NDArray[Any], unit: float) -> None:
@@ -153,6 +155,75 @@ class DepthColors:
             near = self._seen[0] + _SMOOTHING * (near - self._seen[0])
             far = self._seen[1] + _SMOOTHING * (far - self._seen[1])
         self._seen = near, far
+
+
+class GreyRange(NamedTuple):
+    """How :class:`GreyLevels` shows numbers as greys.
+
+    Attributes:
+        low: What is black, in the numbers of the image; None to follow the images.
+        high: What is white; None to follow the images.
+        window: Images over whose extremes the medians are what is followed.
+    """
+
+    low: float | None = None
+    high: float | None = None
+    window: int = 5
+
+
+class GreyLevels:
+    """Shows images of one number per pixel in greys, from black to white, as RViz does.
+
+    Args:
+        range: The numbers that are black and white.
+    """
+
+    def __init__(self, range: GreyRange) -> None:
+        self._range = range
+        self._extremes: deque[tuple[float, float]] = deque(maxlen=max(range.window, 1))
+
+    def convert(self, image: RawImage, received: Time | None = None) -> Frame:
+        """Convert an image of 16UC1, mono16 or 32FC1; numbers that are not finite become black.
+
+        Raises:
+            UnsupportedError: The encoding is another.
+            DecodeError: Sizes, step and data are inconsistent.
+        """
+        if image.encoding not in DEPTH_ENCODINGS:
+            raise UnsupportedError(
+                f"image encoding {image.encoding[:40]!r} has no range of greys; "
+                f"these do: {', '.join(DEPTH_ENCODINGS)}"
+            )
+        numbers = pixels_of(image, ENCODINGS[image.encoding])
+        finite = None if numbers.dtype.kind == "u" else np.isfinite(numbers)
+        low, high, _ = self._range
+        if low is None or high is None:
+            known = numbers if finite is None else numbers[finite]
+            if known.size:
+                self._extremes.append((float(known.min()), float(known.max())))
+            middle = np.median(self._extremes, axis=0) if self._extremes else (0.0, 1.0)
+            low = float(middle[0]) if low is None else low
+            high = float(middle[1]) if high is None else high
+        if high > low:
+            scale = 255 / (high - low)
+            with np.errstate(over="ignore"):
+                greys = numbers * np.float32(scale) - np.float32(low * scale)
+            np.clip(greys, 0, 255, out=greys)
+            if finite is not None:
+                greys[~finite] = 0
+        else:
+            greys = np.zeros(numbers.shape, np.float32)
+        rows = greys.astype(np.uint8)
+        return Frame(
+            PixelFormat.GRAY8,
+            image.width,
+            image.height,
+            (rows,),
+            image.encoding,
+            image.stamp,
+            received,
+            image.frame_id,
+        )
 
 
 def _steps(depths: NDArray[Any], near: float, far: float) -> NDArray[np.uint16]:

@@ -93,6 +93,7 @@ class Frame:
         encoding: Encoding as received.
         stamp: Time of the image; None if the header has none.
         received: Time of reception; None if it was created here.
+        frame_id: Coordinate frame of the camera.
     """
 
     format: PixelFormat
@@ -102,6 +103,7 @@ class Frame:
     encoding: str = ""
     stamp: Time | None = None
     received: Time | None = None
+    frame_id: str = ""
 
     @property
     def has_alpha(self) -> bool:
@@ -382,6 +384,7 @@ def convert(
         image.encoding,
         image.stamp,
         received,
+        image.frame_id,
     )
 
 

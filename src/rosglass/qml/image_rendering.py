@@ -9,6 +9,7 @@ import numpy as np
 
 from rosglass.errors import Error, UnsupportedError
 from rosglass.images import DEPTH_ENCODINGS, DepthColors, View, convert, reduce
+from rosglass.images.depth import GreyLevels, GreyRange
 from rosglass.images.encodings import PixelFormat
 from rosglass.qt import QT6, QtCore, QtGui, optional
 
@@ -153,7 +154,8 @@ class Look:
     Attributes:
         video: Whether the viewer needs video frames; otherwise images.
         view: The visible part and its rotation.
-        colors: Colour map, nearest and farthest depth for depth images; None for grey.
+        colors: Colour map, nearest and farthest depth for depth images; or how their numbers are
+            shown as greys; None for greys of fixed depths.
         interval: Seconds between two pictures; 0 for all pictures.
         room: Width and height of the picture on the screen, pixels, before rotation; larger
             pictures are reduced to about this size. None keeps their size.
@@ -162,7 +164,7 @@ class Look:
 
     video: bool = True
     view: View = _WHOLE
-    colors: tuple[str, float | None, float | None] | None = None
+    colors: tuple[str, float | None, float | None] | GreyRange | None = None
     interval: float = 0.0
     room: tuple[int, int] | None = None
     painted: bool = False
@@ -220,7 +222,7 @@ class Renderer:
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
         #: The depth colours adapt to the pictures, separately for each setting.
-        self._colors: dict[Any, DepthColors] = {}
+        self._colors: dict[Any, DepthColors | GreyLevels] = {}
 
     def render(
         self, image: RawImage, received: Time, late: float, looks: Iterable[Look]
@@ -280,7 +282,11 @@ class Renderer:
             if painter is None:
                 while len(self._colors) >= _MOST_COLORS:
                     del self._colors[next(iter(self._colors))]
-                painter = self._colors[colors] = DepthColors(*colors)
+                grey = isinstance(colors, GreyRange)
+                painter = GreyLevels(colors) if grey else DepthColors(*colors)
+                self._colors[colors] = painter
+            if isinstance(painter, GreyLevels):
+                return painter.convert(image, received)
             return painter.convert(image, received, allocate)
         accept = VIDEO_FORMATS if kinds == {True} else IMAGE_FORMATS
         if len(kinds) == 2:

@@ -8,6 +8,7 @@ import pytest
 
 from rosglass.errors import DecodeError, UnsupportedError
 from rosglass.images import COLOR_MAPS, DepthColors, RawImage
+from rosglass.images.depth import GreyLevels, GreyRange
 
 W, H = 64, 8
 
@@ -121,3 +122,48 @@ def test_other_pictures_are_named() -> None:
         DepthColors().convert(RawImage(2, 2, "rgb8", 6, bytes(12)))
     with pytest.raises(DecodeError, match="step is 3"):
         DepthColors().convert(RawImage(2, 2, "16UC1", 3, bytes(12)))
+
+
+def greys(frame: object) -> np.ndarray:
+    assert frame.planes[0].shape == (H, W)
+    return frame.planes[0].astype(int)
+
+
+def test_greys_of_a_fixed_range_are_clipped() -> None:
+    expected = np.clip((ramp() - 1500) / 1000, 0, 1) * 255
+    for image, scale in (
+        (millimetres(ramp()), 1),
+        (millimetres(ramp(), True), 1),
+        (metres(ramp() / 1000), 1000),
+    ):
+        shown = GreyLevels(GreyRange(1500 / scale, 2500 / scale)).convert(image)
+        assert np.abs(greys(shown) - expected).max() <= 1
+
+
+def test_black_and_white_follow_the_median_of_the_extremes() -> None:
+    levels = GreyLevels(GreyRange(window=3))
+    shown = greys(levels.convert(millimetres(ramp())))
+    assert (shown[0, 0], shown[0, -1]) == (0, 255)
+    outlier = ramp()
+    outlier[0, 0] = 60000
+    shown = greys(levels.convert(millimetres(ramp())))
+    shown = greys(levels.convert(millimetres(outlier)))
+    assert (shown[0, 0], shown[0, -1]) == (255, 255), "one picture does not change the range"
+    levels.convert(millimetres(outlier))
+    assert greys(levels.convert(millimetres(outlier)))[0, -1] < 20, "most of them do"
+
+
+def test_numbers_that_are_not_finite_and_empty_ranges_are_black() -> None:
+    some = ramp() / 1000
+    some[0, :4] = np.nan, np.inf, -np.inf, 3e38
+    shown = greys(GreyLevels(GreyRange(1, 3)).convert(metres(some)))
+    assert shown[0, :4].tolist() == [0, 0, 0, 255]
+    assert shown[1, -1] == 255
+    for numbers in (np.full((H, W), np.nan), np.full((H, W), 2.0)):
+        assert not greys(GreyLevels(GreyRange()).convert(metres(numbers))).any()
+    assert not greys(GreyLevels(GreyRange(5, 1)).convert(metres(some))).any()
+
+
+def test_greys_are_for_one_number_per_pixel() -> None:
+    with pytest.raises(UnsupportedError, match="'rgb8' has no range of greys"):
+        GreyLevels(GreyRange()).convert(RawImage(W, H, "rgb8", 3 * W, bytes(3 * W * H)))
