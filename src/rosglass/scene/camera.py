@@ -22,6 +22,7 @@ __all__ = [
     "FOV_RAD",
     "Camera",
     "Matrix",
+    "PinholeCamera",
     "Seen",
     "Size",
     "interpolate",
@@ -219,6 +220,58 @@ class Camera:
             return point_of(origin + across), point_of(-turn[:, 2])
         ahead = height / 2 / math.tan(self.fov / 2)
         return point_of(origin), point_of(unit(turn @ np.array([right, up, -ahead])))
+
+
+@dataclass(frozen=True, eq=False)
+class PinholeCamera(Camera):
+    """A camera of the robot: what it looks at need not be in the middle of the picture.
+
+    Attributes:
+        focal: Focal lengths to the right and downwards, in units of the item.
+        centre: Where its axis is seen, in units of the item from its upper left corner.
+
+    Raises:
+        Error: A number is not finite, or a focal length is not above 0.
+    """
+
+    focal: Size = (1.0, 1.0)
+    centre: Size = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        numbers = (*self.focal, *self.centre)
+        if not (all(map(math.isfinite, numbers)) and min(self.focal) > 0):
+            raise Error(
+                f"a camera needs focal lengths above 0 and a finite centre, not {self.focal} and "
+                f"{self.centre}"
+            )
+
+    def __eq__(self, other: object) -> bool:
+        same = super().__eq__(other)
+        if same is not True or not isinstance(other, PinholeCamera):
+            return NotImplemented if same is NotImplemented else False
+        return (self.focal, self.centre) == (other.focal, other.centre)
+
+    __hash__ = None
+
+    @cached_property
+    def projection(self) -> Matrix:
+        """The matrix from the eye's frame to OpenGL's clip space, depths -1 (near) to 1."""
+        width, height = self.size
+        matrix = np.zeros((4, 4))
+        matrix[0, 0], matrix[1, 1] = 2 * self.focal[0] / width, 2 * self.focal[1] / height
+        matrix[0, 2] = 1 - 2 * self.centre[0] / width
+        matrix[1, 2] = 2 * self.centre[1] / height - 1
+        matrix[2, 2] = matrix[3, 2] = -1.0
+        matrix[2, 3] = -2 * self.near
+        return matrix
+
+    def ray(self, x: float, y: float) -> tuple[Point, Point]:
+        """Return the ray from the camera through a place of the picture, in the fixed frame."""
+        right = (x - self.centre[0]) / self.focal[0]
+        down = (y - self.centre[1]) / self.focal[1]
+        turn, origin = self.pose[:3, :3], self.pose[:3, 3]
+        return point_of(origin), point_of(unit(turn @ np.array([right, -down, -1.0])))
 
 
 def interpolate(start: Camera, goal: Camera, share: float) -> Camera:

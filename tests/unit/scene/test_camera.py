@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rosglass.errors import Error
-from rosglass.scene.camera import Camera, interpolate
+from rosglass.scene.camera import Camera, PinholeCamera, interpolate
 from rosglass.scene.views import OrbitView, TopDownOrthoView
 
 
@@ -153,3 +153,24 @@ def test_an_animation_between_maps_stays_a_map() -> None:
     assert half.scale == pytest.approx(20)
     right = half.pose[:3, 0]
     assert math.atan2(right[1], right[0]) == pytest.approx(0.5)
+
+
+def test_a_pinhole_camera_sees_points_where_its_matrix_projects_them() -> None:
+    camera = PinholeCamera(np.eye(4), (400, 300), focal=(200, 220), centre=(190, 140))
+    seen = camera.project((0.5, -0.3, -2))
+    assert (seen.x, seen.y) == pytest.approx((200 * 0.25 + 190, 220 * 0.15 + 140))
+    origin, direction = camera.ray(seen.x, seen.y)
+    assert origin == (0, 0, 0)
+    assert np.array(direction) / -direction[2] * 2 == pytest.approx([0.5, -0.3, -2])
+    clip = camera.projection @ [0.5, -0.3, -2, 1]
+    found = camera.unproject(seen.x, seen.y, (clip[2] / clip[3] + 1) / 2)
+    assert found == pytest.approx((0.5, -0.3, -2))
+
+
+def test_pinhole_cameras_differ_by_their_lens() -> None:
+    camera = PinholeCamera(np.eye(4), (400, 300), focal=(200, 220), centre=(190, 140))
+    assert camera == PinholeCamera(np.eye(4), (400, 300), focal=(200, 220), centre=(190, 140))
+    assert camera != PinholeCamera(np.eye(4), (400, 300), focal=(200, 221), centre=(190, 140))
+    assert camera != Camera(np.eye(4), (400, 300))
+    with pytest.raises(Error, match="focal lengths above 0 and a finite centre"):
+        PinholeCamera(np.eye(4), (400, 300), focal=(200, 0), centre=(190, 140))
