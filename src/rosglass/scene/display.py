@@ -45,7 +45,10 @@ __all__ = [
     "FIXED_FRAME",
     "OUTDATED_ALPHA",
     "Display",
+    "Intake",
+    "OneTopicDisplay",
     "Status",
+    "Subscriptions",
     "TopicDisplay",
     "frame_and_stamp",
     "matrix_of",
@@ -309,7 +312,7 @@ class _Item(NamedTuple):
     stamp: int
 
 
-class _Intake:
+class Intake:
     """Decodes messages in the node's thread, and hands them to the GUI thread.
 
     Args:
@@ -378,57 +381,29 @@ class _Intake:
         return items, error
 
 
-class TopicDisplay(Display):
-    """A display of the messages of one topic.
+class OneTopicDisplay(Display):
+    """A display of one topic, with its settings in the files of either RViz.
 
     Attributes:
         MESSAGES: Names of the types that it shows, without ``msg/``.
-        KEEPS_ALL: Whether each message counts, as for markers; otherwise the newest does.
-        EAGER: Whether all fields of a message are decoded at once, which is faster if all are used.
     """
 
     MESSAGES: ClassVar[tuple[str, ...]] = ()
-    KEEPS_ALL: ClassVar[bool] = False
-    EAGER: ClassVar[bool] = False
 
     topic = Setting("Topic", "topic", "", "Topic to subscribe to.", then="_on_topic")
     depth = Setting(
         "Topic/Depth", "int", 5, "Messages kept until their transform is known.", min=1, max=1000,
         then="_schedule",
     )  # fmt: skip
-    reliability = Setting(
-        "Topic/Reliability Policy", "enum", BEST_AVAILABLE, "What publishers have to offer.",
-        choices=list(_RELIABILITY), then="_schedule",
-    )  # fmt: skip
-    durability = Setting(
-        "Topic/Durability Policy", "enum", BEST_AVAILABLE, "Whether earlier messages are wanted.",
-        choices=list(_DURABILITY), then="_schedule",
-    )  # fmt: skip
 
     #: How many messages were received.
     received = ReadOnly(int, 0)
-
-    def __init__(
-        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
-    ) -> None:
-        self._intake: _Intake | None = None
-        self._waiting: deque[_Item] = deque()
-        self._last: _Item | None = None
-        self._arrived = 0.0
-        super().__init__(parent, runtime)
-
-    # -- files -----------------------------------------------------------------------------------
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
         """Take the settings of a file of either RViz, which write topics differently."""
         refused = super().load_settings({k: v for k, v in saved.items() if k != "Topic"})
         try:
-            given = read_topic(saved)
-            self.set("Topic", given.name)
-            if given.depth:
-                self.depth = min(max(given.depth, 1), 1000)
-            self.reliability = given.reliability or self.reliability
-            self.durability = given.durability or self.durability
+            self._load_topic(read_topic(saved))
         except Error as error:
             refused.append(str(error))
         return refused
@@ -440,20 +415,22 @@ class TopicDisplay(Display):
         kept.pop("Topic", None)
         if topic is not None:
             kept["Topic"] = topic
-        # What is ours alone, no RViz can read.
-        policies = [
-            value if value != BEST_AVAILABLE else None
-            for value in (self.reliability, self.durability)
-        ]
-        write_topic(kept, TopicSetting(self.topic, self.depth, *policies), ros)
+        write_topic(kept, self._saved_topic(), ros)
         return kept
+
+    def _load_topic(self, given: TopicSetting) -> None:
+        self.set("Topic", given.name)
+        if given.depth:
+            limits = self.SETTINGS["Topic/Depth"].kind.options
+            self.depth = min(max(given.depth, limits["min"]), limits["max"])
+
+    def _saved_topic(self) -> TopicSetting:
+        return TopicSetting(self.topic, self.depth)
 
     def _on_enabled(self) -> None:
         super()._on_enabled()
         if not self.enabled:
             self.reset()  # it would be old when the display is shown again
-
-    # -- the subscription ------------------------------------------------------------------------
 
     def _on_topic(self) -> None:
         self._topic = self.topic
@@ -461,6 +438,51 @@ class TopicDisplay(Display):
         self.clear_status()
         self.reset()
         self._schedule()
+
+
+class TopicDisplay(OneTopicDisplay):
+    """A display of the messages of one topic.
+
+    Attributes:
+        KEEPS_ALL: Whether each message counts, as for markers; otherwise the newest does.
+        EAGER: Whether all fields of a message are decoded at once, which is faster if all are used.
+    """
+
+    KEEPS_ALL: ClassVar[bool] = False
+    EAGER: ClassVar[bool] = False
+
+    reliability = Setting(
+        "Topic/Reliability Policy", "enum", BEST_AVAILABLE, "What publishers have to offer.",
+        choices=list(_RELIABILITY), then="_schedule",
+    )  # fmt: skip
+    durability = Setting(
+        "Topic/Durability Policy", "enum", BEST_AVAILABLE, "Whether earlier messages are wanted.",
+        choices=list(_DURABILITY), then="_schedule",
+    )  # fmt: skip
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self._intake: Intake | None = None
+        self._waiting: deque[_Item] = deque()
+        self._last: _Item | None = None
+        self._arrived = 0.0
+        super().__init__(parent, runtime)
+
+    def _load_topic(self, given: TopicSetting) -> None:
+        super()._load_topic(given)
+        self.reliability = given.reliability or self.reliability
+        self.durability = given.durability or self.durability
+
+    def _saved_topic(self) -> TopicSetting:
+        # What is ours alone, no RViz can read.
+        policies = [
+            value if value != BEST_AVAILABLE else None
+            for value in (self.reliability, self.durability)
+        ]
+        return TopicSetting(self.topic, self.depth, *policies)
+
+    # -- the subscription ------------------------------------------------------------------------
 
     def profile(self) -> QoS:
         """Return what is requested of publishers."""
@@ -485,7 +507,7 @@ class TopicDisplay(Display):
 
     def _factory(self, *wanted: Any) -> Callable[[], Any]:
         node, topics, qos = wanted
-        intake = self._intake = _Intake(
+        intake = self._intake = Intake(
             self.preparer(),
             self.MESSAGES,
             self._executor,
@@ -493,7 +515,7 @@ class TopicDisplay(Display):
             _MOST_WAITING if self.KEEPS_ALL else max(self.depth, 1),
             self.EAGER,
         )
-        return lambda: _Subscriptions(node, topics, qos, intake)
+        return lambda: Subscriptions(node, topics, qos, intake)
 
     def _on_created(self, endpoint: Any) -> None:  # noqa: ARG002 - the base class's signature
         self.set_status("Topic", "warn", "No messages received")
@@ -645,10 +667,14 @@ class TopicDisplay(Display):
         self.root.clear()
 
 
-class _Subscriptions:
-    """The subscriptions of a display, all of which feed the same intake."""
+class Subscriptions:
+    """The subscriptions of a display, all of which feed the same intake.
 
-    def __init__(self, node: Node, topics: tuple[str, ...], qos: QoS, intake: _Intake) -> None:
+    Raises:
+        Error: One of them could not be made.
+    """
+
+    def __init__(self, node: Node, topics: tuple[str, ...], qos: QoS, intake: Intake) -> None:
         self._open: list[Any] = []
         try:
             for topic in topics:

@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor
 from rosglass.errors import Error
 from rosglass.interfaces.names import ros1_name
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
-from rosglass.scene.display import TopicDisplay
+from rosglass.scene.display import OneTopicDisplay
 from rosglass.scene.display_configs import GroupDisplay, UnknownDisplay
 from rosglass.scene.scene_view import SceneView
 
@@ -238,7 +238,7 @@ class DisplaysModel(QAbstractListModel):
             return tuple(setting.kind.options["choices"])
         if setting.kind.NAME == "frame" and display.scene is not None:
             return ("<Fixed Frame>", *display.scene.frames())
-        if setting.kind.NAME == "topic" and isinstance(display, TopicDisplay):
+        if setting.kind.NAME == "topic" and isinstance(display, OneTopicDisplay):
             wanted = display.MESSAGES
             return tuple(name for name, kinds in self._topics() if set(kinds) & set(wanted))
         return ()
