@@ -20,6 +20,7 @@ from rosglass.scene.displays.geometry import (
     WrenchStampedDisplay,
 )
 from rosglass.scene.displays.grid import AxesDisplay, GridDisplay
+from rosglass.scene.displays.image import CameraDisplay, CameraView, ImageDisplay, PictureItem
 from rosglass.scene.displays.map import GridCellsDisplay, MapDisplay
 from rosglass.scene.displays.marker import MarkerArrayDisplay, MarkerDisplay
 from rosglass.scene.displays.path import PathDisplay
@@ -66,11 +67,13 @@ __all__ = ["DISPLAYS", "PANELS", "TOOLS", "register"]
 DISPLAYS = (
     AccelStampedDisplay,
     AxesDisplay,
+    CameraDisplay,
     DepthCloudDisplay,
     FluidPressureDisplay,
     GridCellsDisplay,
     GridDisplay,
     IlluminanceDisplay,
+    ImageDisplay,
     LaserScanDisplay,
     MapDisplay,
     MarkerArrayDisplay,
@@ -93,7 +96,7 @@ DISPLAYS = (
     WrenchStampedDisplay,
 )
 #: Panels written in QML.
-PANELS = ("DisplaysPanel", "ViewsPanel")
+PANELS = ("DisplaysPanel", "ImagePanel", "ImagePanels", "ViewsPanel")
 Scene.TYPES.update({display.TYPE: display for display in (*DISPLAYS, GroupDisplay)})
 #: The tools, likewise; ``Tool`` is the base of own ones.
 TOOLS = (
@@ -120,7 +123,9 @@ def register() -> None:
     os.environ.setdefault("QSG_RENDER_LOOP", "basic")
     # PySide takes texts for names, which its hints do not say.
     register_type: Any = qmlRegisterType
-    for kind in (SceneView, Tool, DisplaysModel, *DISPLAYS, *TOOLS):
+    for kind in (
+        SceneView, CameraView, PictureItem, Tool, DisplaysModel, *DISPLAYS, *TOOLS,
+    ):  # fmt: skip
         register_type(kind, "RosScene", 1, 0, kind.__name__)
     register_type(OverlayElement, "RosScene", 1, 0, "SceneOverlay")
     for name in PANELS:

@@ -14,7 +14,7 @@ from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import Element, single_shot
 from rosglass.qml.runtime import runtime_of
 from rosglass.qml.tf_buffer import TfLink
-from rosglass.qt import Signal, Slot, is_alive
+from rosglass.qt import Property, Signal, Slot, is_alive
 from rosglass.rviz.property_values import shown
 from rosglass.scene.drawing import Group, instance_matrix
 
@@ -53,6 +53,7 @@ class Scene(Element):
     displayAdded = Signal(object)
     #: A display was removed: itself.
     displayRemoved = Signal(object)
+    displaysChanged = Signal()
     #: Transforms were received, or data has to be placed anew.
     placed = Signal()
 
@@ -87,6 +88,9 @@ class Scene(Element):
     def displays(self) -> list[Display]:
         """All displays, in the order in which they were added."""
         return list(self._displays)
+
+    #: All displays, for QML.
+    displayList = Property(list, lambda self: list(self._alive()), notify=displaysChanged)
 
     def add(self, kind: str | Display, name: str = "", **settings: Any) -> Display:
         """Add a display.
@@ -142,6 +146,7 @@ class Scene(Element):
             _log.exception("%s", display.label)
             display.set_status("Display", "error", repr(error))
         self.displayAdded.emit(display)
+        self.displaysChanged.emit()
 
     def remove(self, display: Display) -> None:
         """Remove a display.
@@ -154,6 +159,7 @@ class Scene(Element):
         self._displays.remove(display)
         display.leave()
         self.displayRemoved.emit(display)
+        self.displaysChanged.emit()
         display.deleteLater()
 
     def move(self, display: Display, index: int) -> None:

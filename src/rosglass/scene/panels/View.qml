@@ -60,6 +60,7 @@ ApplicationWindow {
             SplitView.minimumWidth: 100
             focus: true
 
+            ImagePanels { objectName: "imagePanels"; anchors.fill: parent; view: scene }
             Item { id: overlays; anchors.fill: parent }
             Label {
                 anchors.centerIn: parent

@@ -1,0 +1,772 @@
+"""The displays Image and Camera: a camera's pictures, alone or with the scene in them.
+
+They are shown by ``ImagePanel`` (``panels/ImagePanel.qml``), whose items are here: a
+:class:`PictureItem` paints the pictures, a :class:`CameraView` draws the scene from the camera.
+"""
+# ruff: noqa: N815, N802 - the names of properties, signals and events are Qt's
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
+
+from rosglass.comm.qos import Durability, QoS, Reliability
+from rosglass.errors import Error
+from rosglass.images import TRANSPORTS
+from rosglass.images.depth import GreyRange
+from rosglass.interfaces.names import ros1_name
+from rosglass.qml.callbacks import weak_callback
+from rosglass.qml.element import DEFAULT_TIMEOUT_MS
+from rosglass.qml.image_sinks import ImageItem, Sink
+from rosglass.qml.properties import ReadOnly, Writable, report
+from rosglass.qt import Property, QtCore, QtGui, Signal, Slot, is_alive
+from rosglass.scene.camera import PinholeCamera
+from rosglass.scene.display import Intake, OneTopicDisplay, Subscriptions
+from rosglass.scene.scene_view import SceneView
+from rosglass.scene.settings import Setting
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from rosglass.qml.image_rendering import Look, Picture
+    from rosglass.qml.image_stream import SharedStream
+    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.session import Session
+    from rosglass.scene.camera import Camera
+    from rosglass.scene.drawing import Item
+    from rosglass.scene.renderer import Frame
+    from rosglass.scene.scene import Scene
+
+__all__ = [
+    "CameraDisplay",
+    "CameraView",
+    "ImageDisplay",
+    "PictureDisplay",
+    "PictureItem",
+    "camera_info_topic",
+]
+
+_CAMERA_INFO = "sensor_msgs/CameraInfo"
+#: Seconds after which a picture is no longer live.
+_MAX_AGE_S = DEFAULT_TIMEOUT_MS / 1000
+#: Seconds for which a camera's pictures wait for their transform; then they are shown alone.
+_TRANSFORM_WAIT_S = 1.0
+#: Largest factor by which pictures are kept larger than a panel, for a zoom.
+_MOST_ZOOM = 8.0
+#: From a camera (x right, y down, looking along z) to OpenGL's (y up, looking along -z).
+_OPTICAL = np.diag([1.0, -1.0, -1.0, 1.0])
+_NO_PANEL = "no panel shows it: declare ImagePanel { display: ... }"
+
+
+def camera_info_topic(topic: str) -> str:
+    """Return the topic of the ``CameraInfo`` that belongs to an image topic.
+
+    Args:
+        topic: The camera's base topic, or that of a transport: ``/front/image_raw/compressed``.
+    """
+    base, _, last = topic.rpartition("/")
+    if last in TRANSPORTS:
+        base = base.rpartition("/")[0]
+    return f"{base}/camera_info"
+
+
+class PictureDisplay(OneTopicDisplay):
+    """Base class of the displays of a camera's pictures, which several panels may show.
+
+    It receives pictures while a panel shows it.
+    """
+
+    MESSAGES = tuple(dict.fromkeys(ros1_name(one.type) for one in TRANSPORTS.values()))
+
+    #: Another picture is shown, at another place, or none any more.
+    pictureChanged = Signal()
+
+    depth = Setting(
+        "Topic/Depth", "int", 2, "Pictures kept until their transform is known.", min=1, max=100,
+        then="",
+    )  # fmt: skip
+    transport = Setting(
+        "Transport Hint", "enum", "raw",
+        "How pictures are sent; in another way while they are not sent in this one.",
+        choices=list(TRANSPORTS), then="_schedule",
+    )  # fmt: skip
+
+    #: Place and size of its panel in a view, units of the view; empty until the user moves it.
+    panelGeometry = Writable(QtCore.QRectF, QtCore.QRectF(), then="")
+    #: Whether it, and the groups that it is in, are enabled.
+    active = ReadOnly(bool, False)
+    isPicture = Property(bool, lambda _: True, constant=True)
+    #: Whether the scene is drawn in its picture.
+    isCamera = Property(bool, lambda _: False, constant=True)
+    #: Whether the picture is behind the scene.
+    behind = Property(bool, lambda self: self._is_behind(), notify=pictureChanged)
+    #: Opacity of the picture over the scene.
+    overlay = Property(float, lambda self: self._overlay_alpha(), notify=pictureChanged)
+
+    _HOLDS = ("_picture",)
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self._sinks: list[Sink] = []
+        self._shown_look: Look | None = None
+        self._picture: Picture | None = None
+        self._arrived = 0.0
+        super().__init__(parent, runtime)
+
+    # -- panels ----------------------------------------------------------------------------------
+
+    def add_sink(self, item: ImageItem) -> None:
+        """Show the pictures in an item as well."""
+        sink = Sink(item)
+        self._sinks.append(sink)
+        if self._picture is not None:
+            sink.show(self._picture)
+        self._schedule()
+
+    def remove_sink(self, item: ImageItem) -> None:
+        """Show no more pictures in an item."""
+        self._sinks = [one for one in self._sinks if one.item is not item]
+        self._schedule()
+
+    def picture_place(self, width: float, height: float) -> QtCore.QRectF:
+        """Return where the picture is in an item; it may be larger than that.
+
+        Args:
+            width: Of the item.
+            height: The same.
+        """
+        picture = self._picture
+        aspect = 1.0 if picture is None else picture.frame.width / picture.frame.height
+        return _placed(width, height, aspect, 1.0)
+
+    # -- the stream ------------------------------------------------------------------------------
+
+    def _wanted(self) -> tuple[Any, ...] | None:
+        node = self.node
+        if node is None or not self.shown or not self._topic or self.scene is None:
+            return None
+        self._resolved = self._resolve(self._topic)
+        if not self._resolved:
+            return None
+        if not self._sinks:
+            self.set_status("Topic", "warn", _NO_PANEL)
+            return None
+        return node, self._resolved, self.transport
+
+    def _update(self) -> None:
+        super()._update()
+        report(self, active=self.shown)
+
+    def _create_endpoint(self, wanted: tuple[Any, ...]) -> None:
+        from rosglass.qml.image_stream import SharedStream as Stream  # noqa: PLC0415 - QtMultimedia
+
+        session = self._session
+        assert session is not None
+        node, topic, transport = wanted
+        look = self._look()
+        try:
+            stream = Stream.join(session, node, topic, transport, look, self)
+        except Error as error:
+            self.set_status("Topic", "error", str(error))
+            return
+        self._shown_look = look
+        self._set_endpoint(stream)
+
+    def _dispose(self, session: Session, endpoint: SharedStream) -> None:  # noqa: ARG002
+        endpoint.leave(self)
+
+    def _on_created(self, endpoint: SharedStream) -> None:
+        self.set_status("Topic", "warn", "No picture received")
+        self._publishers = self._count_publishers()
+        self._expect_publishers()
+        channel = endpoint.channel(self)
+        if channel is not None and channel.last is not None:
+            self.show_picture(channel.last)
+
+    def _on_closed(self, endpoint: SharedStream | None) -> None:  # noqa: ARG002
+        self._no_publisher.stop()
+        self.reset()
+
+    def _count_publishers(self) -> int:
+        try:
+            return self._endpoint.stream.publisher_count() if self._endpoint is not None else 0
+        except Error:
+            return 0
+
+    def _grey_range(self) -> GreyRange:
+        return GreyRange()
+
+    def _zoom(self) -> float:
+        return 1.0
+
+    def _look(self) -> Look:
+        """Return how pictures are converted: not larger than the largest panel shows them."""
+        from rosglass.qml.image_rendering import Look  # noqa: PLC0415 - loads QtMultimedia
+
+        rooms = [sink.room() for sink in self._sinks if sink.is_alive]
+        known = [room for room in rooms if room is not None]
+        room = None
+        if known and len(known) == len(rooms):
+            zoom = min(max(self._zoom(), 1.0), _MOST_ZOOM)
+            sides = zip(*known, strict=True)
+            width, height = (round(max(side) * zoom) for side in sides)
+            room = (width, height)
+        return Look(False, colors=self._grey_range(), room=room)
+
+    def _update_look(self) -> None:
+        stream = self._endpoint
+        if stream is not None:
+            look = self._look()
+            if look != self._shown_look:
+                self._shown_look = look
+                stream.change_look(self, look)
+
+    # -- pictures --------------------------------------------------------------------------------
+
+    def show_picture(self, picture: Picture) -> None:
+        """Take a picture; called by the stream in the GUI thread."""
+        if not is_alive(self) or self.scene is None or not self.shown:
+            return
+        self._arrived = time.time()
+        if self._outdated:
+            # Not by the last picture of a publisher that is gone.
+            self._recheck_outdated()
+        report(self, received=self.received + 1)
+        self.set_status("Topic", "ok", f"{self.received} pictures received")
+        self.delete_status("Image")
+        self._take_picture(picture)
+
+    def stream_changed(self) -> None:
+        """Read the stream's problem again; called by the stream in the GUI thread."""
+        if not is_alive(self) or self._endpoint is None:
+            return
+        self._publishers = max(self._publishers, self._count_publishers())
+        channel = self._endpoint.channel(self)
+        problem = self._endpoint.stream.problem or (channel.problem if channel else "")
+        if problem:
+            self.set_status("Image", "error", problem)
+        else:
+            self.delete_status("Image")
+
+    def _take_picture(self, picture: Picture) -> None:
+        self._present(picture)
+
+    def _present(self, picture: Picture) -> None:
+        self._picture = picture
+        for sink in self._sinks:
+            if sink.is_alive:
+                sink.show(picture)
+        self.pictureChanged.emit()
+        self._update_stale()
+
+    def reset(self) -> None:
+        """Remove the picture."""
+        super().reset()
+        self._picture = None
+        for sink in self._sinks:
+            sink.clear()
+        self.pictureChanged.emit()
+        self._update_stale()
+
+    def leave(self) -> None:
+        """Stop being shown."""
+        super().leave()
+        if is_alive(self):
+            self._close_endpoint()
+
+    def _is_behind(self) -> bool:
+        return True
+
+    def _overlay_alpha(self) -> float:
+        return 0.0
+
+    # -- age -------------------------------------------------------------------------------------
+
+    @Slot()
+    def _on_tick(self) -> None:
+        super()._on_tick()
+        alive = [sink for sink in self._sinks if sink.is_alive]
+        if len(alive) != len(self._sinks):
+            self._sinks = alive
+            self._schedule()
+        # Items have no signal for a size on the screen that has changed.
+        self._update_look()
+
+    def _recheck_outdated(self) -> None:
+        if self._count_publishers():
+            self._outdated = False
+
+    def _is_old(self) -> bool:
+        picture = self._picture
+        return picture is None or self._steady() - picture.made + picture.late > _MAX_AGE_S
+
+    def _update_stale(self) -> None:
+        super()._update_stale()
+        if self._picture is None or not self.stale:
+            self.delete_status("Data")
+            return
+        when = time.strftime("%H:%M:%S", time.localtime(self._arrived))
+        why = "its publisher is gone" if self._outdated else "no new picture is shown"
+        self.set_status("Data", "warn", f"{why}; the last one is of {when}")
+
+
+class ImageDisplay(PictureDisplay):
+    """A camera's pictures. See its page in ``docs/scene.md``."""
+
+    TYPE = "Image"
+
+    normalizeRange = Setting(
+        "Normalize Range", "bool", True,
+        "Whether black and white follow the pictures, for depths and other numbers.",
+        then="_update_range",
+    )  # fmt: skip
+    minValue = Setting(
+        "Min Value", "float", 0.0, "What is black, in the picture's numbers.", then="_update_range"
+    )
+    maxValue = Setting(
+        "Max Value", "float", 1.0, "What is white, in the picture's numbers.", then="_update_range"
+    )
+    medianWindow = Setting(
+        "Median window", "int", 5, "Pictures over which black and white are medians.",
+        min=1, max=1000, then="_update_range",
+    )  # fmt: skip
+
+    def _grey_range(self) -> GreyRange:
+        if self.normalizeRange:
+            return GreyRange(window=self.medianWindow)
+        return GreyRange(self.minValue, self.maxValue)
+
+    def _update_range(self) -> None:
+        if self.normalizeRange or self.minValue < self.maxValue:
+            self.delete_status("Range")
+        else:
+            text = f"Min Value {self.minValue:g} is not below Max Value {self.maxValue:g}"
+            self.set_status("Range", "warn", f"{text}: depths are black")
+        self._update_look()
+
+
+# -- Camera ----------------------------------------------------------------------------------------
+
+
+class _Lens(NamedTuple):
+    """What a ``CameraInfo`` says of a camera whose pictures are rectified.
+
+    Attributes:
+        width: Of the picture in pixels; 0 where the camera does not say.
+        height: The same.
+        fx: Focal length in pixels, to the right.
+        fy: The same, downwards.
+        cx: Where its axis is seen, pixels from the left.
+        cy: The same, from above.
+        right: Metres from its frame to the camera, of the right one of a stereo pair.
+        down: The same, downwards.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    right: float
+    down: float
+
+
+def _read_lens(message: Any) -> _Lens:
+    """Return what a ``CameraInfo`` says.
+
+    Raises:
+        Error: The camera is not calibrated, or numbers are not finite.
+    """
+    name = "P" if "P" in message else "p"
+    numbers = [float(number) for number in message[name]]
+    if not np.isfinite(numbers).all():
+        raise Error(f"CameraInfo/{name}: contains NaN or infinite numbers: {numbers}")
+    fx, _, cx, tx, _, fy, cy, ty = numbers[:8]
+    if fx <= 0 or fy <= 0:
+        raise Error(
+            f"CameraInfo/{name}: expected focal lengths above 0 pixels, got fx {fx:g} and fy "
+            f"{fy:g}; calibrate the camera"
+        )
+    return _Lens(message.width, message.height, fx, fy, cx, cy, -tx / fx, -ty / fy)
+
+
+class CameraDisplay(PictureDisplay):
+    """The scene as a camera of the robot sees it, with its picture. See ``docs/scene.md``."""
+
+    TYPE = "Camera"
+
+    imageRendering = Setting(
+        "Image Rendering", "enum", "background and overlay",
+        "Whether the picture is behind the scene, over it, or both.",
+        choices=["background", "overlay", "background and overlay"], then="_emit_changed",
+    )  # fmt: skip
+    overlayAlpha = Setting(
+        "Overlay Alpha", "float", 0.5, "Opacity of the picture over the scene.", min=0.0, max=1.0,
+        then="_emit_changed",
+    )  # fmt: skip
+    zoomFactor = Setting(
+        "Zoom Factor", "float", 1.0, "Above 1 magnifies, below 1 shows more around the picture.",
+        min=1e-5, max=1e5, then="_emit_changed",
+    )  # fmt: skip
+    #: Names of displays that are not drawn from the camera.
+    hiddenDisplays = Writable(list, [], then="_emit_changed")
+
+    isCamera = Property(bool, lambda _: True, constant=True)
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self._waiting: deque[Picture] = deque()
+        self._infos: Intake | None = None
+        self._info_topic = ""
+        self._lens: _Lens | None = None
+        #: Of the camera's frame at the time of the picture, in the fixed frame.
+        self._pose: NDArray[np.float64] | None = None
+        self._placed_at = 0.0
+        super().__init__(parent, runtime)
+
+    # -- files -----------------------------------------------------------------------------------
+
+    def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
+        """Take the settings of a file, with the displays that are hidden."""
+        refused = super().load_settings(saved)
+        self.hiddenDisplays = list(_hidden_names(saved.get("Visibility")))
+        return refused
+
+    def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
+        """Return the settings for a file of one RViz."""
+        kept = super().save_settings(older, ros)
+        before = kept.get("Visibility")
+        names = [] if self.scene is None else [one.name for one in self.scene.displays]
+        hidden = set(self.hiddenDisplays)
+        kept["Visibility"] = {
+            **(before if isinstance(before, dict) else {"Value": True}),
+            **{name: name not in hidden for name in names if name != self.name},
+        }
+        return kept
+
+    # -- CameraInfo ------------------------------------------------------------------------------
+
+    def _create_endpoint(self, wanted: tuple[Any, ...]) -> None:
+        super()._create_endpoint(wanted)
+        session = self._session
+        if self._endpoint is None or session is None:
+            return
+        node, topic = wanted[:2]
+        topic = self._info_topic = camera_info_topic(topic)
+        self._placed_at = time.monotonic()
+        self._miss_info()
+        intake = self._infos = Intake(
+            _read_lens, (_CAMERA_INFO,), session.executor, weak_callback(self._on_info), 1
+        )
+        qos = QoS(
+            depth=1, reliability=Reliability.BEST_AVAILABLE, durability=Durability.BEST_AVAILABLE
+        )
+
+        def done(result: Any) -> None:
+            if isinstance(result, Error):
+                if is_alive(self) and self._infos is intake:
+                    self.set_status("Camera Info", "error", str(result))
+            elif is_alive(self) and self._infos is intake:
+                self._cleanup["camera info"] = lambda: session.background(result.close)
+            else:
+                session.background(result.close)
+
+        session.background(lambda: Subscriptions(node, (topic,), qos, intake), done)
+
+    def _miss_info(self) -> None:
+        text = f"no CameraInfo received on {self._info_topic}; the picture is shown alone"
+        self.set_status("Camera Info", "warn", text)
+
+    def _on_closed(self, endpoint: SharedStream | None) -> None:
+        self._infos = None
+        close = self._cleanup.pop("camera info", None)
+        if close is not None:
+            close()
+        self.delete_status("Camera Info")
+        super()._on_closed(endpoint)
+
+    def _on_info(self) -> None:
+        if not is_alive(self) or self._infos is None:
+            return
+        items, error = self._infos.take()
+        before = self._lens
+        if error:
+            # What is drawn by another lens would be at wrong places.
+            self._lens = None
+            self.set_status("Camera Info", "error", error)
+        elif items:
+            self._lens = items[-1].data
+            self.set_status("Camera Info", "ok", "CameraInfo OK")
+        if self._lens != before:
+            self._place_waiting()
+            self.pictureChanged.emit()
+
+    # -- pictures --------------------------------------------------------------------------------
+
+    def _take_picture(self, picture: Picture) -> None:
+        self._waiting.append(picture)
+        while len(self._waiting) > self.depth:
+            self._waiting.popleft()
+        self._place_waiting()
+
+    def _place_waiting(self) -> None:
+        """Show the newest picture whose transform is known; without one for a while, alone."""
+        for at in range(len(self._waiting) - 1, -1, -1):
+            picture = self._waiting[at]
+            pose = self._pose_of(picture)
+            if pose is not None:
+                self._placed_at = time.monotonic()
+            elif self._lens is not None and time.monotonic() - self._placed_at < _TRANSFORM_WAIT_S:
+                continue
+            for _ in range(at + 1):
+                self._waiting.popleft()
+            self._pose = pose
+            self._present(picture)
+            return
+
+    def _pose_of(self, picture: Picture) -> NDArray[np.float64] | None:
+        stamp = picture.frame.stamp
+        frame = picture.frame.frame_id.lstrip("/")
+        if not frame:
+            self.set_status("Transform", "error", "header.frame_id of the picture is empty")
+            return None
+        return self.place_of(frame, 0 if stamp is None else stamp.nanoseconds)
+
+    def on_transforms(self) -> None:
+        """Show what has waited for transforms."""
+        if self._waiting:
+            self._place_waiting()
+
+    def on_fixed_frame(self) -> None:
+        """Look at the scene from the camera's place in the new fixed frame."""
+        if self._picture is not None:
+            self._pose = self._pose_of(self._picture)
+            self.pictureChanged.emit()
+        self.on_transforms()
+
+    def join(self, scene: Scene) -> None:
+        """Start to be shown in a scene."""
+        super().join(scene)
+        self.pictureChanged.emit()
+
+    def reset(self) -> None:
+        """Remove the picture, and what is drawn in it."""
+        self._waiting.clear()
+        self._lens = self._pose = None
+        if self._infos is not None:
+            self._miss_info()
+        super().reset()
+
+    # -- the camera ------------------------------------------------------------------------------
+
+    def _emit_changed(self) -> None:
+        self._update_look()
+        self.pictureChanged.emit()
+
+    def _zoom(self) -> float:
+        return float(self.zoomFactor)
+
+    def _is_behind(self) -> bool:
+        return bool(self.imageRendering != "overlay")
+
+    def _overlay_alpha(self) -> float:
+        return 0.0 if self.imageRendering == "background" else float(self.overlayAlpha)
+
+    def _size(self) -> tuple[int, int] | None:
+        """Return width and height of the picture that the lens is for."""
+        picture, lens = self._picture, self._lens
+        if picture is None or lens is None:
+            return None
+        whole = picture.whole or picture.frame
+        return lens.width or whole.width, lens.height or whole.height
+
+    def picture_place(self, width: float, height: float) -> QtCore.QRectF:
+        """Return where the picture is in an item; it may be larger than that."""
+        size, lens = self._size(), self._lens
+        if size is None or lens is None:
+            place = super().picture_place(width, height)
+            return _placed(width, height, place.width() / max(place.height(), 1e-9), self._zoom())
+        # Equal angles are equally large, also of pixels that are not square.
+        return _placed(width, height, (size[0] / lens.fx) / (size[1] / lens.fy), self._zoom())
+
+    def camera_for(self, width: float, height: float) -> PinholeCamera | None:
+        """Return the camera that sees the scene as the picture does; None while it is unknown.
+
+        Args:
+            width: Of the item that shows it.
+            height: The same.
+        """
+        size, lens, pose = self._size(), self._lens, self._pose
+        if size is None or lens is None or pose is None:
+            return None
+        place = self.picture_place(width, height)
+        across, down = place.width() / size[0], place.height() / size[1]
+        moved = np.eye(4)
+        moved[:2, 3] = lens.right, lens.down
+        try:
+            return PinholeCamera(
+                pose @ moved @ _OPTICAL,
+                (width, height),
+                focal=(lens.fx * across, lens.fy * down),
+                # Coordinates of pixels are those of their middles.
+                centre=(
+                    place.x() + (lens.cx + 0.5) * across,
+                    place.y() + (lens.cy + 0.5) * down,
+                ),
+            )
+        except Error as error:
+            self.set_status("Camera Info", "error", str(error))
+            return None
+
+
+def _hidden_names(saved: Any) -> list[str]:
+    """Return the displays that a file's Visibility hides, also those in groups."""
+    names: list[str] = []
+    if not isinstance(saved, dict):
+        return names
+    for name, value in saved.items():
+        if name == "Value":
+            continue
+        if value is False or (isinstance(value, dict) and value.get("Value") is False):
+            names.append(str(name))
+        names += _hidden_names(value)
+    return names
+
+
+def _placed(width: float, height: float, aspect: float, zoom: float) -> QtCore.QRectF:
+    """Return the place of a picture of an aspect ratio in the middle of an item."""
+    wide = min(width, height * aspect) * zoom
+    high = min(height, width / aspect) * zoom
+    return QtCore.QRectF((width - wide) / 2, (height - high) / 2, wide, high)
+
+
+# -- items -----------------------------------------------------------------------------------------
+
+
+class PictureItem(ImageItem):
+    """Paints the pictures of a display; for ``ImagePanel``."""
+
+    displayChanged = Signal()
+
+    def __init__(self, parent: Any = None) -> None:
+        super().__init__(parent)
+        self._display: PictureDisplay | None = None
+
+    def _get_display(self) -> QtCore.QObject | None:
+        return self._display
+
+    def _set_display(self, display: Any) -> None:
+        before = self._display
+        if display is before or not (display is None or isinstance(display, PictureDisplay)):
+            return
+        if before is not None and is_alive(before):
+            before.remove_sink(self)
+            before.pictureChanged.disconnect(self.update)
+        self._display = display
+        if display is not None:
+            display.add_sink(self)
+            display.pictureChanged.connect(self.update)
+        self.displayChanged.emit()
+
+    display = Property(QtCore.QObject, _get_display, _set_display, notify=displayChanged)
+
+    def _place(self, image: QtGui.QImage) -> tuple[QtCore.QRectF, QtCore.QRectF]:
+        """Return the part of the item where the picture is, and which part of it that is."""
+        display = self._display
+        if display is None or not is_alive(display):
+            return super()._place(image)
+        whole = display.picture_place(self.width(), self.height())
+        seen = whole.intersected(QtCore.QRectF(0, 0, self.width(), self.height()))
+        across = image.width() / max(whole.width(), 1e-9)
+        down = image.height() / max(whole.height(), 1e-9)
+        return seen, QtCore.QRectF(
+            (seen.x() - whole.x()) * across,
+            (seen.y() - whole.y()) * down,
+            seen.width() * across,
+            seen.height() * down,
+        )
+
+
+class CameraView(SceneView):
+    """Draws the scene of a :class:`CameraDisplay` from its camera; for ``ImagePanel``."""
+
+    displayChanged = Signal()
+
+    def __init__(self, parent: Any = None, runtime: Runtime | None = None) -> None:
+        super().__init__(parent, runtime)
+        self._display: CameraDisplay | None = None
+        self._set_background(QColor("transparent"))
+        self.setAcceptedMouseButtons(Qt.MouseButton.NoButton)
+        self.setAcceptHoverEvents(False)
+        self.setAcceptTouchEvents(False)
+
+    def _get_display(self) -> QtCore.QObject | None:
+        return self._display
+
+    def _set_display(self, display: Any) -> None:
+        before = self._display
+        if display is before or not (display is None or isinstance(display, CameraDisplay)):
+            return
+        if before is not None and is_alive(before):
+            before.pictureChanged.disconnect(self._on_picture)
+        self._display = display
+        if display is not None:
+            display.pictureChanged.connect(self._on_picture)
+        self.displayChanged.emit()
+        self._on_picture()
+
+    display = Property(QtCore.QObject, _get_display, _set_display, notify=displayChanged)
+
+    @Slot()
+    def _on_picture(self) -> None:
+        display = self._display
+        if display is not None and display.scene is not None:
+            self._set_scene(display.scene)
+        self.cameraChanged.emit()
+        self.update()
+
+    def wheelEvent(self, event: Any) -> None:
+        """Leave the wheel to others: the camera is the robot's."""
+        event.ignore()
+
+    def _robot_camera(self) -> PinholeCamera | None:
+        display = self._display
+        if display is None or not is_alive(display):
+            return None
+        return display.camera_for(self.width(), self.height())
+
+    def camera(self) -> Camera:
+        """Return the robot's camera; any, where that is unknown."""
+        return self._robot_camera() or super().camera()
+
+    def _take_frame(self) -> Frame | None:
+        frame, display = super()._take_frame(), self._display
+        if frame is None or display is None:
+            return frame
+        if not isinstance(frame.camera, PinholeCamera):
+            return frame._replace(drawables=[])
+        names = set(display.hiddenDisplays)
+        hidden = {one.root for one in self.scene.displays if one.name in names}
+        if not hidden:
+            return frame
+        return frame._replace(
+            drawables=[one for one in frame.drawables if not _is_in(one[0], hidden)]
+        )
+
+
+def _is_in(item: Item | None, groups: set[Any]) -> bool:
+    while item is not None:
+        if item in groups:
+            return True
+        item = item.parent
+    return False

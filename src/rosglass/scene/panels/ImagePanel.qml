@@ -1,0 +1,88 @@
+import QtQuick
+import RosScene 1.0
+
+// The picture of an ImageDisplay, or of a CameraDisplay with the scene in it.
+Rectangle {
+    id: panel
+
+    // The display.
+    property QtObject display: null
+    // Whether it has handles for the user to move and resize it.
+    property bool movable: false
+
+    // The user moves or resizes it, by so much.
+    signal dragged(real x, real y)
+    signal resized(real x, real y)
+
+    readonly property bool bad: display !== null && display.statusLevel !== "ok"
+    readonly property real fade: display !== null && display.stale ? 0.35 : 1
+
+    color: "black"
+    clip: true
+    visible: display !== null && display.active
+
+    PictureItem {
+        objectName: "behind"
+        anchors.fill: parent
+        display: panel.display
+        opacity: panel.fade
+        visible: panel.display !== null && panel.display.behind
+    }
+    Loader {
+        anchors.fill: parent
+        active: panel.display !== null && panel.display.isCamera
+        sourceComponent: CameraView { objectName: "cameraView"; display: panel.display; opacity: panel.fade }
+    }
+    Loader {
+        anchors.fill: parent
+        active: panel.display !== null && panel.display.overlay > 0
+        sourceComponent: PictureItem { display: panel.display; opacity: panel.display.overlay * panel.fade }
+    }
+
+    // What is below the panel gets no wheel or clicks through it.
+    MouseArea { anchors.fill: parent; enabled: panel.movable; onWheel: wheel => wheel.accepted = true }
+
+    Rectangle {
+        width: parent.width
+        height: title.implicitHeight + 6
+        visible: panel.movable || panel.bad
+        color: panel.bad ? "#c0804000" : "#80000000"
+        Text {
+            id: title
+            anchors { left: parent.left; right: parent.right; top: parent.top; margins: 3 }
+            text: panel.display === null ? "" : panel.display.name + (panel.bad ? "\n" + panel.display.statusText : "")
+            textFormat: Text.PlainText
+            wrapMode: Text.Wrap
+            maximumLineCount: 6
+            elide: Text.ElideRight
+            font.pixelSize: 12
+            color: "white"
+        }
+        MouseArea {
+            property point at
+            anchors.fill: parent
+            enabled: panel.movable
+            cursorShape: Qt.SizeAllCursor
+            onPressed: mouse => at = mapToItem(panel.parent, mouse.x, mouse.y)
+            onPositionChanged: mouse => {
+                const now = mapToItem(panel.parent, mouse.x, mouse.y)
+                panel.dragged(now.x - at.x, now.y - at.y)
+                at = now
+            }
+        }
+    }
+    Rectangle {
+        anchors { right: parent.right; bottom: parent.bottom }
+        width: 14
+        height: 14
+        visible: panel.movable
+        color: "#80ffffff"
+        MouseArea {
+            property point at
+            anchors.fill: parent
+            cursorShape: Qt.SizeFDiagCursor
+            onPressed: mouse => at = Qt.point(mouse.x, mouse.y)
+            onPositionChanged: mouse => panel.resized(mouse.x - at.x, mouse.y - at.y)
+        }
+    }
+}

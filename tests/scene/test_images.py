@@ -1,0 +1,391 @@
+"""The displays Image and Camera, and their panels."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conftest import SceneBench
+
+WIDTH, HEIGHT = 200, 150
+#: Tells pictures apart.
+NUMBERS = itertools.count(1)
+#: The camera sits at (0, 0, 1) of the map and looks along x.
+OPTICAL = (-0.5, 0.5, -0.5, 0.5)
+P = [180.0, 0, 90, 0, 0, 190.0, 80, 0, 0, 0, 1, 0]
+
+IMAGE = 'ImageDisplay { id: front; topic: "/front/image" }'
+CAMERA = 'CameraDisplay { id: front; topic: "/front/image" }'
+PANEL = 'ImagePanel { objectName: "panel"; display: front; width: 400; height: 300 }'
+
+
+def picture_of(colour: tuple[int, int, int], seconds: int = 7, **fields: Any) -> dict[str, Any]:
+    pixels = np.full((HEIGHT, WIDTH, 3), colour, np.uint8)
+    return {
+        "header": {"frame_id": "camera", "stamp": {"sec": seconds, "nanosec": next(NUMBERS)}},
+        "width": WIDTH,
+        "height": HEIGHT,
+        "encoding": "rgb8",
+        "step": WIDTH * 3,
+        "data": pixels.reshape(-1),
+        **fields,
+    }
+
+
+class Robot:
+    """Publishes pictures, CameraInfo and transforms."""
+
+    def __init__(self, bench: SceneBench, topic: str = "/front/image") -> None:
+        from rosglass.tf import TransformBroadcaster
+
+        self.bench = bench
+        self.images = bench.robot.create_publisher(topic, "sensor_msgs/Image")
+        self.infos = bench.robot.create_publisher("/front/camera_info", "sensor_msgs/CameraInfo")
+        self.broadcaster = TransformBroadcaster(bench.robot)
+
+    def show(self, display: Any, *colour: int, **fields: Any) -> None:
+        """Publish a picture until the display shows it."""
+        message = picture_of((colour or (0, 255, 255)), **fields)  # type: ignore[arg-type]
+        stamp = message["header"]["stamp"]
+        nanoseconds = stamp["sec"] * 1_000_000_000 + stamp["nanosec"]
+
+        def shown() -> bool:
+            self.images.publish(message)
+            picture = display._picture
+            return picture is not None and picture.frame.stamp.nanoseconds == nanoseconds
+
+        self.bench.wait(shown)
+
+    def send_info(self, display: Any, level: str = "ok", **fields: Any) -> None:
+        """Publish a CameraInfo until the display has it."""
+        message = {"width": WIDTH, "height": HEIGHT, "p": P, **fields}
+        self.bench.wait(
+            lambda: (
+                self.infos.publish(message) or display.status_lines["Camera Info"].level == level
+            )
+        )
+
+    def place(self, seconds: int = 7, y: float = 0.0) -> None:
+        """Publish the camera's transform."""
+        from rosglass import Time
+        from rosglass.tf import Transform
+
+        stamp = Time.from_parts(seconds, 0)
+        self.broadcaster.send_transform(Transform((0, y, 1), OPTICAL, stamp, "map", "camera"))
+
+
+@pytest.fixture
+def load(bench: SceneBench) -> Callable[..., tuple[Any, Robot]]:
+    def loaded(body: str) -> tuple[Any, Robot]:
+        view = bench.load(body)
+        bench.wait(lambda: view.scene.find("front") or view.scene.displays)
+        return view.scene.displays[-1], Robot(bench)
+
+    return loaded
+
+
+def pixel(bench: SceneBench, x: int = 200, y: int = 200) -> tuple[int, ...]:
+    return tuple(int(part) for part in bench.picture()[y, x])
+
+
+def close(a: tuple[int, ...], b: tuple[int, ...], tolerance: int = 3) -> bool:
+    return max(abs(int(x) - int(y)) for x, y in zip(a, b, strict=True)) <= tolerance
+
+
+def test_a_panel_shows_the_pictures(bench: SceneBench, load: Callable[..., Any]) -> None:
+    display, robot = load(IMAGE + PANEL)
+    robot.show(display)
+    assert pixel(bench) == (0, 255, 255)
+    assert display.statusLevel == "ok", display.statusText
+    robot.show(display, 255, 0, 255)
+    assert pixel(bench) == (255, 0, 255)
+    display.enabled = False
+    bench.wait(lambda: display._endpoint is None)
+    assert pixel(bench, 390, 290) == (48, 48, 48), "the panel is hidden"
+
+
+def test_without_a_panel_nothing_is_received(bench: SceneBench, load: Callable[..., Any]) -> None:
+    display, robot = load(IMAGE)
+    bench.wait(lambda: display.statusText)
+    assert "declare ImagePanel" in display.statusText
+    assert robot.images.subscription_count() == 0
+
+
+def test_a_picture_that_is_not_live_fades(bench: SceneBench, load: Callable[..., Any]) -> None:
+    display, robot = load(IMAGE + PANEL)
+    robot.show(display)
+    robot.images.close()
+    bench.wait(lambda: display.statusLevel == "warn")
+    assert "its publisher is gone; the last one is of" in display.statusText
+    assert display.stale
+    assert close(pixel(bench), (0, 89, 89)), "35 % of the picture, on black"
+
+
+def test_an_old_picture_fades_though_its_publisher_lives(
+    bench: SceneBench, load: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene.displays import image
+
+    monkeypatch.setattr(image, "_MAX_AGE_S", 0.3)
+    display, robot = load(IMAGE + PANEL)
+    robot.show(display)
+    bench.wait(lambda: display.statusLevel == "warn")
+    assert "no new picture is shown" in display.statusText
+    robot.show(display)
+    assert display.statusLevel == "ok"
+
+
+def test_depths_are_shown_in_greys(bench: SceneBench, load: Callable[..., Any]) -> None:
+    display, robot = load(IMAGE + PANEL)
+    depths = np.tile(np.linspace(2, 6, WIDTH, dtype="<f4"), (HEIGHT, 1))
+    depths[:10] = np.nan
+    raw = {"encoding": "32FC1", "step": WIDTH * 4, "data": depths.view(np.uint8).reshape(-1)}
+    robot.show(display, **raw)
+    picture = bench.picture()
+    assert close(tuple(picture[200, (2, 200, 397), 0]), (0, 127, 255), 4)
+    assert tuple(picture[10, 397]) == (0, 0, 0), "NaN is black"
+    display.normalizeRange, display.maxValue = False, 12
+    robot.show(display, **raw)
+    robot.show(display, **raw)
+    assert close(tuple(bench.picture()[200, (2, 200, 397), 0]), (42, 85, 127), 4)
+    display.minValue = 12
+    assert "Min Value 12 is not below Max Value 12" in display.statusText
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        ({"encoding": "nosuch"}, "image encoding 'nosuch' cannot be shown"),
+        ({"width": 4_000_000_000}, "4000000000x150 pixels are more than"),
+        ({"step": 3}, "step is 3"),
+        ({"data": np.zeros(5, np.uint8)}, "data has 5"),
+    ],
+)
+def test_a_bad_picture_is_an_error_in_words(
+    bench: SceneBench, load: Callable[..., Any], fields: dict[str, Any], text: str
+) -> None:
+    display, robot = load(IMAGE + PANEL)
+    robot.show(display)
+    bad = picture_of((0, 0, 0), **fields)
+    bench.wait(lambda: robot.images.publish(bad) or display.statusLevel == "error")
+    assert text in display.statusText
+    robot.show(display, 0, 255, 0)
+    assert display.statusLevel == "ok"
+
+
+MARKERS = (
+    'PointStampedDisplay { topic: "/point"; radius: 0.1; color: "#ff0000"; alpha: 1 }' + CAMERA
+)
+
+
+@pytest.fixture
+def camera(bench: SceneBench, load: Callable[..., Any]) -> tuple[Any, Robot]:
+    """A camera that sees a red sphere at (5, -0.5, 1.4), placed in the map."""
+    display, robot = load(MARKERS + PANEL)
+    points = bench.robot.create_publisher("/point", "geometry_msgs/PointStamped")
+    ball = bench.view.scene.displays[0]
+    point = {"header": {"frame_id": "map"}, "point": {"x": 5.0, "y": -0.5, "z": 1.4}}
+    bench.wait(lambda: points.publish(point) or ball.received)
+    robot.place(7)
+    robot.place(8)
+    robot.send_info(display)
+    robot.show(display, 0, 0, 255)
+    bench.wait(lambda: display._pose is not None)
+    return display, robot
+
+
+def middle_of_ball(bench: SceneBench) -> tuple[float, float]:
+    """Return column and row of what is red in the panel."""
+    picture = bench.picture().astype(int)
+    rows, columns = np.nonzero((picture[..., 0] > 60) & (picture[..., 1] < 60))
+    assert len(rows) > 20, "the sphere is not seen"
+    return float(columns.mean()), float(rows.mean())
+
+
+def expected(y: float = 0.0, *, p: list[float] = P) -> tuple[float, float]:
+    """Return where the sphere is seen, in pixels of the panel: twice those of the camera."""
+    right, down, ahead = 0.5 + y, -0.4, 5.0
+    # Angles are kept: fx and fy differ.
+    aspect = (WIDTH / p[0]) / (HEIGHT / p[5])
+    wide, high = min(400, 300 * aspect), min(300, 400 / aspect)
+    u = (p[0] * right + p[3]) / ahead + p[2] + 0.5
+    v = (p[5] * down + p[7]) / ahead + p[6] + 0.5
+    return (400 - wide) / 2 + u * wide / WIDTH, (300 - high) / 2 + v * high / HEIGHT
+
+
+def test_the_scene_fits_the_picture(bench: SceneBench, camera: tuple[Any, Robot]) -> None:
+    display, robot = camera
+    display.imageRendering = "background"
+    assert display.statusLevel == "ok", display.statusText
+    assert pixel(bench, 50, 250) == (0, 0, 255), "the picture is behind"
+    assert middle_of_ball(bench) == pytest.approx(expected(), abs=2)
+    # The picture is placed at its own time.
+    robot.place(10, y=0.4)
+    robot.show(display, 0, 0, 255, seconds=9)
+    assert middle_of_ball(bench) == pytest.approx(expected(0.2), abs=2)
+
+
+def test_the_right_camera_of_a_pair_is_beside_its_frame(
+    bench: SceneBench, camera: tuple[Any, Robot]
+) -> None:
+    display, robot = camera
+    display.imageRendering = "background"
+    right = [*P[:3], -P[0] * 0.3, *P[4:]]
+    bench.wait(
+        lambda: (
+            robot.infos.publish({"width": WIDTH, "height": HEIGHT, "p": right})
+            or display._lens.right > 0
+        )
+    )
+    assert middle_of_ball(bench) == pytest.approx(expected(p=right), abs=2)
+
+
+def test_the_picture_is_behind_over_or_both(bench: SceneBench, camera: tuple[Any, Robot]) -> None:
+    display, _ = camera
+    x, y = (round(part) for part in expected())
+    display.imageRendering = "background"
+    red = pixel(bench, x, y)
+    assert red[2] < 60 < red[0]
+    display.imageRendering = "overlay"
+    assert close(pixel(bench, 50, 250), (0, 0, 127))
+    assert close(pixel(bench, x, y), (red[0] // 2, 0, 127), 40)
+    display.imageRendering, display.overlayAlpha = "background and overlay", 1.0
+    assert pixel(bench, x, y) == (0, 0, 255)
+    display.imageRendering, display.zoomFactor = "background", 0.5
+    picture = bench.picture()
+    assert tuple(picture[20, 200]) == (0, 0, 0), "around the picture"
+    assert tuple(picture[200, 130]) == (0, 0, 255)
+    u, v = expected()
+    assert middle_of_ball(bench) == pytest.approx((100 + u / 2, 75 + v / 2), abs=2)
+
+
+def test_displays_can_be_hidden_in_the_camera(bench: SceneBench, camera: tuple[Any, Robot]) -> None:
+    display, _ = camera
+    display.imageRendering = "background"
+    display.hiddenDisplays = ["PointStamped"]
+    x, y = (round(part) for part in expected())
+    assert pixel(bench, x, y) == (0, 0, 255)
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        ({"p": [float("nan"), *P[1:]]}, "CameraInfo/p: contains NaN or infinite numbers"),
+        ({"p": [0.0] * 12}, "expected focal lengths above 0 pixels, got fx 0 and fy 0"),
+    ],
+)
+def test_a_bad_camera_info_draws_no_scene(
+    bench: SceneBench, camera: tuple[Any, Robot], fields: dict[str, Any], text: str
+) -> None:
+    display, robot = camera
+    display.imageRendering = "background"
+    robot.send_info(display, "error", **fields)
+    assert text in display.statusText
+    x, y = (round(part) for part in expected())
+    assert pixel(bench, x, y) == (0, 0, 255), "only the picture"
+    robot.send_info(display)
+    assert middle_of_ball(bench) == pytest.approx(expected(), abs=2)
+
+
+def test_a_camera_info_without_a_size_takes_the_pictures(
+    bench: SceneBench, camera: tuple[Any, Robot]
+) -> None:
+    display, robot = camera
+    display.imageRendering = "background"
+    bench.wait(
+        lambda: robot.infos.publish({"width": 0, "height": 0, "p": P}) or display._lens.width == 0
+    )
+    assert middle_of_ball(bench) == pytest.approx(expected(), abs=2)
+
+
+def test_without_camera_info_the_picture_is_shown_alone(
+    bench: SceneBench, load: Callable[..., Any]
+) -> None:
+    display, robot = load(CAMERA + PANEL)
+    robot.show(display)
+    assert "no CameraInfo received on /front/camera_info" in display.statusText
+    assert display.camera_for(400, 300) is None
+    assert pixel(bench, 200, 290) == (0, 255, 255)
+
+
+def test_without_a_transform_the_picture_waits_and_is_then_shown_alone(
+    bench: SceneBench, load: Callable[..., Any]
+) -> None:
+    display, robot = load(CAMERA + PANEL)
+    robot.send_info(display)
+    robot.show(display)
+    assert display.status_lines["Transform"].level == "error"
+    assert "no transform from [camera]" in display.statusText
+    assert display.camera_for(400, 300) is None
+    robot.place(7)
+    robot.place(8)
+    robot.show(display)
+    bench.wait(lambda: display.camera_for(400, 300) is not None)
+    assert display.status_lines["Transform"].level == "ok"
+
+
+def test_settings_of_rviz_files(bench: SceneBench, load: Callable[..., Any]) -> None:
+    display, _ = load("GridDisplay {}" + CAMERA)
+    refused = display.load_settings(
+        {
+            "Class": "rviz/Camera",
+            "Image Topic": "/rear/image",
+            "Transport Hint": "compressed",
+            "Queue Size": 7,
+            "Image Rendering": "overlay",
+            "Zoom Factor": 2,
+            "Visibility": {"Grid": False, "Robot": {"Value": True, "TF": False}, "Value": True},
+        }
+    )
+    assert refused == []
+    assert (display.topic, display.transport, display.depth) == ("/rear/image", "compressed", 7)
+    assert (display.imageRendering, display.zoomFactor) == ("overlay", 2)
+    assert display.hiddenDisplays == ["Grid", "TF"]
+    kept = display.save_settings({"Class": "rviz/Camera"}, 1)
+    assert (kept["Image Topic"], kept["Queue Size"]) == ("/rear/image", 7)
+    assert kept["Visibility"] == {"Value": True, "Grid": False}
+
+
+@pytest.mark.parametrize(
+    ("topic", "info"),
+    [
+        ("/front/image_raw", "/front/camera_info"),
+        ("/front/image_raw/compressed", "/front/camera_info"),
+        ("/image", "/camera_info"),
+    ],
+)
+def test_the_camera_info_is_beside_the_image(topic: str, info: str) -> None:
+    pytest.importorskip("PySide6")
+    from rosglass.scene.displays.image import camera_info_topic
+
+    assert camera_info_topic(topic) == info
+
+
+def test_panels_over_a_view_are_moved_and_resized(
+    bench: SceneBench, load: Callable[..., Any]
+) -> None:
+    from PySide6.QtCore import QPoint, QRectF, Qt
+    from PySide6.QtTest import QTest
+
+    display, robot = load(IMAGE + "id: main; ImagePanels { anchors.fill: parent; view: main }")
+    robot.show(display)
+    bench.wait(lambda: pixel(bench, 100, 240) == (0, 255, 255))
+    left = Qt.MouseButton.LeftButton
+
+    def drag(*points: tuple[int, int]) -> QRectF:
+        QTest.mousePress(bench.window, left, pos=QPoint(*points[0]))
+        for at in points[1:]:
+            QTest.mouseMove(bench.window, QPoint(*at))
+        QTest.mouseRelease(bench.window, left, pos=QPoint(*points[-1]))
+        return display.panelGeometry
+
+    assert drag((60, 160), (70, 140), (80, 130)) == QRectF(30, 125, 180, 135)
+    assert drag((205, 255), (215, 260), (235, 275)) == QRectF(30, 125, 210, 155)
+    bench.view.scene.add("Grid")
+    bench.wait(lambda: pixel(bench, 235, 260) == (0, 255, 255))
