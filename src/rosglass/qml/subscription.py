@@ -63,9 +63,11 @@ class Subscription(TopicElement):
     bandwidth = ReadOnly(float, 0.0, tolerance=0.01)
     dropped = ReadOnly(int, 0)
 
-    _HOLDS = ("_sample", "_message", "_value")
+    _HOLDS = ("_sample", "_message", "_value", "_wake")
     _endpoint: TopicSubscription | None
     _timeout: int | None
+    #: Has a sample that arrives announced on the GUI thread; from any thread.
+    _wake: Callable[[], None]
     _subscribed: bool
     _age: float
     _stale: bool
@@ -208,7 +210,9 @@ class Subscription(TopicElement):
         node, topic, type_name, qos = wanted
         return lambda: node.create_subscription(topic, type_name or None, qos=qos)
 
-    def _on_created(self, endpoint: TopicSubscription) -> None:  # noqa: ARG002 - the base's
+    def _on_created(self, endpoint: TopicSubscription) -> None:
+        executor, on_arrival = self._executor, weak_callback(self._on_arrival)
+        self._wake = lambda: executor.post(lambda: on_arrival(endpoint))
         self._set_problem("")
         if is_alive(self):
             self._expect_publishers()
@@ -233,16 +237,6 @@ class Subscription(TopicElement):
 
     # Receiving.
 
-    def _await_sample(self, endpoint: TopicSubscription) -> None:
-        """Have the next sample, or one that is waiting already, announced on the GUI thread."""
-        executor, on_arrival = self._executor, weak_callback(self._on_arrival)
-
-        def wake() -> None:
-            executor.post(lambda: on_arrival(endpoint))
-
-        if not endpoint.add_waiter(wake) and not endpoint.closed:
-            wake()
-
     def _on_arrival(self, endpoint: TopicSubscription) -> None:
         if not is_alive(self) or endpoint is not self._endpoint:
             return
@@ -261,7 +255,8 @@ class Subscription(TopicElement):
             return
         samples = list(iter(endpoint.take, None))
         # Not after showing them: a handler may wait in an event loop of its own.
-        self._await_sample(endpoint)
+        if not endpoint.add_waiter(self._wake) and not endpoint.closed:
+            self._wake()
         for sample in samples if self.throttleRate == 0 else samples[-1:]:
             self._show(sample)
             # A handler may have changed the topic or destroyed this object.
