@@ -143,6 +143,21 @@ def test_unknown_tools_and_settings_are_errors(bench: SceneBench) -> None:
     assert len(tools) == count
 
 
+def test_a_panel_shows_and_changes_settings(bench: SceneBench) -> None:
+    pose = bench.load().tools.find("SetInitialPose")
+    shown = {one["name"]: one for one in pose.settings()}
+    assert shown["Topic"]["text"] == ""
+    assert shown["Topic"]["placeholder"] == "/initialpose"
+    assert shown["X std deviation"]["text"] == "0.5"
+    assert pose.setSetting("X std deviation", "0.25") == ""
+    assert pose.xDeviation == 0.25
+    assert "expected a finite number" in pose.setSetting("X std deviation", "wide")
+    assert "is not from 0" in pose.setSetting("X std deviation", "-1")
+    assert "has no setting 'Y'" in pose.setSetting("Y", "1")
+    assert bench.view.tools.find("PublishPoint").setSetting("Single click", "false") == ""
+    assert not bench.view.tools.find("PublishPoint").singleClick
+
+
 def test_tools_are_added_and_removed(bench: SceneBench) -> None:
     view = bench.load()
     changes: list[int] = []

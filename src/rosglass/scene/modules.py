@@ -96,7 +96,14 @@ DISPLAYS = (
     WrenchStampedDisplay,
 )
 #: Panels written in QML.
-PANELS = ("DisplaysPanel", "ImagePanel", "ImagePanels", "ViewsPanel")
+PANELS = (
+    "DisplaysPanel",
+    "ImagePanel",
+    "ImagePanels",
+    "SelectionPanel",
+    "ToolsPanel",
+    "ViewsPanel",
+)
 Scene.TYPES.update({display.TYPE: display for display in (*DISPLAYS, GroupDisplay)})
 #: The tools, likewise; ``Tool`` is the base of own ones.
 TOOLS = (

@@ -106,6 +106,9 @@ class PublishingTool(Tool):
         ros1 = node.wire == "ros1" if node is not None else self.class_id.startswith("rviz/")
         return self.topic or self.TOPICS[0 if ros1 else 1]
 
+    def _placeholder(self, path: str) -> str:
+        return self.target if path == "Topic" else ""
+
     def activate(self) -> None:
         """Advertise the topic."""
         self._uses_node = True

@@ -270,6 +270,32 @@ class Tool(Configurable, Element):
         """Return the values of all settings by their path."""
         return {path: getattr(self, setting.name) for path, setting in self.SETTINGS.items()}
 
+    @Slot(result=_LIST)
+    def settings(self) -> list[dict[str, str]]:
+        """Return the settings for a panel: name, text, description, and what empty text means."""
+        return [
+            {
+                "name": path,
+                "text": _text_of(value),
+                "description": self.SETTINGS[path].description,
+                "placeholder": self._placeholder(path),
+            }
+            for path, value in self.values().items()
+        ]
+
+    def _placeholder(self, path: str) -> str:  # noqa: ARG002 - for subclasses
+        return ""
+
+    @Slot(str, str, result=str)
+    def setSetting(self, path: str, text: str) -> str:  # noqa: N802 - QML's name
+        """Change a setting to what the user has entered; return why it does not fit, or ""."""
+        try:
+            setting = self._setting(path)
+            setattr(self, setting.name, setting.restore(text))
+        except Error as error:
+            return f"{path}: {error}"
+        return ""
+
     def _restyle(self) -> None:
         """Apply changed settings."""
 
@@ -812,6 +838,14 @@ class Tools(QtCore.QObject):
         if is_alive(self):
             self.announce(text)
         return None
+
+
+def _text_of(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, QtGui.QColor):
+        return str(value.name())
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def camera_cursor(event: PointerEvent) -> QtCore.Qt.CursorShape:

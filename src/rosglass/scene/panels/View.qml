@@ -39,6 +39,21 @@ ApplicationWindow {
             ToolButton { text: "Save"; onClicked: window.save() }
             ToolButton { text: "Save as"; onClicked: saving.open() }
             ToolSeparator { }
+            Repeater {
+                model: scene.tools.all
+                ToolButton {
+                    required property var modelData
+
+                    text: modelData.name
+                    down: modelData.selected ? true : undefined
+                    // Keys are the view's.
+                    focusPolicy: Qt.NoFocus
+                    onClicked: modelData.select()
+                    ToolTip.visible: hovered
+                    ToolTip.delay: 500
+                    ToolTip.text: modelData.description + (modelData.shortcutKey ? " (" + modelData.shortcutKey.toUpperCase() + ")" : "")
+                }
+            }
             Item { Layout.fillWidth: true }
             ToolButton { text: "Panels"; checkable: true; checked: window.panels; onToggled: window.panels = checked }
         }
@@ -74,10 +89,24 @@ ApplicationWindow {
                 background: Rectangle { color: "#c0801010"; radius: 6 }
             }
         }
-        ViewsPanel {
+        ColumnLayout {
             visible: window.panels
+            spacing: 0
             SplitView.preferredWidth: 250
-            view: scene
+            TabBar {
+                id: tabs
+
+                Layout.fillWidth: true
+                TabButton { text: "Views" }
+                TabButton { text: "Tools" }
+                TabButton { text: "Selection" }
+            }
+            StackLayout {
+                currentIndex: tabs.currentIndex
+                ViewsPanel { view: scene }
+                ToolsPanel { view: scene }
+                SelectionPanel { view: scene }
+            }
         }
     }
 
@@ -90,7 +119,8 @@ ApplicationWindow {
             ToolSeparator { }
             Label { text: program.time; textFormat: Text.PlainText }
             ToolSeparator { }
-            Label { Layout.fillWidth: true; text: program.message; textFormat: Text.PlainText; elide: Text.ElideRight }
+            Label { Layout.fillWidth: true; visible: program.message !== ""; text: program.message; textFormat: Text.PlainText; elide: Text.ElideRight }
+            Label { objectName: "status"; Layout.fillWidth: true; visible: program.message === ""; text: scene.statusText; textFormat: Text.StyledText; elide: Text.ElideRight }
             Label { text: program.frameRate + " fps" }
         }
     }

@@ -1,0 +1,70 @@
+import QtQuick
+import QtQuick.Controls.Fusion
+import QtQuick.Layouts
+import RosScene 1.0
+
+// RViz's Tool Properties: the settings of all tools.
+Pane {
+    id: panel
+
+    // The SceneView whose tools are shown.
+    property SceneView view: null
+    property string problem: ""
+
+    padding: 4
+
+    ColumnLayout {
+        anchors.fill: parent
+        ListView {
+            objectName: "tools"
+            Layout.fillWidth: true
+            Layout.fillHeight: true
+            clip: true
+            model: panel.view ? panel.view.tools.all : []
+            delegate: Column {
+                id: group
+
+                required property var modelData
+                property var settings: modelData.settings()
+
+                width: ListView.view.width
+                visible: settings.length > 0
+                height: visible ? implicitHeight : 0
+                Label { text: group.modelData.name; textFormat: Text.PlainText; font.bold: true; topPadding: 6 }
+                Repeater {
+                    model: group.settings
+                    RowLayout {
+                        required property var modelData
+
+                        width: group.width
+                        height: 24
+                        Label {
+                            Layout.fillWidth: true
+                            Layout.preferredWidth: 100
+                            text: modelData.name
+                            elide: Text.ElideRight
+                            HoverHandler { id: hover }
+                            ToolTip.visible: hover.hovered && modelData.description !== ""
+                            ToolTip.delay: 500
+                            ToolTip.text: modelData.description
+                        }
+                        TextField {
+                            Layout.fillWidth: true
+                            Layout.preferredWidth: 120
+                            Layout.preferredHeight: 22
+                            text: modelData.text
+                            placeholderText: modelData.placeholder
+                            onEditingFinished: {
+                                if (text === modelData.text)
+                                    return
+                                panel.problem = group.modelData.setSetting(modelData.name, text)
+                                group.settings = group.modelData.settings()
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        Label { Layout.fillWidth: true; visible: panel.problem !== ""; text: panel.problem; textFormat: Text.PlainText; wrapMode: Text.Wrap; color: "#ff6b60" }
+    }
+}
