@@ -114,7 +114,7 @@ class SceneBench:
 
     def drawn(self) -> int:
         """Return how many pictures were drawn."""
-        return sum(one.count for one in self.view._renderers)
+        return self.view.pictures_drawn()
 
     def close(self) -> None:
         from rosglass.qt import send_deferred_deletes

@@ -40,9 +40,9 @@ def show(bench: SceneBench) -> Callable[..., Any]:
         bench.wait(publisher.subscription_count)
 
     def send(message: dict[str, Any], topic: str = "/map") -> Any:
-        before = display._intake.received
+        before = display.received
         kinds[topic].publish(message)
-        bench.wait(lambda: display._intake is not None and display._intake.received > before)
+        bench.wait(lambda: display.received > before)
         bench.wait.settled(bench.session)
         return display
 
@@ -70,11 +70,11 @@ def test_an_update_changes_a_part(bench: SceneBench, show: Callable[..., Any]) -
     part = {"header": {"frame_id": "map"}, "x": 10, "y": 4, "width": 2, "height": 2}
     display = show({**part, "data": np.full(4, 100, np.int8)}, "/map_updates")
     assert display.statusLevel == "ok", display.statusText
-    assert display._cells[4:6, 10:12].tolist() == [[100, 100], [100, 100]]
-    assert int((display._cells == 100).sum()) == 4
+    assert display.cells[4:6, 10:12].tolist() == [[100, 100], [100, 100]]
+    assert int((display.cells == 100).sum()) == 4
     display = show({**part, "x": 19, "data": np.full(4, 100, np.int8)}, "/map_updates")
     assert "x 19, y 4, 2 x 2 cells: beyond the map of 20 x 10 cells" in display.statusText
-    assert int((display._cells == 100).sum()) == 4
+    assert int((display.cells == 100).sum()) == 4
 
 
 @pytest.mark.parametrize(

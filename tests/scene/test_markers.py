@@ -48,7 +48,7 @@ def show(bench: SceneBench) -> Callable[..., Any]:
         before = display.received
         publisher.publish({"markers": list(markers)})
         bench.wait(lambda: display.received > before)
-        bench.wait(lambda: not display._flushing)
+        bench.wait.settled(bench.session)
         return display
 
     return send

@@ -227,8 +227,8 @@ def test_data_that_is_ahead_of_its_transform_is_no_error_for_a_second(bench: Sce
     bench.wait(lambda: path.statusLevel == "ok")
     send(6)
     assert path.statusLevel == "ok"
-    move(6)
-    bench.wait(lambda: not path._waiting)
-    path._placed_at -= 2
+    bench.wait.nothing_happens(1.1)
     send(7)
     assert path.statusLevel == "error"
+    move(7)
+    bench.wait(lambda: path.statusLevel == "ok")

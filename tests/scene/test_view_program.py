@@ -36,7 +36,7 @@ def model(bench: SceneBench) -> Any:
 
 
 def labels(model: Any) -> list[str]:
-    return [row.label for row in model._rows]
+    return [row.label for row in model.rows]
 
 
 def row_of(model: Any, label: str) -> int:
@@ -47,9 +47,9 @@ def test_the_panel_lists_options_displays_and_settings(model: Any) -> None:
     assert labels(model) == ["Global Options", "Fixed Frame", "Background Color", "Grid"]
     model.toggle(row_of(model, "Grid"))
     assert "Cell Size" in labels(model)
-    size = model._rows[row_of(model, "Cell Size")]
+    size = model.rows[row_of(model, "Cell Size")]
     assert (size.kind, size.value, size.depth) == ("float", "1", 1)
-    plane = model._rows[row_of(model, "Plane")]
+    plane = model.rows[row_of(model, "Plane")]
     assert plane.choices == ("XY", "XZ", "YZ")
     model.toggle(row_of(model, "Global Options"))
     assert labels(model)[:2] == ["Global Options", "Grid"]
@@ -103,8 +103,8 @@ def test_rows_follow_the_status(bench: SceneBench, model: Any) -> None:
     model.add("Axes", "")
     model.edit(row_of(model, "Reference Frame"), "tool")
     row = row_of(model, "Axes")
-    assert model._rows[row].level == "error"
-    assert "no transform from [tool]" in model._rows[row].description
+    assert model.rows[row].level == "error"
+    assert "no transform from [tool]" in model.rows[row].description
     assert "Transform" in labels(model)
 
 

@@ -572,6 +572,7 @@ class TopicDisplay(OneTopicDisplay):
         if not is_alive(self) or intake is None or self.scene is None:
             return
         items, error = intake.take()
+        report(self, received=intake.received)
         if error:
             self.set_status("Message", "error", error)
         elif items:
@@ -579,7 +580,6 @@ class TopicDisplay(OneTopicDisplay):
         if not items:
             return
         self._arrived = time.time()
-        report(self, received=intake.received)
         self.set_status("Topic", "ok", f"{intake.received} messages received")
         self._outdated = False
         if self.KEEPS_ALL:

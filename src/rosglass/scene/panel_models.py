@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from rosglass.scene.display import Display
     from rosglass.scene.settings import Setting
 
-__all__ = ["DisplaysModel"]
+__all__ = ["DisplaysModel", "PanelRow"]
 
 #: Milliseconds between two looks at what has no signal of its own.
 _REFRESH_MS = 250
 _FIXED_FRAME, _BACKGROUND = "Fixed Frame", "Background Color"
 
 
-class _Row(NamedTuple):
+class PanelRow(NamedTuple):
     """A row of the panel.
 
     Attributes:
@@ -59,7 +59,7 @@ class _Row(NamedTuple):
 
 
 _ROLES = {
-    Qt.ItemDataRole.UserRole + number: name for number, name in enumerate(_Row._fields[1:], 1)
+    Qt.ItemDataRole.UserRole + number: name for number, name in enumerate(PanelRow._fields[1:], 1)
 }
 
 
@@ -107,7 +107,7 @@ class DisplaysModel(QAbstractListModel):
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
         self._view: SceneView | None = None
-        self._rows: list[_Row] = []
+        self._rows: list[PanelRow] = []
         self._expanded: set[tuple[Any, ...]] = {("options",)}
         self._timer = QtCore.QTimer(self)
         self._timer.setInterval(_REFRESH_MS)
@@ -130,6 +130,11 @@ class DisplaysModel(QAbstractListModel):
 
     #: The view that is shown.
     view = Property(QtCore.QObject, _get_view, _set_view, notify=viewChanged)
+
+    @property
+    def rows(self) -> list[PanelRow]:
+        """What is shown, from the top."""
+        return list(self._rows)
 
     # -- Qt's model ------------------------------------------------------------------------------
 
@@ -184,31 +189,31 @@ class DisplaysModel(QAbstractListModel):
                 index = self.index(number)
                 self.dataChanged.emit(index, index)
 
-    def _walk(self, view: SceneView) -> Iterator[_Row]:
+    def _walk(self, view: SceneView) -> Iterator[PanelRow]:
         scene = view.scene
         key = ("options",)
-        yield _Row(
+        yield PanelRow(
             key, 0, "Global Options", "options", expandable=True, expanded=key in self._expanded
         )
         if key in self._expanded:
             frames = tuple(scene.frames())
-            yield _Row(
+            yield PanelRow(
                 (*key, _FIXED_FRAME), 1, _FIXED_FRAME, "frame", scene.fixed_frame,
                 "The frame in which everything is placed.", choices=frames,
             )  # fmt: skip
-            yield _Row(
+            yield PanelRow(
                 (*key, _BACKGROUND), 1, _BACKGROUND, "color",
                 view.property("background").name(), "What is behind everything.",
             )  # fmt: skip
         yield from self._walk_group(view, None, 0)
 
-    def _walk_group(self, view: SceneView, group: Display | None, depth: int) -> Iterator[_Row]:
+    def _walk_group(self, view: SceneView, group: Display | None, depth: int) -> Iterator[PanelRow]:
         for display in view.scene.displays:
             if display.group is not group or not is_alive(display):
                 continue
             key = ("display", id(display))
             expanded = key in self._expanded
-            yield _Row(
+            yield PanelRow(
                 key, depth, display.name, "display", display.TYPE, display.statusText,
                 display.statusLevel, bool(display.enabled), expandable=True, expanded=expanded,
             )  # fmt: skip
@@ -217,13 +222,13 @@ class DisplaysModel(QAbstractListModel):
                 if isinstance(display, GroupDisplay):
                     yield from self._walk_group(view, display, depth + 1)
 
-    def _walk_display(self, display: Display, key: Any, depth: int) -> Iterator[_Row]:
+    def _walk_display(self, display: Display, key: Any, depth: int) -> Iterator[PanelRow]:
         for name, line in display.status_lines.items():
-            yield _Row(
+            yield PanelRow(
                 (*key, "status", name), depth, name, "status", line.text, line.text, line.level
             )
         for path, setting in display.SETTINGS.items():
-            yield _Row(
+            yield PanelRow(
                 (*key, path),
                 depth + path.count("/"),
                 path.rpartition("/")[2],

@@ -145,6 +145,11 @@ class MapDisplay(TopicDisplay):
         self._where = ("", 0)
         super().__init__(parent, runtime)
 
+    @property
+    def cells(self) -> NDArray[np.uint8] | None:
+        """The map with its updates, (rows, columns) bytes; None before the first one."""
+        return self._cells
+
     def further_topics(self, topic: str) -> tuple[str, ...]:
         """Return the topic of updates."""
         return (self._resolve(self.updateTopic or f"{topic}_updates"),)
