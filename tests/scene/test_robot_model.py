@@ -159,3 +159,29 @@ def test_settings_are_written_for_either_rviz(bench: SceneBench) -> None:
     assert other.load_settings({**saved, "Links": links, "Description Source": "Topic"}) == []
     assert (other.alpha, other.is_link_enabled("arm")) == (0.5, False)
     assert other.save_settings(saved, 2)["Links"]["arm"] == {"Value": False}
+
+
+def test_a_robot_whose_transforms_stop_fades(bench: SceneBench, monkeypatch: Any) -> None:
+    from rosglass import Time
+    from rosglass.scene import display
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    monkeypatch.setattr(display, "_SILENT_S", 0.5)
+    view = bench.load("RobotModelDisplay {}")
+    (robot,) = view.scene.displays
+    publish(bench, URDF)
+    send_transforms(bench, "mast")
+    broadcaster = TransformBroadcaster(bench.robot)
+    sent = iter(range(1, 10_000))
+
+    def move() -> bool:
+        stamp = Time.from_parts(next(sent), 0)
+        broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), stamp, "map", "base_link"))
+        return shapes(robot) == {BOX, CYLINDER}
+
+    bench.wait(move)
+    assert robot.root.alpha == 1.0
+    bench.wait(lambda: robot.root.alpha < 1.0)
+    assert "[base_link] may be somewhere else: no transform has come for" in robot.statusText
+    bench.wait(lambda: move() and robot.root.alpha == 1.0)
+    assert robot.statusLevel == "ok", robot.statusText

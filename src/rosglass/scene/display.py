@@ -78,6 +78,8 @@ _DURABILITY = {
 _MOST_WAITING = 1000
 #: Seconds for which data may wait for its transform before that is an error.
 _LATE_S = 1.0
+#: Seconds without a transform after which a frame that is followed may be somewhere else.
+_SILENT_S = 5.0
 #: Opacity of data whose publisher or connection is gone.
 OUTDATED_ALPHA = 0.35
 
@@ -154,6 +156,8 @@ class Display(Configurable, TopicElement):
         self.saved: dict[str, Any] = {}
         #: When a frame was found last, by the clock of :func:`time.monotonic`.
         self._placed_at = -math.inf
+        #: Whether the frame that it follows is not updated any more.
+        self._frame_is_silent = False
         #: The group that it is in; None for none.
         self.group: Display | None = None
         super().__init__(parent, runtime)
@@ -224,6 +228,32 @@ class Display(Configurable, TopicElement):
     def on_fixed_frame(self) -> None:
         """Place everything anew: another frame is the fixed one."""
         self.on_transforms()
+
+    def followed_frame(self) -> str:
+        """Return the frame whose newest pose is shown; empty for none."""
+        return ""
+
+    def check_frame(self) -> None:
+        """Fade what follows a frame that is not updated any more; called by the scene."""
+        frame = self.followed_frame() if self.shown else ""
+        silence = (
+            0.0 if frame in ("", FIXED_FRAME) or self.scene is None else (self.scene.silence(frame))
+        )
+        self._frame_is_silent = silence > _SILENT_S
+        if self._frame_is_silent:
+            since = (
+                "the connection is lost"
+                if math.isinf(silence)
+                else (f"no transform has come for {silence:.0f} s")
+            )
+            self.set_status("Frame", "warn", f"[{frame}] may be somewhere else: {since}")
+        else:
+            self.delete_status("Frame")
+        self._fade()
+
+    def _fade(self) -> None:
+        """Draw what may be out of date as such."""
+        self.root.alpha = OUTDATED_ALPHA if self._frame_is_silent else 1.0
 
     def reset(self) -> None:
         """Drop all data that was received, e.g. as time has jumped back."""
@@ -465,6 +495,8 @@ class TopicDisplay(OneTopicDisplay):
     ) -> None:
         self._intake: Intake | None = None
         self._waiting: deque[_Item] = deque()
+        #: Whether the publisher or the connection of what is shown is gone.
+        self._is_gone = False
         self._last: _Item | None = None
         self._arrived = 0.0
         super().__init__(parent, runtime)
@@ -544,12 +576,17 @@ class TopicDisplay(OneTopicDisplay):
     def _show_age(self) -> None:
         """Fade data whose publisher or connection is gone, and say so."""
         gone = self._outdated and self._last is not None and self.enabled
-        self.root.alpha = OUTDATED_ALPHA if gone else 1.0
+        self._is_gone = bool(gone)
+        self._fade()
         if gone:
             when = time.strftime("%H:%M:%S", time.localtime(self._arrived))
             self.set_status("Data", "warn", f"its publisher is gone; the last message is of {when}")
         else:
             self.delete_status("Data")
+
+    def _fade(self) -> None:
+        faded = self._is_gone or self._frame_is_silent
+        self.root.alpha = OUTDATED_ALPHA if faded else 1.0
 
     # -- messages --------------------------------------------------------------------------------
 

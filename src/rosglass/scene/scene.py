@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.executor import Dispatcher
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.display import Display
-    from rosglass.tf import TransformBuffer
+    from rosglass.tf import FrameTree, TransformBuffer
 
 __all__ = ["Scene"]
 
@@ -70,6 +71,9 @@ class Scene(Element):
         self._link: TfLink | None = None
         self._watch: Any = None
         self._loader: Dispatcher | None = None
+        self._ticks = 0
+        #: The frames, as they were half a second ago at most.
+        self._tree: FrameTree | None = None
         super().__init__(parent, runtime)
         self._timer = single_shot(self, self._follow)
         self._tree_changed = False
@@ -228,6 +232,37 @@ class Scene(Element):
         found = buffer.lookup_transform(target, frame, Time(stamp) if stamp else None)
         return instance_matrix(found.translation, found.rotation)
 
+    def silence(self, frame: str) -> float:
+        """Return for how long a frame may have been somewhere else, in seconds.
+
+        That is since the last transform of whichever link between it and the fixed frame was
+        received longest ago; 0 without moving links, infinite while the connection is lost.
+        """
+        session = self._session
+        if frame in ("", self._fixed_frame):
+            return 0.0
+        if session is None or session.state != "connected":
+            return math.inf
+        tree = self._tree
+        if tree is None:
+            return 0.0
+        try:
+            links = tree.chain(self._fixed_frame, frame)
+        except TransformException:
+            return 0.0
+        return max((tree[one].silence for one in links if not tree[one].static), default=0.0)
+
+    @Slot()
+    def _on_tick(self) -> None:
+        """Look twice a second for displays whose frames are not updated any more."""
+        self._ticks += 1
+        buffer = self.transforms
+        if self._ticks % 5 or buffer is None:
+            return
+        self._tree = buffer.tree()
+        for display in self._alive():
+            display.check_frame()
+
     def load(self, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
         """Run a job that takes long, such as reading meshes, in a thread of the scene.
 
@@ -286,7 +321,7 @@ class Scene(Element):
         leave = self._cleanup.pop("transforms", None)
         if leave is not None:
             leave()
-        self._link = self._watch = None
+        self._link = self._watch = self._tree = None
 
     def _on_transforms(self) -> None:
         if is_alive(self) and not self._timer.isActive():

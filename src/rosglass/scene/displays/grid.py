@@ -31,6 +31,10 @@ class _InFrame(Display):
         super().__init__(parent, runtime)
         self.root.add(self._body)
 
+    def followed_frame(self) -> str:
+        """Return the frame that it is drawn in."""
+        return str(self.frame)
+
     def on_transforms(self) -> None:
         """Follow the frame."""
         pose = self.place_of(self.frame)

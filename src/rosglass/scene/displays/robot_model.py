@@ -303,6 +303,8 @@ class RobotModelDisplay(Display):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         self._bodies: dict[str, _Link] = {}
+        self._body = Group()
+        self._root_link = ""
         self._switched: dict[str, bool] = {}
         self._text: str | None = None
         self._next = 0.0
@@ -366,7 +368,8 @@ class RobotModelDisplay(Display):
         for name in result.robot.links:
             part = _Part(self, name)
             link = self._bodies[name] = _Link(result.visuals[name], result.collisions[name], part)
-            self.root.add(link.root)
+            self._body.add(link.root)
+        self._root_link = result.robot.root
         report(self, links=sorted(self._bodies), robotName=result.robot.name)
         self.set_status("URDF", "ok", "URDF parsed OK")
         for number, warning in enumerate(result.robot.warnings[:_MAX_LINK_LINES]):
@@ -377,9 +380,15 @@ class RobotModelDisplay(Display):
 
     def _clear(self) -> None:
         self._bodies.clear()
-        self.root.clear()
+        self._body.clear()
+        self.root.add(self._body)
         self.clear_status()
         report(self, links=[], robotName="")
+
+    def followed_frame(self) -> str:
+        """Return the frame of the robot's root link."""
+        prefix = self.tfPrefix.strip("/")
+        return f"{prefix}/{self._root_link}" if prefix and self._root_link else self._root_link
 
     # -- the links -------------------------------------------------------------------------------
 
@@ -394,7 +403,7 @@ class RobotModelDisplay(Display):
         return self._switched.get(link, bool(self.allLinksEnabled))
 
     def _restyle(self) -> None:
-        self.root.alpha = self.alpha
+        self._body.alpha = self.alpha
         for link in self._bodies.values():
             link.visual.visible = self.visualEnabled
             link.collision.visible = self.collisionEnabled
