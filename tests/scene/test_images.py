@@ -277,6 +277,7 @@ def test_displays_can_be_hidden_in_the_camera(bench: SceneBench, camera: tuple[A
     ("fields", "text"),
     [
         ({"p": [float("nan"), *P[1:]]}, "CameraInfo/p: contains NaN or infinite numbers"),
+        ({"p": [*P[:3], 1e300, *P[4:]]}, "CameraInfo/p: 1e+300 is no number of pixels"),
         ({"p": [0.0] * 12}, "expected focal lengths above 0 pixels, got fx 0 and fy 0"),
     ],
 )
@@ -350,6 +351,17 @@ def test_settings_of_rviz_files(bench: SceneBench, load: Callable[..., Any]) -> 
     kept = display.save_settings({"Class": "rviz/Camera"}, 1)
     assert (kept["Image Topic"], kept["Queue Size"]) == ("/rear/image", 7)
     assert kept["Visibility"] == {"Value": True, "Grid": False}
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_the_matrix_of_ros_1_is_a_capital(ros: int) -> None:
+    pytest.importorskip("PySide6")
+    from rosglass.messages import load
+    from rosglass.scene.displays.image import _read_lens
+
+    kind = load("sensor_msgs/msg/CameraInfo", ros=ros)
+    lens = _read_lens(kind({"width": 4, "height": 3, "P" if ros == 1 else "p": P}))
+    assert lens == (4, 3, 180, 190, 90, 80, 0, 0)
 
 
 @pytest.mark.parametrize(

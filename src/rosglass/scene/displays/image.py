@@ -60,6 +60,8 @@ _MAX_AGE_S = DEFAULT_TIMEOUT_MS / 1000
 _TRANSFORM_WAIT_S = 1.0
 #: Largest factor by which pictures are kept larger than a panel, for a zoom.
 _MOST_ZOOM = 8.0
+#: What numbers of a CameraInfo can be; beyond, places on the screen would not be finite.
+_MIN_FOCAL_PIXELS, _MAX_PIXELS = 0.001, 1e9
 #: From a camera (x right, y down, looking along z) to OpenGL's (y up, looking along -z).
 _OPTICAL = np.diag([1.0, -1.0, -1.0, 1.0])
 _NO_PANEL = "no panel shows it: declare ImagePanel { display: ... }"
@@ -390,8 +392,10 @@ def _read_lens(message: Any) -> _Lens:
     numbers = [float(number) for number in message[name]]
     if not np.isfinite(numbers).all():
         raise Error(f"CameraInfo/{name}: contains NaN or infinite numbers: {numbers}")
+    if max(map(abs, numbers)) > _MAX_PIXELS:
+        raise Error(f"CameraInfo/{name}: {max(numbers, key=abs):g} is no number of pixels")
     fx, _, cx, tx, _, fy, cy, ty = numbers[:8]
-    if fx <= 0 or fy <= 0:
+    if min(fx, fy) < _MIN_FOCAL_PIXELS:
         raise Error(
             f"CameraInfo/{name}: expected focal lengths above 0 pixels, got fx {fx:g} and fy "
             f"{fy:g}; calibrate the camera"
@@ -488,7 +492,7 @@ class CameraDisplay(PictureDisplay):
         self.set_status("Camera Info", "warn", text)
 
     def _on_closed(self, endpoint: SharedStream | None) -> None:
-        self._infos = None
+        self._infos = self._lens = None
         close = self._cleanup.pop("camera info", None)
         if close is not None:
             close()
@@ -562,9 +566,7 @@ class CameraDisplay(PictureDisplay):
     def reset(self) -> None:
         """Remove the picture, and what is drawn in it."""
         self._waiting.clear()
-        self._lens = self._pose = None
-        if self._infos is not None:
-            self._miss_info()
+        self._pose = None
         super().reset()
 
     # -- the camera ------------------------------------------------------------------------------
@@ -607,26 +609,19 @@ class CameraDisplay(PictureDisplay):
             height: The same.
         """
         size, lens, pose = self._size(), self._lens, self._pose
-        if size is None or lens is None or pose is None:
+        if size is None or lens is None or pose is None or min(width, height) <= 0:
             return None
         place = self.picture_place(width, height)
         across, down = place.width() / size[0], place.height() / size[1]
         moved = np.eye(4)
         moved[:2, 3] = lens.right, lens.down
-        try:
-            return PinholeCamera(
-                pose @ moved @ _OPTICAL,
-                (width, height),
-                focal=(lens.fx * across, lens.fy * down),
-                # Coordinates of pixels are those of their middles.
-                centre=(
-                    place.x() + (lens.cx + 0.5) * across,
-                    place.y() + (lens.cy + 0.5) * down,
-                ),
-            )
-        except Error as error:
-            self.set_status("Camera Info", "error", str(error))
-            return None
+        return PinholeCamera(
+            pose @ moved @ _OPTICAL,
+            (width, height),
+            focal=(lens.fx * across, lens.fy * down),
+            # Coordinates of pixels are those of their middles.
+            centre=(place.x() + (lens.cx + 0.5) * across, place.y() + (lens.cy + 0.5) * down),
+        )
 
 
 def _hidden_names(saved: Any) -> list[str]:
