@@ -256,6 +256,17 @@ def test_a_cloud_that_lies_is_an_error_in_words(
     assert shown.at(0, 0) == (255, 255, 255), "the last good cloud stays"
 
 
+def test_a_cloud_of_too_many_points_is_an_error_in_words(
+    show: Callable[..., Shown], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rosglass.scene.displays.point_cloud._MAX_POINTS", 2)
+    shown = show("PointCloud2")
+    shown.send(cloud([(0, 0, 0)] * 2))
+    display = shown.send(cloud([(3, 0, 0)] * 3))
+    assert "3 points are more than the 2 that are drawn" in display.statusText
+    assert shown.at(0, 0) == (255, 255, 255), "the last good cloud stays"
+
+
 def test_a_transformer_without_its_fields_says_so(show: Callable[..., Shown]) -> None:
     shown = show("PointCloud2", 'colorTransformer: "RGB8"')
     display = shown.send(cloud([(0, 0, 0, 1)], "ring"))

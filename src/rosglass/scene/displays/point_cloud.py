@@ -67,6 +67,8 @@ __all__ = [
 _MAX_FLOAT = 3e38
 #: Largest size of points in metres and in pixels.
 _MAX_SIZE_M, _MAX_SIZE_PX = 1000.0, 256.0
+#: Most points of one cloud: more do not fit into a buffer of the GPU.
+_MAX_POINTS = 20_000_000
 #: Seconds that one turn of a laser scanner may take.
 _MAX_SCAN_S = 10.0
 #: Metres, or half of the radians, up to which a scanner has not moved during a scan.
@@ -113,6 +115,11 @@ class _ColorSettings(NamedTuple):
 
     def prepare(self, cloud: Cloud) -> _Prepared:
         """Return a cloud with everything that depends on each of its points."""
+        if cloud.point_count > _MAX_POINTS:
+            raise Error(
+                f"{cloud.point_count} points are more than the {_MAX_POINTS} that are drawn; "
+                "publish a thinned-out cloud"
+            )
         name = choose_color_transformer(cloud.layout, self.chosen)
         # These are computed once: the GUI thread only reads them.
         cloud.bounds()
