@@ -498,14 +498,14 @@ def test_a_rectangle_selects(bench: SceneBench, hand: Hand) -> None:
 
     class Part:
         name = "arm_link"
-        display = view.scene.add("Axes", "Robot", alpha=0.0)
+        display = view.scene.add("Path", "Robot")
 
         def describe(self) -> list[tuple[str, str]]:
             return [("Mass", "3 kg")]
 
     box = add_box(view, (-2, 0, 0), Part())
     cloud = Points()
-    cloud.owner = view.scene.add("Grid", "Cloud", alpha=0.0)
+    cloud.owner = view.scene.add("Path", "Cloud")
     cloud.set_points([[2, 0, 0], [2.2, 0, 0], [3, 3, 5]])
     view.scene.root.add(cloud)
     selection = view.selection
@@ -596,7 +596,7 @@ def test_an_own_tool_in_qml_gets_points(bench: SceneBench, hand: Hand) -> None:
         " onKeyPressed: (event) => { keys += event.key } }"
     )
     yaw = view.controller.yaw
-    add_box(view, (0, 0, 0), view.scene.add("Grid", "Tower", alpha=0.0))
+    add_box(view, (0, 0, 0), view.scene.add("Path", "Tower"))
     hand.press(hand.at((3, 0, 0)))
     hand.move((5, 5))
     hand.release(hand.at((0, 0, 0.5)))
