@@ -453,24 +453,50 @@ def test_view_types_and_saved_views(over: Over) -> None:
     assert {"rviz/FPS", "rviz/Orbit"} <= set(run("return rviz.view.viewTypes"))
 
 
+POINT = "expected x, y and z in metres, e.g. Qt.vector3d(1, 2, 0), got "
+MODE = "expected rviz.view.MODE_3D (0) or MODE_2D (1), got "
+FRAME = "expected the name of a frame, or '' for none, got "
+VIEW = "expected a view type, e.g. 'rviz/Orbit', got "
+NAME = "expected a name for the view, a text of one line, got "
 VIEW_MISTAKES = {
     "mode = 7": "rviz.view.mode: there is no view mode 7: expected 0 (3D) or 1 (2D)",
-    "mode = 'flat'": "expected rviz.view.MODE_3D (0) or MODE_2D (1), got 'flat'",
+    "mode = 'flat'": f"rviz.view.mode: {MODE}'flat'",
+    "mode = null": f"rviz.view.mode: {MODE}null",
+    "mode = true": f"rviz.view.mode: {MODE}true",
+    "mode = NaN": f"rviz.view.mode: {MODE}NaN",
     "trackedFrame = 'nowhere'": "rviz.view.trackedFrame: ",
-    "trackedFrame = 5": "rviz.view.trackedFrame: expected the name of a frame, or '' for none",
+    "trackedFrame = 5": f"rviz.view.trackedFrame: {FRAME}5",
+    "trackedFrame = null": f"rviz.view.trackedFrame: {FRAME}null",
     "animationDuration = -1": "animationDuration: expected a number from 0 to 60, got -1",
+    "animationDuration = 'slow'": "animationDuration: expected a number from 0 to 60, got 'slow'",
+    "animationDuration = true": "animationDuration: expected a number from 0 to 60, got true",
     "trackingGain = NaN": "rviz.view.trackingGain: expected a number from 0 to 1000, got NaN",
+    "trackingGain = []": "rviz.view.trackingGain: expected a number from 0 to 1000, got []",
     "type = 'orbit'": "there is no view type 'orbit'; did you mean rviz/Orbit?; there are",
-    "type = 'rviz/Nope'": "there is no view type",
-    "type = 5": "rviz.view.type: expected a view type, e.g. 'rviz/Orbit', got 5",
+    "type = 'rviz/Orbi'": "there is no view type 'rviz/Orbi'; did you mean rviz/Orbit",
+    "type = 5": f"rviz.view.type: {VIEW}5",
+    "eye = Qt.vector3d(1, 2, 3)": "read-only",
     "moveEye()": "rviz.view.moveEye(eye[, options]): eye must be given",
-    "moveEye([1, 2, Infinity])": "expected x, y and z in metres",
+    "moveEye([0, 0, null])": f"rviz.view.moveEye: eye: {POINT}[0, 0, null]",
+    "moveEye([1, 2, Infinity])": f"rviz.view.moveEye: eye: {POINT}[1, 2, Infinity]",
     "moveEye([1, 2, 1e9])": "is more than 1e+08 m from the fixed frame's origin",
+    "moveEye([1, 2, 3], 'map')": "options: expected {frame, animate, stopTracking, switchTo3D}",
+    "moveEye([1, 2, 3], {frame: null})": "rviz.view.moveEye: frame: expected a text, got null",
+    "moveEye([1, 2, 3], {frame: 'nowhere'})": "moveEye: ",
     "moveEye([1, 2, 3], {animated: true})": "there is no option 'animated'; there are frame,",
+    "moveEye([1, 2, 3], {animate: 1})": "animate: expected true or false, got 1",
+    "moveEyeAndFocus([1, 2, 3])": "moveEyeAndFocus(eye, focus[, options]): focus must be given",
+    "moveEyeAndFocus([1, 2, 3], 5)": f"rviz.view.moveEyeAndFocus: focus: {POINT}5",
     "moveEyeAndFocus([1, 2, 3], [1, 2, 3])": "are both at [1.0, 2.0, 3.0]",
-    "saveView('')": "rviz.view.saveView: expected a name for the view, a text of one line, got ''",
+    "moveEyeAndFocus([1, 2, 3], [0, 0, 0], {switchTo3D: true})": "no option 'switchTo3D'",
+    "setMode('3D')": f"rviz.view.setMode: {MODE}'3D'",
+    "setMode(0, 1)": "rviz.view.setMode: animate: expected true or false, got 1",
+    "track(null)": f"rviz.view.track: {FRAME}null",
+    "track(['map'])": f"rviz.view.track: {FRAME}['map']",
+    "saveView('')": f"rviz.view.saveView: {NAME}''",
     "showView('x')": "rviz.view.showView: there is no saved view 'x'; no views are saved",
     "removeView(null)": "rviz.view.removeView: there is no saved view null; no views are saved",
+    "removeView()": "rviz.view.removeView(name): name must be given",
     "misspelled = 1": "rviz.view has no member 'misspelled'",
 }
 

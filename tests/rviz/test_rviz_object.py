@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import subprocess
 import sys
@@ -72,20 +71,6 @@ def test_tools(app: Any, tools: Any, qml: Any, wait: Any) -> None:
     assert [tool.class_id for tool in tools.all] == ["rviz/MoveCamera"]
     run("rviz.toolManager.removeAll()")
     assert run("return [rviz.toolManager.tools.length, rviz.toolManager.currentTool]") == [0, None]
-
-
-def test_tool_icons(tools: Any, qml: Any, wait: Any) -> None:
-    here = qml(
-        """Row { property alias a: a; property alias b: b; property alias c: c
-        Image { id: a; source: rviz.toolManager.getTool("rviz/Select").iconSource }
-        Image { id: b; source: a.source; sourceSize.width: 20 }
-        Image { id: c; source: "image://rviz_tool_icons/no/Such" } }"""
-    )
-    sizes = (
-        "return [root.a, root.b, root.c].map(i => [i.status, i.sourceSize.width, i.implicitHeight])"
-    )
-    wait(lambda: here.run(sizes)[0][0] == 1)
-    assert here.run(sizes) == [[1, 48, 48], [1, 20, 20], [1, 48, 48]]
 
 
 def test_displays(app: Any, displays: Any, qml: Any, wait: Any) -> None:
@@ -258,44 +243,6 @@ def straight_down(app: Any, wait: Any) -> None:
     wait(lambda: len(frames) > 3)
 
 
-def test_position_trackers(app: Any, displays: Any, qml: Any, wait: Any) -> None:
-    here = qml(
-        """Item { property var tracker: null; property var told: []
-        function track() { tracker = rviz.createPositionTracker(0, 0, 0)
-            tracker.positionChanged.connect(p => told.push([p.x, p.y, p.z])) } }""",
-        scale=2.0,
-    )
-    straight_down(app, wait)
-    run = here.run
-    run("root.track()")
-    where = "const p = root.tracker.position; return [p.x, p.y, p.z]"
-    x, y, z = run(where)
-    panel = app.window.panel
-    assert (x, y) == pytest.approx((panel.width() / 4, panel.height() / 4), abs=1)
-    assert z == pytest.approx(10, abs=0.05)
-    # It follows the camera, the point, and the overlay's scale.
-    app.rviz.view.move_eye_and_focus((0, 0, 20), (0, 0, 0), animate=False)
-    wait(lambda: abs(run(where)[2] - 20) < 0.1)
-    assert run("return root.told.length") > 0
-    run("root.tracker.point = Qt.vector3d(0, 0, 5)")
-    assert run(where)[2] == pytest.approx(15, abs=0.1)
-    assert run("return root.tracker.point") == {"x": 0, "y": 0, "z": 5}
-    here.overlay.scale = 1.0
-    wait(lambda: run(where)[0] == pytest.approx(panel.width() / 2, abs=1))
-    run("root.tracker.point = {x: 0, y: 0, z: 30}")
-    # JSON has no NaN.
-    assert run(where) == [None, None, None]
-    assert run("return isNaN(root.tracker.position.x)")
-    # A frame that nobody knows.
-    run("root.tracker.point = [0, 0, 0]; root.tracker.frame = 'nowhere'")
-    wait(lambda: "nowhere" in run("return root.tracker.problem"))
-    assert run(where) == [None, None, None]
-    run("root.tracker.frame = ''")
-    assert run("return root.tracker.problem") == ""
-    assert "expected x, y and z" in here.fails("rviz.createPositionTracker('a', 0, 0)")
-    assert "expected x, y and z" in here.fails("root.tracker.point = 5")
-
-
 def test_trackers_end_with_their_objects(app: Any, qml: Any, wait: Any) -> None:
     here = qml()
     before = len(app.rviz.trackers)
@@ -318,99 +265,6 @@ def test_trackers_end_with_their_overlay(app: Any, qml: Any) -> None:
     assert len(app.rviz.trackers) == before
 
 
-def test_picking(app: Any, displays: Any, qml: Any, wait: Any) -> None:
-    here = qml(scale=2.0)
-    displays.find("Grid").enabled = False
-    displays.add("rviz/Axes")
-    displays.set("Axes/Length", 4)
-    displays.set("Axes/Radius", 0.5)
-    displays.set("Global Options/Fixed Frame", "map")
-    straight_down(app, wait)
-    middle = "const x = root.width / 2, y = root.height / 2;"
-    wait(lambda: here.run(middle + "return rviz.pick(x, y)") is not None)
-    found = here.run(middle + "return rviz.pick(x, y)")
-    # The end of the axis that points at the camera.
-    assert found["z"] == pytest.approx(4, abs=0.05)
-    assert abs(found["x"]) < 0.1
-    assert abs(found["y"]) < 0.1
-    # There and back again, somewhere on another axis.
-    run = here.run
-    back = run(
-        "const t = rviz.createPositionTracker(0, 2, 0.25), p = t.position;"
-        "return [p.x, p.y, rviz.pick(p.x, p.y), rviz.pick(p)]"
-    )
-    assert back[2]["y"] == pytest.approx(2, abs=0.1)
-    assert back[2]["z"] == pytest.approx(0.25, abs=0.05)
-    assert back[2] == back[3]
-    assert run("return rviz.pick(1, 1)") is None
-    assert run("return [rviz.pick(-5, 0), rviz.pick(1e6, 0)]") == [None, None]
-    # Around the place.
-    beside = "const p = rviz.createPositionTracker(0, 2, 0.25).position; let x = p.x;"
-    beside += "while (rviz.pick(x, p.y)) x -= 1; x -= 3;"
-    beside += "return [rviz.pick(x, p.y), rviz.pick(x, p.y, 10)]"
-    near = run(beside)
-    assert near[0] is None
-    assert near[1] is not None
-    assert "in units of the overlay" in here.fails("rviz.pick('a', 2)")
-    assert "expected finite x and y" in here.fails("rviz.pick(NaN, 2)")
-
-
-def test_the_view(app: Any, qml: Any, wait: Any) -> None:
-    here = qml("Item { property vector3d eye: rviz.view.eye; property int mode: rviz.view.mode }")
-    run = here.run
-    run("rviz.view.reset()")
-    eye = "const e = rviz.view.eye; return [e.x, e.y, e.z]"
-    assert run(eye) == pytest.approx([4, 0, 3], abs=1e-3)
-    run("rviz.view.moveEye(Qt.vector3d(1, 2, 3), {animate: false})")
-    assert run(eye) == pytest.approx([1, 2, 3], abs=1e-3)
-    wait(lambda: abs(here.root.property("eye").y() - 2) < 1e-2)
-    run("rviz.view.moveEyeAndFocus([0, -5, 5], {x: 0, y: 0, z: 1}, {animate: false})")
-    focus = run("const f = rviz.view.focus; return [f.x, f.y, f.z]")
-    assert focus == pytest.approx([0, 0, 1], abs=1e-3)
-    run("rviz.view.setMode(rviz.view.MODE_2D, false)")
-    assert run("return [rviz.view.mode, rviz.view.type]") == [1, "rviz/TopDownOrtho"]
-    wait(lambda: here.root.property("mode") == 1)
-    run("rviz.view.saveView('Above'); rviz.view.type = 'rviz/XYOrbit'")
-    assert run("return [rviz.view.savedViews, rviz.view.type]") == [["Above"], "rviz/XYOrbit"]
-    run("rviz.view.showView('Above')")
-    assert run("return rviz.view.type") == "rviz/TopDownOrtho"
-    run("rviz.view.removeView(0); rviz.view.animationDuration = 0.2; rviz.view.mode = 0")
-    wait(lambda: run("return rviz.view.type") == "rviz/Orbit")
-    assert run("return rviz.view.savedViews") == []
-    assert "rviz/FPS" in run("return rviz.view.viewTypes")
-    here.refuses(
-        {
-            # RViz itself crashes at those.
-            "rviz.view.type = 'rviz/Nope'": "there is no view type",
-            "rviz.view.showView('Above')": "no views are saved",
-            "rviz.view.moveEye(5)": "expected x, y and z",
-            "rviz.view.moveEye([1, 2, 3], {animated: 1})": "there is no option 'animated'",
-            "rviz.view.setMode(7)": "0 (3D)",
-            "rviz.view.animationDuration = NaN": "from 0 to 60",
-            "rviz.view.track('nowhere')": "nowhere",
-        }
-    )
-
-
-def test_configs(app: Any, displays: Any, qml: Any, wait: Any, tmp_path: Path) -> None:
-    here = qml(
-        """Item { property var told: []
-        property Connections c: Connections { target: rviz
-            function onConfigLoaded(file) { told.push(file) } } }"""
-    )
-    file = tmp_path / "saved.rviz"
-    displays.find("Grid").name = "Saved grid"
-    here.run(f"rviz.saveConfig('{file}')")
-    assert "Saved grid" in file.read_text()
-    here.run("rviz.display('Saved grid').name = 'Grid'")
-    here.run(f"root.told = []; rviz.loadConfig('{file.as_uri()}')")
-    wait(lambda: here.run("return root.told"))
-    assert here.run("return root.told") == [str(file)]
-    assert here.run("return rviz.displays.map(d => d.name)") == ["Saved grid", "Overlay0"]
-    assert "does not exist" in here.fails("rviz.loadConfig('/nowhere/x.rviz')")
-    assert "could not save" in here.fails("rviz.saveConfig('/nowhere/x.rviz')")
-
-
 def test_screenshots(app: Any, qml: Any, tmp_path: Path) -> None:
     from rosglass.rviz.qt5 import QtGui
 
@@ -425,14 +279,6 @@ def test_screenshots(app: Any, qml: Any, tmp_path: Path) -> None:
     assert "there is no folder" in here.fails("rviz.screenshot('/nowhere/x.png')")
     assert ".png" in here.fails(f"rviz.screenshot('{tmp_path}/x.xyz')")
     assert "expected the path" in here.fails("rviz.screenshot(5)")
-
-
-def test_registered_properties_and_config(qml: Any) -> None:
-    here = qml("Item { property var p: rviz.registerFloatProperty('Speed', 0.5) }")
-    assert here.run("return root.p.value") == 0.5
-    here.run("root.p.value = 2; rviz.config = {a: [1, 2]}")
-    assert here.run("return [root.p.value, rviz.config.a[1]]") == [2, 2]
-    assert math.isclose(here.overlay.properties.properties["Speed"].get(), 2)
 
 
 def test_overlays_that_come_and_go(app: Any, tools: Any, qml: Any, wait: Any) -> None:
@@ -475,33 +321,3 @@ def test_nothing_crashes_hangs_or_raises(screen: str, master: str, tmp_path: Pat
     assert "came to the end" in text
     for sign in ("Traceback (most recent", "internal error"):
         assert sign not in text, text[text.index(sign) :][:2000]
-
-
-def test_trackers_of_frames(app: Any, qml: Any, wait: Any) -> None:
-    """Trackers move with the robot, and report an unknown position."""
-    from rosglass.tf import Transform
-
-    app.rviz.fixed_frame = "map"
-    here = qml(
-        "import Ros2 1.0\nItem { Component.onCompleted: Ros2.init('tracking')\n"
-        "property var t: rviz.createPositionTracker(Qt.vector3d(1, 0, 0), 'tracked_link') }"
-    )
-    straight_down(app, wait)
-    run = here.run
-    assert "tracked_link" in run("return root.t.problem")
-    wait(lambda: app.rviz.frames.buffer is not None)
-
-    def place(x: float) -> None:
-        made = Transform((x, 0.0, 0.0), frame_id="map", child_frame_id="tracked_link")
-        app.rviz.frames.buffer.set_transform(made, static=True)
-
-    place(2.0)
-    wait(lambda: run("return root.t.problem") == "")
-    # The same place of the fixed frame.
-    same = "const s = rviz.createPositionTracker({0}, 0, 0).position, p = root.t.position;"
-    same += "return Math.hypot(p.x - s.x, p.y - s.y) < 0.5"
-    wait(lambda: run(same.replace("{0}", "3")))
-    place(1.0)
-    wait(lambda: run(same.replace("{0}", "2")))
-    # What is static does not get old.
-    assert run("return root.t.stale") is False
