@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar, overload
 from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
-from rosglass.ros1.names import expand
 from rosglass.rviz.camera import Camera
 from rosglass.rviz.host import Hook, as_pyside
 from rosglass.rviz.orbit import (
@@ -122,6 +121,13 @@ class _Setting(Generic[_T]):
         return settings.properties.properties[self.name]
 
 
+def _check_namespace(name: str) -> None:
+    # Outside of RViz, few programs use a package of ROS 1.
+    from rosglass.ros1.names import expand  # noqa: PLC0415
+
+    expand(name, "rviz", "/")
+
+
 class ViewSettings:
     """Settings of the view controller, as attributes.
 
@@ -178,7 +184,7 @@ class ViewSettings:
         "Namespace",
         "~hector_view_controller",
         "Namespace of the topics and services: a ROS name, in which ~ stands for RViz's node.",
-        lambda name: expand(name, "rviz", "/"),
+        _check_namespace,
     )
 
     def __init__(self) -> None:

@@ -42,7 +42,7 @@ from rosglass.scene.displays.pose import (
 )
 from rosglass.scene.displays.robot_model import RobotModelDisplay
 from rosglass.scene.displays.tf import TFDisplay
-from rosglass.scene.overlay import OverlayElement
+from rosglass.scene.overlay_element import OverlayElement
 from rosglass.scene.panel_models import DisplaysModel
 from rosglass.scene.publishing_tools import (
     Nav2GoalTool,
