@@ -182,3 +182,27 @@ Visualization Manager:
     assert "display 'A': Cell Size: expected a finite number, got" in "\n".join(notes)
     assert "Color: expected a colour, e.g. '255; 128; 0', got '1; 2'" in "\n".join(notes)
     assert view.scene.displays[0].alpha == 0.25
+
+
+#: Settings that rviz 1.14 does not write: those of RViz 2, and the parts of settings that it leaves
+#: out with the default choice.
+NEWER = {
+    "LaserScan": {"Min Intensity", "Max Intensity"},
+    "Map": {"Update Topic", "Queue Size"},
+    "PointCloud": {"Min Intensity", "Max Intensity"},
+    "PointCloud2": {"Min Intensity", "Max Intensity"},
+    "TF": {"Filter (whitelist)", "Filter (blacklist)"},
+}
+
+
+def test_settings_have_the_names_that_rviz_writes(bench: SceneBench) -> None:
+    (file,) = (file for file in FILES if file.stem == "ros1_all_displays")
+    before = RvizConfig.load(file)
+    view = bench.load()
+    view.load_config(file)
+    added = {}
+    for old, new in zip(before.walk(), view.collect_config(1).walk(), strict=True):
+        names = set(new.settings) - set(old.settings) - NEWER.get(old.type, set())
+        if names:
+            added[old.type] = names
+    assert added == {}

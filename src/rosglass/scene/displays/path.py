@@ -34,7 +34,7 @@ class PathDisplay(TopicDisplay):
         "Line Style", "enum", "Lines", "How the line is drawn.", choices=["Lines", "Billboards"]
     )
     lineWidth = Setting(
-        "Line Style/Line Width", "float", 0.03, "Of billboards, in metres.", min=0.001
+        "Line Width", "float", 0.03, "Of billboards, in metres.", min=0.001
     )
     color = Setting("Color", "color", "#19ff00", "The colour of the line.")
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
@@ -43,13 +43,13 @@ class PathDisplay(TopicDisplay):
     poseStyle = Setting(
         "Pose Style", "enum", "None", "How poses are drawn.", choices=["None", "Axes", "Arrows"]
     )
-    axesLength = Setting("Pose Style/Length", "float", 0.3, "Of axes, in metres.", min=0.0)
-    axesRadius = Setting("Pose Style/Radius", "float", 0.03, "Of axes, in metres.", min=0.0)
-    poseColor = Setting("Pose Style/Pose Color", "color", "#ff55ff", "Of arrows.")
-    shaftLength = Setting("Pose Style/Shaft Length", "float", 0.1, "Of arrows, metres.", min=0.0)
-    headLength = Setting("Pose Style/Head Length", "float", 0.2, "Of arrows, metres.", min=0.0)
-    shaftDiameter = Setting("Pose Style/Shaft Diameter", "float", 0.1, "In metres.", min=0.0)
-    headDiameter = Setting("Pose Style/Head Diameter", "float", 0.3, "In metres.", min=0.0)
+    axesLength = Setting("Length", "float", 0.3, "Of axes, in metres.", min=0.0)
+    axesRadius = Setting("Radius", "float", 0.03, "Of axes, in metres.", min=0.0)
+    poseColor = Setting("Pose Color", "color", "#ff55ff", "Of arrows.")
+    shaftLength = Setting("Shaft Length", "float", 0.1, "Of arrows, metres.", min=0.0)
+    headLength = Setting("Head Length", "float", 0.2, "Of arrows, metres.", min=0.0)
+    shaftDiameter = Setting("Shaft Diameter", "float", 0.1, "In metres.", min=0.0)
+    headDiameter = Setting("Head Diameter", "float", 0.3, "In metres.", min=0.0)
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
