@@ -535,6 +535,10 @@ def test_a_rectangle_selects(bench: SceneBench, hand: Hand) -> None:
     box.pose = instance_matrix((-2, 1, 0))
     bench.wait(lambda: selection._root.pose[1, 3] == pytest.approx(1))
     assert before.y == pytest.approx(0)
+    box.set_instances([])
+    # Before it has followed.
+    assert selection.middle() is None
+    assert selection.items()[0].part == "arm_link"
     box.remove()
     bench.wait(lambda: selection.count == 0)
     assert len(selection._lines.rows) == 0
