@@ -756,11 +756,11 @@ class Labels(Drawable):
 
     Attributes:
         texts: One for each; several lines are allowed.
-        positions: (n, 3), metres; where the middle of each is, or its left edge.
+        positions: (n, 3), metres; where the middle of each is, or of its left or upper edge.
         heights: Of a line, in metres, or in pixels of the screen.
         colours: (n, 4) RGBA bytes.
         in_pixels: Whether `heights` are pixels.
-        align: ``centre`` or ``left``.
+        align: ``centre``, ``left`` or ``below``.
     """
 
     MAX_LENGTH = 1000

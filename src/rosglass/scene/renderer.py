@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from PySide6.QtCore import QByteArray, QSize, Qt
+from PySide6.QtCore import QByteArray, QPointF, QSize, Qt
 from PySide6.QtGui import (
     QColor,
     QFont,
@@ -83,6 +83,8 @@ _MODES = {"flat": 0.0, "bgra": 1.0, "rainbow": 2.0, "gradient": 3.0, "axis": 4.0
 _INDEX_UINT32 = QRhiCommandBuffer.IndexFormat.IndexUInt32
 #: Pixels of a line of text in the image of labels.
 _LINE_PX = 32
+#: Pixels from the top of a line to its baseline: letters are as high up as RViz's.
+_BASELINE_PX = 26.5
 
 
 class Frame(NamedTuple):
@@ -624,7 +626,8 @@ class _LabelsOnDevice(_OnDevice):
 
     def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
         block[0] = (1, 1, 1, self.drawable.alpha * alpha)
-        block[1, :2] = (self.drawable.in_pixels, self.drawable.align == "left")
+        align = self.drawable.align
+        block[1, :3] = (self.drawable.in_pixels, align == "left", align == "below")
 
     def draw(self, run: _Pass, blend: bool) -> None:
         pipeline = self.device.pipeline(
@@ -665,7 +668,8 @@ def _paint_texts(
         if x and x + wide > limit // 2:
             x, y, row = 0, y + row, 0
         places.append((x, y))
-        x, row, width = x + wide, max(row, high), max(width, x + wide)
+        # A gap: pixels between two texts are a mix of both.
+        x, row, width = x + wide + 2, max(row, high + 2), max(width, x + wide)
     height = min(max(y + row, 1), limit)
     width = min(width, limit)
     image = QImage(width, height, QImage.Format.Format_Alpha8)
@@ -675,14 +679,8 @@ def _paint_texts(
     painter.setPen(Qt.GlobalColor.white)
     for text, (left, top), (wide, high) in zip(texts, places, boxes, strict=True):
         painter.setClipRect(left, top, wide, high)
-        painter.drawText(
-            left + 2,
-            top,
-            wide,
-            high,
-            Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter,
-            text,
-        )
+        for number, line in enumerate(text.split("\n")):
+            painter.drawText(QPointF(left + 2, top + number * _LINE_PX + _BASELINE_PX), line)
     painter.end()
     view = np.frombuffer(image.constBits(), np.uint8).reshape(height, image.bytesPerLine())
     sizes = np.array(boxes, np.float32).reshape(-1, 2)
@@ -690,7 +688,8 @@ def _paint_texts(
         [np.array(places, np.float32).reshape(-1, 2), sizes], axis=1
     )
     shares /= np.array([width, height, width, height], np.float32)
-    return np.ascontiguousarray(view[:, :width]), shares, sizes / np.float32(_LINE_PX)
+    # A copy: the image frees its pixels.
+    return view[:, :width].copy(), shares, sizes / np.float32(_LINE_PX)
 
 
 _KINDS: dict[type, type[_OnDevice]] = {

@@ -81,7 +81,7 @@ class TFDisplay(Display):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         self._axes, self._arrows = AxesShapes(self), ArrowShapes(self)
-        self._names = Labels()
+        self._names = Labels(align="below")
         #: Whether frames are shown, of those that were switched.
         self._switched: dict[str, bool] = {}
         self._next = 0.0
