@@ -168,7 +168,7 @@ def test_two_vectors_are_two_arrows_and_a_circle(
     show: Callable[..., Any], display_type: str, message_type: str, message: dict[str, Any]
 ) -> None:
     display = show(display_type, message_type, message)
-    assert len(parts(display, CONE)) == 2
+    assert len(parts(display, CONE)) == 3, "the head of the circle as well"
     shaft = parts(display, CYLINDER)[0].instances["matrix"][0]
     assert place(shaft) == [0.0, 0.0, 1.0]  # the middle of 2 m along z
     assert sum(isinstance(one, Lines) for one in parts(display)) == 1

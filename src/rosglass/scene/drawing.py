@@ -290,7 +290,8 @@ class Points(Drawable):
         position: Where x, y, z (float32) are in a row.
         channel: Where the channel is in a row; -1 for none.
         channel_is_bytes: Whether the channel is four bytes B, G, R, A; otherwise one float32.
-        style: ``points`` (pixels), ``squares``, ``flat squares``, ``spheres``, ``boxes`` (metres).
+        style: ``points`` (pixels), ``squares``, ``flat squares``, ``spheres``, ``boxes`` (metres),
+            ``tiles`` (squares in the plane of their own frame, metres).
         size: Pixels of the screen for ``points``, metres for the others.
         size_by_depth: Whether metres are multiplied with z of each point, as the pixels of depth
             images are as large as they are far away.
@@ -298,7 +299,7 @@ class Points(Drawable):
         alpha: Opacity, 0 to 1.
     """
 
-    STYLES = ("points", "squares", "flat squares", "spheres", "boxes")
+    STYLES = ("points", "squares", "flat squares", "spheres", "boxes", "tiles")
 
     def __init__(self) -> None:
         super().__init__()
@@ -494,6 +495,7 @@ class Shape:
         indices: (m, 3) or (m * 3) numbers of vertices; if None, each three vertices are a triangle.
         colours: RGBA for each vertex; white if None.
         uv: (n, 2) places in the texture, from its upper left corner; 0 if None.
+        closed: Whether it has no holes and is symmetric to x = 0: its inner side is not drawn.
 
     Raises:
         Error: The shapes of the arrays don't fit, or an index is beyond the vertices.
@@ -511,7 +513,9 @@ class Shape:
         *,
         colours: ArrayLike | None = None,
         uv: ArrayLike | None = None,
+        closed: bool = False,
     ) -> None:
+        self.closed = closed
         at = _checked("positions", positions, (3,))
         if indices is None:
             faces = np.arange(len(at) // 3 * 3, dtype=np.uint32).reshape(-1, 3)
@@ -830,7 +834,7 @@ def _box_shape() -> Shape:
                 normals.append([side * (n == axis) for n in range(3)])
     first = 4 * np.arange(6)[:, np.newaxis]
     faces = np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])])
-    return Shape(corners, normals, faces)
+    return Shape(corners, normals, faces, closed=True)
 
 
 def _turned(profile: list[tuple[float, float, float, float]], around: int = 32) -> Shape:
@@ -846,7 +850,7 @@ def _turned(profile: list[tuple[float, float, float, float]], around: int = 32) 
         a = ring * (around + 1) + np.arange(around)
         b = a + around + 1
         faces += [np.stack([a, a + 1, b + 1], axis=1), np.stack([a, b + 1, b], axis=1)]
-    return Shape(np.concatenate(at), np.concatenate(normal), np.concatenate(faces))
+    return Shape(np.concatenate(at), np.concatenate(normal), np.concatenate(faces), closed=True)
 
 
 def _sphere_shape(rings: int = 16) -> Shape:

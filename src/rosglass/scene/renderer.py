@@ -243,6 +243,7 @@ class _Device:
         topology: Any,
         blend: bool,
         bindings: Any,
+        cull: bool = False,
     ) -> QRhiGraphicsPipeline:
         """Return a pipeline, made when it is first needed.
 
@@ -253,8 +254,9 @@ class _Device:
             topology: What the vertices are.
             blend: Whether it is translucent; it does not hide what is behind it then.
             bindings: Of any drawable of this kind.
+            cull: Whether triangles are drawn from their outer side only.
         """
-        key = (shaders, layout, topology, blend)
+        key = (shaders, layout, topology, blend, cull)
         if key in self._pipelines:
             return self._pipelines[key]
         made = self.rhi.newGraphicsPipeline()
@@ -278,6 +280,8 @@ class _Device:
         inputs.setAttributes([QRhiVertexInputAttribute(*attribute) for attribute in attributes])
         made.setVertexInputLayout(inputs)
         made.setTopology(topology)
+        if cull:
+            made.setCullMode(QRhiGraphicsPipeline.CullMode.Back)
         made.setDepthTest(True)
         made.setDepthWrite(not blend)
         made.setDepthOp(QRhiGraphicsPipeline.CompareOp.LessOrEqual)
@@ -400,7 +404,7 @@ class _PointsOnDevice(_OnDevice):
         flag = paint.per_point_alpha if paint.mode == "bgra" else paint.invert
         block[1] = (_MODES[paint.mode], paint.low, paint.high, flag)
         block[2] = (*paint.first, points.size)
-        unit = 0 if points.style == "points" else 2 if points.size_by_depth else 1
+        unit = {"points": 0, "tiles": 3}.get(points.style, 2 if points.size_by_depth else 1)
         block[3] = (*paint.last, unit)
         block[4] = paint.axis
 
@@ -519,7 +523,7 @@ class _MeshOnDevice(_OnDevice):
     def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
         red, green, blue, own = self.drawable.colour
         block[0] = (red, green, blue, own * alpha)
-        block[1, 0] = self.drawable.lit
+        block[1, :2] = self.drawable.lit, self.drawable.shape.closed
 
     def draw(self, run: _Pass, blend: bool) -> None:
         assert self._shape is not None
@@ -530,6 +534,7 @@ class _MeshOnDevice(_OnDevice):
             _Topology.Triangles,
             blend,
             self.bound,
+            self._shape.closed,
         )
         self.begin(run, pipeline)
         run.commands.setVertexInput(

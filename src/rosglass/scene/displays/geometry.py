@@ -263,7 +263,7 @@ class _Screw(_History):
             arrow.set_arrows(pose, (length, 0.1 * wide), (0.3 * length, 0.2 * wide), rgba)
             group.add(arrow)
             if number:
-                group.add(_circle(pose, length, rgba))
+                group.add(*_circle(pose[:3, 0], length, wide, rgba))
 
 
 def _along(x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -275,18 +275,38 @@ def _along(x: NDArray[np.float64]) -> NDArray[np.float64]:
     return pose
 
 
-def _circle(pose: NDArray[np.float64], length: float, rgba: tuple[float, ...]) -> Lines:
-    """Return most of a circle around an arrow, with a head: which way it turns."""
-    angles = np.linspace(0.2, 2 * np.pi - 0.2, 32)
-    at = np.stack([np.full_like(angles, length / 2), np.cos(angles), np.sin(angles)], axis=1)
-    at[:, 1:] *= length / 4
-    way = at[-1] - at[-2]
-    side = np.cross(way, (1, 0, 0))
-    head = [[at[-1], at[-1] - 2 * way + turn * side] for turn in (-1, 1)]
-    lines = Lines(0.05 * length, in_metres=True)
-    whole = np.concatenate([np.stack([at[:-1], at[1:]], axis=1), np.array(head)])
-    lines.set_segments(whole @ pose[:3, :3].T, rgba)
-    return lines
+def _circle(
+    axis: NDArray[np.float64], length: float, wide: float, rgba: tuple[float, ...]
+) -> tuple[Lines, Mesh]:
+    """Return most of a circle around an arrow, and its head: which way it turns."""
+    place = np.eye(4)
+    place[:3, :3] = _rotation_of_z_to(axis)
+    place[:3, 3] = axis * length / 2
+    angles = np.linspace(math.pi / 4, 2 * math.pi, 29)
+    at = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1) * length / 4
+    lines = Lines(0.05 * wide, in_metres=True)
+    lines.set_strip(at @ place[:3, :3].T + place[:3, 3], rgba)
+    head = Mesh(CONE, rgba)
+    # From where the circle ends, along y.
+    local = np.array(
+        [
+            [0.2 * wide, 0, 0, length / 4],
+            [0, 0, 0.1 * wide, 0],
+            [0, -0.2 * wide, 0, 0],
+            [0, 0, 0, 1],
+        ]
+    )
+    head.set_instances((place @ local)[np.newaxis])
+    return lines, head
+
+
+def _rotation_of_z_to(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the shortest rotation, 3 x 3, from z to a direction of length 1."""
+    x, y, z = axis.tolist()
+    if z < -1 + 1e-9:
+        return np.diag([1.0, -1.0, -1.0])
+    u, v = x / (1 + z), y / (1 + z)
+    return np.array([[1 - x * u, -x * v, x], [-y * u, 1 - y * v, y], [-x, -y, z]])
 
 
 class WrenchStampedDisplay(_Screw):

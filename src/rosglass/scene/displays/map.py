@@ -246,25 +246,25 @@ class GridCellsDisplay(TopicDisplay):
         return _read_cells
 
     def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:  # noqa: ARG002
-        """Show cells as squares."""
-        points, self._size = data
+        """Show cells as rectangles in the plane of their frame."""
+        points, self._size, height = data
+        # Tiles are squares: the other side comes with the pose.
         self._cells.set_points(points)
-        self._cells.pose = pose
+        self._cells.pose = pose @ np.diag([1.0, height / self._size, 1.0, 1.0])
         self.root.add(self._cells)
         self._restyle()
 
     def _restyle(self) -> None:
         colouring = self._cells.colouring._replace(mode="flat", first=rgb_of(self.color))
-        self._cells.set_look(
-            style="flat squares", size=self._size, colouring=colouring, alpha=self.alpha
-        )
+        self._cells.set_look(style="tiles", size=self._size, colouring=colouring, alpha=self.alpha)
 
 
-def _read_cells(message: Any) -> tuple[NDArray[np.float32], float]:
+def _read_cells(message: Any) -> tuple[NDArray[np.float32], float, float]:
     width, height = float(message.cell_width), float(message.cell_height)
     if not (np.isfinite([width, height]).all() and width > 0 and height > 0):
         raise Error(f"cell_width {width}, cell_height {height}: expected metres above 0")
     if len(message.cells) > _MAX_CELLS:
         raise Error(f"cells: {len(message.cells)} are more than the {_MAX_CELLS} that are drawn")
     points = np.array([(p.x, p.y, p.z) for p in message.cells], np.float32).reshape(-1, 3)
-    return points, min(width, height)
+    points[:, 1] *= width / height
+    return points, width, height

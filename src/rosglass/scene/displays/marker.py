@@ -54,6 +54,8 @@ _NAMES = [
     *("sphere_list", "points", "text_view_facing", "mesh_resource", "triangle_list", "arrow_strip"),
 ]
 _MAX_POINTS, _MAX_MARKERS = 2_000_000, 100_000
+#: What lists of points are drawn as.
+_POINT_STYLES = {CUBE_LIST: "boxes", SPHERE_LIST: "spheres", POINTS: "squares"}
 #: Share of an arrow between two points that is its head, where no length is given, as in RViz.
 _HEAD_SHARE = 0.23
 #: Turns z, along which cylinders and cones stand, to x, along which arrows point.
@@ -340,17 +342,13 @@ def _drawables(marker: MarkerRecord, meshes: _Meshes) -> Iterable[Drawable]:
             colours = each if isinstance(each, tuple) else each.reshape(-1, 2, 4)
             lines.set_segments(points.reshape(-1, 2, 3), colours)
         yield lines
-    elif kind in (CUBE_LIST, SPHERE_LIST):
-        mesh = Mesh(BOX if kind == CUBE_LIST else SPHERE)
-        matrices = np.zeros((len(points), 4, 4), np.float32)
-        matrices[:, 0, 0], matrices[:, 1, 1], matrices[:, 2, 2] = x, y, z
-        matrices[:, :3, 3], matrices[:, 3, 3] = points, 1
-        mesh.set_instances(matrices, each)
-        yield mesh
-    elif kind == POINTS:
+    elif kind in _POINT_STYLES:
         cloud = Points()
-        cloud.set_points(points, each)
-        cloud.set_look(style="squares", size=abs(x), alpha=_alpha(marker))
+        # Their sides are equal: the others come with the pose.
+        sides = np.array([1.0, y / x, z / x]) if kind == CUBE_LIST else np.ones(3)
+        cloud.set_points(points / sides, each)
+        cloud.pose = np.diag([*sides, 1.0])
+        cloud.set_look(style=_POINT_STYLES[kind], size=abs(x))
         yield cloud
     elif kind == TEXT:
         labels = Labels()
@@ -362,12 +360,6 @@ def _drawables(marker: MarkerRecord, meshes: _Meshes) -> Iterable[Drawable]:
         yield from _arrow_strip(marker)
     elif kind == MESH:
         yield from meshes.of(marker)
-
-
-def _alpha(marker: MarkerRecord) -> float:
-    if len(marker.colours) and len(marker.colours) == len(marker.points):
-        return float(np.clip(marker.colours[:, 3].min(), 0, 1))
-    return min(max(marker.colour[3], 0.0), 1.0)
 
 
 def _triangles(marker: MarkerRecord) -> Mesh:

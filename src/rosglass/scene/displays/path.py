@@ -33,9 +33,7 @@ class PathDisplay(TopicDisplay):
     lineStyle = Setting(
         "Line Style", "enum", "Lines", "How the line is drawn.", choices=["Lines", "Billboards"]
     )
-    lineWidth = Setting(
-        "Line Width", "float", 0.03, "Of billboards, in metres.", min=0.001
-    )
+    lineWidth = Setting("Line Width", "float", 0.03, "Of billboards, in metres.", min=0.001)
     color = Setting("Color", "color", "#19ff00", "The colour of the line.")
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
     bufferLength = Setting("Buffer Length", "int", 1, "How many paths are shown.", min=1, max=1000)

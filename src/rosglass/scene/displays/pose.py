@@ -76,8 +76,9 @@ class _Shaped(TopicDisplay):
         none = poses[:0]
         self._arrows.set_arrows(
             poses if self.shape == "Arrow" else none,
-            (self.shaftLength, 2 * self.shaftRadius),
-            (self.headLength, 2 * self.headRadius),
+            # RViz takes what it calls radius for the diameter.
+            (self.shaftLength, self.shaftRadius),
+            (self.headLength, self.headRadius),
             (*rgb_of(self.color), self.alpha),
         )
         self._axes.set_axes(
@@ -150,8 +151,9 @@ class PoseArrayDisplay(TopicDisplay):
         )
         self._arrows.set_arrows(
             poses if self.shape == "Arrow (3D)" else none,
-            (self.shaftLength, 2 * self.shaftRadius),
-            (self.headLength, 2 * self.headRadius),
+            # RViz takes what it calls radius for the diameter.
+            (self.shaftLength, self.shaftRadius),
+            (self.headLength, self.headRadius),
             colour,
         )
         self._axes.set_axes(
@@ -235,8 +237,8 @@ class _WithCovariance(_Shaped):
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
-        #: Beside each pose: its covariance.
-        self._covariances: list[NDArray[np.float64]] = []
+        #: Beside each pose: its covariance, and the rotation of its frame in the fixed frame.
+        self._covariances: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
         self._ellipsoids, self._discs, self._cones = Mesh(SPHERE), Mesh(CYLINDER), Mesh(CONE)
         self._uncertain = Group(self._ellipsoids, self._discs, self._cones)
         super().__init__(parent, runtime)
@@ -247,7 +249,7 @@ class _WithCovariance(_Shaped):
 
     def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:  # noqa: ARG002
         """Show a pose with its covariance."""
-        self._poses, self._covariances = [pose @ data.pose], [data.covariance]
+        self._poses, self._covariances = [pose @ data.pose], [(data.covariance, pose[:3, :3])]
         self._draw()
 
     def _draw(self) -> None:
@@ -264,9 +266,12 @@ class _WithCovariance(_Shaped):
         pairs = list(zip(self._poses, self._covariances, strict=True)) if self.covariance else []
         ellipsoids = [
             found
-            for pose, covariance in pairs
+            for pose, (covariance, turn) in pairs
             if self.covariancePosition
-            for found in (_ellipsoid(pose, covariance[:3, :3], self.positionScale),)
+            for found in (
+                # Positions vary along the axes of the message's frame.
+                _ellipsoid(_turned(pose, turn), covariance[:3, :3], self.positionScale),
+            )
             if found is not None
         ]
         self._ellipsoids.set_instances(
@@ -275,12 +280,10 @@ class _WithCovariance(_Shaped):
         )
         discs: list[tuple[int, NDArray[np.float64]]] = []
         cones: list[NDArray[np.float64]] = []
-        for pose, covariance in pairs if self.covarianceOrientation else ():
-            whole = pose.copy()
-            if self.orientationFrame == "Fixed":
-                whole[:3, :3] = np.eye(3)
+        for pose, (covariance, turn) in pairs if self.covarianceOrientation else ():
+            whole = _turned(pose, turn) if self.orientationFrame == "Fixed" else pose
             turns = covariance[3:, 3:]
-            if not turns[:2, :2].any() and turns[2, 2] > 0:
+            if covariance[2, 2] <= 0 and turns[0, 0] <= 0 and turns[1, 1] <= 0 < turns[2, 2]:
                 cones.append(self._cone(whole, turns[2, 2]))
             else:
                 discs += self._discs_of(whole, turns)
@@ -314,15 +317,22 @@ class _WithCovariance(_Shaped):
             # The end of axis x moves along y by a rotation around z, along -z by one around y.
             along = np.array([[turns[v, v], -turns[v, u]], [-turns[u, v], turns[u, u]]])
             values, vectors = np.linalg.eigh((along + along.T) / 2)
-            size = 2 * np.sqrt(np.maximum(values, 0)) * self.orientationScale * reach
-            if not size.any():
+            angles = np.sqrt(np.maximum(values, 0)) * self.orientationScale
+            if not angles.any():
                 continue
-            limit = 2 * reach * math.tan(math.radians(85))
+            size = 2 * reach * np.tan(np.minimum(angles, math.radians(85)))
             local = np.eye(4)
-            local[:2, :2] = vectors * np.clip(size, 1e-4, limit)
+            local[:2, :2] = vectors * np.maximum(size, 1e-4)
             local[2, 2], local[2, 3] = 1e-3, reach
             found.append((axis, pose @ _STANDING[axis] @ local))
         return found
+
+
+def _turned(pose: NDArray[np.float64], turn: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a pose with another rotation, 3 x 3."""
+    turned: NDArray[np.float64] = pose.copy()
+    turned[:3, :3] = turn
+    return turned
 
 
 def _ellipsoid(
@@ -370,7 +380,7 @@ class OdometryDisplay(_WithCovariance):
         if self._poses and self._is_near(self._poses[-1], new):
             return
         self._poses.append(new)
-        self._covariances.append(data.covariance)
+        self._covariances.append((data.covariance, pose[:3, :3]))
         most = min(self.keep or _MAX_KEPT, _MAX_KEPT)
         del self._poses[:-most], self._covariances[:-most]
         self._draw()

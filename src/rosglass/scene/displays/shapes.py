@@ -79,12 +79,12 @@ class AxesShapes(Group):
         Args:
             poses: (n, 4, 4).
             length: Metres, for each or all.
-            radius: Metres, for each or all.
+            radius: Metres, for each or all; across an axis, as RViz takes what it calls radius.
             alpha: Opacity.
         """
         at = stack_poses(poses)
         length = np.broadcast_to(np.asarray(length, np.float64), len(at))
-        local = _along(length, np.asarray(radius) * 2.0, length / 2, len(at))
+        local = _along(length, radius, length / 2, len(at))
         matrices = at[:, np.newaxis] @ (_ALONG @ local[:, np.newaxis])
         colours = np.tile(_COLOURS * [1, 1, 1, alpha], (len(at), 1))
         self._mesh.set_instances(matrices.reshape(-1, 4, 4), colours if len(at) else (1, 1, 1, 1))

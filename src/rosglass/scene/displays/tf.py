@@ -29,7 +29,7 @@ __all__ = ["TFDisplay"]
 _MAX_FRAMES = 2000
 #: Sizes in RViz at a marker scale of 1, metres.
 _AXIS_M, _AXIS_RADIUS_M, _NAME_M = 0.2, 0.02, 0.1
-_SHAFT_M, _HEAD_M, _HEAD_WIDTH_M = 0.01, 0.08, 0.08
+_SHAFT_M, _HEAD_M, _HEAD_WIDTH_M = 0.01, 0.1, 0.04
 _SHAFT_COLOUR, _HEAD_COLOUR = (0.8, 0.8, 0.3, 1.0), (1.0, 0.1, 0.6, 1.0)
 #: The share of its timeout after which a frame begins to fade.
 _FADE_AFTER = 1 / 3

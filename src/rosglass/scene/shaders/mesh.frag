@@ -12,8 +12,7 @@ void main()
     if (object.a.x > 0.5) {
         float far = length(v_normal);
         // Both sides of a surface are lit: meshes of robots are not always closed.
-        float facing = far > 0.0 ? abs(v_normal.z) / far : 1.0;
-        tint.rgb *= min(0.25 + facing, 1.0);
+        tint.rgb *= far > 0.0 ? abs(v_normal.z) / far : 1.0;
     }
     colour = vec4(tint.rgb * tint.a, tint.a);
 }

@@ -15,6 +15,9 @@ layout(location = 3) out vec3 v_eye;
 void main()
 {
     mat4 instance = mat4(column0, column1, column2, column3);
+    // A closed shape is symmetric: mirrored twice, its outer side remains the one that is drawn.
+    if (object.a.y > 0.5 && determinant(mat3(object.model) * mat3(instance)) < 0.0)
+        instance[0] = -instance[0];
     mat4 place = frame.view * object.model;
     vec4 eye = place * (instance * vec4(position, 1.0));
     // The normal of a scaled surface: by the inverse transposed, up to its length.

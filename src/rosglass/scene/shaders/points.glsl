@@ -24,7 +24,7 @@ vec4 point_colour(vec3 position, vec4 channel)
 
 float size_in_metres(vec3 position)
 {
-    return object.c.w > 1.5 ? object.b.w * position.z : object.b.w;
+    return object.c.w > 1.5 && object.c.w < 2.5 ? object.b.w * position.z : object.b.w;
 }
 
 bool is_finite(vec3 v)

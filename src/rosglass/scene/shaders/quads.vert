@@ -9,7 +9,10 @@ void main()
     v_colour = point_colour(position, channel);
     v_corner = vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1) * 2.0 - 1.0;
     vec4 eye = frame.view * (object.model * vec4(position, 1.0));
-    if (object.c.w > 0.5) {  // metres
+    if (object.c.w > 2.5) {  // in the plane of their own frame
+        vec4 at = vec4(position + vec3(v_corner * object.b.w * 0.5, 0.0), 1.0);
+        gl_Position = frame.projection * (frame.view * (object.model * at));
+    } else if (object.c.w > 0.5) {  // metres
         // As in RViz, they face the eye, and one side is across to the y axis of their frame.
         vec3 at = frame.viewport.w > 0.5 ? vec3(0.0, 0.0, 1.0) : normalize(-eye.xyz);
         vec3 right = cross((frame.view * object.model[1]).xyz, at);
