@@ -129,6 +129,10 @@ def test_points_have_packed_colors_with_alpha(show: Callable[..., Shown]) -> Non
     picture = shown.bench.picture()
     assert shown.at(-3, 0, picture) == (255, 128, 0)
     assert near(shown.at(3, 0, picture), 24, 88, 152, tolerance=3)
+    (drawable,) = display.root
+    assert not drawable.opaque
+    shown.send(cloud([(3, 0, 0, 0xFF0080FF)], "rgba", types=types))
+    assert drawable.opaque, "no point needs blending"
     display.colorTransformer = "MONO8"
     red, green, blue = shown.at(-3, 0)
     assert red == green == blue
@@ -223,6 +227,21 @@ def test_clouds_stay_for_the_decay_time(bench: SceneBench, show: Callable[..., S
     assert shown.at(0, 0) == BACKGROUND, "what is old does not return"
 
 
+def test_each_cloud_counts_that_has_waited_for_its_transform(
+    bench: SceneBench, show: Callable[..., Shown]
+) -> None:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    shown = show("PointCloud2", 'decayTime: 1000; colorTransformer: "FlatColor"')
+    for x in (-3, 0, 3):
+        display = shown.send(cloud([(x, 0, 0)], header={"frame_id": "late"}))
+    assert display.points == 0
+    late = Transform((0, 0, 0), (0, 0, 0, 1), Time(), "map", "late")
+    StaticTransformBroadcaster(bench.robot).send_transform(late)
+    bench.wait(lambda: display.points == 3)
+
+
 def test_points_without_a_position_are_counted_and_not_drawn(show: Callable[..., Shown]) -> None:
     shown = show("PointCloud2", 'style: "Spheres"')
     nan, inf = math.nan, math.inf
@@ -286,6 +305,8 @@ def test_a_picked_point_has_all_fields(bench: SceneBench, show: Callable[..., Sh
     display = shown.send(cloud(rows, "intensity"))
     x, y = rows[321][:2]
     hit = bench.view.pick(CENTER[1] + x * PIXELS_PER_M, CENTER[0] - y * PIXELS_PER_M, 0.0)
+    (shown_cloud,) = display._shown.values()
+    assert shown_cloud._data.vertices.order is not None, "picks are to be mapped back"
     # Squares of one metre overlap: the nearest of those at the same height is any of them.
     assert hit is not None
     described = dict(hit.drawable.owner.describe(hit.number))
@@ -300,7 +321,7 @@ def test_a_picked_point_has_all_fields(bench: SceneBench, show: Callable[..., Sh
 
 
 def test_a_cloud_returns_with_its_frame(bench: SceneBench, show: Callable[..., Shown]) -> None:
-    shown = show("PointCloud2")
+    shown = show("PointCloud2", "decayTime: 1000")
     shown.send(cloud([(0, 0, 0)]))
     bench.view.fixedFrame = "odom"
     assert "no transform from [map]" in shown.display.statusText
