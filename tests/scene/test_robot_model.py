@@ -159,6 +159,11 @@ def test_settings_are_written_for_either_rviz(bench: SceneBench) -> None:
     assert other.load_settings({**saved, "Links": links, "Description Source": "Topic"}) == []
     assert (other.alpha, other.is_link_enabled("arm")) == (0.5, False)
     assert other.save_settings(saved, 2)["Links"]["arm"] == {"Value": False}
+    # A file of RViz 1 shows robots with ROS 2 as well, whose description is on a topic.
+    old = {"Class": "rviz/RobotModel", "Robot Description": "arm_description"}
+    assert other.load_settings(old) == []
+    assert (other.descriptionSource, other.robotDescription) == ("Automatic", "arm_description")
+    assert other.save_settings(old, 1)["Robot Description"] == "arm_description"
 
 
 def test_a_robot_whose_transforms_stop_fades(bench: SceneBench, monkeypatch: Any) -> None:

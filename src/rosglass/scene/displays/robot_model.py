@@ -471,7 +471,9 @@ class RobotModelDisplay(Display):
             found = read_description(saved)
             name = {"topic": "descriptionTopic", "file": "descriptionFile"}
             setattr(self, name.get(found.source, "robotDescription"), found.name)
-            self.descriptionSource = found.source.capitalize()
+            # A file of RViz 1 names the parameter, which robots with ROS 2 do not have.
+            source = found.source.capitalize()
+            self.descriptionSource = _AUTOMATIC if source == _PARAMETER else source
         except Error as error:
             refused.append(str(error))
         return refused
