@@ -1,5 +1,7 @@
 // The paper's Figure 1: an operator station over RViz's 3D view.
 //   rosglass rviz figure1.rviz --overlay Dashboard.qml --bare
+// The same without RViz, for ROS 1 and ROS 2:
+//   rosglass view figure1.rviz --overlay Dashboard.qml --kiosk
 import QtQuick 2.15
 import QtQuick.Layouts 1.15
 import Ros 1.0

@@ -153,3 +153,26 @@ def test_the_command_says_what_is_wrong(
     assert done.returncode == 1
     assert text in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_the_command_shows_overlays(app: Any, tmp_path: Path) -> None:
+    from PySide6.QtGui import QImage
+
+    overlay, picture = tmp_path / "Panel.qml", tmp_path / "view.png"
+    overlay.write_text(
+        "import QtQuick 2.15\nimport Ros 1.0\nRectangle { color: rviz.fixedFrame === 'odom' ? "
+        '"#ff0000" : "#0000ff"\nComponent.onCompleted: { Ros.init("panel"); rviz.isBare = true } }'
+    )
+    arguments = ("--fixed-frame", "odom", "--url", "local://overlays", "--overlay", str(overlay))
+    done = view_command(*arguments, "--screenshot", str(picture), "--after", "1")
+    assert done.returncode == 0, done.stderr
+    image = QImage(str(picture))
+    # Without panels.
+    assert {image.pixelColor(x, y).name() for x in (2, 1277) for y in (2, 797)} == {"#ff0000"}
+    overlay.write_text("import QtQuick 2.15\nItem { nothing: 1 }")
+    done = view_command(*arguments)
+    assert done.returncode == 1
+    assert "Panel.qml:2:" in done.stderr
+    done = view_command("--overlay", str(tmp_path / "Nothing.qml"))
+    assert done.returncode == 1
+    assert "Nothing.qml" in done.stderr

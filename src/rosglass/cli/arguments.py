@@ -86,6 +86,26 @@ def _add_import_paths(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_overlays(parser: argparse.ArgumentParser) -> None:
+    """Declare the interfaces over a 3D view."""
+    overlay = parser.add_argument(
+        "--overlay",
+        dest="overlays",
+        metavar="FILE.qml",
+        action="append",
+        default=[],
+        help="an interface over the 3D view; package://name/path for a file in a package; may be "
+        "repeated, the last one is uppermost",
+    )
+    complete(overlay, "*.qml")
+    parser.add_argument(
+        "--watch",
+        action="store_true",
+        help="reload interfaces when a file in their folders is saved",
+    )
+    _add_import_paths(parser)
+
+
 def _add_interface_options(
     parser: argparse.ArgumentParser, drawn: str, window: str, after: float
 ) -> None:
@@ -183,16 +203,7 @@ def _rviz(parser: argparse.ArgumentParser) -> None:
         "default). Also remappings, as for RViz: scan:=/robot/scan",
     )
     complete(config, "*.rviz")
-    overlay = parser.add_argument(
-        "--overlay",
-        dest="overlays",
-        metavar="FILE.qml",
-        action="append",
-        default=[],
-        help="an interface over the 3D view; package://name/path for a file in a package; may be "
-        "repeated, the last one is uppermost",
-    )
-    complete(overlay, "*.qml")
+    _add_overlays(parser)
     parser.add_argument(
         "--url",
         default="",
@@ -206,12 +217,6 @@ def _rviz(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         help="time to wait for the master (default: no limit)",
     )
-    parser.add_argument(
-        "--watch",
-        action="store_true",
-        help="reload interfaces when a file in their folders is saved",
-    )
-    _add_import_paths(parser)
     parser.add_argument(
         "--fixed-frame",
         metavar="FRAME",
@@ -252,6 +257,7 @@ def _view(parser: argparse.ArgumentParser) -> None:
         "a grid and the robot's frames)",
     )
     complete(config, "*.rviz")
+    _add_overlays(parser)
     parser.add_argument(
         "--url",
         default="",

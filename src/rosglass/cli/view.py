@@ -30,6 +30,7 @@ def run(args: argparse.Namespace) -> int:
             "without a graphics card, Mesa's llvmpipe will do"
         )
     try:
+        from rosglass.qml.modules import interface_file  # noqa: PLC0415 - loads Qt
         from rosglass.scene.program import WINDOW, ViewProgram  # noqa: PLC0415 - loads Qt
     except ModuleNotFoundError as error:
         if not str(error.name).startswith("PySide6"):
@@ -38,7 +39,14 @@ def run(args: argparse.Namespace) -> int:
             'the 3D view needs Qt 6: pip install "rosglass[qml]" (inside RViz\'s Python there is '
             "Qt 5; use another virtual environment)"
         ) from None
-    program = ViewProgram(args.config, args.fixed_frame, kiosk=args.kiosk)
+    program = ViewProgram(
+        args.config,
+        args.fixed_frame,
+        kiosk=args.kiosk,
+        overlays=[interface_file(file) for file in args.overlays],
+        watch=args.watch,
+        import_paths=args.import_paths,
+    )
     try:
         return show(
             str(WINDOW),

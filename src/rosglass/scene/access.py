@@ -242,13 +242,15 @@ class SceneAccess(QtCore.QObject):
 
     @Slot(QQuickWindow)
     def _on_window(self, window: QQuickWindow | None) -> None:
+        if window is None or window is self._window:
+            # A window that is being destroyed cannot be disconnected from.
+            return
         before, self._window = self._window, window
         if before is not None and is_alive(before):
             before.afterAnimating.disconnect(self._on_frame)
             before.visibilityChanged.disconnect(self._on_visibility)
-        if window is not None:
-            window.afterAnimating.connect(self._on_frame)
-            window.visibilityChanged.connect(self._on_visibility)
+        window.afterAnimating.connect(self._on_frame)
+        window.visibilityChanged.connect(self._on_visibility)
 
     @Slot()
     def _on_frame(self) -> None:

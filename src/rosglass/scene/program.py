@@ -17,8 +17,10 @@ from rosglass.scene.rviz_config import RvizConfig
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Sequence
 
     from rosglass.qml.session import Session
+    from rosglass.scene.access import SceneAccess
     from rosglass.scene.scene_view import SceneView
 
 __all__ = ["WINDOW", "ViewProgram", "config_file"]
@@ -57,6 +59,9 @@ class ViewProgram(QtCore.QObject):
         config: The ``.rviz`` file to open; empty for RViz's default, a grid.
         fixed_frame: The fixed frame instead of the config's; empty for none.
         kiosk: Whether the panels are hidden.
+        overlays: QML files to show over the view, the last one on top.
+        watch: Whether to reload these when a file in their folders is saved.
+        import_paths: Additional folders with QML modules, for these.
 
     Raises:
         Error: The config cannot be read.
@@ -72,6 +77,8 @@ class ViewProgram(QtCore.QObject):
     message = ReadOnly(str, "")
     frameRate = ReadOnly(int, 0)
     kiosk = ReadOnly(bool, False)
+    #: Whether an overlay wants the 3D view alone.
+    bare = ReadOnly(bool, False)
 
     def __init__(
         self,
@@ -79,6 +86,9 @@ class ViewProgram(QtCore.QObject):
         fixed_frame: str = "",
         *,
         kiosk: bool = False,
+        overlays: Sequence[str | os.PathLike[str]] = (),
+        watch: bool = False,
+        import_paths: Sequence[str | os.PathLike[str]] = (),
     ) -> None:
         super().__init__()
         self._session: Session | None = None
@@ -86,6 +96,9 @@ class ViewProgram(QtCore.QObject):
         # Read before the window is shown: a mistake in its name is an error of the command.
         self._config = RvizConfig.load(self._path) if self._path is not None else None
         self._fixed_frame = fixed_frame
+        self._overlays = list(overlays)
+        self._overlay_options: dict[str, Any] = {"watch": watch, "import_paths": import_paths}
+        self._access: SceneAccess | None = None
         self._view: SceneView | None = None
         self._saved = ""
         self._discarded = False
@@ -101,8 +114,8 @@ class ViewProgram(QtCore.QObject):
         """The view, once the window has made it."""
         return self._view
 
-    @Slot(QtCore.QObject, QtCore.QObject)
-    def begin(self, view: Any, overlays: Any) -> None:  # noqa: ARG002 - overlays are shown by others
+    @Slot(QtCore.QObject)
+    def begin(self, view: Any) -> None:
         """Take the window's view, and show the config in it; called by the window."""
         self._view = view
         runtime = runtime_of(view)
@@ -115,11 +128,41 @@ class ViewProgram(QtCore.QObject):
             self._show(self._config)
         if self._fixed_frame:
             view.scene.fixed_frame = self._fixed_frame
+        # An overlay may choose the node's name.
+        self._show_overlays(view)
         if not session.is_initialized:
             session.init("rosglass_view")
         self._remember()
         self._timer.start()
         self._refresh()
+
+    def _show_overlays(self, view: SceneView) -> None:
+        if not self._overlays:
+            return
+        # Slow to load; most views have none.
+        from rosglass.scene.access import access_of  # noqa: PLC0415
+        from rosglass.scene.overlay import add_overlay  # noqa: PLC0415
+
+        self._access = access = access_of(view)
+        access.bare_changed.connect(self._on_bare)
+        try:
+            for file in self._overlays:
+                add_overlay(view, file, **self._overlay_options)
+        except Error as error:
+            _log.error("%s", error)
+            # The command fails, as it does over RViz; its event loop may not run yet.
+            QtCore.QTimer.singleShot(0, lambda: QtCore.QCoreApplication.exit(1))
+
+    @Slot()
+    def _on_bare(self) -> None:
+        if self._access is not None:
+            report(self, bare=self._access.bare)
+
+    @Slot(bool)
+    def setBare(self, bare: bool) -> None:
+        """Tell the overlays whether the 3D view alone is shown."""
+        if self._access is not None:
+            self._access.bare = bare
 
     def _show(self, config: RvizConfig) -> None:
         assert self._view is not None

@@ -16,8 +16,14 @@ ApplicationWindow {
     visible: true
     title: (program.configName || "new view") + (program.modified ? " *" : "") + " - rosglass view"
 
-    Component.onCompleted: program.begin(scene, overlays)
+    Component.onCompleted: program.begin(scene)
     onClosing: close => { if (!program.mayClose()) { close.accepted = false; closing.open() } }
+
+    onPanelsChanged: program.setBare(!panels)
+    Connections {
+        target: program
+        function onBareChanged() { window.panels = !program.bare }
+    }
 
     Shortcut { sequences: [StandardKey.Save]; onActivated: window.save() }
     Shortcut { sequences: [StandardKey.Open]; onActivated: opening.open() }
@@ -76,7 +82,6 @@ ApplicationWindow {
             focus: true
 
             ImagePanels { objectName: "imagePanels"; anchors.fill: parent; view: scene }
-            Item { id: overlays; anchors.fill: parent }
             Label {
                 anchors.centerIn: parent
                 width: Math.min(implicitWidth, parent.width - 40)
