@@ -29,6 +29,7 @@ __all__ = [
     "inverse",
     "point_of",
     "pose_matrix",
+    "quaternion_of",
     "three_numbers",
     "unit",
 ]
@@ -294,7 +295,7 @@ def interpolate(start: Camera, goal: Camera, share: float) -> Camera:
     if start.fov is not None or goal.fov is not None:
         start, goal = _as_perspective(start, goal.fov), _as_perspective(goal, start.fov)
     distance = start.focus_distance * (goal.focus_distance / start.focus_distance) ** share
-    turn = slerp(_quaternion(start.pose), _quaternion(goal.pose), share)
+    turn = slerp(quaternion_of(start.pose), quaternion_of(goal.pose), share)
     pose = np.eye(4)
     pose[:3, :3] = np.transpose([rotate(turn, axis) for axis in _AXES])
     focus = np.array(start.focus.towards(goal.focus, share))
@@ -367,7 +368,7 @@ def three_numbers(point: Sequence[float] | Matrix, what: str, *, finite: bool = 
     return at
 
 
-def _quaternion(pose: Matrix) -> tuple[float, float, float, float]:
+def quaternion_of(pose: Matrix) -> tuple[float, float, float, float]:
     """Return a pose's rotation as x, y, z, w (Bar-Itzhack's method)."""
     r = pose[:3, :3]
     symmetric = np.array(

@@ -43,7 +43,15 @@ if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
 
-__all__ = ["MarkerArrayDisplay", "MarkerDisplay", "MarkerRecord", "Markers", "read_marker"]
+__all__ = [
+    "MarkerArrayDisplay",
+    "MarkerDisplay",
+    "MarkerGroup",
+    "MarkerMeshes",
+    "MarkerRecord",
+    "Markers",
+    "read_marker",
+]
 
 # visualization_msgs/Marker: types and actions.
 ARROW, CUBE, SPHERE_TYPE, CYLINDER_TYPE, LINE_STRIP, LINE_LIST = range(6)
@@ -109,12 +117,19 @@ def _seconds(duration: Any) -> float:
     return float(duration.sec + duration.nanosec * 1e-9)
 
 
-def read_marker(message: Any) -> MarkerRecord:
+def read_marker(message: Any, part: tuple[str, int] | None = None) -> MarkerRecord:
     """Return the record of a ``visualization_msgs/Marker`` of ROS 1 or ROS 2.
 
     What cannot be drawn has the reason in :attr:`MarkerRecord.problem`.
+
+    Args:
+        message: The message.
+        part: Its key where it is part of an interactive marker: it has no namespace and id of its
+            own then, and a scale of 0 is 1 m, as in RViz.
     """
     key, kind, action = (message.ns, message.id), message.type, message.action
+    if part is not None:
+        key, action = part, _ADD
     if action in (_DELETE, _DELETE_ALL):
         return MarkerRecord(key, kind, action)
     header, p, q = message.header, message.pose.position, message.pose.orientation
@@ -126,6 +141,8 @@ def read_marker(message: Any) -> MarkerRecord:
     scale, tint = message.scale, message.color
     numbers = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
     size = (scale.x, scale.y, scale.z)
+    if part is not None:
+        size = (size[0] or 1.0, size[1] or 1.0, size[2] or 1.0)
     colour = (tint.r, tint.g, tint.b, tint.a)
     problem = ""
     if action != _ADD:
@@ -238,8 +255,12 @@ class _Batch:
             )
 
 
-class _Namespace:
-    """The markers of one namespace."""
+class MarkerGroup:
+    """Markers that are shown and hidden together, such as those of one namespace.
+
+    Args:
+        owner: What a pick of them finds; None where they cannot be picked.
+    """
 
     def __init__(self, owner: Any) -> None:
         self.root = Group()
@@ -248,21 +269,21 @@ class _Namespace:
         #: Drawables of markers that are not instances.
         self._own: dict[tuple[str, int], Group] = {}
 
-    def batch(self, shape: Shape) -> _Batch:
+    def _batch(self, shape: Shape) -> _Batch:
         found = self._batches.get(shape)
         if found is None:
             found = self._batches[shape] = _Batch(shape, self._owner)
             self.root.add(found.mesh)
         return found
 
-    def put(self, marker: MarkerRecord, pose: NDArray[np.float64], meshes: _Meshes) -> None:
+    def put(self, marker: MarkerRecord, pose: NDArray[np.float64], meshes: MarkerMeshes) -> None:
         """Draw a marker at a pose of its frame in the fixed frame."""
         self.remove(marker.key)
         place = pose @ marker.pose
         shapes = list(_instances(marker))
         if shapes:
             for shape, local, colour in shapes:
-                self.batch(shape).put(marker.key, place @ local, colour)
+                self._batch(shape).put(marker.key, place @ local, colour)
             return
         group = Group(*_drawables(marker, meshes))
         for item in group:
@@ -281,6 +302,7 @@ class _Namespace:
             batch.discard(key)
 
     def flush(self) -> None:
+        """Draw what has changed since the last call."""
         for batch in self._batches.values():
             batch.flush()
 
@@ -330,7 +352,7 @@ def _standing(origin: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np
     return pose
 
 
-def _drawables(marker: MarkerRecord, meshes: _Meshes) -> Iterable[Drawable]:
+def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]:
     """Iterate over what a marker draws beside instances, in its own frame."""
     kind, points, (x, y, z) = marker.kind, marker.points, marker.scale
     each = marker.colours if len(marker.colours) == len(points) else marker.colour
@@ -385,7 +407,7 @@ def _arrow_strip(marker: MarkerRecord) -> Iterable[Mesh]:
         yield mesh
 
 
-class _Meshes:
+class MarkerMeshes:
     """Loads the meshes of markers in the session's worker; until then they draw nothing.
 
     Args:
@@ -459,12 +481,12 @@ class Markers(TopicDisplay):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         self._shown: dict[tuple[str, int], _Shown] = {}
-        self._spaces: dict[str, _Namespace] = {}
+        self._spaces: dict[str, MarkerGroup] = {}
         #: Whether namespaces are shown, of those that were switched.
         self._switched: dict[str, bool] = {}
         self._late: deque[MarkerRecord] = deque(maxlen=_WAITING)
         self._flushing = False
-        self._meshes = _Meshes(self._in_background, self._on_mesh)
+        self._meshes = MarkerMeshes(self._in_background, self._on_mesh)
         super().__init__(parent, runtime)
         self._expiry = single_shot(self, self._expire)
 
@@ -560,7 +582,7 @@ class Markers(TopicDisplay):
         self.delete_status("Transform")
         space = self._spaces.get(marker.key[0])
         if space is None:
-            space = self._spaces[marker.key[0]] = _Namespace(self)
+            space = self._spaces[marker.key[0]] = MarkerGroup(self)
             space.root.visible = self.is_namespace_enabled(marker.key[0])
             self.root.add(space.root)
             report(self, namespaces=sorted(self._spaces))
