@@ -161,6 +161,14 @@ class Display(Configurable, TopicElement):
         #: The group that it is in; None for none.
         self.group: Display | None = None
         super().__init__(parent, runtime)
+        state, root = self.__dict__, self.root
+
+        def forget() -> None:
+            # PySide never frees the Python half of an object that QML has made.
+            root.remove()
+            state.clear()
+
+        self.destroyed.connect(forget)
 
     @property
     def label(self) -> str:

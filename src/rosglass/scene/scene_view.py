@@ -147,6 +147,9 @@ class SceneView(QQuickRhiItem):
             root.clear()
             # C++ deletes them a little later, with the scene graph.
             kept = list(renderers)
+            for renderer in kept:
+                if Shiboken.isValid(renderer):
+                    renderer.close()
             state.clear()
             _ORPHANS.extend(kept)
             _drop_orphans()
