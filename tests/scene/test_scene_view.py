@@ -238,3 +238,18 @@ def test_data_that_is_ahead_of_its_transform_is_no_error_for_a_second(bench: Sce
     assert path.statusLevel == "error"
     move(7)
     bench.wait(lambda: path.statusLevel == "ok")
+
+
+def test_python_keeps_the_items_around_a_view_that_is_destroyed(bench: SceneBench) -> None:
+    from rosglass.qt import is_alive, send_deferred_deletes
+
+    view = bench.load(
+        "Loader { active: parent.fixedFrame === 'map'; anchors.fill: parent\n"
+        "sourceComponent: Component { SceneView { AxesDisplay {} } } }"
+    )
+    bench.picture()
+    view.fixedFrame = "odom"
+    send_deferred_deletes()
+    assert is_alive(view)
+    assert is_alive(bench.window)
+    bench.picture()

@@ -16,6 +16,7 @@ from PySide6.QtQuick import QQuickWindow
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error, UnsupportedError
+from rosglass.qml.image_sinks import window_of
 from rosglass.qml.modules import locate
 from rosglass.qml.runtime import runtime_of
 from rosglass.qt import QtCore, QtGui, Signal, Slot, is_alive
@@ -96,7 +97,7 @@ class SceneAccess(QtCore.QObject):
         self._timer.setInterval(1000)
         self._timer.timeout.connect(self._measure)
         self._timer.start()
-        self._on_window(view.window())
+        self._on_window(window_of(view))
         parts = self.__dict__
         view.destroyed.connect(lambda *_: _close_parts(parts))
 
@@ -164,13 +165,13 @@ class SceneAccess(QtCore.QObject):
     @property
     def fullscreen(self) -> bool:
         """Whether the window fills the screen."""
-        window = self.scene_view.window()
+        window = window_of(self.scene_view)
         full = QtGui.QWindow.Visibility.FullScreen
         return window is not None and window.visibility() == full
 
     @fullscreen.setter
     def fullscreen(self, fullscreen: bool) -> None:
-        window = self.scene_view.window()
+        window = window_of(self.scene_view)
         if window is None:
             raise Error("the 3D view is in no window yet")
         # Later: with the render loop of a threaded program, Python may not wait here.
@@ -457,7 +458,7 @@ class ScenePicker(Picker):
 
     def window_picture(self) -> Any:
         """Return a picture of the whole window."""
-        window = self._view.window()
+        window = window_of(self._view)
         if window is None or not window.isExposed() or not self._view.isVisible():
             raise Error("the 3D view is not visible")
         if self._access.is_drawing:

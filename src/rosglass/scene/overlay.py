@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtQuick import QQuickItem
 
 from rosglass.errors import Error
+from rosglass.qml.image_sinks import window_of
 from rosglass.qt import QtCore, Slot, is_alive
 from rosglass.rviz.live_overlay import LiveOverlay
 from rosglass.scene.access import access_of
@@ -100,7 +101,7 @@ class SceneOverlay(LiveOverlay):
         QtCore.QTimer.singleShot(0, self, self.session.go_on)
 
     def _windows(self) -> list[Any]:
-        window = self._view.window() if is_alive(self._view) else None
+        window = window_of(self._view) if is_alive(self._view) else None
         return [] if window is None else [window]
 
     def _close_view(self) -> None:

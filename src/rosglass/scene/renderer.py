@@ -94,14 +94,12 @@ class Frame(NamedTuple):
         drawables: Drawable, pose in the fixed frame, opacity of its groups.
         camera: From where.
         background: Behind everything; its alpha below 1 lets other items shine through.
-        pixel_ratio: Pixels for each unit of the screen.
         moving: Whether the camera is being moved, so that speed counts more than completeness.
     """
 
     drawables: Sequence[tuple[Drawable, NDArray[np.float64], float]]
     camera: Camera
     background: QColor
-    pixel_ratio: float = 1.0
     moving: bool = False
 
 
@@ -843,7 +841,8 @@ class SceneRenderer(QQuickRhiItemRenderer):
         block[16:32] = (device.correction @ camera.projection).T.reshape(-1)
         size = self.renderTarget().pixelSize()
         flat = abs(float(camera.projection[3, 3])) > 0.5
-        block[32:36] = (size.width(), size.height(), frame.pixel_ratio, flat)
+        ratio = size.width() / camera.size[0]
+        block[32:36] = (size.width(), size.height(), ratio, flat)
         batch.updateDynamicBuffer(device.frame_block, 0, block.nbytes, _pointer(block))
 
     def _report(self, problem: str) -> None:

@@ -505,7 +505,6 @@ class SceneView(QQuickRhiItem):
     def _take_frame(self) -> Frame | None:
         if not is_alive(self._scene):
             return None  # it was that of a view that is gone
-        window = self.window()
         if any(one.draws_in_software for one in self._renderers) != self.scene.draws_in_software:
             QtCore.QTimer.singleShot(0, self, self._report_device)
         self._painted += 1
@@ -513,7 +512,6 @@ class SceneView(QQuickRhiItem):
             list(self._drawables()),
             self.camera(),
             self._background,
-            window.effectiveDevicePixelRatio() if window is not None else 1.0,
             time.monotonic() - self._moved_at < _STILL_S,
         )
 
