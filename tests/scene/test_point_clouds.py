@@ -521,10 +521,38 @@ def test_a_depth_image_has_the_color_of_its_time(bench: SceneBench) -> None:
     )
 
 
+def test_depth_and_color_images_may_be_compressed(bench: SceneBench) -> None:
+    cv2 = pytest.importorskip("cv2", reason="compressed images need OpenCV")
+    topics = {
+        "/camera/depth/image_raw/compressedDepth": "16UC1; compressedDepth png",
+        "/camera/rgb/image_raw/compressed": "rgb8; png compressed bgr8",
+    }
+    camera = Camera(
+        bench,
+        'transport: "compressedDepth"; colorTopic: "/camera/rgb/image_raw"\n'
+        'colorTransport: "compressed"',
+    )
+    for topic in topics:
+        camera.publishers[topic] = bench.robot.create_publisher(
+            topic, "sensor_msgs/CompressedImage"
+        )
+    camera.send("/camera/depth/camera_info", CAMERA)
+    depth, color = np.full((2, 2), 4000, np.uint16), np.full((2, 2, 3), (0, 128, 255), np.uint8)
+    files = [bytes(12) + cv2.imencode(".png", depth)[1].tobytes(), cv2.imencode(".png", color)[1]]
+    for (topic, kind), file in zip(topics.items(), files, strict=True):
+        display = camera.send(topic, {"format": kind, "data": bytes(file)})
+    assert display.statusLevel == "ok", display.statusText
+    assert display.points == 4
+    assert tuple(bench.picture()[CENTER[0] - 20, CENTER[1] - 20]) == (255, 128, 0)
+    camera.send(next(iter(topics)), {"format": "16UC1; compressedDepth png", "data": bytes(20)}, 2)
+    display = camera.send(list(topics)[1], {"format": "rgb8; jpeg", "data": b""}, 2)
+    assert display.statusLevel == "error"
+
+
 @pytest.mark.parametrize(
     ("camera_info", "change", "text"),
     [
-        ({}, {"encoding": "rgb8"}, "a depth image is 16UC1, mono16, 32FC1, got 'rgb8'"),
+        ({}, {"encoding": "rgb8"}, "32FC1, compressedDepth, got 'rgb8'"),
         ({}, {"data": b"12"}, "needs 8 bytes, data has 2"),
         ({}, {"width": 3_000_000}, "3000000x2 pixels, the camera info 2x2"),
         ({"width": 0, "height": 0}, {"width": 3_000_000}, "step"),

@@ -205,9 +205,10 @@ def cloud_from_depth_image(depth: Any, camera_info: Any, color: Any = None) -> C
     """Create a cloud from a depth image, its ``CameraInfo``, and an image of the same camera.
 
     Args:
-        depth: ``sensor_msgs/Image`` in millimetres (16UC1, mono16) or metres (32FC1).
+        depth: ``sensor_msgs/Image`` or RawImage in millimetres (16UC1, mono16) or metres (32FC1).
         camera_info: Its calibration.
-        color: ``sensor_msgs/Image`` of the same size, for a field rgb; None for white points.
+        color: ``sensor_msgs/Image`` or RawImage of the same size, for a field rgb; None for white
+            points.
 
     Returns:
         The known pixels in the optical frame (z forward).
@@ -244,6 +245,8 @@ def cloud_from_depth_image(depth: Any, camera_info: Any, color: Any = None) -> C
 
 
 def _raw_image(message: Any) -> RawImage:
+    if isinstance(message, RawImage):
+        return message
     width, height, step = (
         read_integer(message, _IMAGE, name) for name in ("width", "height", "step")
     )

@@ -15,6 +15,7 @@ import numpy as np
 
 from rosglass.comm.time import Time
 from rosglass.errors import Error, TransformException
+from rosglass.images.compressed import decompress, decompress_depth
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Slot
 from rosglass.scene.cloud_sources import (
@@ -566,6 +567,8 @@ def _prepare_scan(scan: Any, settings: _ColorSettings) -> _Prepared:
 
 #: Encodings of depth images; others are color images.
 _DEPTH_ENCODINGS = ("16UC1", "mono16", "32FC1")
+#: In the format of compressed ones.
+_COMPRESSED_DEPTH = "compressedDepth"
 
 
 class _DepthMatcher:
@@ -593,15 +596,16 @@ class _DepthMatcher:
             Error: Something is missing; the text says what.
         """
         with self._lock:
-            if "encoding" not in message:
+            if "format" in message:
+                is_depth, kind = _COMPRESSED_DEPTH in message.format, message.format
+            elif "encoding" in message:
+                is_depth, kind = message.encoding in _DEPTH_ENCODINGS, message.encoding
+            else:
                 self._info = message
                 return None
-            is_depth = message.encoding in _DEPTH_ENCODINGS
             if not is_depth and not self._color_topic:
-                raise Error(
-                    f"encoding: a depth image is {', '.join(_DEPTH_ENCODINGS)}, "
-                    f"got {message.encoding!r}"
-                )
+                known = ", ".join((*_DEPTH_ENCODINGS, _COMPRESSED_DEPTH))
+                raise Error(f"encoding: a depth image is {known}, got {kind[:60]!r}")
             (self._depths if is_depth else self._colors).append(message)
             if self._info is None:
                 raise Error(f"no camera info received; publish it on {self._info_topic}")
@@ -634,12 +638,13 @@ def _prepare_depth(
     if found is None:
         return None
     depth, info, color = found
-    if info.width and (info.width, info.height) != (depth.width, depth.height):
+    image = _decompress(depth)
+    if info.width and (info.width, info.height) != (image.width, image.height):
         raise Error(
-            f"the depth image is {depth.width}x{depth.height} pixels, the camera info "
+            f"the depth image is {image.width}x{image.height} pixels, the camera info "
             f"{info.width}x{info.height}; use the camera info of the depth image"
         )
-    cloud = cloud_from_depth_image(depth, info, color)
+    cloud = cloud_from_depth_image(image, info, None if color is None else _decompress(color))
     if color is not None and color.header.frame_id != depth.header.frame_id:
         text = (
             f"the frame of the depth image is [{depth.header.frame_id}], that of the color image "
@@ -651,12 +656,28 @@ def _prepare_depth(
     return settings.prepare(cloud)._replace(source=depth, pixel_m=pixel_m)
 
 
+def _decompress(message: Any) -> Any:
+    """Return an image that a transport has compressed; others as they are."""
+    if "format" not in message:
+        return message
+    is_depth = _COMPRESSED_DEPTH in message.format
+    return (decompress_depth if is_depth else decompress)(message.data, message.format)
+
+
 class DepthCloudDisplay(CloudDisplay):
     """The points of a depth image, and their colors. See its page in ``docs/scene.md``."""
 
     TYPE = "DepthCloud"
-    MESSAGES = ("sensor_msgs/Image", "sensor_msgs/CameraInfo")
+    MESSAGES = ("sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/CameraInfo")
 
+    transport = Setting(
+        "Depth Map Transport Hint", "enum", "raw", "How depth images are transported.",
+        choices=["raw", _COMPRESSED_DEPTH], then="_on_topic",
+    )  # fmt: skip
+    colorTransport = Setting(
+        "Color Transport Hint", "enum", "raw", "How color images are transported.",
+        choices=["raw", "compressed"], then="_on_topic",
+    )  # fmt: skip
     colorTopic = Setting(
         "Color Image Topic", "topic", "", "Color images of the same camera; empty for none.",
         then="_on_topic",
@@ -676,7 +697,15 @@ class DepthCloudDisplay(CloudDisplay):
     def further_topics(self, topic: str) -> tuple[str, ...]:
         """Return the topics of the calibration, and of color images."""
         color = self._resolve(self.colorTopic)
-        return (_info_topic(topic), *([color] if color else []))
+        return (_info_topic(topic), *([_transported(color, self.colorTransport)] if color else []))
+
+    def _wanted(self) -> tuple[Any, ...] | None:
+        wanted = super()._wanted()
+        if wanted is None:
+            return None
+        node, (topic, *others), qos = wanted
+        self._resolved = _transported(topic, self.transport)
+        return node, (self._resolved, *others), qos
 
     def _factory(self, *wanted: Any) -> Callable[[], Any]:
         (topic, info_topic, *color), depth = wanted[1], self.depth
@@ -703,6 +732,11 @@ class DepthCloudDisplay(CloudDisplay):
         kept = super().save_settings(older, 1)
         kept["Depth Map Topic"] = kept.pop("Topic")
         return kept
+
+
+def _transported(topic: str, transport: str) -> str:
+    """Return the topic of a transport of image_transport."""
+    return topic if transport == "raw" else f"{topic}/{transport}"
 
 
 def _info_topic(topic: str) -> str:
