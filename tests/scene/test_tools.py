@@ -558,29 +558,6 @@ def test_selected_points_are_dropped_with_their_cloud(bench: SceneBench) -> None
     bench.wait(lambda: view.selection.count == 0)
 
 
-def test_a_view_that_is_gone_holds_nothing_that_was_selected(bench: SceneBench) -> None:
-    import gc
-    import weakref
-
-    from rosglass.scene.drawing import Points
-
-    view = bench.load('tool: "SetGoal"')
-    cloud = Points()
-    cloud.owner = "cloud"
-    cloud.set_points([[0, 0, 0]])
-    view.scene.root.add(cloud)
-    view.selection.select_between((0, 0), (400, 300))
-    left = weakref.ref(cloud)
-    del cloud, view
-    bench.load()
-
-    def is_free() -> bool:
-        gc.collect()
-        return left() is None
-
-    bench.wait(is_free)
-
-
 def test_what_is_interactive_gets_the_mouse(bench: SceneBench, hand: Hand) -> None:
     view = bench.load()
     seen: list[str] = []

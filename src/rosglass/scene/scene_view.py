@@ -136,14 +136,11 @@ class SceneView(QQuickRhiItem):
     def _clean_up_when_destroyed(self) -> None:
         # PySide never frees the Python half of an item that QML has made.
         state, renderers, root = self.__dict__, self._renderers, self._scene.root
-        overlay, tools, selection = self.overlay, self._tools, self._selection
+        overlay = self.overlay
 
         def end() -> None:
             root.on_change = None
             overlay.remove()
-            # Nor those of its children; a selection may hold large clouds.
-            for child in (*tools, tools, selection):
-                vars(child).clear()
             root.clear()
             # C++ deletes them a little later, with the scene graph.
             kept = list(renderers)

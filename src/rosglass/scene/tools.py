@@ -548,7 +548,7 @@ class Tools(QtCore.QObject):
         def forget() -> None:
             # QML has destroyed it: only its Python half is left.
             root.remove()
-            if is_alive(self) and tool in vars(self).get("_items", ()):
+            if is_alive(self) and tool in self._items:
                 self._items.remove(tool)
                 if self._current is tool:
                     self._current, self._grab = None, ""
