@@ -103,3 +103,43 @@ def test_views_with_overlays_come_and_go(bench: Any, panel: Path) -> None:
         assert overlay.loaded
     bench.load()
     bench.wait(lambda: overlay.root is None)
+
+
+def test_the_overlay_gets_the_mouse_first(bench: Any, panel: Path) -> None:
+    from PySide6.QtCore import QPoint, Qt
+    from PySide6.QtTest import QTest
+
+    view = bench.load()
+    panel.write_text(
+        "import QtQuick 2.15\nItem { property int clicks: 0; property string text: field.text\n"
+        "MouseArea { width: 100; height: 100; onClicked: parent.clicks++ }\n"
+        "TextInput { id: field; x: 150; width: 100; height: 40 } }"
+    )
+    root = rosglass.scene.add_overlay(view, panel).root
+    bench.picture()
+    left = Qt.MouseButton.LeftButton
+
+    def drag(start: QPoint, end: QPoint) -> None:
+        QTest.mousePress(bench.window, left, pos=start)
+        QTest.mouseMove(bench.window, (start + end) / 2)
+        QTest.mouseMove(bench.window, end)
+        QTest.mouseRelease(bench.window, left, pos=end)
+
+    before = view.camera()
+    QTest.mouseClick(bench.window, left, pos=QPoint(50, 50))
+    drag(QPoint(20, 20), QPoint(80, 80))
+    assert root.property("clicks") == 2
+    assert view.camera() == before
+    # What it does not take goes to the view.
+    drag(QPoint(200, 200), QPoint(240, 230))
+    bench.wait(lambda: view.camera() != before)
+    # Keys go where the last click went.
+    QTest.mouseClick(bench.window, left, pos=QPoint(200, 20))
+    for key in "map":
+        QTest.keyClick(bench.window, key)
+    assert root.property("text") == "map"
+    moved = view.camera()
+    QTest.mouseClick(bench.window, left, pos=QPoint(200, 200))
+    QTest.keyClick(bench.window, "z")
+    bench.wait(lambda: view.camera() != moved)
+    assert root.property("text") == "map"

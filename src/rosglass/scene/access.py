@@ -100,6 +100,9 @@ class SceneAccess(QtCore.QObject):
         self._on_window(window_of(view))
         parts = self.__dict__
         view.destroyed.connect(lambda *_: _close_parts(parts))
+        application = QtCore.QCoreApplication.instance()
+        if application is not None:
+            application.aboutToQuit.connect(self._on_quit)
 
     @property
     def session(self) -> Session:
@@ -271,6 +274,10 @@ class SceneAccess(QtCore.QObject):
         if self.fullscreen != self._full:
             self._full = self.fullscreen
             self.fullscreen_changed.emit()
+
+    @Slot()
+    def _on_quit(self) -> None:
+        self.close()
 
     @Slot()
     def _on_config_loading(self) -> None:

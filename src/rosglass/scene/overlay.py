@@ -92,7 +92,11 @@ class SceneOverlay(LiveOverlay):
         self.arranged.connect(self._arrange)
         view.widthChanged.connect(self._arrange)
         view.heightChanged.connect(self._arrange)
-        view.destroyed.connect(self._on_view_destroyed)
+        view.destroyed.connect(self._on_end)
+        # Later, the bindings of the interface would find half of it deleted.
+        application = QtCore.QCoreApplication.instance()
+        if application is not None:
+            application.aboutToQuit.connect(self._on_end)
         self._arrange()
 
     def _place(self, root: Any) -> None:
@@ -122,7 +126,7 @@ class SceneOverlay(LiveOverlay):
             self._root.setSize(size)
 
     @Slot()
-    def _on_view_destroyed(self) -> None:
+    def _on_end(self) -> None:
         self.close()
 
     def close(self, *, hold: bool = True) -> None:
