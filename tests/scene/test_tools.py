@@ -158,6 +158,38 @@ def test_a_panel_shows_and_changes_settings(bench: SceneBench) -> None:
     assert not bench.view.tools.find("PublishPoint").singleClick
 
 
+def items_of(item: Any) -> Iterator[Any]:
+    yield item
+    for child in item.childItems():
+        yield from items_of(child)
+
+
+def test_panels_change_settings_and_list_the_selection(bench: SceneBench, hand: Hand) -> None:
+    from PySide6.QtTest import QTest
+
+    view = bench.load(
+        'ToolsPanel { objectName: "tools"; width: 200; height: 300; view: parent }\n'
+        "SelectionPanel { x: 200; width: 200; height: 300; view: parent }"
+    )
+    bench.picture()
+    field = next(one for one in items_of(view) if one.property("placeholderText") == "/goal_pose")
+    centre = field.mapToScene(field.boundingRect().center())
+    hand.click((round(centre.x()), round(centre.y())))
+    for letter in "/dock":
+        QTest.keyClick(bench.window, letter)
+    hand.key(hand.keys.Key_Return)
+    assert view.tools.find("SetGoal").topic == "/dock"
+    # Letters in a field select no tools.
+    assert view.tool == "Interact"
+    add_box(view, owner=view.scene.add("Path", "Way"))
+    view.selection.select_between((0, 0), (400, 300))
+    bench.picture()
+    texts = [one.property("text") for one in items_of(view)]
+    assert "1 selected" in texts
+    assert "Way: 0" in texts
+    assert "Position: 0; 0; 0" in texts
+
+
 def test_tools_are_added_and_removed(bench: SceneBench) -> None:
     view = bench.load()
     changes: list[int] = []
