@@ -32,6 +32,7 @@ apt_test=(python3 python3-venv python3-genpy python3-genmsg xdotool x11-apps
           python3-sensor-msgs python3-nav-msgs python3-diagnostic-msgs python3-visualization-msgs
           python3-actionlib-msgs python3-tf2-msgs python3-tf2-ros python3-trajectory-msgs
           python3-shape-msgs python3-stereo-msgs python3-map-msgs python3-pcl-msgs python3-bond
+          python3-interactive-markers
           catkin ros-message-generation ros-message-runtime ros-std-msgs ros-geometry-msgs
           libroscpp-dev libactionlib-dev libstd-msgs-dev
           libstd-srvs-dev libgeometry-msgs-dev libsensor-msgs-dev)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from scene_mouse import Hand, has_colour
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -15,65 +16,6 @@ if TYPE_CHECKING:
     from conftest import SceneBench
 
 pytestmark = pytest.mark.filterwarnings("error")
-
-
-class Hand:
-    """Moves the mouse in the window of a bench, by events that Qt gets."""
-
-    def __init__(self, bench: SceneBench) -> None:
-        from PySide6.QtCore import QPoint, Qt
-        from PySide6.QtTest import QTest
-
-        self.bench, self.window = bench, bench.window
-        self._test, self._point = QTest, QPoint
-        self.LEFT, self.RIGHT = Qt.MouseButton.LeftButton, Qt.MouseButton.RightButton
-        self.SHIFT, self.CTRL = (
-            Qt.KeyboardModifier.ShiftModifier,
-            Qt.KeyboardModifier.ControlModifier,
-        )
-        self.NONE = Qt.KeyboardModifier.NoModifier
-        self.keys = Qt.Key
-
-    def at(self, point: Any) -> tuple[int, int]:
-        """Return the pixel of a point of the fixed frame."""
-        seen = self.bench.view.camera().project(point)
-        return round(seen.x), round(seen.y)
-
-    def press(self, at: Any, button: Any = None, keys: Any = None) -> None:
-        self._test.mousePress(self.window, button or self.LEFT, keys or self.NONE, self._point(*at))
-
-    def move(self, at: Any) -> None:
-        self._test.mouseMove(self.window, self._point(*at))
-
-    def release(self, at: Any, button: Any = None, keys: Any = None) -> None:
-        self._test.mouseRelease(
-            self.window, button or self.LEFT, keys or self.NONE, self._point(*at)
-        )
-
-    def click(self, at: Any, button: Any = None, keys: Any = None) -> None:
-        self.move(at)
-        self.press(at, button, keys)
-        self.release(at, button, keys)
-
-    def drag(self, start: Any, end: Any, button: Any = None, keys: Any = None) -> None:
-        self.press(start, button, keys)
-        self.move(((start[0] + end[0]) // 2, (start[1] + end[1]) // 2))
-        self.move(end)
-        self.release(end, button, keys)
-
-    def wheel(self, at: Any, steps: int) -> None:
-        from PySide6.QtCore import QCoreApplication, QPointF, Qt
-        from PySide6.QtGui import QWheelEvent
-
-        point, turn = QPointF(*at), self._point(0, 120 * steps)
-        event = QWheelEvent(
-            point, point, self._point(), turn, Qt.MouseButton.NoButton, self.NONE,
-            Qt.ScrollPhase.NoScrollPhase, False,
-        )  # fmt: skip
-        QCoreApplication.sendEvent(self.window, event)
-
-    def key(self, key: Any, keys: Any = None) -> None:
-        self._test.keyClick(self.window, key, keys or self.NONE)
 
 
 @pytest.fixture
@@ -95,11 +37,6 @@ def add_box(view: Any, position: Any = (0, 0, 0), owner: Any = "box") -> Any:
     box.pose = instance_matrix(position)
     view.scene.root.add(box)
     return box
-
-
-def has_colour(picture: Any, red: int, green: int, blue: int, tolerance: int = 60) -> int:
-    off = np.abs(picture.astype(int) - (red, green, blue)).max(axis=2)
-    return int((off <= tolerance).sum())
 
 
 # -- the list ------------------------------------------------------------------------------------
@@ -595,6 +532,8 @@ def test_what_is_interactive_gets_the_mouse(bench: SceneBench, hand: Hand) -> No
     seen: list[str] = []
 
     class Marker:
+        help = ""
+
         def handle_pointer(self, what: str, event: Any) -> bool:
             seen.append(what)
             return True

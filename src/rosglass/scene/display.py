@@ -380,15 +380,27 @@ class Intake:
 
     def receive(self, sample: Sample) -> None:
         """Take a sample, in the node's thread."""
-        item, error = None, ""
-        try:
+
+        def decode() -> Message:
             name = sample.type.name
             if self._types and ros1_name(name) not in self._types:
                 raise Error(f"the topic's type is {name}, not {' or '.join(self._types)}")
             if self._eager:
-                message = sample.type.decode_all(sample.data, wire=sample.wire)
-            else:
-                message = sample.message()
+                return sample.type.decode_all(sample.data, wire=sample.wire)
+            return sample.message()
+
+        self.put(decode, sample.type.name)
+
+    def put(self, decode: Callable[[], Message], what: str) -> None:
+        """Take a message, in the node's thread.
+
+        Args:
+            decode: Returns it.
+            what: The name of its type.
+        """
+        item, error = None, ""
+        try:
+            message = decode()
             data = self.prepare(message)
             if data is not None:
                 whole = getattr(data, "source", None)
@@ -396,7 +408,7 @@ class Intake:
         except Error as reason:
             error = str(reason)
         except Exception as reason:  # what peers send never ends the thread
-            _log.exception("a %s", sample.type.name)
+            _log.exception("a %s", what)
             error = f"this message could not be shown: {reason!r}"
         with self._lock:
             first = not self._items and not self._error

@@ -21,6 +21,7 @@ from rosglass.scene.displays.geometry import (
 )
 from rosglass.scene.displays.grid import AxesDisplay, GridDisplay
 from rosglass.scene.displays.image import CameraDisplay, CameraView, ImageDisplay, PictureItem
+from rosglass.scene.displays.interactive_marker import InteractiveMarkersDisplay
 from rosglass.scene.displays.map import GridCellsDisplay, MapDisplay
 from rosglass.scene.displays.marker import MarkerArrayDisplay, MarkerDisplay
 from rosglass.scene.displays.path import PathDisplay
@@ -74,6 +75,7 @@ DISPLAYS = (
     GridDisplay,
     IlluminanceDisplay,
     ImageDisplay,
+    InteractiveMarkersDisplay,
     LaserScanDisplay,
     MapDisplay,
     MarkerArrayDisplay,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rosglass.scene.drawing import Lines, MapImage, Mesh, Points
+from rosglass.scene.drawing import Labels, Lines, MapImage, Mesh, Points
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -79,6 +79,8 @@ def pick(
             found = _pick_mesh(drawable, pose, origin, direction)
         elif isinstance(drawable, MapImage):
             found = _pick_map(drawable, pose, origin, direction)
+        elif isinstance(drawable, Labels):
+            found = _pick_labels(drawable, pose, camera, x, y)
         else:
             continue
         if found is not None:
@@ -264,3 +266,26 @@ def _pick_map(
     if not image.palette[image.cells[row, column], 3]:
         return None
     return row * columns + column, origin + share * direction
+
+
+def _pick_labels(
+    labels: Labels, pose: NDArray[np.float64], camera: Camera, x: float, y: float
+) -> tuple[int, NDArray[np.float64]] | None:
+    places = labels.positions @ pose[:3, :3].T + pose[:3, 3]
+    best: tuple[int, NDArray[np.float64]] | None = None
+    nearest = np.inf
+    for number, (text, place) in enumerate(zip(labels.texts, places, strict=True)):
+        seen = camera.project(tuple(place))
+        if not seen.depth < nearest:
+            continue
+        height = float(labels.heights[number])
+        if not labels.in_pixels:
+            above = camera.project(tuple(place + camera.pose[:3, 1] * height))
+            height = abs(above.y - seen.y)
+        lines = text.split("\n")
+        # Only the renderer knows the letters; on average they are half as wide as a line is high.
+        width = 0.5 * height * max(len(line) for line in lines)
+        left = seen.x - (0 if labels.align == "left" else width / 2)
+        if left <= x <= left + width and abs(y - seen.y) <= height * len(lines) / 2:
+            best, nearest = (number, place), seen.depth
+    return best

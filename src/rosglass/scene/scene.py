@@ -232,6 +232,20 @@ class Scene(Element):
         found = buffer.lookup_transform(target, frame, Time(stamp) if stamp else None)
         return instance_matrix(found.translation, found.rotation)
 
+    def latest_time(self, frame: str) -> int:
+        """Return the time of the newest transform between a frame and the fixed one.
+
+        Returns:
+            Nanoseconds; 0 where it is valid at any time, or is not known.
+        """
+        buffer = self.transforms
+        if buffer is None or frame == self._fixed_frame:
+            return 0
+        try:
+            return buffer.lookup_transform(self._fixed_frame, frame).stamp.nanoseconds
+        except TransformException:
+            return 0
+
     def silence(self, frame: str) -> float:
         """Return for how long a frame may have been somewhere else, in seconds.
 

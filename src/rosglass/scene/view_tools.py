@@ -32,6 +32,10 @@ __all__ = [
 class Interactive(Protocol):
     """Owner of a drawable that handles the mouse itself, as interactive markers do."""
 
+    @property
+    def help(self) -> str:
+        """What the mouse does to it, for the status bar."""
+
     def handle_pointer(self, what: str, event: PointerEvent) -> bool:
         """Handle an event of the tool Interact.
 
@@ -99,6 +103,11 @@ class InteractTool(MoveCameraTool):
                 before.handle_pointer("leave", event)
             if found is not None:
                 found.handle_pointer("enter", event)
+            self.set_status("" if found is None else found.help)
+
+    def help(self, modifiers: Modifier) -> str:
+        """Return what the mouse does to what is under it, or to the camera."""
+        return self.statusText or super().help(modifiers)
 
     def on_press(self, event: PointerEvent) -> bool:
         """Give the press to what is under the mouse, if it handles it."""
@@ -124,6 +133,7 @@ class InteractTool(MoveCameraTool):
     def on_cancel(self) -> None:
         """Drop a drag."""
         focused, self._focused = self._focused, None
+        self.set_status("")
         if focused is not None and self.view is not None:
             focused.handle_pointer("cancel", PointerEvent(self.view, (0.0, 0.0)))
 
@@ -134,6 +144,7 @@ class InteractTool(MoveCameraTool):
     def on_leave(self) -> None:
         """Leave what was under the mouse."""
         focused, self._focused = self._focused, None
+        self.set_status("")
         if focused is not None and self.view is not None:
             focused.handle_pointer("leave", PointerEvent(self.view, (0.0, 0.0)))
 

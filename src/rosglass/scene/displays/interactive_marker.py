@@ -1,0 +1,656 @@
+"""The display InteractiveMarkers: what a robot lets the user drag, click, and choose from menus.
+
+A server publishes changes on ``<namespace>/update``, each with a number. A client gets all markers
+first: in ROS 1 from the latched topic ``update_full``, in ROS 2 from a service. After a gap in the
+numbers it gets them again. What the user does goes to ``<namespace>/feedback``.
+"""
+# ruff: noqa: N815 - the names of properties and signals are QML's
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections import deque
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, cast
+
+from rosglass.errors import Error
+from rosglass.qml.callbacks import weak_callback
+from rosglass.qml.element import single_shot
+from rosglass.qml.properties import ReadOnly, report
+from rosglass.qt import QtCore, QtQml, Signal, Slot, is_alive
+from rosglass.scene.display import OUTDATED_ALPHA, Intake, OneTopicDisplay, TopicDisplay
+from rosglass.scene.displays.interactive_marker_controls import (
+    MENU_SELECT,
+    Control,
+    InteractiveMarker,
+)
+from rosglass.scene.displays.interactive_marker_messages import (
+    MAX_MARKERS,
+    MarkerUpdate,
+    read_update,
+)
+from rosglass.scene.displays.marker import MarkerMeshes
+from rosglass.scene.drawing import Group
+from rosglass.scene.rviz_formats import read_marker_namespace, write_marker_namespace
+from rosglass.scene.settings import Setting
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from rosglass.comm.node import Node
+    from rosglass.comm.qos import QoS
+    from rosglass.messages import Message
+    from rosglass.qml.runtime import Runtime
+    from rosglass.scene.camera import Camera
+    from rosglass.scene.scene import Scene
+    from rosglass.scene.tools import PointerEvent
+
+
+__all__ = ["InteractiveMarkersDisplay"]
+
+_MAX_SERVERS, _MAX_EARLY, _MAX_LINES = 20, 100, 20
+#: Seconds without a message after which a server that sends keep-alives, usually twice a second, is
+#: gone.
+_SILENCE_S = 3.0
+#: Milliseconds until markers that were not received are requested again.
+_RETRY_MS = 2000
+#: Milliseconds between two feedbacks of a drag.
+_FEEDBACK_MS = 33
+_MENU_FILE = Path(__file__).parents[1] / "panels" / "MarkerMenu.qml"
+
+
+class _Connection:
+    """The endpoints of a client of interactive markers; created and closed by the worker.
+
+    Args:
+        node: The node.
+        namespace: Of the server, absolute.
+        qos: What is requested of the updates' publishers.
+        intake: Takes all that is received.
+        on_failed: Called, in any thread, with why the markers were not received.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        namespace: str,
+        qos: QoS,
+        intake: Intake,
+        on_failed: Callable[[str], None],
+    ) -> None:
+        self._node, self._namespace, self._qos = node, namespace, qos
+        self._intake, self._on_failed = intake, on_failed
+        #: The subscription of all markers in ROS 1, while they are wanted.
+        self._full: Any = None
+        self._open: list[Any] = []
+        self.client: Any = None
+        try:
+            self._open.append(
+                node.create_subscription(
+                    f"{namespace}/update", None, qos=qos, raw_callback=intake.receive
+                )
+            )
+            self.feedback = node.create_publisher(
+                f"{namespace}/feedback", "visualization_msgs/InteractiveMarkerFeedback", 100
+            )
+            self._open.append(self.feedback)
+            if node.wire != "ros1":
+                self.client = node.create_service_client(
+                    f"{namespace}/get_interactive_markers",
+                    "visualization_msgs/GetInteractiveMarkers",
+                )
+                self._open.append(self.client)
+        except Error:
+            self.close()
+            raise
+
+    def request(self) -> None:
+        """Request all markers; they go to the intake."""
+        if self.client is None:
+            self.stop_request()
+            self._full = self._node.create_subscription(
+                f"{self._namespace}/update_full",
+                None,
+                qos=self._qos,
+                raw_callback=self._intake.receive,
+            )
+        else:
+            self.client.call_async(timeout=None).on_done(self._on_response)
+
+    def _on_response(self, call: Any) -> None:
+        error = call.exception()
+        if error is None:
+            self._intake.put(call.result, "visualization_msgs/GetInteractiveMarkers")
+        else:
+            self._on_failed(str(error))
+
+    def stop_request(self) -> None:
+        """Receive changes only."""
+        full, self._full = self._full, None
+        if full is not None:
+            full.close()
+
+    def close(self) -> None:
+        """Close all endpoints; safe to call twice."""
+        self.stop_request()
+        while self._open:
+            self._open.pop().close()
+
+
+class _Server:
+    """What is known of a server.
+
+    Attributes:
+        number: The number of its last change; None while its markers are requested.
+        early: Changes that were received before them.
+        beats: Whether it sends keep-alives.
+        heard: When the last message was received, by the clock of :func:`time.monotonic`.
+        silent: Whether its keep-alives have stopped.
+        root: Its markers.
+    """
+
+    def __init__(self) -> None:
+        self.number: int | None = None
+        self.early: deque[MarkerUpdate] = deque(maxlen=_MAX_EARLY)
+        self.beats = self.silent = False
+        self.heard = time.monotonic()
+        self.root = Group()
+        self.markers: dict[str, InteractiveMarker] = {}
+
+
+class InteractiveMarkersDisplay(TopicDisplay):
+    """Markers that the user drags and clicks. See its page in ``docs/scene.md``."""
+
+    TYPE = "InteractiveMarkers"
+    MESSAGES = ("visualization_msgs/InteractiveMarkerUpdate",)
+    KEEPS_ALL: ClassVar[bool] = True
+    EAGER: ClassVar[bool] = True
+    SETTINGS: ClassVar[dict[str, Setting]] = {}
+
+    topic = Setting(
+        "Interactive Markers Namespace", "topic", "",
+        "Namespace of the server, or its update topic.", then="_on_topic",
+    )  # fmt: skip
+    showDescriptions = Setting("Show Descriptions", "bool", True, "Whether texts are shown.")
+    showAxes = Setting("Show Axes", "bool", False, "Whether the axes of markers are shown.")
+    showVisualAids = Setting(
+        "Show Visual Aids", "bool", False, "Whether the axis of a drag is shown during it."
+    )
+    enableTransparency = Setting(
+        "Enable Transparency", "bool", True, "Whether arrows and rings are translucent.",
+        then="_redraw",
+    )  # fmt: skip
+
+    #: A menu is wanted: entries with ``id``, ``title`` and ``children``, and x and y in the view.
+    #: With a handler, no menu is opened; the handler calls :meth:`selectMenuEntry`.
+    menuRequested = Signal("QVariantList", float, float)  # type: ignore[arg-type]
+    #: Names of the interactive markers.
+    markersChanged = Signal()
+    markers: ReadOnly[list[str]] = ReadOnly(cast("type[list[str]]", "QStringList"), [])
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self._servers: dict[str, _Server] = {}
+        self.meshes = MarkerMeshes(self._in_background, self._on_mesh)
+        self._dragging: InteractiveMarker | None = None
+        self._requested = False
+        #: The control whose menu is open, and where it was clicked.
+        self._asked: tuple[Control, Any] | None = None
+        self._ready: Any = None
+        self._view: Any = None
+        super().__init__(parent, runtime)
+        self._retry_request = single_shot(self, self._request_again)
+        self._feedback_timer = QtCore.QTimer(self)
+        self._feedback_timer.setInterval(_FEEDBACK_MS)
+        self._feedback_timer.timeout.connect(self._send_drag)
+
+    # -- the view --------------------------------------------------------------------------------
+
+    def join(self, scene: Scene) -> None:
+        """Start to be shown in a scene, and turn texts to its view."""
+        super().join(scene)
+        view: Any = scene.parent()
+        if view is not None and hasattr(view, "cameraChanged"):
+            self._view = view
+            view.cameraChanged.connect(self._on_camera)
+            view.toolChanged.connect(self._on_tool)
+
+    @property
+    def camera(self) -> Camera | None:
+        """The camera that controls are turned to; None before the view has a size."""
+        if self._view is None or not is_alive(self._view):
+            return None
+        with contextlib.suppress(Error):
+            camera: Camera = self._view.camera()
+            return camera
+        return None
+
+    @Slot()
+    def _on_camera(self) -> None:
+        for marker in self._all():
+            marker.face()
+
+    @Slot()
+    def _on_tool(self) -> None:
+        self._restyle()
+
+    def is_active(self, control: Control) -> bool:
+        """Return whether a control that is not always visible is shown now."""
+        if self._view is None or not is_alive(self._view):
+            return True
+        if self._view.tool != "Interact":
+            return False
+        dragging = self._dragging
+        if dragging is None or dragging.dragged is control:
+            return True
+        return not self._view.tools.current.hideInactiveObjects
+
+    def _restyle(self) -> None:
+        for marker in self._all():
+            marker.restyle()
+
+    def _redraw(self) -> None:
+        for marker in self._all():
+            marker.draw()
+
+    def _all(self) -> list[InteractiveMarker]:
+        return [marker for server in self._servers.values() for marker in server.markers.values()]
+
+    # -- the connection --------------------------------------------------------------------------
+
+    @property
+    def namespace(self) -> str:
+        """The namespace of the server, as it was given."""
+        return str(self.topic).removesuffix("/update_full").removesuffix("/update").rstrip("/")
+
+    def preparer(self) -> Callable[[Message], Any]:
+        """Return the function that reads updates."""
+        named = self.node is not None and self.node.wire == "ros1"
+        return lambda message: read_update(message, named=named)
+
+    def _wanted(self) -> tuple[Any, ...] | None:
+        node = self.node
+        if node is None or not self.shown or not self.namespace or self.scene is None:
+            return None
+        self._resolved = self._resolve(f"{self.namespace}/update")
+        if not self._resolved:
+            return None
+        return node, self._resolved.removesuffix("/update"), self.profile()
+
+    def _factory(self, *wanted: Any) -> Callable[[], Any]:
+        node, namespace, qos = wanted
+        executor, failed = self._executor, weak_callback(self._on_request_failed)
+        types = (*self.MESSAGES, "visualization_msgs/InteractiveMarkerInit")
+        intake = self._intake = Intake(
+            self.preparer(), types, executor, weak_callback(self._on_items), 1000, eager=True
+        )
+
+        def on_failed(text: str) -> None:
+            executor.post(lambda: failed(text))
+
+        return lambda: _Connection(node, namespace, qos, intake, on_failed)
+
+    def _on_created(self, endpoint: Any) -> None:
+        super()._on_created(endpoint)
+        self._drop_markers()
+        self._requested = False
+        if endpoint.client is None:
+            self._request()
+            return
+        ready = weak_callback(self._on_service)
+        self._ready = endpoint.client.on_ready_change(ready, self._executor)
+        self._on_service(endpoint.client.ready)
+
+    def _on_closed(self, endpoint: Any) -> None:
+        watch, self._ready = self._ready, None
+        if watch is not None:
+            watch.close()
+        self._retry_request.stop()
+        super()._on_closed(endpoint)
+
+    def _on_service(self, ready: bool) -> None:
+        """Request the markers of a server that has appeared."""
+        if not is_alive(self) or self._endpoint is None:
+            return
+        if ready:
+            self._request_all()
+        elif not self._servers:
+            self.set_status("Server", "warn", f"no server in {self.namespace}")
+
+    def _request_all(self) -> None:
+        """Request the markers of all servers anew: others may be there by the same names."""
+        for server in self._servers.values():
+            server.number = None
+            server.early.clear()
+        self._requested = False
+        self._request()
+
+    def _request(self) -> None:
+        """Request all markers, unless they are requested already."""
+        connection, session = self._endpoint, self._session
+        if connection is None or session is None or self._requested:
+            return
+        self._requested = True
+        session.background(connection.request)
+        if connection.client is None:
+            self._retry_request.start(_RETRY_MS)
+
+    @Slot()
+    def _request_again(self) -> None:
+        if is_alive(self):
+            self._requested = False
+            if not self._servers or any(one.number is None for one in self._servers.values()):
+                self._request()
+
+    def _on_request_failed(self, text: str) -> None:
+        if is_alive(self) and self._endpoint is not None:
+            self.set_status("Server", "warn", f"the markers were not received: {text}")
+            self._retry_request.start(_RETRY_MS)
+
+    def publish(self, feedback: dict[str, Any]) -> bool:
+        """Send a feedback; return whether a server receives it."""
+        connection, node = self._endpoint, self.node
+        if connection is None or node is None:
+            return False
+        feedback["client_id"] = f"{node.namespace.rstrip('/')}/{node.name}/{self.name}"
+        try:
+            received: bool = connection.feedback.subscription_count() > 0
+            connection.feedback.publish(feedback)
+        except Error as error:
+            self.set_status("Feedback", "error", str(error))
+            return False
+        if received:
+            self.delete_status("Feedback")
+        else:
+            topic = connection.feedback.topic
+            self.set_status("Feedback", "warn", f"no server receives {topic} yet")
+        return received
+
+    # -- updates ---------------------------------------------------------------------------------
+
+    def _on_items(self) -> None:
+        if is_alive(self) and self._outdated:
+            self._request_all()
+        super()._on_items()
+
+    def _show_waiting(self) -> None:
+        while self._waiting:
+            self._take(self._waiting.popleft().data)
+
+    def _take(self, update: MarkerUpdate) -> None:
+        server = self._servers.get(update.server)
+        if server is None:
+            if len(self._servers) >= _MAX_SERVERS:
+                self.set_status("Server", "error", f"only {_MAX_SERVERS} servers are shown")
+                return
+            server = self._servers[update.server] = _Server()
+            self.root.add(server.root)
+        server.heard = time.monotonic()
+        # ROS 1's always do; in ROS 2, some still do.
+        is_ros1 = self._endpoint is not None and self._endpoint.client is None
+        server.beats = server.beats or update.alive or is_ros1
+        if update.full:
+            self._begin(server, update)
+        elif server.number is None:
+            if not update.alive:
+                server.early.append(update)
+            self._request()
+        elif update.number != server.number + (not update.alive):
+            self._on_gap(server, update)
+        else:
+            self._apply(server, update)
+        self._report(update.server, server)
+
+    def _begin(self, server: _Server, update: MarkerUpdate) -> None:
+        """Show all markers of a server, then what has changed since."""
+        if server.number is not None:
+            return  # ROS 1 publishes them after each change
+        early = [one for one in server.early if one.number > update.number]
+        if early and early[0].number != update.number + 1:
+            # Not the newest: in ROS 1, that will follow.
+            self._requested = False
+            self._retry_request.start(_RETRY_MS)
+            return
+        server.number = update.number
+        server.early.clear()
+        kept = {one.name for one in update.markers}
+        for name in [name for name in server.markers if name not in kept]:
+            self._erase(server, name)
+        self._apply(server, update)
+        for one in early:
+            if server.number is not None and one.number == server.number + 1:
+                self._apply(server, one)
+            else:
+                self._on_gap(server, one)
+        if all(one.number is not None for one in self._servers.values()):
+            self._requested = False
+            self._retry_request.stop()
+            if self._endpoint is not None and self._session is not None:
+                self._session.background(self._endpoint.stop_request)
+
+    def _on_gap(self, server: _Server, update: MarkerUpdate) -> None:
+        """Request all markers anew, as changes are missing; show the old ones until then."""
+        server.number = None
+        server.early.clear()
+        if not update.alive:
+            server.early.append(update)
+        self._request()
+
+    def _apply(self, server: _Server, update: MarkerUpdate) -> None:
+        server.number = update.number
+        for record in update.markers:
+            marker = server.markers.get(record.name)
+            if not record.controls:
+                self._erase(server, record.name)
+                self.set_line(record.name, record.problem)
+            elif marker is not None:
+                marker.change(record)
+            elif len(self._all()) >= MAX_MARKERS:
+                self.set_status("Markers", "error", f"only {MAX_MARKERS} markers are shown")
+            else:
+                marker = server.markers[record.name] = InteractiveMarker(self, record)
+                server.root.add(marker.root)
+        for name, frame, stamp, pose in update.poses:
+            marker = server.markers.get(name)
+            if marker is None:
+                self.set_line(name, "its pose was received, but not the marker")
+            elif isinstance(pose, str):
+                self.set_line(name, pose)
+            else:
+                marker.take_pose(frame, stamp, pose)
+        for name in update.erased:
+            self._erase(server, name)
+        names = sorted(marker.record.name for marker in self._all())
+        if names != self.markers:
+            report(self, markers=names)
+
+    def _erase(self, server: _Server, name: str) -> None:
+        marker = server.markers.pop(name, None)
+        self.set_line(name, "")
+        if marker is not None:
+            if marker is self._dragging:
+                self.on_drag(None)
+            marker.controls.clear()
+            marker.root.remove()
+
+    def _drop_markers(self) -> None:
+        self.on_drag(None)
+        for server in self._servers.values():
+            for marker in server.markers.values():
+                marker.controls.clear()
+            server.root.remove()
+        self._servers.clear()
+        report(self, markers=[])
+
+    def reset(self) -> None:
+        """Drop all markers, and request them again."""
+        self._waiting.clear()
+        self._drop_markers()
+        self._asked = None
+        if self._endpoint is not None and self.shown:
+            self._requested = False
+            self._request()
+
+    # -- status ----------------------------------------------------------------------------------
+
+    def set_line(self, name: str, problem: str) -> None:
+        """Set what is wrong with a marker; an empty text if nothing is."""
+        line = f"Marker {name}"
+        if not problem:
+            self.delete_status(line)
+        elif line in self.status_lines or len(self.status_lines) < _MAX_LINES:
+            self.set_status(line, "error", problem)
+
+    def _report(self, name: str, server: _Server) -> None:
+        line = f"Server {name}".strip()
+        if server.silent:
+            text = f"no sign of life for more than {_SILENCE_S:g} s; its markers may be out of date"
+            self.set_status(line, "warn", text)
+        elif server.number is None:
+            self.set_status(line, "warn", "waiting for its markers")
+        else:
+            self.set_status(line, "ok", f"{len(server.markers)} markers")
+
+    def _on_tick(self) -> None:
+        now = time.monotonic()
+        for name, server in self._servers.items():
+            silent = server.beats and now - server.heard > _SILENCE_S
+            if silent != server.silent:
+                server.silent = silent
+                server.root.alpha = OUTDATED_ALPHA if silent else 1.0
+                if not silent:
+                    # It may be another one by the same name.
+                    server.number = None
+                    self._request()
+                self._report(name, server)
+        super()._on_tick()
+
+    def _is_old(self) -> bool:
+        return not any(one.number is not None and not one.silent for one in self._servers.values())
+
+    def _show_age(self) -> None:
+        self._is_gone = self._outdated and bool(self._all()) and bool(self.enabled)
+        self._fade()
+        if self._is_gone:
+            when = time.strftime("%H:%M:%S", time.localtime(self._arrived))
+            self.set_status("Data", "warn", f"the server is gone; its last message is of {when}")
+        else:
+            self.delete_status("Data")
+
+    # -- frames ----------------------------------------------------------------------------------
+
+    def on_transforms(self) -> None:
+        """Follow the frames of markers."""
+        for marker in self._all():
+            marker.place()
+
+    def on_fixed_frame(self) -> None:
+        """Place all markers in another fixed frame."""
+        for marker in self._all():
+            marker.place_anew()
+
+    # -- drags and menus -------------------------------------------------------------------------
+
+    def on_drag(self, marker: InteractiveMarker | None) -> None:
+        """Send the poses of a marker that is dragged; None after the drag."""
+        if marker is self._dragging:
+            return
+        self._dragging = marker
+        if marker is None:
+            self._feedback_timer.stop()
+        else:
+            self._feedback_timer.start()
+        self._restyle()
+
+    @Slot()
+    def _send_drag(self) -> None:
+        if self._dragging is not None:
+            self._dragging.send_drag()
+
+    def show_menu(self, control: Control, event: PointerEvent) -> None:
+        """Open the menu of a marker, or let a handler in QML do so."""
+        entries = list(control.marker.record.menu)
+        if not entries:
+            return
+        self._asked = (control, event.point)
+        meta = self.metaObject()
+        method = meta.method(meta.indexOfSignal("menuRequested(QVariantList,double,double)"))
+        if self.isSignalConnected(method):
+            self.menuRequested.emit(entries, event.x, event.y)
+            return
+        view: Any = event.view
+        engine = QtQml.qmlEngine(view)
+        if engine is None:
+            return  # a view without QML has no menus
+        component = QtQml.QQmlComponent(engine, QtCore.QUrl.fromLocalFile(str(_MENU_FILE)))
+        place = QtCore.QPointF(event.x, event.y)
+        menu: Any = component.createWithInitialProperties(
+            {"entries": entries, "parent": view, "place": place}
+        )
+        if menu is None:
+            self.set_status("Menu", "error", component.errorString())
+            return
+        menu.setParent(view)
+        menu.picked.connect(self.selectMenuEntry)
+        menu.closed.connect(menu.deleteLater)
+
+    @Slot(float)
+    def selectMenuEntry(self, entry: float) -> None:  # noqa: N802 - QML's name
+        """Choose an entry of the menu that was requested last.
+
+        Args:
+            entry: Its ``id``.
+        """
+        asked, number = self._asked, int(entry)
+        if asked is None:
+            return
+        control, point = asked
+        program = control.marker.record.programs.get(number)
+        if program is not None:
+            # RViz runs what a robot's message says; that is no right of a robot.
+            text = f"entry {number} asks to run {program!r} on this computer, which is not done"
+            self.set_status("Menu", "warn", text)
+            return
+        control.marker.send(MENU_SELECT, control.record.name, point, number)
+
+    # -- meshes ----------------------------------------------------------------------------------
+
+    def _in_background(self, work: Callable[[], Any], then: Callable[[Any], None]) -> None:
+        if self.scene is not None:
+            self.scene.load(work, then)
+
+    def _on_mesh(self, uri: str, problem: str) -> None:
+        if not is_alive(self):
+            return
+        if problem:
+            self.set_status("Mesh", "error", f"{uri}: {problem}")
+            return
+        for marker in self._all():
+            for control in marker.controls.values():
+                if control.uses_mesh(uri):
+                    control.draw()
+
+    # -- files -----------------------------------------------------------------------------------
+
+    def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
+        """Take the settings of a file of either RViz, which name the server differently."""
+        keys = ("Interactive Markers Namespace", "Update Topic")
+        refused = super(OneTopicDisplay, self).load_settings(
+            {key: value for key, value in saved.items() if key not in keys}
+        )
+        try:
+            self.set("Interactive Markers Namespace", read_marker_namespace(saved))
+        except Error as error:
+            refused.append(str(error))
+        return refused
+
+    def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
+        """Return the settings for a file of one RViz."""
+        key = "Interactive Markers Namespace"
+        kept = super(OneTopicDisplay, self).save_settings(older, ros)
+        kept.pop(key, None)
+        kept.pop("Update Topic", None)
+        write_marker_namespace(kept, self.namespace, ros)
+        return kept

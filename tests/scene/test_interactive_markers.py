@@ -1,0 +1,717 @@
+"""The display InteractiveMarkers: dragged by real events of the mouse, and what servers receive."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from rosmaster import RosMaster
+from scene_mouse import Hand, has_colour
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from conftest import SceneBench
+
+UPDATE = "visualization_msgs/InteractiveMarkerUpdate"
+FEEDBACK = "visualization_msgs/InteractiveMarkerFeedback"
+KEEP_ALIVE, POSE_UPDATE, MENU_SELECT, BUTTON_CLICK, MOUSE_DOWN, MOUSE_UP = range(6)
+NONE, MENU, BUTTON, MOVE_AXIS, MOVE_PLANE, ROTATE_AXIS, MOVE_ROTATE = range(7)
+MOVE_3D, ROTATE_3D, MOVE_ROTATE_3D = range(7, 10)
+FIXED, VIEW_FACING = 1, 2
+#: The orientation whose x axis is the z axis.
+UPWARDS = {"x": 0.0, "y": -0.7071068, "z": 0.0, "w": 0.7071068}
+BOX = {
+    "type": 1,
+    "scale": {"x": 1.0, "y": 1.0, "z": 1.0},
+    "color": {"r": 0.0, "g": 0.0, "b": 1.0, "a": 1.0},
+    "pose": {"orientation": {"w": 1.0}},
+}
+
+
+def control(mode: int, name: str = "", boxes: bool = False, **fields: Any) -> dict[str, Any]:
+    made = {"name": name or f"mode{mode}", "interaction_mode": mode, "orientation": {"w": 1.0}}
+    return {**made, "markers": [BOX] if boxes else [], **fields}
+
+
+def marker(*controls: dict[str, Any], name: str = "arm", **fields: Any) -> dict[str, Any]:
+    made = {
+        "name": name,
+        "header": {"frame_id": "map"},
+        "pose": {"orientation": {"w": 1.0}},
+        "scale": 2.0,
+        "controls": list(controls),
+    }
+    return {**made, **fields}
+
+
+class MarkerServer:
+    """An interactive marker server of ROS 2, made of a node."""
+
+    def __init__(self, node: Any, namespace: str = "/server") -> None:
+        self.markers: dict[str, dict[str, Any]] = {}
+        self.number = self.requests = 0
+        #: Whether what clients drag is moved, as servers of the field do.
+        self.follows = True
+        self.feedback: list[Any] = []
+        self._update = node.create_publisher(f"{namespace}/update", UPDATE, qos=100)
+        self._service = node.create_service_server(
+            f"{namespace}/get_interactive_markers",
+            "visualization_msgs/GetInteractiveMarkers",
+            self._answer,
+        )
+        node.create_subscription(f"{namespace}/feedback", FEEDBACK, self._take, qos=100)
+
+    def _answer(self, _request: Any) -> dict[str, Any]:
+        self.requests += 1
+        return {"sequence_number": self.number, "markers": list(self.markers.values())}
+
+    def _take(self, feedback: Any) -> None:
+        self.feedback.append(feedback)
+        if feedback.event_type == POSE_UPDATE and self.follows:
+            self.move(feedback.marker_name, feedback.pose)
+
+    def insert(self, *markers: dict[str, Any]) -> None:
+        self.markers.update({one["name"]: one for one in markers})
+        self.send(markers=list(markers))
+
+    def move(self, name: str, pose: Any) -> None:
+        self.markers[name] = {**self.markers[name], "pose": pose}
+        moved = {"name": name, "header": self.markers[name]["header"], "pose": pose}
+        self.send(poses=[moved])
+
+    def erase(self, name: str) -> None:
+        del self.markers[name]
+        self.send(erases=[name])
+
+    def send(self, **update: Any) -> None:
+        self.number += 1
+        self._update.publish({"type": 1, "seq_num": self.number, **update})
+
+    def events(self, kind: int) -> list[Any]:
+        return [one for one in self.feedback if one.event_type == kind]
+
+    def close(self) -> None:
+        self._update.close()
+        self._service.close()
+
+
+@pytest.fixture
+def server(bench: SceneBench) -> MarkerServer:
+    return MarkerServer(bench.robot)
+
+
+@pytest.fixture
+def hand(bench: SceneBench) -> Hand:
+    return Hand(bench)
+
+
+@pytest.fixture
+def show(bench: SceneBench, server: MarkerServer) -> Callable[..., Any]:
+    """Shows markers from above, or at an angle, and returns the display."""
+
+    def load(*markers: dict[str, Any], settings: str = "", view: str = "TopDownOrtho") -> Any:
+        server.markers.update({one["name"]: one for one in markers})
+        made = bench.load(
+            f'view: "{view}"\nInteractiveMarkersDisplay {{ topic: "/server"; {settings} }}'
+        )
+        if view == "TopDownOrtho":
+            made.controller.set("Scale", 40.0)
+            made.camera_moved()
+        (display,) = made.scene.displays
+        bench.wait(lambda: len(display.markers) == len(markers), lambda: display.statusText)
+        bench.picture()
+        return display
+
+    return load
+
+
+def shown(display: Any, name: str = "arm") -> Any:
+    return next(one for one in display._all() if one.record.name == name)
+
+
+def place(display: Any, name: str = "arm") -> list[float]:
+    return [round(float(number), 3) for number in shown(display, name).pose[:3, 3]]
+
+
+# -- drags ----------------------------------------------------------------------------------------
+
+
+def test_an_arrow_is_dragged_and_the_server_moves_the_marker(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
+) -> None:
+    display = show(marker(control(MOVE_AXIS)))
+    start = hand.at((1.5, 0, 0))
+    end = hand.at((3.5, 0.7, 0))
+    hand.move(start)
+    hand.press(start)
+    hand.move(hand.at((2.5, 0.5, 0)))
+    hand.move(end)
+    # Only along the axis.
+    assert place(display)[0] == pytest.approx(2.0, abs=0.06)
+    assert place(display)[1:] == [0.0, 0.0]
+    bench.wait(lambda: server.events(POSE_UPDATE))
+    hand.release(end)
+    bench.wait(lambda: server.events(MOUSE_UP))
+    (down,) = server.events(MOUSE_DOWN)
+    assert (down.marker_name, down.control_name) == ("arm", "mode3")
+    assert down.client_id.endswith("/view/InteractiveMarkers")
+    assert down.mouse_point_valid
+    assert down.mouse_point.x == pytest.approx(1.5, abs=0.1)
+    last = server.events(POSE_UPDATE)[-1]
+    assert last.header.frame_id == "map"
+    assert last.pose.position.x == pytest.approx(2.0, abs=0.06)
+    assert [one.event_type for one in server.feedback][-2:] == [POSE_UPDATE, MOUSE_UP]
+    # Its own pose, sent back, arrives and changes nothing; another one moves it.
+    server.move("arm", {"position": {"x": -1.0}, "orientation": {"w": 1.0}})
+    bench.wait(lambda: place(display) == [-1.0, 0.0, 0.0])
+    bench.picture()
+    hand.press(hand.at((0.5, 0, 0)))
+    bench.wait(lambda: len(server.events(MOUSE_DOWN)) == 2)
+    hand.release(hand.at((0.5, 0, 0)))
+
+
+def test_beside_markers_the_mouse_moves_the_camera(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
+) -> None:
+    display = show(marker(control(MOVE_AXIS)))
+    before = bench.view.camera()
+    hand.drag((20, 20), (60, 60))
+    assert bench.view.camera() != before
+    assert place(display) == [0.0, 0.0, 0.0]
+    bench.wait.settled(bench.session)
+    assert server.feedback == []
+
+
+def test_a_plane_is_dragged(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
+) -> None:
+    display = show(marker(control(MOVE_PLANE, orientation=UPWARDS)))
+    hand.drag(hand.at((1.15, 0, 0)), hand.at((2.15, 1, 0)))
+    assert place(display) == pytest.approx([1.0, 1.0, 0.0], abs=0.06)
+    bench.wait(lambda: server.events(MOUSE_UP))
+
+
+def test_a_ring_is_rotated(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
+) -> None:
+    display = show(marker(control(ROTATE_AXIS, orientation=UPWARDS)))
+    hand.drag(hand.at((1.15, 0, 0)), hand.at((0, 2, 0)))
+    assert place(display) == [0.0, 0.0, 0.0]
+    assert shown(display).pose[:2, 0] == pytest.approx([0.0, 1.0], abs=0.05)
+    bench.wait(lambda: server.events(MOUSE_UP))
+    turn = server.events(POSE_UPDATE)[-1].pose.orientation
+    assert (turn.z, turn.w) == pytest.approx((0.707, 0.707), abs=0.05)
+
+
+def test_a_ring_that_moves_as_well_follows_the_mouse(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
+) -> None:
+    display = show(marker(control(MOVE_ROTATE, orientation=UPWARDS)))
+    hand.drag(hand.at((1.15, 0, 0)), hand.at((3.15, 0, 0)))
+    assert place(display) == pytest.approx([2.0, 0.0, 0.0], abs=0.06)
+    bench.wait(lambda: server.events(MOUSE_UP))
+
+
+@pytest.mark.parametrize("mode", [MOVE_3D, MOVE_ROTATE_3D])
+def test_a_box_is_carried_across_the_view_and_towards_it(
+    show: Callable[..., Any], hand: Hand, mode: int
+) -> None:
+    display = show(marker(control(mode, boxes=True, always_visible=True)))
+    hand.drag(hand.at((0, 0, 0)), hand.at((1, 1, 0)))
+    assert place(display) == pytest.approx([1.0, 1.0, 0.0], abs=0.06)
+    hand.drag(hand.at((1, 1, 0)), hand.at((1, 2, 0)), keys=hand.SHIFT)
+    assert place(display)[:2] == pytest.approx([1.0, 1.0], abs=0.06)
+    assert abs(place(display)[2]) > 0.3
+
+
+@pytest.mark.parametrize("mode", [ROTATE_3D, MOVE_ROTATE_3D])
+def test_a_box_is_tumbled(show: Callable[..., Any], hand: Hand, mode: int) -> None:
+    display = show(marker(control(mode, boxes=True)))
+    keys = hand.CTRL if mode == MOVE_ROTATE_3D else None
+    x, y = hand.at((0, 0, 0))
+    hand.drag((x, y), (x + 30, y), keys=keys)
+    assert place(display) == pytest.approx([0.0, 0.0, 0.0], abs=0.01)
+    turned = shown(display).pose[:3, :3]
+    assert np.trace(turned) == pytest.approx(1 + 2 * np.cos(30 * 2 * np.pi / 300), abs=0.05)
+
+
+def test_a_drag_goes_on_when_its_marker_is_changed(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
+) -> None:
+    server.follows = False
+    display = show(marker(control(MOVE_AXIS)))
+    hand.press(hand.at((1.5, 0, 0)))
+    hand.move(hand.at((2.5, 0, 0)))
+    changed = marker(control(MOVE_AXIS), description="changed")
+    server.insert(changed)
+    bench.wait(lambda: shown(display).record.description == "changed")
+    server.move("arm", {"position": {"y": 5.0}, "orientation": {"w": 1.0}})
+    bench.wait.settled(bench.session)
+    hand.move(hand.at((3.5, 0, 0)))
+    assert place(display) == pytest.approx([2.0, 0.0, 0.0], abs=0.06)
+    # What the server has said counts at the end.
+    hand.release(hand.at((3.5, 0, 0)))
+    bench.wait(lambda: place(display) == [0.0, 5.0, 0.0])
+
+
+def test_a_drag_ends_when_its_marker_is_erased(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
+) -> None:
+    display = show(marker(control(MOVE_AXIS)))
+    hand.press(hand.at((1.5, 0, 0)))
+    hand.move(hand.at((2.5, 0, 0)))
+    server.follows = False
+    bench.wait(lambda: server.events(POSE_UPDATE))
+    server.erase("arm")
+    bench.wait(lambda: not display.markers)
+    hand.move(hand.at((3.5, 0, 0)))
+    hand.release(hand.at((3.5, 0, 0)))
+    bench.wait.settled(bench.session)
+    assert server.events(MOUSE_UP) == []
+    assert display.statusLevel == "ok"
+
+
+def test_a_held_marker_is_kept_alive_and_escape_ends_a_drag(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
+) -> None:
+    display = show(marker(control(MOVE_AXIS)))
+    hand.press(hand.at((1.5, 0, 0)))
+    bench.wait(lambda: len(server.events(KEEP_ALIVE)) > 1)
+    assert server.events(POSE_UPDATE) == []
+    hand.key(hand.keys.Key_Escape)
+    bench.wait(lambda: server.events(MOUSE_UP))
+    hand.move(hand.at((3.5, 0, 0)))
+    hand.release(hand.at((3.5, 0, 0)))
+    assert place(display) == [0.0, 0.0, 0.0]
+
+
+# -- buttons, menus, hovering ---------------------------------------------------------------------
+
+
+def test_a_button_is_clicked(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
+) -> None:
+    show(marker(control(BUTTON, "go", boxes=True, always_visible=True)))
+    middle = hand.at((0, 0, 0))
+    hand.click(middle)
+    bench.wait(lambda: server.events(MOUSE_UP))
+    kinds = [one.event_type for one in server.feedback]
+    assert kinds == [MOUSE_DOWN, BUTTON_CLICK, MOUSE_UP]
+    assert server.feedback[1].control_name == "go"
+    assert server.feedback[1].mouse_point.z == pytest.approx(0.5, abs=0.05)
+    # Released beside it, it was not meant.
+    hand.press(middle)
+    hand.release((5, 5))
+    bench.wait(lambda: len(server.events(MOUSE_UP)) == 2)
+    assert len(server.events(BUTTON_CLICK)) == 1
+
+
+MENU_ENTRIES = [
+    {"id": 1, "title": "Grasp <b>it</b>"},
+    {"id": 2, "title": "More"},
+    {"id": 3, "parent_id": 2, "title": "[x] Fast"},
+    {"id": 4, "parent_id": 2, "title": "[ ] Slow"},
+    {"id": 5, "title": "Run", "command": "rm -rf ~", "command_type": 1},
+]
+
+
+def open_menu(bench: SceneBench) -> Any:
+    """Return the menu that is open."""
+
+    def find() -> Any:
+        from PySide6.QtCore import QObject
+
+        found = bench.view.findChildren(QObject)
+        return next((o for o in found if o.property("entries") and o.property("opened")), None)
+
+    return bench.wait(find)
+
+
+@pytest.mark.parametrize(("mode", "button"), [(MENU, "LEFT"), (BUTTON, "RIGHT")])
+def test_an_entry_of_a_menu_is_chosen(
+    bench: SceneBench,
+    show: Callable[..., Any],
+    server: MarkerServer,
+    hand: Hand,
+    mode: int,
+    button: str,
+) -> None:
+    from PySide6.QtQuick import QQuickItem
+
+    show(marker(control(mode, "box", boxes=True), menu_entries=MENU_ENTRIES))
+    hand.click(hand.at((0, 0, 0)), getattr(hand, button))
+    menu = open_menu(bench)
+    assert menu.property("count") == 3
+    items = menu.property("contentItem").findChildren(QQuickItem)
+    first = next(one for one in items if one.property("number") == 1)
+    assert first.property("text") == "Grasp <b>it</b>"
+    at = first.mapToScene(first.boundingRect().center()).toPoint()
+    hand.click((at.x(), at.y()))
+    bench.wait(lambda: server.events(MENU_SELECT))
+    (chosen,) = server.events(MENU_SELECT)
+    assert (chosen.menu_entry_id, chosen.control_name) == (1, "box")
+    assert chosen.mouse_point_valid
+
+
+def test_an_own_menu_in_qml_and_programs_of_menus_are_not_run(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
+) -> None:
+    display = show(
+        marker(control(BUTTON, boxes=True), menu_entries=MENU_ENTRIES),
+        settings="""
+            property var asked: null
+            onMenuRequested: (entries, x, y) => {
+                asked = entries; selectMenuEntry(entries[1].children[1].id)
+            }""",
+    )
+    hand.click(hand.at((0, 0, 0)), hand.RIGHT)
+    bench.wait(lambda: server.events(MENU_SELECT))
+    assert server.events(MENU_SELECT)[0].menu_entry_id == 4
+    asked = display.property("asked")
+    assert [one["title"] for one in asked] == ["Grasp <b>it</b>", "More", "Run"]
+    assert [one["title"] for one in asked[1]["children"]] == ["\u2611 Fast", "\u2610 Slow"]
+    display.selectMenuEntry(5)
+    assert "asks to run 'rm -rf ~' on this computer, which is not done" in display.statusText
+    bench.wait.settled(bench.session)
+    assert len(server.events(MENU_SELECT)) == 1
+
+
+def test_what_is_under_the_mouse_is_lighter_and_the_status_bar_says_what_it_does(
+    bench: SceneBench, show: Callable[..., Any], hand: Hand
+) -> None:
+    show(marker(control(BUTTON, boxes=True), menu_entries=MENU_ENTRIES))
+    hand.move((5, 5))
+    assert has_colour(bench.picture(), 0, 0, 255, 10) > 500
+    hand.move(hand.at((0, 0, 0)))
+    assert has_colour(bench.picture(), 77, 77, 255, 10) > 500
+    assert bench.view.statusText == (
+        "<b>Left-Click:</b> Activate. <b>Right-Click:</b> Show context menu."
+    )
+    hand.press(hand.at((0, 0, 0)))
+    assert has_colour(bench.picture(), 128, 128, 255, 10) > 500
+    hand.release(hand.at((0, 0, 0)))
+    hand.move((5, 5))
+    assert has_colour(bench.picture(), 0, 0, 255, 10) > 500
+    assert "Activate" not in bench.view.statusText
+
+
+def test_a_menu_without_markers_is_a_text_that_is_clicked(
+    bench: SceneBench, show: Callable[..., Any], hand: Hand
+) -> None:
+    words = control(MENU, description="menu of the arm")
+    show(marker(words, menu_entries=MENU_ENTRIES), settings="showDescriptions: false")
+    # 1.2 times the scale above it, as the viewer sees it.
+    hand.click(hand.at((0, 2.4, 0)))
+    assert open_menu(bench).property("count") == 3
+
+
+# -- what is drawn --------------------------------------------------------------------------------
+
+
+def drawn(display: Any) -> list[Any]:
+    return [one for one, _, _ in display.root.drawables()]
+
+
+def test_settings(bench: SceneBench, show: Callable[..., Any], hand: Hand) -> None:
+    from rosglass.scene.drawing import Labels
+
+    display = show(marker(control(MOVE_AXIS), description="the arm"))
+    (labels,) = [one for one in drawn(display) if isinstance(one, Labels)]
+    assert labels.texts == ("the arm",)
+    assert not any(one.opaque for one in drawn(display))
+    display.showDescriptions = False
+    assert labels not in drawn(display)
+    display.enableTransparency = False
+    assert all(one.opaque for one in drawn(display))
+    count = len(drawn(display))
+    display.showAxes = True
+    assert len(drawn(display)) == count + 1
+    display.showVisualAids = True
+    hand.press(hand.at((1.5, 0, 0)))
+    assert len(drawn(display)) == count + 2
+    hand.release(hand.at((1.5, 0, 0)))
+    assert len(drawn(display)) == count + 1
+
+
+def test_other_tools_and_drags_hide_what_is_not_always_visible(
+    bench: SceneBench, show: Callable[..., Any], hand: Hand
+) -> None:
+    display = show(
+        marker(control(MOVE_AXIS), control(NONE, boxes=True, always_visible=True)),
+        marker(control(MOVE_AXIS), name="leg", pose={"position": {"y": 2.0}}),
+    )
+    assert len(drawn(display)) == 5
+    hand.press(hand.at((1.5, 0, 0)))
+    assert len(drawn(display)) == 3
+    hand.release(hand.at((1.5, 0, 0)))
+    assert len(drawn(display)) == 5
+    bench.view.tools.select("Select")
+    assert len(drawn(display)) == 1
+    bench.view.tools.select("Interact")
+    assert len(drawn(display)) == 5
+
+
+def test_controls_face_the_viewer_or_stay_fixed_or_turn_with_the_marker(
+    bench: SceneBench, show: Callable[..., Any]
+) -> None:
+    turned = {"orientation": {"z": 0.7071068, "w": 0.7071068}}
+    display = show(
+        marker(
+            control(MOVE_AXIS, "inherit"),
+            control(MOVE_AXIS, "fixed", orientation_mode=FIXED),
+            control(MOVE_PLANE, "facing", orientation_mode=VIEW_FACING),
+            control(
+                MOVE_PLANE,
+                "apart",
+                orientation_mode=VIEW_FACING,
+                independent_marker_orientation=True,
+                boxes=True,
+            ),
+            pose=turned,
+        ),
+        view="Orbit",
+    )
+    controls = shown(display).controls
+
+    def axis(name: str) -> list[float]:
+        return [round(float(number), 3) for number in controls[name].frame()[:3, 0]]
+
+    assert axis("inherit") == [0.0, 1.0, 0.0]
+    assert axis("fixed") == [1.0, 0.0, 0.0]
+    for _ in range(2):
+        ahead = -bench.view.camera().pose[:3, 2]
+        for name in ("facing", "apart"):
+            assert axis(name) == pytest.approx(ahead, abs=0.01)
+        group = controls["facing"]._shapes.root
+        assert group.pose[:3, 0] == pytest.approx(ahead, abs=0.01)
+        group = controls["apart"]._shapes.root
+        assert group.pose[:3, 0] == pytest.approx([0, 1, 0], abs=0.01)
+        bench.view.controller.set("Yaw", 2.0)
+        bench.view.camera_moved()
+
+
+def test_markers_of_a_frame_follow_it_and_stamped_ones_stay(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
+) -> None:
+    from rosglass import Time
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    broadcaster = TransformBroadcaster(bench.robot)
+
+    def move(x: float, sec: int) -> None:
+        stamp = Time.from_parts(sec, 0)
+        broadcaster.send_transform(Transform((x, 0, 0), (0, 0, 0, 1), stamp, "map", "tool"))
+
+    display = show(
+        marker(control(BUTTON, boxes=True), header={"frame_id": "tool"}),
+        marker(
+            control(MOVE_AXIS),
+            name="leg",
+            header={"frame_id": "tool", "stamp": {"sec": 1, "nanosec": 0}},
+            pose={"position": {"y": 2.0}},
+        ),
+    )
+    assert "Marker arm: no transform from [tool]" in display.statusText
+
+    def at(name: str) -> float:
+        found = shown(display, name).root
+        return round(float(found.pose[0, 3]), 2) if found.visible else -1.0
+
+    move(1.0, 1)
+    bench.wait(lambda: (at("arm"), at("leg")) == (1.0, 1.0))
+    assert display.statusLevel == "ok"
+    move(-2.0, 2)
+    bench.wait(lambda: (at("arm"), at("leg")) == (-2.0, 1.0))
+    bench.picture()
+    hand.click(hand.at((-2, 0, 0)))
+    bench.wait(lambda: server.events(BUTTON_CLICK))
+    (clicked,) = server.events(BUTTON_CLICK)
+    assert (clicked.header.frame_id, clicked.header.stamp.sec) == ("tool", 2)
+    assert clicked.mouse_point.x == pytest.approx(0.0, abs=0.05)
+    # The place of stamped ones is sent in the fixed frame.
+    server.follows = False
+    hand.drag(hand.at((2.5, 2, 0)), hand.at((3.5, 2, 0)))
+    bench.wait(lambda: server.events(POSE_UPDATE))
+    moved = server.events(POSE_UPDATE)[-1]
+    assert moved.header.frame_id == "map"
+    assert (moved.pose.position.x, moved.pose.position.y) == pytest.approx((2.0, 2.0), abs=0.06)
+
+
+# -- servers --------------------------------------------------------------------------------------
+
+
+def test_after_a_gap_all_markers_are_requested_again(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer
+) -> None:
+    display = show(marker(control(MOVE_AXIS)))
+    server.insert(marker(control(MOVE_AXIS), name="leg"))
+    bench.wait(lambda: display.markers == ["arm", "leg"])
+    requests = server.requests
+    del server.markers["leg"]
+    server.number += 1  # an update that is lost
+    server.insert(marker(control(MOVE_AXIS), name="hand"))
+    bench.wait(lambda: display.markers == ["arm", "hand"])
+    assert server.requests == requests + 1
+
+
+def test_a_server_that_is_gone_is_said_and_a_new_one_is_shown(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer
+) -> None:
+    display = show(marker(control(MOVE_AXIS)))
+    bench.wait(lambda: not display.stale)
+    server.close()
+    bench.wait(lambda: "the server is gone" in display.statusText)
+    assert display.stale
+    assert display.root.alpha < 1
+    other = MarkerServer(bench.robot)
+    other.markers["new"] = marker(control(MOVE_AXIS), name="new")
+    bench.wait(lambda: display.markers == ["new"], lambda: display.statusText)
+    bench.wait(lambda: not display.stale)
+    assert display.root.alpha == 1
+
+
+def test_without_a_server_the_status_says_so(bench: SceneBench) -> None:
+    view = bench.load('InteractiveMarkersDisplay { topic: "/nowhere/update" }')
+    (display,) = view.scene.displays
+    bench.wait(lambda: "no server in /nowhere" in display.statusText)
+    assert display.statusLevel == "warn"
+
+
+@pytest.mark.parametrize(
+    ("bad", "text"),
+    [
+        ({"scale": float("nan")}, "scale nan"),
+        ({"pose": {"orientation": {"w": float("inf")}}}, "is not finite"),
+        ({"controls": [control(77)]}, "control 'mode77': interaction_mode 77 is none"),
+        ({"controls": [control(3, orientation_mode=9)]}, "orientation_mode 9 is none"),
+        ({"controls": []}, "it has no controls"),
+        (
+            {"controls": [control(2, boxes=True)], "menu_entries": [{"id": 7, "parent_id": 7}]},
+            "menu entry 7: its parent 7 is not above it",
+        ),
+        ({"controls": [control(2, markers=[{**BOX, "type": 55}])]}, "type 55: expected 0 to 12"),
+    ],
+)
+def test_a_bad_marker_says_what_is_wrong_and_the_others_are_shown(
+    bench: SceneBench,
+    show: Callable[..., Any],
+    server: MarkerServer,
+    bad: dict[str, Any],
+    text: str,
+) -> None:
+    display = show(marker(control(MOVE_AXIS)))
+    server.insert({**marker(control(MOVE_AXIS), name="bad"), **bad})
+    bench.wait(lambda: "Marker bad: " in display.statusText)
+    assert text in display.statusText
+    assert display.statusLevel == "error"
+    assert "arm" in display.markers
+    server.insert(marker(control(MOVE_AXIS), name="bad"))
+    bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
+    assert display.markers == ["arm", "bad"]
+
+
+def test_both_rviz_write_the_namespace_differently(bench: SceneBench) -> None:
+    view = bench.load("InteractiveMarkersDisplay { }")
+    (display,) = view.scene.displays
+    assert display.load_settings({"Update Topic": "/arm/update", "Show Axes": True}) == []
+    assert (display.namespace, display.showAxes) == ("/arm", True)
+    assert display.save_settings()["Interactive Markers Namespace"] == "/arm"
+    assert display.save_settings(ros=1)["Update Topic"] == "/arm/update"
+    assert "Topic" not in display.save_settings()
+
+
+# -- ROS 1 ----------------------------------------------------------------------------------------
+
+
+class RospyServer:
+    """Debian's server, as a process."""
+
+    def __init__(self, master: RosMaster) -> None:
+        self.lines: list[str] = []
+        program = Path(__file__).with_name("rospy_interactive_markers.py")
+        # It must not outlive tests that are killed.
+        command = ["setpriv", "--pdeathsig", "KILL", "/usr/bin/python3", str(program)]
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(
+            command, env=master.env(), stdin=pipe, stdout=pipe, text=True, bufsize=1
+        )
+        assert self._process.stdout is not None
+        self._output = self._process.stdout
+        assert self._output.readline() == "ready\n"
+        import threading
+
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        self.lines.extend(self._output)
+
+    def send(self, line: str) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{line}\n")
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.wait()
+
+
+@pytest.fixture
+def ros1(
+    make_bench: Callable[[str], SceneBench], tmp_path: Path
+) -> Iterator[tuple[SceneBench, RospyServer, RosMaster]]:
+    if not Path("/usr/lib/python3/dist-packages/interactive_markers").exists():
+        pytest.skip("not installed: sudo apt-get install python3-interactive-markers")
+    with RosMaster(tmp_path / "ros") as master:
+        server = RospyServer(master)
+        bench = make_bench(master.url)
+        yield bench, server, master
+        bench.close()
+        server.kill()
+
+
+def test_a_server_of_ros_1(ros1: tuple[SceneBench, RospyServer, RosMaster]) -> None:
+    bench, server, master = ros1
+    view = bench.load(
+        'view: "TopDownOrtho"\nInteractiveMarkersDisplay { topic: "/arm_markers/update" }'
+    )
+    view.controller.set("Scale", 40.0)
+    view.camera_moved()
+    (display,) = view.scene.displays
+    hand = Hand(bench)
+    bench.wait(lambda: display.markers == ["arm"], lambda: display.statusText)
+    bench.picture()
+    # Dragged, the server's callback gets the pose, and its update moves the marker.
+    hand.press(hand.at((1.5, 0, 0)))
+    hand.move(hand.at((2.5, 0, 0)))
+    bench.wait(
+        lambda: any(
+            line.startswith(("feedback arm 1 1.0", "feedback arm 1 0.9")) for line in server.lines
+        ),
+        lambda: (server.lines, display.statusText),
+    )
+    hand.release(hand.at((2.5, 0, 0)))
+    bench.wait(lambda: any(line.startswith("feedback arm 5") for line in server.lines))
+    server.send("insert leg 2")
+    bench.wait(lambda: display.markers == ["arm", "leg"])
+    # The server keeps what was dragged.
+    assert place(display)[0] == pytest.approx(1.0, abs=0.06)
+    server.send("skip -")
+    server.send("insert hand 3")
+    bench.wait(lambda: display.markers == ["arm", "hand", "leg"], lambda: display.statusText)
+    assert place(display)[0] == pytest.approx(1.0, abs=0.06)
+    server.send("erase leg")
+    bench.wait(lambda: display.markers == ["arm", "hand"])
+    bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
+    assert "Server /marker_server: 2 markers" in display.statusText
+    # Killed, it cannot say goodbye: its keep-alives are missed.
+    server.kill()
+    bench.wait(lambda: "no sign of life" in display.statusText, lambda: display.statusText)
+    assert display.stale
+    other = RospyServer(master)
+    bench.wait(lambda: display.markers == ["arm"], lambda: display.statusText)
+    bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
+    assert place(display) == [0.0, 0.0, 0.0]
+    other.kill()
