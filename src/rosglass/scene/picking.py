@@ -142,7 +142,8 @@ def _project(
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         clip = points @ whole[(0, 1, 3), :3].T + whole[(0, 1, 3), 3]
         seen = clip[:, :2] / clip[:, 2:]
-        seen = (seen * (0.5, -0.5) + 0.5) * (width, height)
+        half = np.array((width / 2, -height / 2), np.float32)
+        seen = seen * half + np.abs(half)
         far = -(points @ to_eye[2, :3].astype(np.float32) + np.float32(to_eye[2, 3]))
     return seen, far
 
@@ -156,14 +157,26 @@ def _pick_points(
     points: Points, pose: NDArray[np.float64], camera: Camera, x: float, y: float, radius: float
 ) -> tuple[int, NDArray[np.float64]] | None:
     xyz = points.xyz()
-    seen, far = _project(xyz, pose, camera)
-    with np.errstate(invalid="ignore"):
-        reach = radius + (
-            points.size / 2
-            if points.style == "points"
-            else points.sizes(xyz) / 2 * _units_per_metre(camera, far)
-        )
-        near = (far > 0) & (np.abs(seen[:, 0] - x) <= reach) & (np.abs(seen[:, 1] - y) <= reach)
+    to_eye = camera.view @ pose
+    clip = camera.projection @ to_eye
+    width, height = camera.size
+    # Pixels from the place in x and y, both times w; w; and metres ahead of the camera.
+    rows = np.stack(
+        [
+            (clip[0] - (2 * x / width - 1) * clip[3]) * width / 2,
+            (clip[1] - (1 - 2 * y / height) * clip[3]) * height / 2,
+            clip[3],
+            -to_eye[2],
+        ]
+    ).astype(np.float32)
+    with np.errstate(invalid="ignore", over="ignore"):
+        right, down, w, far = rows[:, :3] @ np.ascontiguousarray(xyz).T + rows[:, 3:]
+        if points.style == "points":
+            reach = (radius + points.size / 2) * w
+        else:
+            metres = points.sizes(xyz) / 2
+            reach = radius * w + metres * (camera.projection[1, 1] * height / 2)
+        near = (far > 0) & (np.abs(right) <= reach) & (np.abs(down) <= reach)
     indices = np.flatnonzero(near)
     if not len(indices):
         return None
