@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -253,3 +254,53 @@ def test_python_keeps_the_items_around_a_view_that_is_destroyed(bench: SceneBenc
     assert is_alive(view)
     assert is_alive(bench.window)
     bench.picture()
+
+
+def test_frames_fade_one_by_one_and_all_when_transforms_stop(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.scene.drawing import Mesh
+    from rosglass.tf import StaticTransformBroadcaster, Transform, TransformBroadcaster
+
+    view = bench.load("TFDisplay { frameTimeout: 1; showArrows: false }")
+    (frames,) = view.scene.displays
+    StaticTransformBroadcaster(bench.robot).send_transform(
+        Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "mast")
+    )
+    TransformBroadcaster(bench.robot).send_transform(
+        Transform((2, 0, 0), (0, 0, 0, 1), Time(1), "map", "arm")
+    )
+
+    def opacities() -> dict[str, float]:
+        meshes = [one for one, _, _ in frames.root.drawables() if isinstance(one, Mesh)]
+        alphas = meshes[0].instances["rgba"][::3, 3].tolist() if meshes else []
+        return dict(zip(frames.frames, alphas, strict=True))
+
+    bench.wait(lambda: opacities() == {"arm": 1.0, "map": 1.0, "mast": 1.0})
+    bench.wait(lambda: opacities().get("arm", 1.0) < 1.0)
+    assert opacities()["mast"] == 1.0
+    bench.wait(lambda: frames.frames == ["map", "mast"])
+    # Nothing moves any more: nothing is drawn.
+    bench.picture()
+    before = bench.drawn()
+    bench.wait.nothing_happens(1.2)
+    assert bench.drawn() == before
+
+
+def test_a_silent_link_above_the_fixed_frame_is_of_no_account(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    view = bench.load()
+    view.fixedFrame = "odom"
+    broadcaster = TransformBroadcaster(bench.robot)
+    still = (0, 0, 0), (0, 0, 0, 1)
+    broadcaster.send_transform(Transform(*still, Time.from_parts(1, 0), "map", "odom"))
+    sent = itertools.count(1)
+
+    def move() -> None:
+        stamp = Time.from_parts(2, next(sent))
+        broadcaster.send_transform(Transform(*still, stamp, "odom", "base"))
+
+    move()
+    bench.wait(lambda: move() or view.scene.silence("map") > 1.5)
+    assert view.scene.silence("base") < 1.0

@@ -176,3 +176,26 @@ def test_the_command_shows_overlays(app: Any, tmp_path: Path) -> None:
     done = view_command("--overlay", str(tmp_path / "Nothing.qml"))
     assert done.returncode == 1
     assert "Nothing.qml" in done.stderr
+
+
+def test_what_would_be_lost_is_asked_for(bench: SceneBench, tmp_path: Path) -> None:
+    from rosglass.scene.program import ViewProgram
+
+    view = bench.load()
+    program = ViewProgram()
+    program.begin(view)
+    assert program.mayClose()
+    view.scene.displays[0].cellSize = 2.0
+    assert not program.mayClose()
+    bench.wait(lambda: program.modified)
+    program.save(str(tmp_path / "new.rviz"))
+    assert program.mayClose()
+    assert program.configName == "new.rviz"
+    view.controller.set("Yaw", 0.1)
+    assert program.mayClose(), "where the camera stands is no change"
+    view.scene.add("Axes")
+    assert not program.mayClose()
+    program.open(str(tmp_path / "new.rviz"))
+    assert [one.name for one in view.scene.displays] == ["Grid", "TF"]
+    program.open(str(tmp_path / "none.rviz"))
+    assert "there is no such file" in program.message

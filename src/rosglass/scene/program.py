@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+import pickle
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,6 +31,8 @@ _log = logging.getLogger("rosglass.scene")
 WINDOW = Path(__file__).with_name("panels") / "View.qml"
 #: Milliseconds between two looks at clock, frame rate and changes.
 _REFRESH_MS = 500
+#: Seconds between two looks at whether the view has changed.
+_LOOK_S = 2.0
 #: Seconds for which a message stays in the status bar.
 _MESSAGE_S = 10.0
 
@@ -100,9 +103,9 @@ class ViewProgram(QtCore.QObject):
         self._overlay_options: dict[str, Any] = {"watch": watch, "import_paths": import_paths}
         self._access: SceneAccess | None = None
         self._view: SceneView | None = None
-        self._saved = ""
+        self._saved = b""
         self._discarded = False
-        self._said_at = 0.0
+        self._said_at = self._next_look = 0.0
         self._counted, self._counted_at = 0, time.monotonic()
         report(self, kiosk=kiosk)
         self._timer = QtCore.QTimer(self)
@@ -179,21 +182,18 @@ class ViewProgram(QtCore.QObject):
         report(self, message=text)
 
     def _remember(self) -> None:
-        self._saved = self._text()
+        self._saved = self._state()
+        report(self, modified=False)
 
-    def _text(self) -> str:
-        """Return the config as it would be saved, for a look at whether it has changed."""
+    def _state(self) -> bytes:
+        """Return what would be saved, for a look at whether it has changed."""
         if self._view is None:
-            return ""
+            return b""
         config = self._view.collect_config()
-        views = config.manager.get("Views", {})
+        manager = dict(config.manager)
         # Where the camera stands is no change worth a question.
-        current = views.pop("Current", None)
-        try:
-            return config.dump()
-        finally:
-            if current is not None:
-                views["Current"] = current
+        manager["Views"] = {**manager.get("Views", {}), "Current": None}
+        return pickle.dumps(manager)
 
     @Slot(QtCore.QUrl)
     @Slot(str)
@@ -229,7 +229,7 @@ class ViewProgram(QtCore.QObject):
     @Slot(result=bool)
     def mayClose(self) -> bool:
         """Return whether nothing would be lost."""
-        return self._discarded or not self._path or self._text() == self._saved
+        return self._discarded or self.kiosk or self._state() == self._saved
 
     @Slot()
     def discard(self) -> None:
@@ -242,6 +242,9 @@ class ViewProgram(QtCore.QObject):
             self._timer.stop()
             return
         now = time.monotonic()
+        if now >= self._next_look:
+            self._next_look = now + _LOOK_S
+            report(self, modified=self._state() != self._saved)
         if self.message and now - self._said_at > _MESSAGE_S:
             report(self, message="")
         drawn = view.pictures_drawn()
@@ -252,7 +255,6 @@ class ViewProgram(QtCore.QObject):
         report(
             self,
             frameRate=rate,
-            modified=bool(self._path) and self._text() != self._saved,
             connected=session.state == "connected",
             connection=f"{session.state}: {session.detail}" if session.detail else session.state,
             time=f"ROS {ros_time:.2f}   wall {time.strftime('%H:%M:%S')}",

@@ -81,6 +81,8 @@ _ORIGIN_STEP_M = 1000.0
 MOVING_POINTS = 60_000
 _MODES = {"flat": 0.0, "bgra": 1.0, "rainbow": 2.0, "gradient": 3.0, "axis": 4.0}
 _INDEX_UINT32 = QRhiCommandBuffer.IndexFormat.IndexUInt32
+#: Bytes from one vertex to the next that every graphics interface takes.
+_MAX_STRIDE = 2048
 #: Pixels of a line of text in the image of labels.
 _LINE_PX = 32
 #: Pixels from the top of a line to its baseline: letters are as high up as RViz's.
@@ -185,8 +187,9 @@ class _Device:
         """Upload an array, into the same buffer if it is large enough and not much too large."""
         size = max(array.nbytes, 16)
         if buffer is None or not size <= buffer.size() <= 4 * size:
-            self.free(buffer)
-            buffer = self.keep(self.rhi.newBuffer(QRhiBuffer.Type.Static, usage, size))
+            # The old one is freed last: the graphics interface may refuse a new one.
+            old, buffer = buffer, self.keep(self.rhi.newBuffer(QRhiBuffer.Type.Static, usage, size))
+            self.free(old)
         assert buffer is not None
         if array.nbytes:
             batch.uploadStaticBuffer(buffer, 0, array.nbytes, _pointer(array))
@@ -203,8 +206,9 @@ class _Device:
         kind = QRhiTexture.Format.R8 if pixels.ndim == 2 else QRhiTexture.Format.RGBA8
         size = QSize(width, height)
         if old is None or old.pixelSize() != size or old.format() != kind:
+            made = self.keep(self.rhi.newTexture(kind, size))
             self.free(old)
-            old = self.keep(self.rhi.newTexture(kind, size))
+            old = made
         assert old is not None
         part = QRhiTextureSubresourceUploadDescription(QByteArray(pixels.tobytes()))
         part.setDataStride(pixels.strides[0])
@@ -372,6 +376,11 @@ class _OnDevice:
         """Draw it."""
         raise NotImplementedError
 
+    def bind(self, *images: tuple[QRhiTexture, QRhiSampler]) -> None:
+        """Let the shaders read other images."""
+        old, self.bound = self.bound, self.device.bindings(self.block, *images)
+        self.device.free(old)
+
     def begin(self, run: _Pass, pipeline: Any) -> None:
         """Set pipeline, viewport (on Vulkan only after the pipeline) and bindings."""
         run.commands.setGraphicsPipeline(pipeline)
@@ -412,8 +421,9 @@ class _PointsOnDevice(_OnDevice):
         vertex = "points" if native else "boxes" if points.style == "boxes" else "quads"
         fragment = points.style if points.style in ("spheres", "boxes") else "flat"
         channel = points.channel if points.channel >= 0 else points.position
+        thin = max(min(run.thin, _MAX_STRIDE // points.stride), 1)
         layout = (
-            ((points.stride * run.thin, not native),),
+            ((points.stride * thin, not native),),
             (
                 (0, 0, _Format.Float3, points.position),
                 (0, 1, _Format.UNormByte4 if points.channel_is_bytes else _Format.Float, channel),
@@ -427,7 +437,7 @@ class _PointsOnDevice(_OnDevice):
         )
         self.begin(run, pipeline)
         run.commands.setVertexInput(0, [(self._buffer, 0)])
-        count = -(-points.count // run.thin)
+        count = -(-points.count // thin)
         if native:
             run.commands.draw(count)
         else:
@@ -487,15 +497,14 @@ class _MeshOnDevice(_OnDevice):
     ) -> None:
         mesh = self.drawable
         if self._textures != mesh.textures:
-            self._textures = mesh.textures
-            self.device.free(self.bound)
             if mesh.texture is None:
-                self.device.free(self._texture)
-                self._texture = None
+                old, self._texture = self._texture, None
+                self.device.free(old)
             else:
                 self._texture = self.device.texture(batch, mesh.texture, self._texture)
             image = self._texture or self.device.white_texture(batch)
-            self.bound = self.device.bindings(self.block, (image, self.device.smooth))
+            self.bind((image, self.device.smooth))
+            self._textures = mesh.textures
         super().prepare(batch, place, alpha)
 
     def upload(self, batch: QRhiResourceUpdateBatch) -> None:
@@ -566,10 +575,7 @@ class _MapOnDevice(_OnDevice):
         self._sent = drawable.cells, drawable.palette
         assert self._cells is not None
         assert self._palette is not None
-        device.free(self.bound)
-        self.bound = device.bindings(
-            self.block, (self._cells, device.sharp), (self._palette, device.sharp)
-        )
+        self.bind((self._cells, device.sharp), (self._palette, device.sharp))
 
     def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
         block[0] = (1, 1, 1, self.drawable.alpha * alpha)
@@ -617,8 +623,7 @@ class _LabelsOnDevice(_OnDevice):
                 labels.texts, min(self.device.largest_texture, 4096)
             )
             self._texture = self.device.texture(batch, pixels, self._texture)
-            self.device.free(self.bound)
-            self.bound = self.device.bindings(self.block, (self._texture, self.device.smooth))
+            self.bind((self._texture, self.device.smooth))
         rows = np.zeros(labels.count, self.ROW)
         rows["position"] = np.nan_to_num(labels.positions, nan=0.0, posinf=0.0, neginf=0.0)
         # One that has no place is not shown.
@@ -687,6 +692,9 @@ def _paint_texts(
     painter.end()
     view = np.frombuffer(image.constBits(), np.uint8).reshape(height, image.bytesPerLine())
     sizes = np.array(boxes, np.float32).reshape(-1, 2)
+    # What does not fit into the image is not shown.
+    bottom = np.array(places, np.float32).reshape(-1, 2)[:, 1] + sizes[:, 1]
+    sizes[bottom > height] = 0
     shares: NDArray[np.float32] = np.concatenate(
         [np.array(places, np.float32).reshape(-1, 2), sizes], axis=1
     )
@@ -774,7 +782,11 @@ class SceneRenderer(QQuickRhiItemRenderer):
             viewport = QRhiViewport(0, 0, size.width(), size.height())
             run = _Pass(commands, viewport, self._thinning(device, frame))
             for on_device, blend in ready:
-                on_device.draw(run, blend)
+                try:
+                    on_device.draw(run, blend)
+                except Exception as error:  # noqa: PERF203 - the others are drawn all the same
+                    _log.exception("the 3D view")
+                    problem = f"{type(on_device.drawable).__name__} cannot be drawn: {error}"
         except Exception as error:
             _log.exception("the 3D view")
             problem = f"the 3D view cannot draw: {error}"

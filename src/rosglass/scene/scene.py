@@ -264,7 +264,9 @@ class Scene(Element):
             links = tree.chain(self._fixed_frame, frame)
         except TransformException:
             return 0.0
-        return max((tree[one].silence for one in links if not tree[one].static), default=0.0)
+        # The topmost frame's own link to its parent is not part of the way.
+        moving = (tree[one] for one in links if tree[one].parent in links)
+        return max((link.silence for link in moving if not link.static), default=0.0)
 
     @Slot()
     def _on_tick(self) -> None:

@@ -30,6 +30,7 @@ from rosglass.scene.scene import Scene
 from rosglass.scene.selection import Selection
 from rosglass.scene.tools import PointerEvent, Tool, Tools
 from rosglass.scene.views import VIEWS, create_view
+from rosglass.tf.topics import is_ros1
 
 if TYPE_CHECKING:
     import os
@@ -373,12 +374,14 @@ class SceneView(QQuickRhiItem):
         self.configLoaded.emit(config.source)
         return notes
 
-    def collect_config(self, ros: int = 2) -> RvizConfig:
+    def collect_config(self, ros: int | None = None) -> RvizConfig:
         """Return the config of what is shown, with what its file had beside that.
 
         Args:
-            ros: The RViz that a new config is for, 1 or 2.
+            ros: The RViz that a new config is for, 1 or 2; by default that of the robot.
         """
+        if ros is None:
+            ros = 1 if self.scene.node is not None and is_ros1(self.scene.node) else 2
         config = self.config or RvizConfig(ros)
         config.fixed_frame = self.scene.fixed_frame
         config.background_color = cast("tuple[float, ...]", self._background.getRgbF())

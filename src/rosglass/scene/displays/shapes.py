@@ -72,7 +72,7 @@ class AxesShapes(Group):
         self.add(self._mesh)
 
     def set_axes(
-        self, poses: Any, length: ArrayLike, radius: ArrayLike, alpha: float = 1.0
+        self, poses: Any, length: ArrayLike, radius: ArrayLike, alpha: ArrayLike = 1.0
     ) -> None:
         """Draw axes.
 
@@ -80,13 +80,14 @@ class AxesShapes(Group):
             poses: (n, 4, 4).
             length: Metres, for each or all.
             radius: Metres, for each or all; across an axis, as RViz takes what it calls radius.
-            alpha: Opacity.
+            alpha: Opacity, for each or all.
         """
         at = stack_poses(poses)
         length = np.broadcast_to(np.asarray(length, np.float64), len(at))
         local = _along(length, radius, length / 2, len(at))
         matrices = at[:, np.newaxis] @ (_ALONG @ local[:, np.newaxis])
-        colours = np.tile(_COLOURS * [1, 1, 1, alpha], (len(at), 1))
+        colours = np.tile(_COLOURS, (len(at), 1))
+        colours[:, 3] = np.repeat(np.broadcast_to(np.asarray(alpha), len(at)), 3)
         self._mesh.set_instances(matrices.reshape(-1, 4, 4), colours if len(at) else (1, 1, 1, 1))
 
 

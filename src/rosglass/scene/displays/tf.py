@@ -12,7 +12,7 @@ import numpy as np
 from rosglass.errors import TransformException
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot
-from rosglass.scene.display import Display
+from rosglass.scene.display import OUTDATED_ALPHA, Display
 from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, stack_poses
 from rosglass.scene.drawing import Labels
 from rosglass.scene.settings import Setting
@@ -31,6 +31,8 @@ _MAX_FRAMES = 2000
 _AXIS_M, _AXIS_RADIUS_M, _NAME_M = 0.2, 0.02, 0.1
 _SHAFT_M, _HEAD_M, _HEAD_WIDTH_M = 0.01, 0.1, 0.04
 _SHAFT_COLOUR, _HEAD_COLOUR = (0.8, 0.8, 0.3, 1.0), (1.0, 0.1, 0.6, 1.0)
+#: Seconds between two looks at frames that are not updated any more.
+_LOOK_S = 0.5
 #: The share of its timeout after which a frame begins to fade.
 _FADE_AFTER = 1 / 3
 
@@ -85,8 +87,11 @@ class TFDisplay(Display):
         #: Whether frames are shown, of those that were switched.
         self._switched: dict[str, bool] = {}
         self._next = 0.0
-        #: Whether a frame fades.
-        self._silent = False
+        #: Whether a frame is not static, and when they are looked at without a transform.
+        self._moves = False
+        self._next_look = 0.0
+        #: What is drawn, to draw nothing anew while nothing changes.
+        self._drawn: Any = None
         super().__init__(parent, runtime)
         self.root.add(self._axes, self._arrows, self._names)
 
@@ -144,7 +149,9 @@ class TFDisplay(Display):
     def _on_tick(self) -> None:
         # Frames that are not updated any more fade without a transform.
         super()._on_tick()
-        if self.enabled and self._silent:
+        now = time.monotonic()
+        if self.enabled and self._moves and now >= self._next_look:
+            self._next_look = now + _LOOK_S
             self._draw()
 
     def _is_chosen(self, name: str) -> bool:
@@ -179,7 +186,7 @@ class TFDisplay(Display):
                 continue
             self.delete_status(name)
             shown.append(_Frame(name, pose, self._share(info), info.parent))
-        self._silent = any(frame.share < 1 for frame in shown)
+        self._moves = any(not tree[frame.name].static for frame in shown)
         shown = [frame for frame in shown if frame.share > 0]
         for line in list(self.status_lines):
             if line not in tree and line in self.frames:
@@ -191,6 +198,8 @@ class TFDisplay(Display):
 
     def _share(self, info: FrameInfo) -> float:
         """Return the opacity of a frame by its age: 1 while it is updated, 0 after the timeout."""
+        if self._session is not None and self._session.state != "connected":
+            return OUTDATED_ALPHA
         if info.static or not info.parent:
             return 1.0
         left = (self.frameTimeout - info.silence) / (self.frameTimeout * (1 - _FADE_AFTER))
@@ -199,35 +208,48 @@ class TFDisplay(Display):
     def _fill(self, frames: list[_Frame]) -> None:
         names = [frame.name for frame in frames]
         poses = stack_poses([frame.pose for frame in frames])
-        shares = np.array([frame.share for frame in frames])
+        shares = np.round([frame.share for frame in frames], 2)
         scale, alpha = self.markerScale, self.markerAlpha
+        looks = (scale, alpha, self.showNames, self.showAxes, self.showArrows)
+        parents = [frame.parent for frame in frames]
+        drawn = (names, parents, poses.tobytes(), shares.tobytes(), looks)
+        if drawn == self._drawn:
+            return
+        self._drawn = drawn
         self._axes.visible = self.showAxes
         self._arrows.visible = self.showArrows
         self._names.visible = self.showNames
-        low = float(shares.min()) if len(shares) else 1.0
-        self._axes.set_axes(poses, _AXIS_M * scale, _AXIS_RADIUS_M * scale, alpha * low)
+        self._axes.set_axes(poses, _AXIS_M * scale, _AXIS_RADIUS_M * scale, alpha * shares)
         at = poses[:, :3, 3] if len(poses) else np.zeros((0, 3))
         tint = np.ones((len(names), 4), np.float32)
         tint[:, 3] = shares * alpha
         self._names.set_texts(names, at, _NAME_M * scale, tint if names else (1, 1, 1, 1))
         where = {name: index for index, name in enumerate(names)}
         pairs = [(where[f.name], where[f.parent]) for f in frames if f.parent in where]
-        arrows, lengths = [], []
+        arrows, lengths, opacities = [], [], []
         for child, parent in pairs:
             way = at[parent] - at[child]
             length = float(np.linalg.norm(way))
             if length > 1e-4:
                 arrows.append(_pointing(at[child], way / length))
                 lengths.append(length)
+                opacities.append(alpha * shares[child])
         far = np.array(lengths)
         head = np.minimum(_HEAD_M * scale, far)
         self._arrows.set_arrows(
             np.array(arrows).reshape(-1, 4, 4),
             (far - head, _SHAFT_M * scale),
             (head, _HEAD_WIDTH_M * scale),
-            (*_SHAFT_COLOUR[:3], alpha * low),
-            (*_HEAD_COLOUR[:3], alpha * low),
+            _with_alpha(_SHAFT_COLOUR, opacities),
+            _with_alpha(_HEAD_COLOUR, opacities),
         )
+
+
+def _with_alpha(colour: tuple[float, ...], opacities: list[float]) -> NDArray[np.float64]:
+    """Return a colour with each opacity, (n, 4)."""
+    out = np.tile(np.array(colour), (max(len(opacities), 1), 1))
+    out[: len(opacities), 3] = opacities
+    return out
 
 
 def _pointing(origin: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:

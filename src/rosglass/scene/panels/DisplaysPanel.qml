@@ -9,7 +9,9 @@ Pane {
 
     // The SceneView that is shown and changed.
     property alias view: rows.view
-    property int current: -1
+    // The row that is selected; it follows rows that come and go above it.
+    property alias current: list.currentIndex
+    readonly property bool ofDisplay: current >= 0 && list.currentItem !== null && list.currentItem.ofDisplay
     // What the user has entered and does not fit.
     property string problem: ""
 
@@ -32,6 +34,7 @@ Pane {
             Layout.fillHeight: true
             clip: true
             model: rows
+            currentIndex: -1
             boundsBehavior: Flickable.StopAtBounds
             ScrollBar.vertical: ScrollBar { }
 
@@ -63,7 +66,8 @@ Pane {
                     onDoubleClicked: if (row.expandable) rows.toggle(row.index)
                     ToolTip.visible: containsMouse && row.description !== ""
                     ToolTip.delay: 800
-                    ToolTip.text: row.description
+                    // No rich text: names come from the robot.
+                    ToolTip.text: row.description.replace(/</g, "\u2039")
                 }
                 RowLayout {
                     anchors { fill: parent; leftMargin: 4 + 14 * row.depth; rightMargin: 10 }
@@ -147,8 +151,8 @@ Pane {
         RowLayout {
             Layout.margins: 4
             Button { objectName: "addDisplay"; text: "Add"; onClicked: adding.open() }
-            Button { text: "Remove"; enabled: panel.current > 0; onClicked: { rows.remove(panel.current); panel.current = -1 } }
-            Button { text: "Rename"; enabled: panel.current > 0; onClicked: renaming.open() }
+            Button { text: "Remove"; enabled: panel.ofDisplay; onClicked: rows.remove(panel.current) }
+            Button { text: "Rename"; enabled: panel.ofDisplay; onClicked: renaming.open() }
             Item { Layout.fillWidth: true }
         }
     }

@@ -17,7 +17,12 @@ ApplicationWindow {
     title: (program.configName || "new view") + (program.modified ? " *" : "") + " - rosglass view"
 
     Component.onCompleted: program.begin(scene)
-    onClosing: close => { if (!program.mayClose()) { close.accepted = false; closing.open() } }
+    onClosing: close => {
+        if (!program.mayClose()) {
+            close.accepted = false
+            unsaved.ask(() => { program.discard(); window.close() })
+        }
+    }
 
     onPanelsChanged: program.setBare(!panels)
     Connections {
@@ -26,10 +31,16 @@ ApplicationWindow {
     }
 
     Shortcut { sequences: [StandardKey.Save]; onActivated: window.save() }
-    Shortcut { sequences: [StandardKey.Open]; onActivated: opening.open() }
+    Shortcut { sequences: [StandardKey.Open]; onActivated: window.openOther() }
     Shortcut { sequence: "F10"; onActivated: window.panels = !window.panels }
     Shortcut { sequence: "F11"; onActivated: window.visibility = window.visibility === Window.FullScreen ? Window.Windowed : Window.FullScreen }
 
+    function openOther() {
+        if (program.mayClose())
+            opening.open()
+        else
+            unsaved.ask(() => opening.open())
+    }
     function save() {
         if (program.configName)
             program.save("")
@@ -41,7 +52,7 @@ ApplicationWindow {
         visible: window.panels
         RowLayout {
             anchors.fill: parent
-            ToolButton { text: "Open"; onClicked: opening.open() }
+            ToolButton { text: "Open"; onClicked: window.openOther() }
             ToolButton { text: "Save"; onClicked: window.save() }
             ToolButton { text: "Save as"; onClicked: saving.open() }
             ToolSeparator { }
@@ -145,13 +156,23 @@ ApplicationWindow {
         onAccepted: program.save(selectedFile)
     }
     MessageDialog {
-        id: closing
+        id: unsaved
+        property var then: null
+        function ask(job) { then = job; open() }
         title: "rosglass view"
         text: "The view has changed. Save it?"
         buttons: MessageDialog.Save | MessageDialog.Discard | MessageDialog.Cancel
         onButtonClicked: (button, role) => {
-            if (button === MessageDialog.Save) window.save()
-            else if (button === MessageDialog.Discard) { program.discard(); window.close() }
+            if (button === MessageDialog.Save) {
+                if (program.configName) {
+                    program.save("")
+                    if (program.mayClose()) then()
+                } else {
+                    saving.open()
+                }
+            } else if (button === MessageDialog.Discard) {
+                then()
+            }
         }
     }
 }
