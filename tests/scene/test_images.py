@@ -117,6 +117,35 @@ def test_without_a_panel_nothing_is_received(bench: SceneBench, load: Callable[.
     assert robot.images.subscription_count() == 0
 
 
+@pytest.mark.parametrize("kind", [IMAGE, CAMERA])
+def test_a_panel_that_is_destroyed_ends_the_stream(
+    bench: SceneBench, load: Callable[..., Any], kind: str
+) -> None:
+    display, robot = load(
+        f"{kind} Loader {{ active: parent.fixedFrame === 'map'; sourceComponent: {PANEL} }}"
+    )
+    robot.show(display)
+    bench.view.fixedFrame = "odom"
+    bench.wait(lambda: display._endpoint is None)
+    assert "declare ImagePanel" in display.statusText
+    assert display._picture is None
+    bench.wait(lambda: robot.images.subscription_count() == 0)
+    bench.view.fixedFrame = "map"
+    robot.show(display)
+    bench.wait(lambda: pixel(bench, 200, 290) == (0, 255, 255))
+
+
+def test_a_display_that_is_removed_leaves_no_panel(
+    bench: SceneBench, load: Callable[..., Any]
+) -> None:
+    display, robot = load(CAMERA + "id: main; ImagePanels { anchors.fill: parent; view: main }")
+    robot.show(display)
+    bench.wait(lambda: pixel(bench, 100, 280) == (0, 255, 255))
+    bench.view.scene.remove(display)
+    bench.wait(lambda: pixel(bench, 100, 280) == (48, 48, 48))
+    bench.wait(lambda: robot.images.subscription_count() == 0)
+
+
 def test_a_picture_that_is_not_live_fades(bench: SceneBench, load: Callable[..., Any]) -> None:
     display, robot = load(IMAGE + PANEL)
     robot.show(display)

@@ -656,6 +656,8 @@ class PictureItem(ImageItem):
     def __init__(self, parent: Any = None) -> None:
         super().__init__(parent)
         self._display: PictureDisplay | None = None
+        state = self.__dict__
+        self.destroyed.connect(lambda: state.update(_display=None))
 
     def _get_display(self) -> QtCore.QObject | None:
         return self._display
