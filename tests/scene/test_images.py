@@ -362,24 +362,29 @@ def test_without_a_transform_the_picture_waits_and_is_then_shown_alone(
 
 def test_settings_of_rviz_files(bench: SceneBench, load: Callable[..., Any]) -> None:
     display, _ = load("GridDisplay {}" + CAMERA)
-    refused = display.load_settings(
-        {
-            "Class": "rviz/Camera",
-            "Image Topic": "/rear/image",
-            "Transport Hint": "compressed",
-            "Queue Size": 7,
-            "Image Rendering": "overlay",
-            "Zoom Factor": 2,
-            "Visibility": {"Grid": False, "Robot": {"Value": True, "TF": False}, "Value": True},
-        }
-    )
-    assert refused == []
+    assert "Panel Geometry" not in display.save_settings({}, 2)
+    place = {"X": 30, "Y": 125, "Width": 180, "Height": 135}
+    saved = {
+        "Class": "rviz/Camera",
+        "Image Topic": "/rear/image",
+        "Transport Hint": "compressed",
+        "Queue Size": 7,
+        "Image Rendering": "overlay",
+        "Zoom Factor": 2,
+        "Visibility": {"Grid": False, "Robot": {"Value": True, "TF": False}, "Value": True},
+        "Panel Geometry": place,
+    }
+    assert display.load_settings(saved) == []
     assert (display.topic, display.transport, display.depth) == ("/rear/image", "compressed", 7)
     assert (display.imageRendering, display.zoomFactor) == ("overlay", 2)
     assert display.hiddenDisplays == ["Grid", "TF"]
+    assert display.panelGeometry.getRect() == (30, 125, 180, 135)
     kept = display.save_settings({"Class": "rviz/Camera"}, 1)
     assert (kept["Image Topic"], kept["Queue Size"]) == ("/rear/image", 7)
     assert kept["Visibility"] == {"Value": True, "Grid": False}
+    assert kept["Panel Geometry"] == place
+    (refused,) = display.load_settings({"Panel Geometry": {**place, "Width": "wide"}})
+    assert "Panel Geometry/Width: expected a" in refused
 
 
 @pytest.mark.parametrize("ros", [1, 2])

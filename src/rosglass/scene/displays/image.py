@@ -27,6 +27,7 @@ from rosglass.qml.properties import ReadOnly, Writable, report
 from rosglass.qt import Property, QtCore, QtGui, Signal, Slot, is_alive
 from rosglass.scene.camera import PinholeCamera
 from rosglass.scene.display import Intake, OneTopicDisplay, Subscriptions
+from rosglass.scene.rviz_formats import read_number
 from rosglass.scene.scene_view import SceneView
 from rosglass.scene.settings import Setting
 
@@ -64,6 +65,8 @@ _MOST_ZOOM = 8.0
 _MIN_FOCAL_PIXELS, _MAX_PIXELS = 0.001, 1e9
 #: From a camera (x right, y down, looking along z) to OpenGL's (y up, looking along -z).
 _OPTICAL = np.diag([1.0, -1.0, -1.0, 1.0])
+#: The place of a panel in a view, in config files; RViz does not read it.
+_PANEL, _SIDES = "Panel Geometry", ("X", "Y", "Width", "Height")
 _NO_PANEL = "no panel shows it: declare ImagePanel { display: ... }"
 
 
@@ -122,6 +125,32 @@ class PictureDisplay(OneTopicDisplay):
         self._picture: Picture | None = None
         self._arrived = 0.0
         super().__init__(parent, runtime)
+
+    # -- files -----------------------------------------------------------------------------------
+
+    def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
+        """Take the settings of a file, and where its panel was."""
+        refused = super().load_settings(saved)
+        place = saved.get(_PANEL)
+        if isinstance(place, dict):
+            try:
+                numbers = [
+                    read_number(place.get(side), f"{_PANEL}/{side}", minimum=0, maximum=100_000)
+                    for side in _SIDES
+                ]
+            except Error as error:
+                refused.append(str(error))
+            else:
+                self.panelGeometry = QtCore.QRectF(*numbers)
+        return refused
+
+    def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
+        """Return the settings for a file of one RViz, and where its panel is."""
+        kept = super().save_settings(older, ros)
+        place: Any = self.panelGeometry
+        if not place.isEmpty():
+            kept[_PANEL] = dict(zip(_SIDES, place.getRect(), strict=True))
+        return kept
 
     # -- panels ----------------------------------------------------------------------------------
 
