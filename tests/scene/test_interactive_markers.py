@@ -239,6 +239,45 @@ def test_a_box_is_tumbled(show: Callable[..., Any], hand: Hand, mode: int) -> No
     assert np.trace(turned) == pytest.approx(1 + 2 * np.cos(30 * 2 * np.pi / 300), abs=0.05)
 
 
+@pytest.mark.parametrize("frame", ["map", "tool"])
+def test_drags_in_perspective_and_in_frames_that_are_turned(
+    bench: SceneBench, show: Callable[..., Any], hand: Hand, frame: str
+) -> None:
+    from rosglass import Time
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    tilt = (0.3, -0.5, 0.1, 0.8)
+    broadcaster = TransformBroadcaster(bench.robot)
+    display = show(
+        marker(
+            control(MOVE_AXIS),
+            control(ROTATE_AXIS, orientation=UPWARDS),
+            header={"frame_id": frame},
+            pose={"position": {"x": 0.2}, "orientation": {"z": 0.2, "w": 0.98}},
+        ),
+        view="Orbit",
+    )
+    broadcaster.send_transform(Transform((1, -1, 0.5), tilt, Time.from_parts(1, 0), "map", "tool"))
+    bench.wait(lambda: shown(display).root.visible)
+    arm = shown(display)
+
+    def pixel(*point: float) -> tuple[int, int]:
+        return hand.at(tuple((arm.root.pose @ start @ (*point, 1.0))[:3]))
+
+    start = arm.pose
+    hand.drag(pixel(1.4, 0, 0), pixel(0.4, 0, 0))
+    moved = np.linalg.inv(start) @ arm.pose
+    assert moved[:3, 3] == pytest.approx([-1.0, 0.0, 0.0], abs=0.1)
+    assert moved[:3, :3] == pytest.approx(np.eye(3), abs=1e-6)
+    start = arm.pose
+    bench.picture()
+    hand.drag(pixel(0, 1.15, 0), pixel(1.4, 1.4, 0))
+    turned = np.linalg.inv(start) @ arm.pose
+    assert turned[:3, 3] == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
+    assert turned[:2, 0] == pytest.approx([0.707, -0.707], abs=0.1)
+    assert turned[2, 2] == pytest.approx(1.0, abs=1e-6)
+
+
 def test_a_drag_goes_on_when_its_marker_is_changed(
     bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
 ) -> None:
@@ -556,6 +595,39 @@ def test_after_a_gap_all_markers_are_requested_again(
     server.insert(marker(control(MOVE_AXIS), name="hand"))
     bench.wait(lambda: display.markers == ["arm", "hand"])
     assert server.requests == requests + 1
+
+
+def test_updates_that_come_before_the_markers_count_in_their_order(bench: SceneBench) -> None:
+    from rosglass.scene.displays.interactive_marker_messages import (
+        InteractiveMarkerRecord,
+        MarkerUpdate,
+        read_interactive_marker,
+    )
+
+    view = bench.load("InteractiveMarkersDisplay { }")
+    (display,) = view.scene.displays
+    kind = bench.robot.create_publisher("/any", "visualization_msgs/InteractiveMarker").type
+
+    def read(name: str) -> InteractiveMarkerRecord:
+        return read_interactive_marker(kind(marker(control(MOVE_AXIS), name=name)))
+
+    def take(number: int, *names: str, full: bool = False, erased: tuple[str, ...] = ()) -> None:
+        markers = tuple(read(name) for name in names)
+        display._take(MarkerUpdate("", number, full, False, markers, (), erased))
+
+    take(3, "c")
+    take(4, erased=("a",))
+    assert display.markers == []
+    # All markers of before a change that is missing are no use.
+    take(1, "a", full=True)
+    assert display.markers == []
+    assert "waiting for its markers" in display.statusText
+    take(2, "a", "b", full=True)
+    assert display.markers == ["b", "c"]
+    take(6, "d")
+    assert display.markers == ["b", "c"]
+    take(6, "b", "d", full=True)
+    assert display.markers == ["b", "d"]
 
 
 def test_a_server_that_is_gone_is_said_and_a_new_one_is_shown(

@@ -167,6 +167,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
     KEEPS_ALL: ClassVar[bool] = True
     EAGER: ClassVar[bool] = True
     SETTINGS: ClassVar[dict[str, Setting]] = {}
+    _HOLDS = ("_view", "_camera", "_asked")
 
     topic = Setting(
         "Interactive Markers Namespace", "topic", "",
@@ -200,6 +201,8 @@ class InteractiveMarkersDisplay(TopicDisplay):
         self._asked: tuple[Control, Any] | None = None
         self._ready: Any = None
         self._view: Any = None
+        #: Its camera, until that moves.
+        self._camera: Camera | None = None
         super().__init__(parent, runtime)
         self._retry_request = single_shot(self, self._request_again)
         self._feedback_timer = QtCore.QTimer(self)
@@ -222,13 +225,14 @@ class InteractiveMarkersDisplay(TopicDisplay):
         """The camera that controls are turned to; None before the view has a size."""
         if self._view is None or not is_alive(self._view):
             return None
-        with contextlib.suppress(Error):
-            camera: Camera = self._view.camera()
-            return camera
-        return None
+        if self._camera is None:
+            with contextlib.suppress(Error):
+                self._camera = self._view.camera()
+        return self._camera
 
     @Slot()
     def _on_camera(self) -> None:
+        self._camera = None
         for marker in self._all():
             marker.face()
 
@@ -341,7 +345,11 @@ class InteractiveMarkersDisplay(TopicDisplay):
     def _request_again(self) -> None:
         if is_alive(self):
             self._requested = False
-            if not self._servers or any(one.number is None for one in self._servers.values()):
+            # In ROS 1, the request of a first server lasts until there is one.
+            is_first = not self._servers and self._endpoint is not None
+            if is_first and self._endpoint.client is None:
+                self._requested = True
+            elif is_first or any(one.number is None for one in self._servers.values()):
                 self._request()
 
     def _on_request_failed(self, text: str) -> None:

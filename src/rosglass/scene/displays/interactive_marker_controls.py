@@ -13,6 +13,7 @@ import numpy as np
 
 from rosglass.comm.time import Time
 from rosglass.errors import TransformException
+from rosglass.qt import is_alive
 from rosglass.scene.camera import inverse, quaternion_of
 from rosglass.scene.displays.interactive_marker_messages import (
     BUTTON,
@@ -216,6 +217,8 @@ class Control:
         """Handle an event of the tool Interact; see ``Interactive`` there."""
         if self.marker.controls.get(self.record.name) is not self:
             return False  # it was removed under the mouse
+        if not is_alive(self.display):
+            return False
         if what == "press":
             return self._on_press(event)
         if what == "move" and self._grab is not None:
@@ -511,7 +514,9 @@ class InteractiveMarker:
     def face(self) -> None:
         """Turn what faces the viewer."""
         for control in (*self.controls.values(), self.title):
-            if control is not None and control.record.facing == VIEW_FACING:
+            if control is None or not control.record.markers:
+                continue
+            if control.record.facing == VIEW_FACING:
                 control.place()
 
     def _move(self) -> None:
