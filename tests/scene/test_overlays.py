@@ -143,3 +143,62 @@ def test_the_overlay_gets_the_mouse_first(bench: Any, panel: Path) -> None:
     QTest.keyClick(bench.window, "z")
     bench.wait(lambda: view.camera() != moved)
     assert root.property("text") == "map"
+
+
+CONFIG = """
+Visualization Manager:
+  Displays:
+    - Class: hector_rviz_overlay_controls/QmlOverlay
+      Name: Panel
+      Enabled: true
+      Path: FILE
+      Z-Index: 3
+      Opacity: 1
+      Configuration: {Speed: 0.75, Label: 5}
+      Overlay Configuration: {tab: 2, names: [a, '"7"']}
+  Global Options: {Fixed Frame: map}
+"""
+
+
+def test_overlays_of_configs_are_shown_and_kept(bench: Any, panel: Path, tmp_path: Path) -> None:
+    from rosglass.scene.access import access_of
+    from rosglass.scene.rviz_config import RvizConfig
+
+    panel.write_text(
+        'import QtQuick 2.15\nRectangle { color: "#ff0000"; property var config: rviz.config\n'
+        "property var speed: rviz.registerFloatProperty('Speed', 0.5)\n"
+        "property var label: rviz.registerStringProperty('Label', 'none') }"
+    )
+    file, again = tmp_path / "one.rviz", tmp_path / "two.rviz"
+    file.write_text(CONFIG.replace("FILE", str(panel)))
+    view = bench.load()
+    assert view.load_config(file) == []
+    (display,) = view.scene.displays
+    bench.wait(lambda: display.overlay is not None and display.overlay.loaded)
+    overlay = display.overlay
+    assert tuple(bench.picture()[100, 100]) == (255, 0, 0)
+    assert (overlay.name, overlay.z, display.statusText) == ("Panel", 3, "Qml: OK")
+    values = overlay.properties.properties
+    assert (values["Speed"].get(), values["Label"].get()) == (0.75, "5")
+    assert overlay.properties.get_config() == {"tab": 2, "names": ["a", "7"]}
+    values["Speed"].set(2.0)
+    overlay.properties.set_config({"tab": "3"})
+    view.save_config(again)
+    (saved,) = RvizConfig.load(again).displays
+    assert saved.class_id == "hector_rviz_overlay_controls/QmlOverlay"
+    assert view.load_config(again) == []
+    (display,) = view.scene.displays
+    bench.wait(lambda: display.overlay is not None and display.overlay.loaded)
+    assert display.overlay.properties.properties["Speed"].get() == 2.0
+    assert display.overlay.properties.get_config() == {"tab": "3"}
+    # The old one is gone, and the panel's switch hides this one.
+    assert overlay.root is None
+    display.enabled = False
+    bench.wait(lambda: tuple(bench.picture()[100, 100]) != (255, 0, 0))
+    display.overlay.visible = True
+    assert display.enabled
+    display.set("Path", str(panel.with_name("Nothing.qml")))
+    bench.wait(lambda: "Nothing.qml" in display.statusText)
+    made = access_of(view).displays.add("rosglass/QmlOverlay", "Other")
+    assert (made.class_id, made.status.level) == ("rosglass/QmlOverlay", "ok")
+    bench.wait(lambda: "Choose a QML file" in made.status.text)

@@ -20,10 +20,12 @@ __all__ = [
     "KINDS",
     "Kind",
     "from_config",
+    "from_plain",
     "merged",
     "plain_config",
     "shown",
     "to_config",
+    "to_plain",
     "to_storable",
 ]
 
@@ -502,15 +504,25 @@ def _scalar(text: str) -> Any:
 
 def from_config(config: Any) -> Any:
     """Return a value written by :func:`to_config` or by hector_rviz_overlay."""
-    return _typed(plain_config(config))
+    return from_plain(plain_config(config))
 
 
-def _typed(value: Any) -> Any:
+def from_plain(value: Any) -> Any:
+    """Return a value written by :func:`to_plain`, from dicts, lists and scalars of a file."""
     if isinstance(value, dict):
-        return {key: _typed(inner) for key, inner in value.items()}
+        return {key: from_plain(inner) for key, inner in value.items()}
     if isinstance(value, list):
-        return [_typed(inner) for inner in value]
+        return [from_plain(inner) for inner in value]
     return _scalar(value) if isinstance(value, str) else value
+
+
+def to_plain(value: Any) -> Any:
+    """Return a value from :func:`to_storable` as a file has it, which :func:`to_config` writes."""
+    if isinstance(value, dict) and value:
+        return {key: to_plain(inner) for key, inner in value.items()}
+    if isinstance(value, list) and value:
+        return [to_plain(inner) for inner in value]
+    return _text(value)
 
 
 def plain_config(config: Any) -> Any:

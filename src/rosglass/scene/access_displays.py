@@ -171,7 +171,7 @@ def _described(
 def _class_id(kind: str) -> str:
     """Return RViz 1's class id of a type, or RViz 2's of one that only RViz 2 has."""
     one, two = DISPLAYS.get(kind, ("", ""))
-    return one or two or f"rosglass/{kind}"
+    return one or two or (kind if "/" in kind else f"rosglass/{kind}")
 
 
 def _path(path: str | Sequence[str]) -> str:
@@ -414,7 +414,7 @@ class SceneDisplays(PluginList):
         if not isinstance(class_id, str) or class_id.count("/") != 1:
             near = similar(class_id, self.classes) if isinstance(class_id, str) else ""
             raise Error(f"expected a class id, e.g. 'rviz/Grid', got {shown(class_id)}{near}")
-        kind = display_type(class_id) or class_id.removeprefix("rosglass/")
+        kind = display_type(class_id) or class_id
         if kind not in self._scene.TYPES:
             hint = similar(class_id, self.classes) or f"; there are: {', '.join(self.classes)}"
             raise Error(f"no display was added: there is no class {class_id:.80}{hint}")

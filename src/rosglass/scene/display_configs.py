@@ -28,6 +28,10 @@ __all__ = [
 ]
 
 
+#: Classes of other packages that rosglass has as well.
+_SAME = {"hector_rviz_overlay_controls/QmlOverlay": "rosglass/QmlOverlay"}
+
+
 class UnknownDisplay(Display):
     """A display of a config that rosglass does not have; it shows nothing, and is written back."""
 
@@ -84,8 +88,8 @@ def _add(scene: Scene, one: DisplayConfig, group: GroupDisplay | None, notes: li
     display: Display
     if one.is_group:
         display = GroupDisplay(scene, runtime)
-    elif one.type in scene.TYPES:
-        display = scene.TYPES[one.type](scene, runtime)
+    elif (known := one.type or _SAME.get(one.class_id, one.class_id)) in scene.TYPES:
+        display = scene.TYPES[known](scene, runtime)
     else:
         display = UnknownDisplay(scene, runtime, class_id=one.class_id)
         notes.append(f"display {one.name!r}: rosglass has no {one.class_id}; it is kept as it is")

@@ -41,6 +41,7 @@ from rosglass.scene.displays.pose import (
     PoseDisplay,
     PoseWithCovarianceDisplay,
 )
+from rosglass.scene.displays.qml_overlay import QmlOverlayDisplay
 from rosglass.scene.displays.robot_model import RobotModelDisplay
 from rosglass.scene.displays.tf import TFDisplay
 from rosglass.scene.overlay_element import OverlayElement
@@ -106,6 +107,7 @@ PANELS = (
     "ToolsPanel",
     "ViewsPanel",
 )
+Scene.TYPES[QmlOverlayDisplay.TYPE] = QmlOverlayDisplay
 Scene.TYPES.update({display.TYPE: display for display in (*DISPLAYS, GroupDisplay)})
 #: The tools, likewise; ``Tool`` is the base of own ones.
 TOOLS = (

@@ -108,7 +108,7 @@ class Scene(Element):
             Error: There is no such type or property, or a value does not fit.
         """
         if isinstance(kind, str):
-            found = self.TYPES.get(kind.rpartition("/")[2])
+            found = self.TYPES.get(kind) or self.TYPES.get(kind.rpartition("/")[2])
             if found is None:
                 hint = similar(kind, self.TYPES) or f"; there are: {', '.join(sorted(self.TYPES))}"
                 raise Error(f"there is no type of displays {shown(kind)}{hint}")

@@ -1,0 +1,148 @@
+"""The overlays of a ``.rviz`` file: QML files over the view, as entries of the Displays panel."""
+# ruff: noqa: N815 - the names of properties are QML's
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from rosglass.errors import Error
+from rosglass.qt import Slot, is_alive
+from rosglass.rviz.property_values import from_plain, to_plain
+from rosglass.scene.display import Display
+from rosglass.scene.settings import Setting
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rosglass.qml.runtime import Runtime
+    from rosglass.qt import QtCore
+    from rosglass.scene.overlay import SceneOverlay
+
+__all__ = ["QmlOverlayDisplay"]
+
+_CONFIGURATION, _CONFIG = "Configuration", "Overlay Configuration"
+
+
+class QmlOverlayDisplay(Display):
+    """An overlay that RViz's config files have, also those of hector_rviz_overlay."""
+
+    TYPE = "rosglass/QmlOverlay"
+
+    path = Setting(
+        "Path", "path", "", "The QML file; package://name/path for one in a ROS package.",
+        then="_schedule",
+    )  # fmt: skip
+    zIndex = Setting("Z-Index", "int", 0, "Higher numbers are on top.", then="_arrange")
+    scale = Setting(
+        "Scale", "float", 1.0, "Units of the view for each of the overlay.", min=0.1, max=10.0,
+        then="_arrange",
+    )  # fmt: skip
+    opacity = Setting("Opacity", "float", 1.0, "Opacity.", min=0.0, max=1.0, then="_arrange")
+    liveReload = Setting(
+        "Live Reload", "bool", False, "Reload when the file, or one beside it, is saved.",
+        then="_arrange",
+    )  # fmt: skip
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        self.overlay: SceneOverlay | None = None
+        #: Values of the properties that the file registers, and its free-form map.
+        self._registered: dict[str, Any] = {}
+        self._free: dict[str, Any] = {}
+        super().__init__(parent, runtime)
+
+    # -- the overlay -----------------------------------------------------------------------------
+
+    def _wanted(self) -> tuple[Any, ...] | None:
+        if self.scene is None or not self.path:
+            self.set_status("Qml", "warn", "Choose a QML file as Path")
+            return None
+        return (self.path,)
+
+    def _create_endpoint(self, wanted: tuple[Any, ...]) -> None:
+        assert self.scene is not None
+        view = self.scene.parent()
+        try:
+            # Later: few configs have overlays, which need much that other displays do not.
+            made = import_module("rosglass.scene.overlay").SceneOverlay
+            overlay = self.overlay = made(wanted[0], view, self.name)
+            self._cleanup["overlay"] = overlay.close
+            overlay.properties.load(self._registered)
+            overlay.properties.set_config(self._free)
+            self._arrange()
+            overlay.problem_changed.connect(self._on_problem)
+            overlay.arranged.connect(self._on_arranged)
+            overlay.load()
+        except Error as error:
+            self.set_status("Qml", "error", str(error))
+        else:
+            self._on_problem(overlay.problem)
+
+    def _on_closed(self, endpoint: Any) -> None:  # noqa: ARG002 - the base class's signature
+        overlay, self.overlay = self.overlay, None
+        self._cleanup.pop("overlay", None)
+        if overlay is not None:
+            self._registered = overlay.properties.save()
+            self._free = overlay.properties.get_config()
+            overlay.close()
+
+    def leave(self) -> None:
+        """Stop being shown."""
+        if is_alive(self):
+            self._close_endpoint()
+        super().leave()
+
+    def _on_enabled(self) -> None:
+        super()._on_enabled()
+        self._arrange()
+
+    def on_group_enabled(self) -> None:
+        """Show or hide it with its group."""
+        super().on_group_enabled()
+        self._arrange()
+
+    def _arrange(self) -> None:
+        overlay = self.overlay
+        if overlay is not None:
+            # First, as each of them is reported to :meth:`_on_arranged`.
+            overlay.visible, overlay.watch = self.shown, self.liveReload
+            overlay.z, overlay.scale, overlay.opacity = self.zIndex, self.scale, self.opacity
+
+    @Slot(str)
+    def _on_problem(self, problem: str) -> None:
+        self.set_status("Qml", "error" if problem else "ok", problem or "OK")
+
+    @Slot()
+    def _on_arranged(self) -> None:
+        # By its own JavaScript, or a program.
+        if self.overlay is not None and self.overlay.visible != self.shown:
+            self.setProperty("enabled", self.overlay.visible)
+
+    # -- files -----------------------------------------------------------------------------------
+
+    def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
+        """Take the settings of a file, and what the overlay itself has kept in it."""
+        refused = super().load_settings(saved)
+        registered, free = saved.get(_CONFIGURATION), from_plain(saved.get(_CONFIG))
+        self._registered = _as_text(registered) if isinstance(registered, dict) else {}
+        self._free = free if isinstance(free, dict) else {}
+        return refused
+
+    def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
+        """Return the settings for a file, with what the overlay itself keeps in it."""
+        kept = super().save_settings(older, ros)
+        properties = None if self.overlay is None else self.overlay.properties
+        kept[_CONFIGURATION] = self._registered if properties is None else properties.save()
+        kept[_CONFIG] = to_plain(self._free if properties is None else properties.get_config())
+        return kept
+
+
+def _as_text(value: Any) -> Any:
+    """Return values as text, as RViz gives them: the kinds of the properties read them."""
+    if isinstance(value, dict):
+        return {str(key): _as_text(inner) for key, inner in value.items()}
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return str(value) if isinstance(value, (int, float)) else value
