@@ -58,6 +58,15 @@ def drawables(display: Any) -> list[Any]:
     return [one for one, _, _ in display.root.drawables()]
 
 
+def xs(display: Any) -> list[float]:
+    """Return where shapes are along x."""
+    return [
+        round(float((pose @ matrix.reshape(4, 4).T)[0, 3]), 3)
+        for one, pose, _ in display.root.drawables()
+        for matrix in one.instances["matrix"]
+    ]
+
+
 SHAPES = [
     (marker(0), 60),
     (marker(0, points=points((0, 0, 0), (2, 0, 0)), scale={"x": 0.3, "y": 0.6, "z": 0.0}), 60),
@@ -147,14 +156,135 @@ def test_markers_wait_for_their_frame_and_locked_ones_follow_it(
         stamp = Time.from_parts(sec, 0)
         broadcaster.send_transform(Transform((x, 0, 0), (0, 0, 0, 1), stamp, "map", "arm"))
 
-    def where() -> list[float]:
-        return [round(float(one.instances["matrix"][0][12]), 3) for one in drawables(display)]
-
     move(1.0, 1)
-    bench.wait(lambda: where() == [1.0, 1.0])
+    bench.wait(lambda: xs(display) == [1.0, 1.0])
     assert display.statusLevel == "ok"
+    # Others that wait do not hold them up.
+    show(marker(3, 2, header={"frame_id": "nowhere"}))
+    boxes, _ = drawables(display)
+    uploads = boxes.geometry
     move(3.0, 2)
-    bench.wait(lambda: where() == [3.0, 1.0])
+    bench.wait(lambda: xs(display) == [3.0, 1.0])
+    # Only its pose was set.
+    assert (drawables(display)[0], boxes.geometry) == (boxes, uploads)
+
+
+def send_static(node: Any, parent: str, child: str, x: float = 0.0) -> None:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    broadcaster = StaticTransformBroadcaster(node)
+    broadcaster.send_transform(Transform((x, 0, 0), (0, 0, 0, 1), Time(0), parent, child))
+
+
+def test_all_markers_of_an_array_are_applied_in_order(show: Callable[..., Any]) -> None:
+    display = show(*(marker(1, number) for number in range(1200)))
+    assert [one.count for one in drawables(display)] == [1200]
+    erase = marker(1, action=DELETE_ALL, ns="")
+    show(erase, *(marker(1, number) for number in range(10)))
+    assert [one.count for one in drawables(display)] == [10]
+    show(erase)
+    show(marker(1, 1, action=DELETE), marker(1, 1), marker(1, 2))
+    assert [one.count for one in drawables(display)] == [2]
+    assert display.statusLevel == "ok", display.statusText
+
+
+def test_one_that_cannot_be_drawn_does_not_hide_the_others(show: Callable[..., Any]) -> None:
+    flat = {"x": 1e-200, "y": 1e200, "z": 1.0}
+    display = show(
+        marker(1), marker(6, 1, scale=flat, points=points((0, 0, 0))), marker(2, 2), marker(3, 3)
+    )
+    assert len(drawables(display)) == 3
+    assert "shapes/1: it cannot be drawn: a pose must be" in display.statusText
+
+
+def test_a_waiting_marker_is_replaced_and_deleted_by_newer_ones(
+    bench: SceneBench, show: Callable[..., Any]
+) -> None:
+    away = {"frame_id": "arm"}
+    display = show(marker(1), marker(1, header=away), marker(2, 1, header=away))
+    assert len(drawables(display)) == 1  # the older one, until the newer one has a place
+    show(marker(3), marker(2, 1, action=DELETE), marker(2, 2, header=away))
+    send_static(bench.robot, "map", "arm", 2.0)
+    bench.wait(lambda: xs(display) == [0.0, 2.0])
+    assert display.statusLevel == "ok", display.statusText
+
+
+def test_markers_that_wait_are_bounded_and_their_lines_too(
+    bench: SceneBench, show: Callable[..., Any]
+) -> None:
+    display = show(
+        *(marker(1, number, header={"frame_id": f"f{number}"}) for number in range(1010))
+    )
+    assert len(display.status_lines) <= 52
+    assert "Transform [f10]: no transform from [f10]" in display.statusText
+    assert "Markers: and 960 more" in display.statusText
+    send_static(bench.robot, "map", "f1009")
+    bench.wait(lambda: len(drawables(display)) == 1)
+    show(*(marker(99, number) for number in range(1010)))
+    assert len(display.status_lines) <= 52
+    show(marker(1, action=DELETE_ALL, ns=""))
+    assert display.statusLevel == "ok", display.statusText
+
+
+def test_a_marker_of_a_time_that_never_comes_is_dropped(
+    bench: SceneBench, show: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene.displays import marker as module
+
+    monkeypatch.setattr(module, "_MAX_WAIT_S", 0.0)
+    header = {"frame_id": "arm", "stamp": {"sec": 5, "nanosec": 0}}
+    display = show(marker(1, header=header), marker(1, 1, header={"frame_id": "leg"}))
+    send_static(bench.robot, "map", "other")
+    bench.wait(lambda: "shapes/0: it was dropped after 0 s: no trans" in display.statusText)
+    assert "Transform [arm]" not in display.statusText
+    # Any time is good for this one.
+    assert "Transform [leg]" in display.statusText
+
+
+def test_what_cannot_be_placed_in_another_fixed_frame_is_hidden(
+    bench: SceneBench, show: Callable[..., Any]
+) -> None:
+    send_static(bench.robot, "map", "arm", 2.0)
+    view = bench.view
+    bench.wait(lambda: "arm" in view.scene.frames())
+    display = show(
+        marker(1, header={"frame_id": "arm"}),
+        marker(2, 1, header={"frame_id": "arm"}, frame_locked=True),
+        marker(3, 2, header={"frame_id": "island"}),
+    )
+    bench.wait(lambda: xs(display) == [2.0, 2.0])
+    view.scene.fixed_frame = "island"
+    bench.wait(lambda: xs(display) == [0.0])
+    bench.wait(lambda: "Transform [arm]: no transform from [arm]" in display.statusText)
+    view.scene.fixed_frame = "map"
+    bench.wait(lambda: xs(display) == [2.0, 2.0])
+    bench.wait(lambda: "Transform [arm]" not in display.statusText)
+    assert "Transform [island]" in display.statusText
+
+
+def test_a_display_makes_no_timer_per_message(bench: SceneBench, show: Callable[..., Any]) -> None:
+    from rosglass.qt import QtCore
+
+    display = show(marker(1))
+    before = len(display.findChildren(QtCore.QTimer))
+    for _ in range(5):
+        show(marker(1))
+    assert len(display.findChildren(QtCore.QTimer)) == before
+
+
+def test_markers_of_a_publisher_that_is_gone_are_faded(bench: SceneBench) -> None:
+    view = bench.load('MarkerArrayDisplay { topic: "/markers" }')
+    (display,) = view.scene.displays
+    publisher = bench.robot.create_publisher("/markers", "visualization_msgs/MarkerArray")
+    bench.wait(publisher.subscription_count)
+    assert display.stale
+    publisher.publish({"markers": [marker(1)]})
+    bench.wait(lambda: not display.stale)
+    assert display.root.alpha == 1.0
+    publisher.close()
+    bench.wait(lambda: display.stale and display.root.alpha < 1.0)
+    assert "Data: its publisher is gone" in display.statusText
 
 
 @pytest.mark.parametrize(

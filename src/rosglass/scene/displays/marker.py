@@ -7,8 +7,8 @@ arrows of one namespace are instances of one mesh, so that ten thousand of them 
 
 from __future__ import annotations
 
+import logging
 import time
-from collections import deque
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
 
 import numpy as np
@@ -17,7 +17,7 @@ from rosglass.errors import Error, TransformException
 from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot, is_alive
-from rosglass.scene.display import TopicDisplay
+from rosglass.scene.display import Status, TopicDisplay
 from rosglass.scene.displays.shapes import poses_matrices
 from rosglass.scene.drawing import (
     BOX,
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
+    from rosglass.scene.scene import Scene
 
 __all__ = [
     "MarkerArrayDisplay",
@@ -52,6 +53,8 @@ __all__ = [
     "Markers",
     "read_marker",
 ]
+
+_log = logging.getLogger("rosglass.scene")
 
 # visualization_msgs/Marker: types and actions.
 ARROW, CUBE, SPHERE_TYPE, CYLINDER_TYPE, LINE_STRIP, LINE_LIST = range(6)
@@ -68,7 +71,16 @@ _POINT_STYLES = {CUBE_LIST: "boxes", SPHERE_LIST: "spheres", POINTS: "squares"}
 _HEAD_SHARE = 0.23
 #: Turns z, along which cylinders and cones stand, to x, along which arrows point.
 _TO_X = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-_WAITING = 1000
+#: Markers that wait for a transform, of which the oldest make room.
+_MAX_LATE = 1000
+#: Seconds after which no transform of a marker's time will come any more.
+_MAX_WAIT_S = 60.0
+#: Seconds for which a marker may wait for the transform of its time before that is an error.
+_LATE_S = 1.0
+#: Lookups that fail until the other waiting markers have to wait for the next transforms.
+_MAX_MISSES = 50
+#: Lines of the status, and markers whose problems are known.
+_MAX_LINES, _MAX_PROBLEMS = 50, 1000
 
 
 class MarkerRecord(NamedTuple):
@@ -454,16 +466,58 @@ class MarkerMeshes:
         self._on_loaded(uri, "")
 
 
-class _Shown(NamedTuple):
-    """A marker that is shown.
+class _Late(NamedTuple):
+    """A marker that waits for its transform.
 
     Attributes:
         marker: Its record.
-        expires: When it ends, by the clock of :func:`time.monotonic`; inf for never.
+        since: When it came, by the clock of :func:`time.monotonic`.
+        reason: Why it cannot be placed.
+        is_known: Whether its frame is, at another time.
     """
 
     marker: MarkerRecord
-    expires: float
+    since: float
+    reason: str
+    is_known: bool
+
+
+class _Poses:
+    """Poses of frames in the fixed frame at one moment, each looked up once.
+
+    Attributes:
+        misses: How many lookups have failed.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._found: dict[tuple[str, int], NDArray[np.float64] | str] = {}
+        self.misses = 0
+
+    def at(self, frame: str, stamp: int = 0) -> NDArray[np.float64] | str:
+        """Return a frame's pose at a time; why it is not known, in words, where it is not."""
+        found = self._found.get((frame, stamp))
+        if found is None:
+            newest = self.at(frame) if stamp else None
+            found = newest if isinstance(newest, str) else self._look_up(frame, stamp)
+            self._found[frame, stamp] = found
+        return found
+
+    def _look_up(self, frame: str, stamp: int) -> NDArray[np.float64] | str:
+        scene, buffer = self._scene, self._scene.transforms
+        what = f"no transform from [{frame[:100]}]"
+        # A look at the names costs much less than a lookup that fails.
+        if frame not in ("", scene.fixed_frame) and buffer and not buffer.has_frame(frame):
+            return f"{what}: there is no frame of this name yet"
+        try:
+            return scene.look_up(frame or scene.fixed_frame, stamp)
+        except TransformException as error:
+            self.misses += 1
+            return f"{what}: {error}"
+
+
+def _time_of(marker: MarkerRecord) -> int:
+    return 0 if marker.locked else marker.stamp
 
 
 class Markers(TopicDisplay):
@@ -480,15 +534,25 @@ class Markers(TopicDisplay):
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
-        self._shown: dict[tuple[str, int], _Shown] = {}
-        self._spaces: dict[str, MarkerGroup] = {}
+        self._shown: dict[tuple[str, int], MarkerRecord] = {}
+        #: When markers end, by the clock of :func:`time.monotonic`.
+        self._expires: dict[tuple[str, int], float] = {}
+        #: By namespace and, for markers that are locked to one, frame: its pose is the group's.
+        self._groups: dict[tuple[str, str], MarkerGroup] = {}
+        #: Markers that cannot be placed in this fixed frame, by their frames.
+        self._hidden: dict[str, dict[tuple[str, int], None]] = {}
+        #: Frames of locked markers that are not known, and why.
+        self._lost: dict[str, str] = {}
         #: Whether namespaces are shown, of those that were switched.
         self._switched: dict[str, bool] = {}
-        self._late: deque[MarkerRecord] = deque(maxlen=_WAITING)
-        self._flushing = False
+        self._late: dict[tuple[str, int], _Late] = {}
+        self._problems: dict[tuple[str, int], Status] = {}
+        #: Names of the lines of the status that are about markers.
+        self._lines: set[str] = set()
         self._meshes = MarkerMeshes(self._in_background, self._on_mesh)
         super().__init__(parent, runtime)
         self._expiry = single_shot(self, self._expire)
+        self._flush_timer = single_shot(self, self._flush)
 
     def preparer(self) -> Callable[[Any], list[MarkerRecord]]:
         """Return the function that reads markers."""
@@ -498,8 +562,11 @@ class Markers(TopicDisplay):
     def setNamespaceEnabled(self, namespace: str, enabled: bool) -> None:  # noqa: N802 - QML's name
         """Show or hide the markers of a namespace."""
         self._switched[namespace] = enabled
-        if namespace in self._spaces:
-            self._spaces[namespace].root.visible = enabled
+        self._switch_groups()
+
+    def _switch_groups(self) -> None:
+        for (namespace, frame), group in self._groups.items():
+            group.root.visible = self.is_namespace_enabled(namespace) and frame not in self._lost
 
     def is_namespace_enabled(self, namespace: str) -> bool:
         """Return whether the markers of a namespace are shown."""
@@ -517,7 +584,7 @@ class Markers(TopicDisplay):
     def save_settings(self, older: Any = None, ros: int = 2) -> dict[str, Any]:
         """Return the settings for a file, with the namespaces that are shown."""
         kept = super().save_settings(older, ros)
-        names = sorted({*self._spaces, *self._switched})
+        names = sorted({*(name for name, _ in self._groups), *self._switched})
         kept["Namespaces"] = {name: self.is_namespace_enabled(name) for name in names}
         return kept
 
@@ -525,119 +592,237 @@ class Markers(TopicDisplay):
 
     def _show_waiting(self) -> None:
         # Each marker has a frame and time of its own.
+        if self.scene is None or not self._waiting:
+            return
+        poses = _Poses(self.scene)
         while self._waiting:
-            self._late.extend(self._waiting.popleft().data)
-        for _ in range(len(self._late)):
-            self._apply(self._late.popleft())
+            item = self._waiting.popleft()
+            self._last = item._replace(data=None)
+            for marker in item.data:
+                self._apply(marker, poses)
+        self._show_age()
+        self._flush_later()
 
     def on_transforms(self) -> None:
         """Show what has waited for transforms; move what is locked to its frame."""
         self._show_waiting()
-        if self._late:
-            return
-        locked = [one.marker for one in self._shown.values() if one.marker.locked]
-        for marker in locked:
-            self._place_marker(marker, 0)
+        if self.scene is not None:
+            self._follow(_Poses(self.scene))
 
     def on_fixed_frame(self) -> None:
-        """Place all markers anew."""
-        for one in list(self._shown.values()):
-            self._place_marker(one.marker, 0 if one.marker.locked else one.marker.stamp)
+        """Place all markers anew; hide those that cannot be placed."""
         self._show_waiting()
+        if self.scene is None:
+            return
+        poses = _Poses(self.scene)
+        for marker in list(self._shown.values()):
+            if not marker.locked:
+                self._place_anew(marker, poses)
+        self._follow(poses, hide=True)
 
-    def _apply(self, marker: MarkerRecord) -> None:
-        name = f"{marker.key[0]}/{marker.key[1]}"
+    def _follow(self, poses: _Poses, *, hide: bool = False) -> None:
+        """Place what has waited, and what is locked to its frame."""
+        if self._late or self._hidden or self._lost or hide:
+            self._flush_later()
+        for frame in list(self._hidden):
+            if not isinstance(poses.at(frame), str):
+                for key in self._hidden.pop(frame):
+                    self._place_anew(self._shown[key], poses)
+        for key in list(self._late):
+            # The others are the first ones of the next time.
+            if poses.misses >= _MAX_MISSES:
+                break
+            self._try_late(self._late.pop(key), poses)
+        for (_, frame), group in self._groups.items():
+            pose = poses.at(frame) if frame else group.root.pose
+            if not isinstance(pose, str):
+                group.root.pose = pose
+                self._lost.pop(frame, None)
+            elif hide:
+                self._lost[frame] = pose
+        if self._lost or hide:
+            self._switch_groups()
+
+    def _try_late(self, late: _Late, poses: _Poses) -> None:
+        marker = late.marker
+        pose = poses.at(marker.frame, _time_of(marker))
+        if not isinstance(pose, str):
+            self._show_marker(marker, pose)
+        elif _time_of(marker) and time.monotonic() - late.since > _MAX_WAIT_S:
+            text = f"it was dropped after {_MAX_WAIT_S:.0f} s: {pose}"
+            self._note_problem(marker.key, "error", text)
+        else:
+            is_known = not isinstance(poses.at(marker.frame), str)
+            self._late[marker.key] = late._replace(reason=pose, is_known=is_known)
+
+    def _apply(self, marker: MarkerRecord, poses: _Poses) -> None:
+        key = marker.key
         if marker.action == _DELETE_ALL:
-            self._clear(marker.key[0])
+            self._clear(key[0])
             return
-        if marker.action == _DELETE:
-            self._remove(marker.key)
+        # What waits under its name is older.
+        self._late.pop(key, None)
+        if marker.action == _DELETE or marker.problem:
+            self._remove(key)
+            if marker.problem:
+                self._note_problem(key, "error", marker.problem)
             return
-        if marker.problem:
-            self._remove(marker.key)
-            self.set_status(name, "error", marker.problem)
+        pose = poses.at(marker.frame, _time_of(marker))
+        if not isinstance(pose, str):
+            self._show_marker(marker, pose)
             return
-        if marker.key not in self._shown and len(self._shown) >= _MAX_MARKERS:
-            self.set_status("Markers", "error", f"only {_MAX_MARKERS} markers are shown")
+        is_known = not isinstance(poses.at(marker.frame), str)
+        self._late[key] = _Late(marker, time.monotonic(), pose, is_known)
+        if len(self._late) > _MAX_LATE:
+            oldest = next(iter(self._late))
+            del self._late[oldest]
+            text = f"it was dropped: more than {_MAX_LATE} markers wait for transforms"
+            self._note_problem(oldest, "error", text)
+
+    def _show_marker(self, marker: MarkerRecord, pose: NDArray[np.float64]) -> None:
+        """Show a marker that is new, with its frame at a pose in the fixed frame."""
+        key = marker.key
+        self._remove(key)
+        if len(self._shown) >= _MAX_MARKERS:
+            self._note_problem(key, "error", f"only {_MAX_MARKERS} markers are shown")
             return
-        if not self._place_marker(marker, 0 if marker.locked else marker.stamp):
-            # It may come later: the first ones that wait for too long make room.
-            self._late.append(marker)
-            return
-        self.delete_status(name)
-        expires = time.monotonic() + marker.lifetime if marker.lifetime else np.inf
-        self._shown[marker.key] = _Shown(marker, expires)
+        self._shown[key] = marker
         if marker.lifetime:
-            self._schedule_expiry()
+            self._expires[key] = time.monotonic() + marker.lifetime
+        self._draw(marker, pose)
 
-    def _place_marker(self, marker: MarkerRecord, stamp: int) -> bool:
-        scene = self.scene
-        if scene is None:
-            return False
+    def _draw(self, marker: MarkerRecord, pose: NDArray[np.float64]) -> None:
         try:
-            pose = scene.look_up(marker.frame or scene.fixed_frame, stamp)
-        except TransformException as error:
-            self.set_status("Transform", "error", f"no transform from [{marker.frame}]: {error}")
-            return False
-        self.delete_status("Transform")
-        space = self._spaces.get(marker.key[0])
-        if space is None:
-            space = self._spaces[marker.key[0]] = MarkerGroup(self)
-            space.root.visible = self.is_namespace_enabled(marker.key[0])
-            self.root.add(space.root)
-            report(self, namespaces=sorted(self._spaces))
-        space.put(marker, pose, self._meshes)
-        self._flush_later()
-        return True
+            group = self._group_of(marker)
+            if group is None:
+                group = self._add_group(marker)
+            if marker.locked and marker.frame:
+                group.root.pose, pose = pose, np.eye(4)
+            group.put(marker, pose, self._meshes)
+        except Exception as error:  # one that cannot be drawn does not hide the others
+            if not isinstance(error, Error):
+                _log.exception("%s: marker %s", self.label, _line_of(marker.key))
+            self._remove(marker.key)
+            self._note_problem(marker.key, "error", f"it cannot be drawn: {error}")
 
-    def _flush_later(self) -> None:
-        if not self._flushing:
-            self._flushing = True
-            single_shot(self, self._flush).start(0)
+    def _place_anew(self, marker: MarkerRecord, poses: _Poses) -> None:
+        """Draw a marker in another place, or not at all while its frame is not known."""
+        pose = poses.at(marker.frame, _time_of(marker))
+        if isinstance(pose, str):
+            # At its time it is not known any more: rather the newest than a wrong place.
+            pose = poses.at(marker.frame)
+        if not isinstance(pose, str):
+            self._forget_hidden(marker)
+            self._draw(marker, pose)
+            return
+        group = self._group_of(marker)
+        if group is not None:
+            group.remove(marker.key)
+        self._hidden.setdefault(marker.frame, {})[marker.key] = None
 
-    def _flush(self) -> None:
-        self._flushing = False
-        if is_alive(self):
-            for space in self._spaces.values():
-                space.flush()
+    def _forget_hidden(self, marker: MarkerRecord) -> None:
+        hidden = self._hidden.get(marker.frame)
+        if hidden is not None:
+            hidden.pop(marker.key, None)
+            if not hidden:
+                del self._hidden[marker.frame]
+
+    def _group_of(self, marker: MarkerRecord) -> MarkerGroup | None:
+        return self._groups.get((marker.key[0], marker.frame if marker.locked else ""))
+
+    def _add_group(self, marker: MarkerRecord) -> MarkerGroup:
+        namespace, frame = marker.key[0], marker.frame if marker.locked else ""
+        group = self._groups[namespace, frame] = MarkerGroup(self)
+        group.root.visible = self.is_namespace_enabled(namespace)
+        self.root.add(group.root)
+        return group
 
     def _remove(self, key: tuple[str, int]) -> None:
-        self._shown.pop(key, None)
-        space = self._spaces.get(key[0])
-        if space is not None:
-            space.remove(key)
-            self._flush_later()
-        self.delete_status(f"{key[0]}/{key[1]}")
-        if self._late:
-            kept = [one for one in self._late if one.key != key]
-            self._late = deque(kept, maxlen=_WAITING)
+        self._problems.pop(key, None)
+        self._expires.pop(key, None)
+        marker = self._shown.pop(key, None)
+        if marker is not None:
+            self._forget_hidden(marker)
+            group = self._group_of(marker)
+            if group is not None:
+                group.remove(key)
 
     def _clear(self, namespace: str) -> None:
         """Remove the markers of a namespace; all of them for an empty one, as RViz does."""
-        for key in [key for key in self._shown if namespace in ("", key[0])]:
-            self._remove(key)
-        self._late.clear()
+        for key in [*self._shown, *self._late, *self._problems]:
+            if namespace in ("", key[0]):
+                self._late.pop(key, None)
+                self._remove(key)
 
     def reset(self) -> None:
         """Drop all markers."""
         super().reset()
-        self._shown.clear()
-        self._spaces.clear()
+        for held in (self._shown, self._expires, self._groups, self._hidden, self._lost):
+            held.clear()
         self._late.clear()
+        self._problems.clear()
         report(self, namespaces=[])
+
+    # -- what has changed ------------------------------------------------------------------------
+
+    def _flush_later(self) -> None:
+        """Draw and report what has changed, once for all that is received together."""
+        self._flush_timer.start(0)
+
+    @Slot()
+    def _flush(self) -> None:
+        for group in self._groups.values():
+            group.flush()
+        report(self, namespaces=sorted({namespace for namespace, _ in self._groups}))
+        self._report_problems()
+        self._schedule_expiry()
+
+    def _note_problem(self, key: tuple[str, int], level: str, text: str) -> None:
+        self._problems[key] = Status(level, text)
+        if len(self._problems) > _MAX_PROBLEMS:
+            del self._problems[next(iter(self._problems))]
+
+    def _report_problems(self) -> None:
+        """Write the lines of the status: one for each frame without a transform, then markers."""
+        reasons = dict(self._lost)
+        if self.scene is not None:
+            poses = _Poses(self.scene)
+            found_at = {frame: poses.at(frame) for frame in self._hidden}
+            reasons.update({k: v for k, v in found_at.items() if isinstance(v, str)})
+        latest = time.monotonic() - _LATE_S
+        for late in self._late.values():
+            # Transforms of a moment often come after the data: only a delay is an error.
+            if not late.is_known or late.since <= latest:
+                reasons.setdefault(late.marker.frame, late.reason)
+            elif not self._flush_timer.isActive():
+                self._flush_timer.start(int(_LATE_S * 1000) + 1)
+        found = [(f"Transform [{one[:100]}]", Status("error", reasons[one])) for one in reasons]
+        found += [(_line_of(key), status) for key, status in self._problems.items()]
+        lines = dict(found[:_MAX_LINES])
+        rest = found[_MAX_LINES:]
+        if rest:
+            level = "error" if any(one.level == "error" for _, one in rest) else "warn"
+            lines["Markers"] = Status(level, f"and {len(rest)} more problems like these")
+        for name in self._lines - lines.keys():
+            self.delete_status(name)
+        for name, status in lines.items():
+            self.set_status(name, *status)
+        self._lines = set(lines)
 
     # -- lifetimes -------------------------------------------------------------------------------
 
     def _schedule_expiry(self) -> None:
-        first = min((one.expires for one in self._shown.values()), default=np.inf)
-        if np.isfinite(first):
-            self._expiry.start(max(int((first - time.monotonic()) * 1000) + 1, 1))
+        if self._expires:
+            first = min(self._expires.values()) - time.monotonic()
+            # A day is enough at once: Qt counts milliseconds in 32 bits.
+            self._expiry.start(max(int(min(first, 86_400.0) * 1000) + 1, 1))
 
+    @Slot()
     def _expire(self) -> None:
         now = time.monotonic()
-        for key in [key for key, one in self._shown.items() if one.expires <= now]:
+        for key in [key for key, end in self._expires.items() if end <= now]:
             self._remove(key)
-        self._schedule_expiry()
+        self._flush_later()
 
     # -- meshes ----------------------------------------------------------------------------------
 
@@ -646,14 +831,21 @@ class Markers(TopicDisplay):
             self.scene.load(work, then)
 
     def _on_mesh(self, uri: str, problem: str) -> None:
-        if not is_alive(self):
+        if not is_alive(self) or self.scene is None:
             return
         if problem:
             self.set_status("Mesh", "error", f"{uri}: {problem}")
             return
-        for one in list(self._shown.values()):
-            if one.marker.kind == MESH and one.marker.resource == uri:
-                self._place_marker(one.marker, 0 if one.marker.locked else one.marker.stamp)
+        poses = _Poses(self.scene)
+        for marker in list(self._shown.values()):
+            if marker.kind == MESH and marker.resource == uri:
+                self._place_anew(marker, poses)
+        self._flush_later()
+
+
+def _line_of(key: tuple[str, int]) -> str:
+    """Return the name of the line of the status about a marker."""
+    return f"{key[0][:100]}/{key[1]}"
 
 
 def _read_markers(message: Any) -> list[MarkerRecord]:
