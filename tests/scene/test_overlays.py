@@ -67,7 +67,7 @@ def test_the_view_at_rest_is_not_drawn_for_an_overlay(bench: Any, panel: Path) -
     )
     overlay = rosglass.scene.add_overlay(view, panel)
     bench.wait(lambda: overlay.root.property("frames") > 3)
-    bench.wait(lambda: view._still.isActive() is False)
+    bench.wait(lambda: not view.is_moving)
     drawn, frames = view.frames_drawn, overlay.root.property("frames")
     bench.wait(lambda: overlay.root.property("frames") > frames + 10)
     assert view.frames_drawn <= drawn + 1

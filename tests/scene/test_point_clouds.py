@@ -63,9 +63,9 @@ class Shown:
 
     def send(self, message: dict[str, Any]) -> Any:
         """Publish a message, and return the display once it has received it."""
-        display, before = self.display, self.display._intake.received
+        display, before = self.display, self.display.received
         self.publisher.publish(message)
-        self.bench.wait(lambda: display._intake.received > before)
+        self.bench.wait(lambda: display.received > before)
         self.bench.wait.settled(self.bench.session)
         return display
 

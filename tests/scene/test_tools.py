@@ -183,10 +183,10 @@ def test_the_mouse_moves_the_camera(bench: SceneBench, hand: Hand) -> None:
     yaw, distance = view.controller.yaw, view.controller.distance
     hand.press((200, 150))
     hand.move((240, 150))
-    assert view._focal.visible
+    assert list(view.overlay.drawables()), "the ball at the focal point"
     assert has_colour(bench.picture(), 255, 255, 0, 130) > 0
     hand.release((240, 150))
-    assert not view._focal.visible
+    assert not list(view.overlay.drawables())
     assert view.controller.yaw == pytest.approx(yaw - 0.2)
     hand.drag((200, 150), (200, 170), hand.RIGHT)
     assert view.controller.distance > distance
@@ -216,17 +216,17 @@ def test_f_and_focus_camera_turn_the_camera(bench: SceneBench, hand: Hand) -> No
     hand.key(hand.keys.Key_F)
     # It turns, and does not jump.
     assert np.linalg.norm(np.array(view.camera().focus) - start) < 0.5
-    bench.wait(lambda: view._turn is None)
+    bench.wait(lambda: not view.is_turning)
     assert np.array(view.camera().focus) == pytest.approx(np.array((1, 1, 0)), abs=0.9)
     hand.key(hand.keys.Key_Z)
-    bench.wait(lambda: view._turn is None)
+    bench.wait(lambda: not view.is_turning)
     assert view.camera().focus == pytest.approx((0, 0, 0))
     view.tool = "FocusCamera"
     hand.move(hand.at((1, 1, 0)))
     assert "Focus on this point. [" in view.statusText
     hand.click(hand.at((1, 1, 0)))
     assert view.tool == "Interact"
-    bench.wait(lambda: view._turn is None)
+    bench.wait(lambda: not view.is_turning)
     assert np.array(view.camera().focus) == pytest.approx(np.array((1, 1, 0)), abs=0.9)
 
 
@@ -346,9 +346,9 @@ def test_a_goal_while_disconnected_is_not_sent(bench: SceneBench, hand: Hand) ->
     view = bench.load()
     view.tool = "SetGoal"
     goal = view.tools.current
-    bench.wait(lambda: goal._endpoint is not None)
+    bench.wait(lambda: goal.is_ready)
     bench.session.shutdown()
-    bench.wait(lambda: goal._endpoint is None)
+    bench.wait(lambda: not goal.is_ready)
     hand.drag(hand.at((0, 0, 0)), hand.at((1, 0, 0)))
     assert "not sent, for the robot is not connected" in view.statusText
     assert "not connected" in goal.problem
@@ -404,17 +404,14 @@ def test_a_goal_is_sent_to_an_action(bench: SceneBench, hand: Hand, tmp_path: Pa
     nav2.close()
 
 
-def test_a_goal_to_an_action_without_server_says_so(bench: SceneBench, hand: Hand) -> None:
-    from rosglass.scene import publishing_tools
-
+def test_a_goal_to_an_action_without_server_says_so(
+    bench: SceneBench, hand: Hand, monkeypatch: pytest.MonkeyPatch
+) -> None:
     view = bench.load('Nav2GoalTool { name: "Go" }\ntool: "Go"')
     goal = view.tools.current
-    bench.wait(lambda: goal._endpoint is not None)
-    before, publishing_tools._GOAL_TIMEOUT_S = publishing_tools._GOAL_TIMEOUT_S, 0.2
-    try:
-        hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
-    finally:
-        publishing_tools._GOAL_TIMEOUT_S = before
+    bench.wait(lambda: goal.is_ready)
+    monkeypatch.setattr("rosglass.scene.publishing_tools._GOAL_TIMEOUT_S", 0.2)
+    hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
     bench.wait(lambda: "navigate_to_pose" in goal.problem, lambda: goal.problem)
 
 
@@ -502,7 +499,7 @@ def test_a_rectangle_selects(bench: SceneBench, hand: Hand) -> None:
     # The box is followed, and forgotten with the drawable.
     before = selection.middle()
     box.pose = instance_matrix((-2, 1, 0))
-    bench.wait(lambda: selection._root.pose[1, 3] == pytest.approx(1))
+    bench.wait(lambda: [pose[1, 3] for _, pose, _ in view.overlay.drawables()] == [1])
     assert before.y == pytest.approx(0)
     box.set_instances([])
     # Before it has followed.
@@ -510,7 +507,7 @@ def test_a_rectangle_selects(bench: SceneBench, hand: Hand) -> None:
     assert selection.items()[0].part == "arm_link"
     box.remove()
     bench.wait(lambda: selection.count == 0)
-    assert len(selection._lines.rows) == 0
+    assert not list(view.overlay.drawables())
 
 
 def test_selected_points_are_dropped_with_their_cloud(bench: SceneBench) -> None:

@@ -473,6 +473,16 @@ class SceneView(QQuickRhiItem):
             self.cameraChanged.emit()
             self.update()
 
+    @property
+    def is_moving(self) -> bool:
+        """Whether the camera was moved just now, so that large clouds are thinned out."""
+        return self._still.isActive()
+
+    @property
+    def is_turning(self) -> bool:
+        """Whether the camera is on its way to what it is to look at."""
+        return self._turn is not None
+
     def pick(self, x: float, y: float, radius: float = 2.0) -> Hit | None:
         """Return what is nearest to the camera at a place; None for nothing.
 

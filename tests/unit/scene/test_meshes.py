@@ -90,7 +90,9 @@ def collada(
 
 def stl(corners: Any, normals: Any = 0.0, header: bytes = b"") -> bytes:
     corners = np.asarray(corners, np.float32).reshape(-1, 3, 3)
-    table = np.zeros(len(corners), meshes._STL)
+    table = np.zeros(
+        len(corners), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
+    )
     table["corners"], table["normal"] = corners, normals
     return header.ljust(80) + struct.pack("<I", len(corners)) + table.tobytes()
 
