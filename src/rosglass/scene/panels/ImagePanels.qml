@@ -27,7 +27,7 @@ Item {
             height: placed ? saved.height : width * 0.75
             x: placed ? Math.max(0, Math.min(saved.x, area.width - 40)) : 10 + index * (width + 10)
             y: placed ? Math.max(0, Math.min(saved.y, area.height - 40)) : area.height - height - 10
-            onDragged: (dx, dy) => keep(Qt.rect(x + dx, y + dy, width, height))
+            onDragged: (dx, dy) => keep(Qt.rect(Math.max(0, x + dx), Math.max(0, y + dy), width, height))
             onResized: (dx, dy) => keep(Qt.rect(x, y, Math.max(80, width + dx), Math.max(60, height + dy)))
         }
     }
