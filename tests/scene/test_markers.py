@@ -292,7 +292,6 @@ def test_markers_of_a_publisher_that_is_gone_are_faded(bench: SceneBench) -> Non
     [
         ({"type": 99}, "type 99: expected 0 to 12"),
         ({"action": 7}, "action 7: expected"),
-        ({"scale": {"x": 0.0, "y": 1.0, "z": 1.0}}, "is 0 in a direction"),
         ({"pose": {"position": {"x": float("nan")}}}, "is not finite"),
         ({"type": 5, "points": points((0, 0, 0))}, "points: 1 are not pairs"),
         ({"type": 11, "points": points((0, 0, 0))}, "are not triples"),
@@ -308,6 +307,22 @@ def test_a_bad_marker_says_what_is_wrong_and_the_others_are_drawn(
     assert len(drawables(display)) == 1
     # Mended, its line goes.
     show(marker(1))
+    assert display.statusLevel == "ok"
+
+
+@pytest.mark.parametrize(("kind", "pixels"), [(1, 100), (3, 100), (0, 20), (6, 100), (7, 100)])
+def test_flat_shapes_are_drawn_with_a_warning(
+    bench: SceneBench, show: Callable[..., Any], kind: int, pixels: int
+) -> None:
+    lists = {"points": points((0, 0, 0))} if kind in (6, 7) else {}
+    display = show(marker(kind, scale={"x": 2.0, "y": 2.0, "z": 0.0}, **lists))
+    # RViz takes flat arrows without a word.
+    assert display.statusLevel == ("ok" if kind == 0 else "warn"), display.statusText
+    assert ("is 0 in a direction: drawn as 0.0001 m" in display.statusText) == (kind != 0)
+    picture = bench.picture().astype(int)
+    red = (picture[..., 0] > 60) & (picture[..., 1] < 40) & (picture[..., 2] < 40)
+    assert red.sum() > pixels
+    show(marker(kind, **lists))
     assert display.statusLevel == "ok"
 
 

@@ -71,6 +71,10 @@ _POINT_STYLES = {CUBE_LIST: "boxes", SPHERE_LIST: "spheres", POINTS: "squares"}
 _HEAD_SHARE = 0.23
 #: Turns z, along which cylinders and cones stand, to x, along which arrows point.
 _TO_X = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+#: Directions of the scale that count, where not all do.
+_SCALED = {LINE_STRIP: "x", LINE_LIST: "x", POINTS: "xy", TEXT: "z", ARROW_STRIP: "xy"}
+#: Metres that are drawn for a scale of 0: surfaces without thickness have no shade.
+_THIN_M = 1e-4
 #: Markers that wait for a transform, of which the oldest make room.
 _MAX_LATE = 1000
 #: Seconds after which no transform of a marker's time will come any more.
@@ -102,7 +106,8 @@ class MarkerRecord(NamedTuple):
         text: Of texts.
         resource: URI of a mesh.
         embedded: Whether a mesh has its own colours.
-        problem: Why it is not drawn as it should be, in words; empty otherwise.
+        problem: Why it is not drawn, in words; empty otherwise.
+        warning: Why it may not look as it should, in words; empty otherwise.
     """
 
     key: tuple[str, int]
@@ -121,6 +126,7 @@ class MarkerRecord(NamedTuple):
     resource: str = ""
     embedded: bool = False
     problem: str = ""
+    warning: str = ""
 
 
 def _seconds(duration: Any) -> float:
@@ -167,9 +173,10 @@ def read_marker(message: Any, part: tuple[str, int] | None = None) -> MarkerReco
     if count > _MAX_POINTS:
         problem = f"points: {count} are more than the {_MAX_POINTS} that are drawn"
     if not problem:
-        problem = _scale_problem(kind, size, count)
+        problem = _points_problem(kind, count)
     if problem:
         return MarkerRecord(key, kind, action, header.frame_id.lstrip("/"), at, problem=problem)
+    size, warning = _without_zeros(kind, size, count)
     points = np.array([(o.x, o.y, o.z) for o in message.points], np.float32).reshape(-1, 3)
     colours = np.array([(c.r, c.g, c.b, c.a) for c in message.colors], np.float32).reshape(-1, 4)
     return MarkerRecord(
@@ -188,21 +195,23 @@ def read_marker(message: Any, part: tuple[str, int] | None = None) -> MarkerReco
         message.text,
         message.mesh_resource,
         message.mesh_use_embedded_materials,
+        warning=warning,
     )
 
 
-def _scale_problem(kind: int, size: tuple[float, float, float], count: int) -> str:
-    x, y, z = size
-    needs = {
-        ARROW: (x, y) if count else (x, y, z),
-        LINE_STRIP: (x,),
-        LINE_LIST: (x,),
-        POINTS: (x, y),
-        TEXT: (z,),
-        ARROW_STRIP: (x, y),
-    }.get(kind, (x, y, z))
-    if 0 in needs:
-        return f"scale {size} of a {_NAMES[kind]} is 0 in a direction that it needs"
+def _without_zeros(
+    kind: int, size: tuple[float, float, float], count: int
+) -> tuple[tuple[float, float, float], str]:
+    """Return a scale without zeros where it counts, and a warning if there was one."""
+    axes = "xy" if kind == ARROW and count else _SCALED.get(kind, "xyz")
+    x, y, z = (n or _THIN_M if axis in axes else n for axis, n in zip("xyz", size, strict=True))
+    # As in RViz, an arrow may be flat.
+    if (x, y, z) == size or (kind == ARROW and size[0] and size[1]):
+        return (x, y, z), ""
+    return (x, y, z), f"scale {size} of a {_NAMES[kind]} is 0 in a direction: drawn as {_THIN_M} m"
+
+
+def _points_problem(kind: int, count: int) -> str:
     if kind == LINE_LIST and count % 2:
         return f"points: {count} are not pairs, which a line_list needs"
     if kind == TRIANGLE_LIST and (count % 3 or not count):
@@ -687,6 +696,8 @@ class Markers(TopicDisplay):
             self._note_problem(key, "error", f"only {_MAX_MARKERS} markers are shown")
             return
         self._shown[key] = marker
+        if marker.warning:
+            self._note_problem(key, "warn", marker.warning)
         if marker.lifetime:
             self._expires[key] = time.monotonic() + marker.lifetime
         self._draw(marker, pose)
