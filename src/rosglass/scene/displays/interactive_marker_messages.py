@@ -246,11 +246,11 @@ def _complete(control: ControlRecord, scale: float) -> ControlRecord:
         colours[:, :3] = np.outer(shades, (red, green, blue))
         colours[:, 3] = AUTOMATIC_ALPHA
         size = (scale, scale, scale)
-        made.append(
-            MarkerRecord(
-                ("", 0), TRIANGLE_LIST, 0, pose=pose, scale=size, points=points, colours=colours
-            )
+        ring = MarkerRecord(
+            ("", 0), TRIANGLE_LIST, 0, pose=pose, scale=size, colour=tint, points=points
         )
+        # Without colours of its own, it is lit.
+        made.append(ring if control.mode == MOVE_PLANE else ring._replace(colours=colours))
     elif control.mode == MENU:
         height = 0.25 * scale
         pose = instance_matrix((-0.1 * height, 0, 1.2 * scale - 0.1 * height))

@@ -414,7 +414,8 @@ def _triangles(marker: MarkerRecord) -> Mesh:
         colours = np.repeat(marker.colours, 3, axis=0)
     if colours is None:
         return Mesh(Shape(points), marker.colour)
-    return Mesh(Shape(points, colours=colours))
+    # RViz does not light what has colours of its own.
+    return Mesh(Shape(points, colours=colours), lit=False)
 
 
 def _arrow_strip(marker: MarkerRecord) -> Iterable[Mesh]:
