@@ -121,6 +121,7 @@ _PACKAGES = (
     "ros1",
     "ros2",
     "rviz",
+    "scene",
     "tf",
     "wires",
 )
