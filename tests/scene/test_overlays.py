@@ -202,3 +202,38 @@ def test_overlays_of_configs_are_shown_and_kept(bench: Any, panel: Path, tmp_pat
     made = access_of(view).displays.add("rosglass/QmlOverlay", "Other")
     assert (made.class_id, made.status.level) == ("rosglass/QmlOverlay", "ok")
     bench.wait(lambda: "Choose a QML file" in made.status.text)
+
+
+def test_popups_follow_points_of_a_view_beside_others(bench: Any, panel: Path) -> None:
+    from PySide6.QtCore import QPointF
+    from PySide6.QtQuick import QQuickItem
+
+    from rosglass.scene.access import access_of
+
+    panel.write_text(
+        "import QtQuick 2.15\nimport QtQuick.Controls 2.15\nimport RosRviz 1.0\n"
+        "Item { Component.onCompleted: edge.objectName = 'edge'\n"
+        "AnchoredPopup { id: popup; point: Qt.vector3d(0, 0, 0); padding: 0; visible: true\n"
+        "contentItem: Rectangle { id: edge; color: '#00ff00'; implicitWidth: 40\n"
+        "implicitHeight: 40 } } }"
+    )
+    # As between the panels of a window.
+    root = bench.load('SceneView { objectName: "inner"; x: 120; y: 60; width: 240; height: 200 }')
+    from rosglass.scene import SceneView
+
+    view = root.findChild(SceneView, "inner")
+    access = access_of(view)
+    access.view.move_eye_and_focus((0, 0, 10), (0, 0, 0), animate=False)
+    overlay = rosglass.scene.add_overlay(view, panel, scale=2.0)
+    edge = overlay.root.findChild(QQuickItem, "edge")
+    middle = view.mapToScene(QPointF(120, 100))
+
+    def shown() -> bool:
+        at = edge.mapToScene(QPointF(20, 20))
+        return abs(at.x() - middle.x()) < 3 and abs(at.y() - middle.y()) < 3
+
+    bench.wait(shown)
+    picture = bench.picture()
+    assert tuple(picture[round(middle.y()), round(middle.x())]) == (0, 255, 0)
+    access.view.move_eye_and_focus((0, 1, 10), (0, 1, 0), animate=False)
+    bench.wait(lambda: not shown())

@@ -79,6 +79,8 @@ class Overlay(QtCore.QObject):
         self.properties = RegisteredProperties()
         self._z, self._scale, self._opacity, self._visible = 0, 1.0, 1.0, True
         self._problem = ""
+        #: The item of the window that it covers; None if that is the whole window.
+        self.area: Any = None
         #: Whether it is above all overlays that are not popups.
         self.is_popup = False
         #: Whether it blocks all input to what is below it, including RViz's view, while visible.

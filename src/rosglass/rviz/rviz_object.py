@@ -495,6 +495,8 @@ class RvizObject(RegisteredProperties):
 
     # Overlay and window.
 
+    #: The item that positions of trackers refer to; null for the whole window. For RosRviz only.
+    _area = Property(QtCore.QObject, lambda self: self.overlay.area, constant=True)
     #: Whether this overlay is shown.
     visible = member("visible", bool, visibleChanged, path="overlay.visible")
     isFullscreen = member(

@@ -88,6 +88,7 @@ class SceneOverlay(LiveOverlay):
         self._view = view
         #: Holds the root item, and has the overlay's place, scale and opacity.
         self._frame = QQuickItem(view)
+        self.area = self._frame
         self._frame.setTransformOrigin(QQuickItem.TransformOrigin.TopLeft)
         self.arranged.connect(self._arrange)
         view.widthChanged.connect(self._arrange)

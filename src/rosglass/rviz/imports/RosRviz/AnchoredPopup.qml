@@ -70,7 +70,10 @@ Popup {
         y = Math.max(0, Math.min(y + dy, parent.height - height))
     }
 
-    parent: Overlay.overlay
+    parent: rviz._area || Overlay.overlay
+    // Popups have the size of the window, whatever the scale of their parent.
+    scale: rviz._area ? rviz._area.scale : 1
+    transformOrigin: Popup.TopLeft
     focus: modal
     z: modal ? 1 : 0
     closePolicy: modal ? Popup.CloseOnEscape : Popup.NoAutoClose
