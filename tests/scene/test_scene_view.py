@@ -304,3 +304,78 @@ def test_a_silent_link_above_the_fixed_frame_is_of_no_account(bench: SceneBench)
     move()
     bench.wait(lambda: move() or view.scene.silence("map") > 1.5)
     assert view.scene.silence("base") < 1.0
+
+
+def test_data_of_a_publisher_that_is_gone_stays_so_beside_another(bench: SceneBench) -> None:
+    from rosglass.comm.qos import QoS
+
+    view = bench.load('PathDisplay { topic: "/plan" }')
+    (path,) = view.scene.displays
+
+    def publish(qos: Any = 1) -> Any:
+        publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path", qos)
+        bench.wait(publisher.subscription_count)
+        before = path.received
+        publisher.publish({"header": {"frame_id": "map"}})
+        bench.wait(lambda: path.received > before and path.statusLevel == "ok")
+        return publisher
+
+    first = publish()
+    first.close()
+    bench.wait(lambda: "its publisher is gone" in path.statusText)
+    second = bench.robot.create_publisher("/plan", "nav_msgs/Path")
+    bench.wait(second.subscription_count)
+    bench.wait.nothing_happens(0.3)
+    assert "its publisher is gone" in path.statusText
+    second.close()
+    # The same connection again: what is latched is valid, what is not may be old.
+    for qos, level in ((1, "warn"), (QoS.latched(), "ok")):
+        publisher = publish(qos)
+        path._outdated = True
+        path._on_connection()
+        bench.wait.nothing_happens(0.2)
+        assert path.statusLevel == level, path.statusText
+        publisher.close()
+
+
+def test_displays_of_a_hidden_group_show_nothing_old_later(bench: SceneBench) -> None:
+    from rosglass.scene.display_configs import GroupDisplay
+
+    view = bench.load()
+    group = view.scene.add(GroupDisplay(view.scene, view.scene._find_runtime()))
+    path = view.scene.TYPES["Path"](view.scene, view.scene._find_runtime())
+    path.group, path.topic = group, "/plan"
+    view.scene.adopt(path)
+    publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
+    bench.wait(publisher.subscription_count)
+    publisher.publish({"header": {"frame_id": "map"}})
+    bench.wait(lambda: path.statusLevel == "ok" and list(path.root))
+    group.enabled = False
+    assert not list(path.root)
+    assert path.statusText == ""
+
+
+@pytest.mark.parametrize("change", ["topic", "enabled"])
+def test_nothing_that_is_on_its_way_is_shown_after_a_change(bench: SceneBench, change: str) -> None:
+    from rosglass.qt import QtCore
+
+    view = bench.load('PathDisplay { topic: "/plan" }')
+    (path,) = view.scene.displays
+    publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
+    bench.wait(lambda: path._endpoint is not None and publisher.subscription_count())
+    intake = path._intake
+    publisher.publish({"header": {"frame_id": "map"}})
+    while not intake.received:
+        QtCore.QThread.msleep(10)
+    if change == "topic":
+        path.topic = "/other"
+    else:
+        path.enabled = False
+        path.enabled = True
+    path._on_items()
+    bench.wait.nothing_happens(0.2)
+    assert path.received == 0
+    assert not list(path.root)
+    # It receives again.
+    path.topic = "/plan"
+    bench.wait(lambda: publisher.publish({"header": {"frame_id": "map"}}) or path.received)

@@ -216,13 +216,13 @@ class Display(Configurable, TopicElement):
 
     def _on_enabled(self) -> None:
         self.root.visible = self.enabled
-        if not self.enabled:
-            self.clear_status()
-        self._restyle()
-        self._schedule()
+        self.on_group_enabled()
 
     def on_group_enabled(self) -> None:
-        """Receive something, or nothing any more, as the group is shown or hidden."""
+        """Receive something, or nothing any more, as it or its group is shown or hidden."""
+        if not self.shown:
+            self.clear_status()
+        self._restyle()
         self._schedule()
 
     # -- for subclasses --------------------------------------------------------------------------
@@ -377,6 +377,8 @@ class Intake:
         self._items: deque[_Item] = deque(maxlen=depth)
         self._error = ""
         self.received = self.dropped = 0
+        #: Identity of the publisher of the last message; empty if the wire has none.
+        self.publisher = b""
 
     def receive(self, sample: Sample) -> None:
         """Take a sample, in the node's thread."""
@@ -389,6 +391,7 @@ class Intake:
                 return sample.type.decode_all(sample.data, wire=sample.wire)
             return sample.message()
 
+        self.publisher = sample.publisher
         self.put(decode, sample.type.name)
 
     def put(self, decode: Callable[[], Message], what: str) -> None:
@@ -477,14 +480,17 @@ class OneTopicDisplay(Display):
     def _saved_topic(self) -> TopicSetting:
         return TopicSetting(self.topic, self.depth)
 
-    def _on_enabled(self) -> None:
-        super()._on_enabled()
-        if not self.enabled:
+    def on_group_enabled(self) -> None:
+        """Receive something, or nothing any more, as it or its group is shown or hidden."""
+        super().on_group_enabled()
+        if not self.shown:
+            self._close_endpoint()  # not later: messages of it may be on their way
             self.reset()  # it would be old when the display is shown again
 
     def _on_topic(self) -> None:
         self._topic = self.topic
         self._resolved = ""
+        self._close_endpoint()  # not later: messages of it may be on their way
         self.clear_status()
         self.reset()
         self._schedule()
@@ -582,7 +588,22 @@ class TopicDisplay(OneTopicDisplay):
         super()._on_create_failed(error)
 
     def _recheck_outdated(self) -> None:
-        if self._count_publishers():
+        # The publisher that latched the message still exists and would have sent a newer one.
+        intake, node, session = self._intake, self.node, self._session
+        if intake is None or not intake.received or node is None or session is None:
+            return
+        if session.state != "connected":
+            return
+        try:
+            publishers = node.publishers(self._resolved)
+        except Error:
+            return
+        known = any(one.gid for one in publishers)
+        if any(
+            one.qos.durability is Durability.TRANSIENT_LOCAL
+            and (one.gid == intake.publisher or not known)
+            for one in publishers
+        ):
             self._outdated = False
             self._show_age()
 
