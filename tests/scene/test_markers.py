@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from rosglass.scene.drawing import BOX, Labels, Lines, Mesh, Points
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     from conftest import SceneBench
 
@@ -333,3 +335,70 @@ def test_labels_of_wild_texts_are_bounded(bench: SceneBench, show: Callable[...,
     assert len(labels.texts[0]) == Labels.MAX_LENGTH
     assert np.isfinite(bench.picture()).all()
     assert bench.view.problem == ""
+
+
+def test_meshes_have_their_textures_and_are_made_in_another_thread(
+    bench: SceneBench,
+    show: Callable[..., Any],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from PySide6.QtGui import QImage
+
+    from rosglass.scene.displays import marker as module
+
+    image = QImage(2, 2, QImage.Format.Format_RGBA8888)
+    image.fill(0xFF00FF00)
+    image.save(str(tmp_path / "green.png"))
+    (tmp_path / "quad.mtl").write_text("newmtl paint\nKd 1 1 1\nmap_Kd green.png\n")
+    (tmp_path / "quad.obj").write_text(
+        "mtllib quad.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+        "usemtl paint\nf 1/1 2/2 3/3\n"
+    )
+    threads = []
+
+    class Shape(module.Shape):
+        def __init__(self, *args: Any, **options: Any) -> None:
+            threads.append(threading.current_thread())
+            super().__init__(*args, **options)
+
+    monkeypatch.setattr(module, "Shape", Shape)
+    uri = f"file://{tmp_path}/quad.obj"
+    display = show(
+        marker(10, mesh_resource=uri, mesh_use_embedded_materials=True),
+        marker(10, 1, mesh_resource=uri),
+        marker(10, 2, mesh_resource=f"file://{tmp_path}/gone.obj"),
+    )
+    bench.wait(lambda: len(drawables(display)) == 2)
+    painted, plain = drawables(display)
+    assert painted.texture[0, 0].tolist() == [0, 255, 0, 255]
+    assert (plain.texture, plain.colour) == (None, (1.0, 0.0, 0.0, 1.0))
+    assert len(threads) == 1
+    assert threading.main_thread() not in threads
+    bench.wait(lambda: "shapes/2" in display.status_lines)
+    assert "gone.obj: there is no such file" in display.status_lines["shapes/2"].text
+    show(marker(1, 2))
+    assert display.statusLevel == "ok", display.statusText
+
+
+def test_meshes_that_are_kept_are_bounded() -> None:
+    from rosglass.errors import Error
+    from rosglass.scene.displays.marker import MESH, MarkerMeshes, MarkerRecord
+
+    waiting: list[Any] = []
+    loaded: list[str] = []
+    meshes = MarkerMeshes(lambda _, done: waiting.append(done), lambda uri, _: loaded.append(uri))
+
+    def of(number: int) -> None:
+        list(meshes.of(MarkerRecord(("", number), MESH, ADD, resource=f"{number}.stl")))
+
+    for number in range(1000):
+        of(number)
+    with pytest.raises(Error, match="more than 1000 meshes are being read"):
+        of(1000)
+    for done in waiting:
+        done(Error("gone"))
+    assert len(loaded) == 1000
+    assert len(meshes._files) == 200
+    of(1000)
+    assert len(waiting) == 1001

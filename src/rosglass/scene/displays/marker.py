@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import time
+from copy import copy
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
 
 import numpy as np
@@ -18,6 +19,7 @@ from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot, is_alive
 from rosglass.scene.display import Status, TopicDisplay
+from rosglass.scene.displays.robot_model import read_texture
 from rosglass.scene.displays.shapes import poses_matrices
 from rosglass.scene.drawing import (
     BOX,
@@ -83,6 +85,8 @@ _MAX_WAIT_S = 60.0
 _LATE_S = 1.0
 #: Lookups that fail until the other waiting markers have to wait for the next transforms.
 _MAX_MISSES = 50
+#: Meshes that are kept for further markers, and that are being read.
+_MAX_MESHES, _MAX_READING = 200, 1000
 #: Lines of the status, and markers whose problems are known.
 _MAX_LINES, _MAX_PROBLEMS = 50, 1000
 
@@ -429,8 +433,35 @@ def _arrow_strip(marker: MarkerRecord) -> Iterable[Mesh]:
         yield mesh
 
 
+class _MeshFile(NamedTuple):
+    """A mesh file that was read.
+
+    Attributes:
+        parts: For each part a drawable, with its texture, and the colour of its material or None.
+        problem: What could not be read, in words; empty otherwise.
+    """
+
+    parts: list[tuple[Mesh, tuple[float, ...] | None]]
+    problem: str
+
+
+def _read_mesh(uri: str) -> _MeshFile:
+    """Read a mesh and its textures; takes seconds for large ones."""
+    made: list[tuple[Mesh, tuple[float, ...] | None]] = []
+    problem = ""
+    for part in load_mesh_cached(locate_resource(uri), uri):
+        mesh = Mesh(Shape(part.positions, part.normals, part.indices, uv=part.uv))
+        if part.texture is not None:
+            try:
+                mesh.set_texture(read_texture(part.texture, uri))
+            except (Error, OSError) as error:
+                problem = str(error)
+        made.append((mesh, part.colour))
+    return _MeshFile(made, problem)
+
+
 class MarkerMeshes:
-    """Loads the meshes of markers in the session's worker; until then they draw nothing.
+    """Loads the meshes of markers in the scene's thread; until then they draw nothing.
 
     Args:
         background: Runs a function in another thread, and one with its result in the GUI thread.
@@ -443,37 +474,49 @@ class MarkerMeshes:
         on_loaded: Callable[[str, str], None],
     ) -> None:
         self._background, self._on_loaded = background, on_loaded
-        self._parts: dict[str, list[Any] | None] = {}
+        #: By URI, those used last at the end; None while it is being read.
+        self._files: dict[str, _MeshFile | None] = {}
+        self._reading = 0
 
     def of(self, marker: MarkerRecord) -> Iterable[Mesh]:
-        """Return the drawables of a mesh marker; begin to load it if need be."""
+        """Return the drawables of a mesh marker; begin to load it if need be.
+
+        Raises:
+            Error: Too many others are being loaded.
+        """
         uri = marker.resource
-        if uri not in self._parts:
-            self._parts[uri] = None
-            self._background(
-                lambda: load_mesh_cached(locate_resource(uri), uri),
-                lambda result: self._loaded(uri, result),
-            )
-        for part in self._parts[uri] or ():
-            colour = marker.colour
+        if uri not in self._files:
+            if self._reading >= _MAX_READING:
+                raise Error(f"more than {_MAX_READING} meshes are being read; send it again later")
+            self._files[uri] = None
+            self._reading += 1
+            self._background(lambda: _read_mesh(uri), lambda result: self._loaded(uri, result))
+        file = self._files[uri] = self._files.pop(uri)
+        for part, own in file.parts if file is not None else ():
+            colour: tuple[float, ...] = marker.colour
             if marker.embedded and colour[:3] == (0.0, 0.0, 0.0):
                 colour = (1.0, 1.0, 1.0, colour[3] or 1.0)
-            shape, own = part
             if marker.embedded and own is not None:
                 colour = tuple(a * b for a, b in zip(own, colour, strict=True))
-            mesh = Mesh(shape, colour)
+            mesh = copy(part) if marker.embedded else Mesh(part.shape)
+            mesh.set_look(colour=colour)
             mesh.set_instances(_scaled(*marker.scale)[np.newaxis])
             yield mesh
 
+    def problem_of(self, marker: MarkerRecord) -> str:
+        """Return what is wrong with the file of a marker, in words; empty for none."""
+        file = self._files.get(marker.resource) if marker.kind == MESH else None
+        return "" if file is None else file.problem
+
     def _loaded(self, uri: str, result: Any) -> None:
-        if isinstance(result, Exception):
-            self._on_loaded(uri, str(result))
-            return
-        self._parts[uri] = [
-            (Shape(part.positions, part.normals, part.indices, uv=part.uv), part.colour)
-            for part in result
-        ]
-        self._on_loaded(uri, "")
+        self._reading -= 1
+        file = result if isinstance(result, _MeshFile) else _MeshFile([], str(result))
+        self._files[uri] = file
+        # The drawables of markers that are shown keep theirs.
+        old = [one for one, found in self._files.items() if found is not None][:-_MAX_MESHES]
+        for one in old:
+            del self._files[one]
+        self._on_loaded(uri, "" if file.parts else file.problem)
 
 
 class _Late(NamedTuple):
@@ -711,6 +754,9 @@ class Markers(TopicDisplay):
             if marker.locked and marker.frame:
                 group.root.pose, pose = pose, np.eye(4)
             group.put(marker, pose, self._meshes)
+            problem = self._meshes.problem_of(marker)
+            if problem:
+                self._note_problem(marker.key, "error", problem)
         except Exception as error:  # one that cannot be drawn does not hide the others
             if not isinstance(error, Error):
                 _log.exception("%s: marker %s", self.label, _line_of(marker.key))
@@ -842,11 +888,8 @@ class Markers(TopicDisplay):
         if self.scene is not None:
             self.scene.load(work, then)
 
-    def _on_mesh(self, uri: str, problem: str) -> None:
+    def _on_mesh(self, uri: str, _problem: str) -> None:
         if not is_alive(self) or self.scene is None:
-            return
-        if problem:
-            self.set_status("Mesh", "error", f"{uri}: {problem}")
             return
         poses = _Poses(self.scene)
         for marker in list(self._shown.values()):

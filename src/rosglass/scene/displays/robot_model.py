@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from rosglass.qt import QtCore
     from rosglass.scene.urdf import Visual
 
-__all__ = ["RobotModelDisplay", "link_drawables"]
+__all__ = ["RobotModelDisplay", "link_drawables", "read_texture"]
 
 #: Milliseconds until a parameter that is not there is looked up again.
 _RETRY_MS = 2000
@@ -124,7 +124,7 @@ def _matrix(*scale: float, along: float = 0.0) -> NDArray[np.float64]:
     return matrix
 
 
-def _texture(source: str | bytes, name: str) -> NDArray[np.uint8]:
+def read_texture(source: str | bytes, name: str) -> NDArray[np.uint8]:
     """Return the pixels of a picture, (h, w, 4).
 
     Raises:
@@ -181,7 +181,7 @@ def link_drawables(visual: Visual, problems: dict[str, str], *, plain: bool = Fa
         and not isinstance(geometry, MeshFile)
     ):
         try:
-            pixels = _texture(material.texture, material.texture)
+            pixels = read_texture(material.texture, material.texture)
             for mesh in made:
                 mesh.set_texture(pixels)
         except (Error, OSError) as error:
@@ -213,7 +213,7 @@ def _mesh_drawables(
         mesh.set_instances((visual.origin @ _matrix(*geometry.scale))[np.newaxis])
         if part.texture is not None and not plain:
             try:
-                mesh.set_texture(_texture(part.texture, geometry.uri))
+                mesh.set_texture(read_texture(part.texture, geometry.uri))
             except (Error, OSError) as error:
                 problems[geometry.uri] = str(error)
         made.append(mesh)
