@@ -237,3 +237,18 @@ def test_popups_follow_points_of_a_view_beside_others(bench: Any, panel: Path) -
     assert tuple(picture[round(middle.y()), round(middle.x())]) == (0, 255, 0)
     access.view.move_eye_and_focus((0, 1, 10), (0, 1, 0), animate=False)
     bench.wait(lambda: not shown())
+
+
+def test_rosglass_view_shows_a_file_once(bench: Any, panel: Path, tmp_path: Path) -> None:
+    from rosglass.scene.program import ViewProgram
+
+    config, other = tmp_path / "one.rviz", panel.with_name("Other.qml")
+    config.write_text(CONFIG.replace("FILE", str(panel)))
+    other.write_text(RED.replace("ff0000", "00ff00"))
+    view = bench.load()
+    program = ViewProgram(config, overlays=[panel, other])
+    program.begin(view)
+    (display,) = view.scene.displays
+    bench.wait(lambda: display.overlay is not None and display.overlay.loaded)
+    interfaces = [inner for item in view.childItems() for inner in item.childItems()]
+    assert sorted(item.property("color").name() for item in interfaces) == ["#00ff00", "#ff0000"]

@@ -9,11 +9,12 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rosglass.errors import Error
-from rosglass.qml.modules import locate
+from rosglass.errors import Error, QmlError
+from rosglass.qml.modules import interface_file, locate
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qml.runtime import runtime_of
 from rosglass.qt import QtCore, Slot, is_alive
+from rosglass.scene.displays.qml_overlay import QmlOverlayDisplay
 from rosglass.scene.rviz_config import RvizConfig
 
 if TYPE_CHECKING:
@@ -35,6 +36,14 @@ _REFRESH_MS = 500
 _LOOK_S = 2.0
 #: Seconds for which a message stays in the status bar.
 _MESSAGE_S = 10.0
+
+
+def _plain_path(file: str) -> str:
+    """Return the path of an overlay's file; empty if it is missing."""
+    try:
+        return str(interface_file(file))
+    except QmlError:
+        return ""
 
 
 def config_file(place: str | os.PathLike[str]) -> Path:
@@ -146,11 +155,18 @@ class ViewProgram(QtCore.QObject):
         from rosglass.scene.access import access_of  # noqa: PLC0415
         from rosglass.scene.overlay import add_overlay  # noqa: PLC0415
 
+        shown = {
+            _plain_path(one.path)
+            for one in view.scene.displays
+            if isinstance(one, QmlOverlayDisplay)
+        }
         self._access = access = access_of(view)
         access.bare_changed.connect(self._on_bare)
         try:
             for file in self._overlays:
-                add_overlay(view, file, **self._overlay_options)
+                # The config may have it already.
+                if str(file) not in shown:
+                    add_overlay(view, file, **self._overlay_options)
         except Error as error:
             _log.error("%s", error)
             # The command fails, as it does over RViz; its event loop may not run yet.
