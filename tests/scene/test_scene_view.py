@@ -79,6 +79,23 @@ def test_two_views_show_one_scene_from_two_sides(bench: SceneBench) -> None:
     assert not (shaded(picture, 0) | shaded(picture, 1)).any()
 
 
+def test_a_destroyed_view_frees_what_it_made_on_the_device(bench: SceneBench) -> None:
+    from PySide6.QtCore import QObject
+
+    view = bench.load(
+        'Loader { objectName: "loader"; anchors.fill: parent\n'
+        "sourceComponent: Component { SceneView { GridDisplay {} } } }"
+    )
+    loader = view.findChild(QObject, "loader")
+    bench.picture()
+    (renderer,) = loader.property("item")._renderers
+    assert renderer._device is not None
+    loader.setProperty("active", False)
+    # The scene graph lets go of it before the item is gone.
+    bench.picture()
+    bench.wait(lambda: renderer._device is None, timeout=5)
+
+
 def test_a_display_in_a_frame_follows_it(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import Transform, TransformBroadcaster

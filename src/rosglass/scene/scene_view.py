@@ -143,11 +143,11 @@ class SceneView(QQuickRhiItem):
             root.on_change = None
             overlay.remove()
             root.clear()
-            # C++ deletes them a little later, with the scene graph.
             kept = list(renderers)
             for renderer in kept:
-                if Shiboken.isValid(renderer):
-                    renderer.close()
+                # C++ has deleted it before or does so a little later, with the scene graph; what
+                # Python has made on the device is freed by neither.
+                renderer.close()
             state.clear()
             _ORPHANS.extend(kept)
             _drop_orphans()
