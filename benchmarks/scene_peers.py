@@ -1,0 +1,376 @@
+"""The processes that benchmarks/scene.py measures: RViz, a view of rosglass, and small programs.
+
+Each takes JSON objects, a line each, and answers each with a line of JSON. ``rviz`` runs in
+.venv-system, all others in .venv.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import statistics
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+VIEW = (1280, 800)
+#: Degrees that the camera turns with each frame.
+_STEP_RAD = 0.02
+#: What is above the 3D view.
+_QML = """
+import QtQuick
+import RosScene 1.0
+Item {
+    property bool animated: false
+    SceneView { id: scene; objectName: "scene"; anchors.fill: parent }
+    Rectangle {
+        x: 20; y: 20; width: 320; height: 120; radius: 8; color: "#c0202020"
+        Text { x: 12; y: 12; color: "white"; text: "battery 87 %"; font.pixelSize: 22 }
+        Rectangle { x: 12; y: 60; width: 140; height: 40; radius: 4; color: "#406090" }
+    }
+    Rectangle {
+        x: 1100; y: 60; width: 100; height: 100; color: "#40c060"
+        NumberAnimation on rotation {
+            running: animated; loops: Animation.Infinite; from: 0; to: 360; duration: 2000
+        }
+    }
+}
+"""
+_BARE = "import QtQuick\nimport Bare 1.0\nBareItem { width: 1280; height: 800 }"
+_CYCLES = """
+import QtQuick
+import RosScene 1.0
+Item {
+    property bool shown: false
+    Loader {
+        anchors.fill: parent
+        active: shown
+        sourceComponent: Component { SceneView { GridDisplay {} AxesDisplay {} } }
+    }
+}
+"""
+
+
+def memory() -> float:
+    """Return the resident memory of this process in MiB."""
+    text = Path("/proc/self/smaps_rollup").read_text(encoding="ascii")
+    return int(text.split("Rss:")[1].split()[0]) / 1024
+
+
+def run_for(seconds: float) -> None:
+    """Run the event loop."""
+    from rosglass.qt import QtCore, run_event_loop
+
+    loop = QtCore.QEventLoop()
+    QtCore.QTimer.singleShot(round(seconds * 1000), loop.quit)
+    run_event_loop(loop)
+
+
+def measured(frames: Callable[[], int], run: Callable[[], None]) -> dict[str, float]:
+    """Return the frames, and CPU milliseconds of all threads, while something runs."""
+    count, cpu, started = frames(), time.process_time(), time.perf_counter()
+    run()
+    count, cpu = frames() - count, time.process_time() - cpu
+    took = time.perf_counter() - started
+    return {
+        "frames": count,
+        "ms": 1000 * cpu / max(count, 1),
+        "fps": count / took,
+        "percent": 100 * cpu / took,
+    }
+
+
+class Rviz:
+    """RViz, its 3D view alone, with hard edges."""
+
+    def __init__(self, url: str) -> None:
+        from rosglass.rviz import Application
+
+        self._app = Application(url=url, anti_aliasing=False, bare=True)
+        self._app.window.widget.setGeometry(0, 0, *VIEW)
+        self._app.window.widget.show()
+        self._count = 0
+        self._app.window.before_frame.connect(self._on_frame)
+
+    def _on_frame(self) -> None:
+        self._count += 1
+
+    def load(self, config: str) -> None:
+        """Open a config."""
+        self._app.load_config(config)
+        for _ in range(4):
+            panel, widget = self._app.window.panel, self._app.window.widget
+            widget.resize(
+                widget.width() + VIEW[0] - panel.width(),
+                widget.height() + VIEW[1] - panel.height(),
+            )
+            self._app.qt.processEvents()
+
+    def wait(self, seconds: float) -> dict[str, float]:
+        """Let it draw as it does by itself."""
+        return measured(lambda: self._count, lambda: run_for(seconds))
+
+    def move(self, seconds: float, all: bool = True) -> dict[str, float]:  # noqa: ARG002
+        """Turn the camera with each frame, drawing as fast as it can."""
+        from rosglass.qt import QtCore
+        from rosglass.rviz.host import pyqt
+
+        core, manager = pyqt(), self._app.window.manager
+        yaw = manager.getViewManager().getCurrent().subProp("Yaw")
+        manager.stopUpdate()
+
+        def draw() -> None:
+            yaw.setValue(yaw.getValue() + _STEP_RAD)
+            core.QMetaObject.invokeMethod(manager, "onUpdate", core.Qt.DirectConnection)
+
+        timer = QtCore.QTimer()
+        timer.timeout.connect(draw)
+        timer.start(0)
+        found = measured(lambda: self._count, lambda: run_for(seconds))
+        timer.stop()
+        manager.startUpdate()
+        return found
+
+
+class Costs:
+    """Seconds of CPU that messages take, in the thread that each function runs in."""
+
+    def __init__(self) -> None:
+        self.seconds = {"node": 0.0, "gui": 0.0}
+        self.longest = 0.0
+
+    def watch(self, owner: Any, name: str, thread: str) -> None:
+        """Count a method's time."""
+        method = getattr(owner, name)
+
+        def timed(*args: Any) -> Any:
+            started = time.thread_time()
+            try:
+                return method(*args)
+            finally:
+                took = time.thread_time() - started
+                self.seconds[thread] += took
+                if thread == "gui":
+                    self.longest = max(self.longest, took)
+
+        setattr(owner, name, timed)
+
+
+class View:
+    """A SceneView below some QML, in a window."""
+
+    def __init__(self, url: str) -> None:
+        from PySide6.QtGui import QGuiApplication
+        from PySide6.QtQuick import QQuickView
+
+        import rosglass.scene
+        from rosglass.qml import Session, install
+        from rosglass.scene import display, renderer
+
+        self.costs = Costs()
+        self.costs.watch(display.Intake, "receive", "node")
+        self.costs.watch(display.TopicDisplay, "_on_items", "gui")
+        for kind in renderer._KINDS.values():
+            self.costs.watch(kind, "upload", "gui")
+        self._renderer = renderer
+        self._limit = renderer.MOVING_POINTS
+        self._app = QGuiApplication(["scene"])
+        rosglass.scene.register()
+        self._window = QQuickView()
+        self._session = Session(url)
+        install(self._window.engine(), self._session)
+        self._session.init("scene_view")
+        file = Path(os.environ["HOME"], "View.qml")
+        file.write_text(_QML)
+        self._window.setResizeMode(QQuickView.ResizeMode.SizeRootObjectToView)
+        self._window.resize(*VIEW)
+        self._window.setSource(file.as_uri())
+        self._root = self._window.rootObject()
+        self._view = self._root.findChild(rosglass.scene.SceneView, "scene")
+        self._window.show()
+
+    def load(self, config: str) -> None:
+        """Open a config."""
+        self._view.load_config(config)
+
+    def received(self) -> int:
+        """Return how many displays have got a message."""
+        return sum(getattr(one, "received", 1) > 0 for one in self._view.scene.displays)
+
+    def wait(self, seconds: float) -> dict[str, float]:
+        """Let it draw as it does by itself, and count what messages cost."""
+        costs = self.costs
+        costs.seconds, costs.longest = {"node": 0.0, "gui": 0.0}, 0.0
+        before = self._messages()
+        found = measured(self._view.pictures_drawn, lambda: run_for(seconds))
+        found["messages"] = count = self._messages() - before
+        found |= {f"{k}_ms": 1000 * v / max(count, 1) for k, v in costs.seconds.items()}
+        return found | {"longest_ms": 1000 * costs.longest}
+
+    def _messages(self) -> int:
+        displays = self._view.scene.displays
+        return sum(one._intake.received for one in displays if getattr(one, "_intake", None))
+
+    def move(self, seconds: float, all: bool = True) -> dict[str, float]:
+        """Turn the camera with each frame, drawing as fast as it can."""
+        self._renderer.MOVING_POINTS = 10**9 if all else self._limit
+        view, controller = self._view, self._view.controller
+
+        def turn() -> None:
+            controller.set("Yaw", (controller.get("Yaw") + _STEP_RAD) % 6.28)
+            view.camera_moved()
+
+        self._window.frameSwapped.connect(turn)
+        turn()
+        found = measured(view.pictures_drawn, lambda: run_for(seconds))
+        self._window.frameSwapped.disconnect(turn)
+        return found
+
+    def animate(self, seconds: float) -> dict[str, float]:
+        """Animate QML above the scene, which is still."""
+        frames: list[None] = []
+        count = lambda: frames.append(None)  # noqa: E731 - methods change metaobjects
+        self._window.frameSwapped.connect(count)
+        self._root.setProperty("animated", True)
+        before = self._view.pictures_drawn()
+        found = measured(lambda: len(frames), lambda: run_for(seconds))
+        self._root.setProperty("animated", False)
+        self._window.frameSwapped.disconnect(count)
+        return found | {"redrawn": self._view.pictures_drawn() - before}
+
+    def pick(self, times: int) -> dict[str, float]:
+        """Pick again and again, at several places."""
+        took, hits = [], 0
+        for number in range(times):
+            started = time.thread_time()
+            x, y = 300 + 37 * number % 700, 200 + 53 * number % 400
+            hits += self._view.pick(x, y) is not None
+            took.append(1000 * (time.thread_time() - started))
+        return {"ms": statistics.median(took), "longest": max(took), "hits": hits}
+
+    def profile(self, seconds: float) -> dict[str, float]:
+        """Return Python's functions by their own time while data arrives, for a look by hand."""
+        import cProfile
+        import pstats
+
+        profiler = cProfile.Profile()
+        profiler.enable()
+        run_for(seconds)
+        profiler.disable()
+        pstats.Stats(profiler, stream=sys.stderr).sort_stats("tottime").print_stats(25)
+        return {}
+
+
+class Cycles:
+    """A window in which a SceneView is made and destroyed."""
+
+    def __init__(self, url: str) -> None:
+        from PySide6.QtGui import QGuiApplication
+        from PySide6.QtQuick import QQuickView
+
+        import rosglass.scene
+        from rosglass.qml import Session, install
+
+        self._app = QGuiApplication(["scene"])
+        rosglass.scene.register()
+        self._window = QQuickView()
+        self._session = Session(url)
+        install(self._window.engine(), self._session)
+        file = Path(os.environ["HOME"], "Cycles.qml")
+        file.write_text(_CYCLES)
+        self._window.setResizeMode(QQuickView.ResizeMode.SizeRootObjectToView)
+        self._window.resize(400, 300)
+        self._window.setSource(file.as_uri())
+        self._window.show()
+
+    def repeat(self, times: int) -> dict[str, float]:
+        """Make and destroy it so many times, and say what it holds afterwards."""
+        from rosglass.qt import send_deferred_deletes
+
+        root = self._window.rootObject()
+        before, started = memory(), time.perf_counter()
+        for _ in range(times):
+            root.setProperty("shown", True)
+            self._window.grabWindow()
+            run_for(0.01)
+            root.setProperty("shown", False)
+            self._window.grabWindow()
+            run_for(0.01)
+            send_deferred_deletes()
+        gc.collect()
+        run_for(0.2)
+        took = 1000 * (time.perf_counter() - started) / times
+        return {"memory": memory(), "grown": memory() - before, "ms": took}
+
+
+def first_frame(what: str) -> None:
+    """Show a window, print FIRST FRAME once it is on the screen, and end."""
+
+    def shown() -> None:
+        print("FIRST FRAME", flush=True)
+        os._exit(0)
+
+    if what == "bare":
+        os.environ["QSG_RENDER_LOOP"] = "basic"
+        from PySide6.QtGui import QColor, QGuiApplication, QRhiDepthStencilClearValue
+        from PySide6.QtQml import qmlRegisterType
+        from PySide6.QtQuick import QQuickRhiItem, QQuickRhiItemRenderer, QQuickView
+
+        class Renderer(QQuickRhiItemRenderer):
+            def initialize(self, commands: Any) -> None: ...
+            def synchronize(self, item: Any) -> None: ...
+            def render(self, commands: Any) -> None:
+                depth = QRhiDepthStencilClearValue(1.0, 0)
+                commands.beginPass(self.renderTarget(), QColor("#303030"), depth, None)
+                commands.endPass()
+
+        class BareItem(QQuickRhiItem):
+            def createRenderer(self) -> Any:  # noqa: N802 - Qt's name
+                self.renderer = Renderer()
+                return self.renderer
+
+        app = QGuiApplication(["bare"])
+        qmlRegisterType(BareItem, "Bare", 1, 0, "BareItem")
+        window = QQuickView()
+        window.frameSwapped.connect(shown)
+        file = Path(os.environ["HOME"], "Bare.qml")
+        file.write_text(_BARE)
+        window.setSource(file.as_uri())
+        window.show()
+        app.exec()
+        return
+    from rosglass import cli
+    from rosglass.scene.program import ViewProgram
+
+    begin = ViewProgram.begin
+
+    def watch(self: Any, view: Any, *others: Any) -> None:
+        begin(self, view, *others)
+        view.window().frameSwapped.connect(lambda: view.pictures_drawn() and shown())
+
+    ViewProgram.begin = watch  # type: ignore[method-assign, assignment]
+    sys.exit(cli.main(["view", "--url", "local://benchmark"]))
+
+
+def main() -> None:
+    what, url = sys.argv[1:3]
+    del sys.argv[1:]
+    if what in ("bare", "program"):
+        first_frame(what)
+        return
+    peer: Any = {"rviz": Rviz, "view": View, "cycles": Cycles}[what](url)
+    run_for(1.0)
+    print(json.dumps({}), flush=True)
+    for line in sys.stdin:
+        order = json.loads(line)
+        print(json.dumps(getattr(peer, order.pop("do"))(**order)), flush=True)
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()
