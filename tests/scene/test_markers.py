@@ -229,6 +229,17 @@ def test_markers_that_wait_are_bounded_and_their_lines_too(
     assert display.statusLevel == "ok", display.statusText
 
 
+def test_a_reset_drops_markers_and_what_was_wrong_with_them(
+    bench: SceneBench, show: Callable[..., Any]
+) -> None:
+    display = show(marker(1), marker(99, 1), marker(1, 2, header={"frame_id": "arm"}))
+    assert display.statusLevel == "error"
+    display.reset()
+    assert drawables(display) == []
+    bench.wait(lambda: display.statusLevel == "ok")
+    assert display.namespaces == []
+
+
 def test_a_marker_of_a_time_that_never_comes_is_dropped(
     bench: SceneBench, show: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -73,6 +73,7 @@ _POINT_STYLES = {CUBE_LIST: "boxes", SPHERE_LIST: "spheres", POINTS: "squares"}
 _HEAD_SHARE = 0.23
 #: Turns z, along which cylinders and cones stand, to x, along which arrows point.
 _TO_X = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+_IDENTITY = np.eye(4)
 #: Directions of the scale that count, where not all do.
 _SCALED = {LINE_STRIP: "x", LINE_LIST: "x", POINTS: "xy", TEXT: "z", ARROW_STRIP: "xy"}
 #: Metres that are drawn for a scale of 0: surfaces without thickness have no shade.
@@ -705,8 +706,10 @@ class Markers(TopicDisplay):
             text = f"it was dropped after {_MAX_WAIT_S:.0f} s: {pose}"
             self._note_problem(marker.key, "error", text)
         else:
-            is_known = not isinstance(poses.at(marker.frame), str)
-            self._late[marker.key] = late._replace(reason=pose, is_known=is_known)
+            if pose != late.reason:
+                is_known = not isinstance(poses.at(marker.frame), str)
+                late = late._replace(reason=pose, is_known=is_known)
+            self._late[marker.key] = late
 
     def _apply(self, marker: MarkerRecord, poses: _Poses) -> None:
         key = marker.key
@@ -752,7 +755,9 @@ class Markers(TopicDisplay):
             if group is None:
                 group = self._add_group(marker)
             if marker.locked and marker.frame:
-                group.root.pose, pose = pose, np.eye(4)
+                if group.root.pose is not pose:
+                    group.root.pose = pose
+                pose = _IDENTITY
             group.put(marker, pose, self._meshes)
             problem = self._meshes.problem_of(marker)
             if problem:
@@ -819,7 +824,7 @@ class Markers(TopicDisplay):
             held.clear()
         self._late.clear()
         self._problems.clear()
-        report(self, namespaces=[])
+        self._flush_later()
 
     # -- what has changed ------------------------------------------------------------------------
 
