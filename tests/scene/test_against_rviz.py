@@ -138,6 +138,37 @@ Z_UP, Y_UP = (
     pose(0, 0, 0, math.pi / 2)["orientation"],
 )
 HALF = {"x": 0.5, "y": 0.5, "z": 0.5}
+INTERACTIVE_MARKERS = [
+    Message(
+        "/server/update_full", "visualization_msgs/InteractiveMarkerInit",
+        {
+            "server_id": "judge", "seq_num": 1,
+            "markers": [
+                controlled("arrows", pose(-2.5, -1.5, 0, 0.4), {"interaction_mode": 3},
+                           {"interaction_mode": 3, "orientation": Z_UP}),
+                controlled("ring", pose(0, -1.5, 0, 0.4, 0.3),
+                           {"interaction_mode": 5, "orientation": Z_UP}),
+                controlled("fixed", pose(2.2, -1.5, 0, 0.4, 0.3),
+                           {"interaction_mode": 4, "orientation": Y_UP,
+                            "orientation_mode": 1}),
+                controlled("pull", pose(-2, 1),
+                           {"interaction_mode": 6, "orientation": Z_UP}),
+                controlled("facing", pose(0.3, 1, 0, 0.5),
+                           {"interaction_mode": 5, "orientation_mode": 2},
+                           {"interaction_mode": 2, "markers": [
+                               marker(0, 1, "yellow", pose(0.2, 0), (0.4, 0.2, 0.3),
+                                      header={})]}),
+                controlled("apart", pose(2, 1, 0, 0.5),
+                           {"interaction_mode": 4, "orientation_mode": 2,
+                            "independent_marker_orientation": True, "markers": [
+                               marker(0, 1, "magenta", pose(0.2, 0), (0.6, 0.3, 0.3),
+                                      header={})]}),
+            ],
+        },
+    ),
+    Message("/server/update", "visualization_msgs/InteractiveMarkerUpdate",
+            {"server_id": "judge", "seq_num": 1}),
+]  # fmt: skip
 CASES: dict[str, tuple[list[dict[str, Any]], list[Message]]] = {
     "grids and axes": (
         [
@@ -396,37 +427,11 @@ CASES: dict[str, tuple[list[dict[str, Any]], list[Message]]] = {
             display("InteractiveMarkers", Update_Topic="/server/update", Show_Descriptions=False,
                     Enable_Transparency=False, Show_Axes=True),
         ],
-        [
-            Message(
-                "/server/update_full", "visualization_msgs/InteractiveMarkerInit",
-                {
-                    "server_id": "judge", "seq_num": 1,
-                    "markers": [
-                        controlled("arrows", pose(-2.5, -1.5, 0, 0.4), {"interaction_mode": 3},
-                                   {"interaction_mode": 3, "orientation": Z_UP}),
-                        controlled("ring", pose(0, -1.5, 0, 0.4, 0.3),
-                                   {"interaction_mode": 5, "orientation": Z_UP}),
-                        controlled("fixed", pose(2.2, -1.5, 0, 0.4, 0.3),
-                                   {"interaction_mode": 4, "orientation": Y_UP,
-                                    "orientation_mode": 1}),
-                        controlled("pull", pose(-2, 1),
-                                   {"interaction_mode": 6, "orientation": Z_UP}),
-                        controlled("facing", pose(0.3, 1, 0, 0.5),
-                                   {"interaction_mode": 5, "orientation_mode": 2},
-                                   {"interaction_mode": 2, "markers": [
-                                       marker(0, 1, "yellow", pose(0.2, 0), (0.4, 0.2, 0.3),
-                                              header={})]}),
-                        controlled("apart", pose(2, 1, 0, 0.5),
-                                   {"interaction_mode": 4, "orientation_mode": 2,
-                                    "independent_marker_orientation": True, "markers": [
-                                       marker(0, 1, "magenta", pose(0.2, 0), (0.6, 0.3, 0.3),
-                                              header={})]}),
-                    ],
-                },
-            ),
-            Message("/server/update", "visualization_msgs/InteractiveMarkerUpdate",
-                    {"server_id": "judge", "seq_num": 1}),
-        ],
+        INTERACTIVE_MARKERS,
+    ),
+    "translucent interactive markers": (
+        [display("InteractiveMarkers", Update_Topic="/server/update", Show_Descriptions=False)],
+        INTERACTIVE_MARKERS,
     ),
     "depth images": (
         [
@@ -638,7 +643,7 @@ def test_pictures_are_those_of_rviz(pair: Pair, case: str) -> None:
             until = time.monotonic() + TIMEOUT_S
             while True:
                 # RViz drops depth images before the first camera info; servers say they are there.
-                if case in ("depth images", "interactive markers"):
+                if case == "depth images" or messages is INTERACTIVE_MARKERS:
                     for publisher, one in zip(publishers, messages, strict=True):
                         publisher.publish(one.fields)
                 ours, theirs = pair.ours(), pair.theirs()

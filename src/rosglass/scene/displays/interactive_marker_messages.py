@@ -245,6 +245,8 @@ def _complete(control: ControlRecord, scale: float) -> ControlRecord:
         colours = np.empty((len(shades), 4), np.float32)
         colours[:, :3] = np.outer(shades, (red, green, blue))
         colours[:, 3] = AUTOMATIC_ALPHA
+        if control.mode == MOVE_ROTATE:
+            colours[shades == 1.0, 3] /= 2  # as in RViz
         size = (scale, scale, scale)
         ring = MarkerRecord(
             ("", 0), TRIANGLE_LIST, 0, pose=pose, scale=size, colour=tint, points=points
