@@ -297,6 +297,30 @@ def test_a_drag_goes_on_when_its_marker_is_changed(
     bench.wait(lambda: place(display) == [0.0, 5.0, 0.0])
 
 
+def test_a_server_that_answers_late_does_not_move_a_marker_back(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
+) -> None:
+    server.follows = False
+    display = show(marker(control(MOVE_AXIS)))
+    hand.press(hand.at((1.5, 0, 0)))
+    hand.move(hand.at((2.5, 0, 0)))
+    bench.wait(lambda: server.events(POSE_UPDATE))
+    early = server.events(POSE_UPDATE)[0].pose
+    hand.move(hand.at((3.5, 0, 0)))
+    received = display.received
+    server.move("arm", early)
+    bench.wait(lambda: display.received > received)
+    hand.release(hand.at((3.5, 0, 0)))
+    assert place(display)[0] == pytest.approx(2.0, abs=0.06)
+    received = display.received
+    server.move("arm", early)
+    bench.wait(lambda: display.received > received)
+    assert place(display)[0] == pytest.approx(2.0, abs=0.06)
+    # What it has decided itself counts.
+    server.move("arm", {"position": {"x": 0.1}, "orientation": {"w": 1.0}})
+    bench.wait(lambda: place(display)[0] == 0.1)
+
+
 def test_a_drag_ends_when_its_marker_is_erased(
     bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
 ) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import deque
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -55,6 +56,8 @@ KEEP_ALIVE, POSE_UPDATE, MENU_SELECT, BUTTON_CLICK, MOUSE_DOWN, MOUSE_UP = range
 #: Seconds until a feedback without a change, by which servers know that the user still holds a
 #: marker; RViz's.
 _HOLD_S = 0.25
+#: Seconds within which a server repeats the poses that it receives.
+_ECHO_S = 2.0
 #: What is added to the colours of a control under the mouse, and of one that is pressed.
 _HOVERED, _PRESSED = 0.3, 0.5
 #: Points of a marker above which it is not painted anew to be highlighted.
@@ -439,6 +442,8 @@ class InteractiveMarker:
         self._sent = 0.0
         #: A pose that the server has sent during a drag.
         self._requested: tuple[str, int, Matrix] | None = None
+        #: When poses were sent, and these, which a server repeats a little later.
+        self._echoes: deque[tuple[float, Matrix]] = deque(maxlen=100)
         self.change(record)
 
     def change(self, record: InteractiveMarkerRecord) -> None:
@@ -540,6 +545,9 @@ class InteractiveMarker:
 
     def take_pose(self, frame: str, stamp: int, pose: Matrix) -> None:
         """Move to where the server says, after a drag."""
+        if self._is_echo(pose):
+            self._requested = None
+            return
         if self.dragged is not None:
             self._requested = (frame, stamp, pose)
             return
@@ -547,6 +555,14 @@ class InteractiveMarker:
             self.frame, self.stamp, self._placed = frame, stamp, False
             self.place()
         self.set_pose(pose)
+
+    def _is_echo(self, pose: Matrix) -> bool:
+        """Return whether a server repeats a pose that a newer one has replaced since."""
+        now = time.monotonic()
+        sent = [one for at, one in self._echoes if now - at < _ECHO_S]
+        if self.dragged is None:
+            sent = sent[:-1]  # the last one is where it is
+        return any(bool(np.abs(one - pose).max() < 1e-6) for one in reversed(sent))
 
     # -- feedback --------------------------------------------------------------------------------
 
@@ -598,6 +614,8 @@ class InteractiveMarker:
             stamp = scene.latest_time(frame)
             if at is not None:
                 at = (inverse(self.root.pose) @ (*at, 1.0))[:3]
+        if event == POSE_UPDATE:
+            self._echoes.append((self._sent, pose))
         return self.display.publish(
             {
                 "header": {"frame_id": frame, "stamp": Time(stamp)},
