@@ -396,3 +396,19 @@ def test_nothing_that_is_on_its_way_is_shown_after_a_change(bench: SceneBench, c
     # It receives again.
     path.topic = "/plan"
     bench.wait(lambda: publisher.publish({"header": {"frame_id": "map"}}) or path.received)
+
+
+def test_a_fixed_frame_that_does_not_exist_is_a_problem(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    view = bench.load()
+    StaticTransformBroadcaster(bench.robot).send_transform(
+        Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "mast")
+    )
+    bench.wait(lambda: view.scene.frames())
+    view.fixedFrame = "mapp"
+    bench.wait(lambda: view.problem)
+    assert "the fixed frame [mapp] does not exist; did you mean map?" in view.problem
+    view.fixedFrame = "map"
+    bench.wait(lambda: not view.problem)

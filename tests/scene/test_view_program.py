@@ -44,7 +44,8 @@ def row_of(model: Any, label: str) -> int:
 
 
 def test_the_panel_lists_options_displays_and_settings(model: Any) -> None:
-    assert labels(model) == ["Global Options", "Fixed Frame", "Background Color", "Grid"]
+    options = ["Global Options", "Fixed Frame", "Background Color"]
+    assert labels(model) == [*options, "Global Status", "Grid"]
     model.toggle(row_of(model, "Grid"))
     assert "Cell Size" in labels(model)
     size = model.rows[row_of(model, "Cell Size")]
@@ -52,7 +53,7 @@ def test_the_panel_lists_options_displays_and_settings(model: Any) -> None:
     plane = model.rows[row_of(model, "Plane")]
     assert plane.choices == ("XY", "XZ", "YZ")
     model.toggle(row_of(model, "Global Options"))
-    assert labels(model)[:2] == ["Global Options", "Grid"]
+    assert labels(model)[:3] == ["Global Options", "Global Status", "Grid"]
 
 
 def test_what_the_user_enters_changes_settings_or_is_refused(bench: SceneBench, model: Any) -> None:

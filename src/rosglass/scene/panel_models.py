@@ -103,6 +103,8 @@ class DisplaysModel(QAbstractListModel):
     viewChanged = Signal()
     #: The user has entered something that does not fit: why.
     refused = Signal(str)
+    #: What the user has entered is set.
+    accepted = Signal()
 
     def __init__(self, parent: QtCore.QObject | None = None) -> None:
         super().__init__(parent)
@@ -205,6 +207,11 @@ class DisplaysModel(QAbstractListModel):
                 (*key, _BACKGROUND), 1, _BACKGROUND, "color",
                 view.property("background").name(), "What is behind everything.",
             )  # fmt: skip
+        problem = scene.problem
+        yield PanelRow(
+            ("status",), 0, "Global Status", "status", problem or "Ok", problem,
+            "error" if problem else "ok",
+        )  # fmt: skip
         yield from self._walk_group(view, None, 0)
 
     def _walk_group(self, view: SceneView, group: Display | None, depth: int) -> Iterator[PanelRow]:
@@ -303,6 +310,8 @@ class DisplaysModel(QAbstractListModel):
                 view.setProperty("background", colour)
         except Error as error:
             self.refused.emit(f"{path}: {error}")
+        else:
+            self.accepted.emit()
         self.refresh()
         # An editor shows again what the setting has.
         index = self.index(row)

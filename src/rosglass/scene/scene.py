@@ -276,8 +276,16 @@ class Scene(Element):
         if self._ticks % 5 or buffer is None:
             return
         self._tree = buffer.tree()
+        self._check_fixed_frame()
         for display in self._alive():
             display.check_frame()
+
+    def _check_fixed_frame(self) -> None:
+        """Say that the fixed frame is none of the robot's."""
+        tree, frame = self._tree, self._fixed_frame
+        known = tree is None or frame in tree or not len(tree)
+        hint = "" if known or tree is None else similar(frame, tree)
+        self._set_problem("" if known else f"the fixed frame [{frame}] does not exist{hint}")
 
     def load(self, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
         """Run a job that takes long, such as reading meshes, in a thread of the scene.

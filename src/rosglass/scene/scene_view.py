@@ -165,6 +165,7 @@ class SceneView(QQuickRhiItem):
         self._scene.changed.connect(self._on_scene)
         self._scene.placed.connect(self._on_placed)
         self._scene.fixedFrameChanged.connect(self.fixedFrameChanged)
+        self._scene.problemChanged.connect(self.problemChanged)
         self._scene.root.add(self.overlay)
 
     def _get_scene(self) -> Scene:
@@ -181,6 +182,7 @@ class SceneView(QQuickRhiItem):
             before.changed.disconnect(self._on_scene)
             before.placed.disconnect(self._on_placed)
             before.fixedFrameChanged.disconnect(self.fixedFrameChanged)
+            before.problemChanged.disconnect(self.problemChanged)
             if before.parent() is self:
                 before.deleteLater()
         self._scene = scene
@@ -223,7 +225,9 @@ class SceneView(QQuickRhiItem):
     background = Property(QColor, _get_background, _set_background, notify=backgroundChanged)
 
     #: Why nothing, or not everything, is drawn; empty without a problem.
-    problem = Property(str, lambda self: self._problem, notify=problemChanged)
+    problem = Property(
+        str, lambda self: self._problem or self._scene.problem, notify=problemChanged
+    )
 
     def _get_view_name(self) -> str:
         return self._view.TYPE

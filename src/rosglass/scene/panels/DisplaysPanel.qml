@@ -20,6 +20,7 @@ Pane {
     DisplaysModel {
         id: rows
         onRefused: text => { panel.problem = text; forget.restart() }
+        onAccepted: panel.problem = ""
     }
     Timer { id: forget; interval: 8000; onTriggered: panel.problem = "" }
 
@@ -52,7 +53,7 @@ Pane {
                 required property bool expanded
                 required property var choices
                 readonly property bool ofDisplay: kind === "display"
-                readonly property color tint: level === "error" ? "#ff6b60" : level === "warn" ? "#ffc040" : palette.text
+                readonly property color tint: level === "error" ? "#c62818" : level === "warn" ? "#9a5b00" : palette.text
 
                 width: list.width
                 height: 24
@@ -122,7 +123,11 @@ Pane {
                         model: row.choices
                         editable: row.kind !== "enum"
                         currentIndex: row.choices.indexOf(String(row.value))
-                        Component.onCompleted: if (editable) editText = String(row.value)
+                        // What is set may be none of the choices, e.g. a frame that is not there yet.
+                        readonly property string given: String(row.value)
+                        onGivenChanged: if (editable) editText = given
+                        onModelChanged: if (editable) Qt.callLater(() => { editText = given })
+                        Component.onCompleted: if (editable) editText = given
                         onActivated: rows.edit(row.index, currentText)
                         onAccepted: rows.edit(row.index, editText)
                     }
@@ -134,7 +139,12 @@ Pane {
                         Layout.preferredHeight: 22
                         text: row.kind === "bool" ? "" : String(row.value)
                         selectByMouse: true
-                        onEditingFinished: if (text !== String(row.value)) rows.edit(row.index, text)
+                        onEditingFinished: {
+                            if (text === String(row.value)) return
+                            rows.edit(row.index, text)
+                            // What was refused is not left standing.
+                            text = Qt.binding(() => row.kind === "bool" ? "" : String(row.value))
+                        }
                     }
                 }
             }
@@ -146,7 +156,7 @@ Pane {
             text: panel.problem
             textFormat: Text.PlainText
             wrapMode: Text.Wrap
-            color: "#ff6b60"
+            color: "#c62818"
         }
         RowLayout {
             Layout.margins: 4
@@ -162,8 +172,10 @@ Pane {
         title: "New name of the display"
         modal: true
         standardButtons: Dialog.Ok | Dialog.Cancel
-        contentItem: TextField { id: newName }
-        onOpened: newName.forceActiveFocus()
+        parent: Overlay.overlay
+        anchors.centerIn: parent
+        contentItem: TextField { id: newName; selectByMouse: true; onAccepted: renaming.accept() }
+        onOpened: { newName.text = list.currentItem ? list.currentItem.label : ""; newName.selectAll(); newName.forceActiveFocus() }
         onAccepted: rows.rename(panel.current, newName.text)
     }
     Dialog {

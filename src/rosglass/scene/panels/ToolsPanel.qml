@@ -65,6 +65,6 @@ Pane {
                 }
             }
         }
-        Label { Layout.fillWidth: true; visible: panel.problem !== ""; text: panel.problem; textFormat: Text.PlainText; wrapMode: Text.Wrap; color: "#ff6b60" }
+        Label { Layout.fillWidth: true; visible: panel.problem !== ""; text: panel.problem; textFormat: Text.PlainText; wrapMode: Text.Wrap; color: "#c62818" }
     }
 }

@@ -14,7 +14,7 @@ ApplicationWindow {
     width: 1280
     height: 800
     visible: true
-    title: (program.configName || "new view") + (program.modified ? " *" : "") + " - rosglass view"
+    title: (program.configName || "new view") + (program.modified ? " *" : "") + " - rosglass"
 
     Component.onCompleted: program.begin(scene)
     onClosing: close => {
@@ -131,7 +131,7 @@ ApplicationWindow {
         padding: 4
         RowLayout {
             anchors.fill: parent
-            Label { Layout.maximumWidth: window.width / 2; text: program.connection; textFormat: Text.PlainText; elide: Text.ElideRight; color: program.connected ? palette.text : "#ffc040" }
+            Label { Layout.maximumWidth: window.width / 2; text: program.connection; textFormat: Text.PlainText; elide: Text.ElideRight; color: program.connected ? palette.text : "#9a5b00" }
             ToolSeparator { }
             Label { text: program.time; textFormat: Text.PlainText }
             ToolSeparator { }

@@ -54,6 +54,6 @@ Pane {
                 }
             }
         }
-        Label { Layout.fillWidth: true; visible: panel.problem !== ""; text: panel.problem; wrapMode: Text.Wrap; color: "#ff6b60" }
+        Label { Layout.fillWidth: true; visible: panel.problem !== ""; text: panel.problem; wrapMode: Text.Wrap; color: "#c62818" }
     }
 }
