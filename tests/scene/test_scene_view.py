@@ -82,6 +82,8 @@ def test_two_views_show_one_scene_from_two_sides(bench: SceneBench) -> None:
 def test_a_destroyed_view_frees_what_it_made_on_the_device(bench: SceneBench) -> None:
     from PySide6.QtCore import QObject
 
+    from rosglass.qt import send_deferred_deletes
+
     view = bench.load(
         'Loader { objectName: "loader"; anchors.fill: parent\n'
         "sourceComponent: Component { SceneView { GridDisplay {} } } }"
@@ -93,6 +95,7 @@ def test_a_destroyed_view_frees_what_it_made_on_the_device(bench: SceneBench) ->
     loader.setProperty("active", False)
     # The scene graph lets go of it before the item is gone.
     bench.picture()
+    send_deferred_deletes()
     bench.wait(lambda: renderer._device is None, timeout=5)
 
 
