@@ -390,6 +390,14 @@ def test_meshes_have_their_textures_and_are_made_in_another_thread(
     assert "gone.obj: there is no such file" in display.status_lines["shapes/2"].text
     show(marker(1, 2))
     assert display.statusLevel == "ok", display.statusText
+    # Sent again in another place, it is not uploaded again.
+    again = marker(10, mesh_resource=uri, mesh_use_embedded_materials=True)
+    again["pose"] = {"position": {"x": 3.0}}
+    show(again)
+    assert painted in drawables(display)
+    assert 3.0 in xs(display)
+    show({**again, "color": {**RED, "g": 0.5}})
+    assert painted not in drawables(display)
 
 
 def test_meshes_that_are_kept_are_bounded() -> None:

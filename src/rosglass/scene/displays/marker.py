@@ -294,6 +294,8 @@ class MarkerGroup:
         self._batches: dict[Shape, _Batch] = {}
         #: Drawables of markers that are not instances.
         self._own: dict[tuple[str, int], Group] = {}
+        #: What those of texts and meshes look like.
+        self._looks: dict[tuple[str, int], tuple[Any, ...]] = {}
 
     def _batch(self, shape: Shape) -> _Batch:
         found = self._batches.get(shape)
@@ -304,8 +306,17 @@ class MarkerGroup:
 
     def put(self, marker: MarkerRecord, pose: NDArray[np.float64], meshes: MarkerMeshes) -> None:
         """Draw a marker at a pose of its frame in the fixed frame."""
-        self.remove(marker.key)
         place = pose @ marker.pose
+        # Textures and texts are uploaded again only if they changed; a mesh that is read is empty.
+        look: tuple[Any, ...] = ()
+        if marker.kind in (TEXT, MESH):
+            look = (marker.kind, marker.scale, marker.colour, marker.text)
+            look += (marker.resource, marker.embedded)
+        own = self._own.get(marker.key)
+        if own and look and self._looks.get(marker.key) == look:
+            own.pose = place
+            return
+        self.remove(marker.key)
         shapes = list(_instances(marker))
         if shapes:
             for shape, local, colour in shapes:
@@ -317,12 +328,15 @@ class MarkerGroup:
                 item.owner = self._owner
         group.pose = place
         self._own[marker.key] = group
+        if look:
+            self._looks[marker.key] = look
         self.root.add(group)
 
     def remove(self, key: tuple[str, int]) -> None:
         """Do not draw a marker any more."""
         group = self._own.pop(key, None)
         if group is not None:
+            self._looks.pop(key, None)
             group.remove()
         for batch in self._batches.values():
             batch.discard(key)
@@ -738,7 +752,15 @@ class Markers(TopicDisplay):
     def _show_marker(self, marker: MarkerRecord, pose: NDArray[np.float64]) -> None:
         """Show a marker that is new, with its frame at a pose in the fixed frame."""
         key = marker.key
-        self._remove(key)
+        before = self._shown.get(key)
+        if before is not None and self._group_of(before) is self._group_of(marker):
+            # Its group replaces it, or moves it if nothing else has changed.
+            del self._shown[key]
+            self._forget_hidden(before)
+            self._problems.pop(key, None)
+            self._expires.pop(key, None)
+        else:
+            self._remove(key)
         if len(self._shown) >= _MAX_MARKERS:
             self._note_problem(key, "error", f"only {_MAX_MARKERS} markers are shown")
             return
