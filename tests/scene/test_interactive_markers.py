@@ -689,6 +689,13 @@ def test_without_a_server_the_status_says_so(bench: SceneBench) -> None:
             {"controls": [control(2, boxes=True)], "menu_entries": [{"id": 7, "parent_id": 7}]},
             "menu entry 7: its parent 7 is not above it",
         ),
+        (
+            {
+                "controls": [control(2, boxes=True)],
+                "menu_entries": [{"id": n + 1, "parent_id": n} for n in range(400)],
+            },
+            "menu entry 11 is deeper than 10 menus",
+        ),
         ({"controls": [control(2, markers=[{**BOX, "type": 55}])]}, "type 55: expected 0 to 12"),
     ],
 )

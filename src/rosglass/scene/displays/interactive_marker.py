@@ -50,6 +50,8 @@ if TYPE_CHECKING:
 __all__ = ["InteractiveMarkersDisplay"]
 
 _MAX_SERVERS, _MAX_EARLY, _MAX_LINES = 20, 100, 20
+#: Letters of a name in the status.
+_MAX_NAME = 80
 #: Seconds without a message after which a server that sends keep-alives, usually twice a second, is
 #: gone.
 _SILENCE_S = 3.0
@@ -505,14 +507,14 @@ class InteractiveMarkersDisplay(TopicDisplay):
 
     def set_line(self, name: str, problem: str) -> None:
         """Set what is wrong with a marker; an empty text if nothing is."""
-        line = f"Marker {name}"
+        line = f"Marker {name[:_MAX_NAME]}"
         if not problem:
             self.delete_status(line)
         elif line in self.status_lines or len(self.status_lines) < _MAX_LINES:
             self.set_status(line, "error", problem)
 
     def _report(self, name: str, server: _Server) -> None:
-        line = f"Server {name}".strip()
+        line = f"Server {name[:_MAX_NAME]}".strip()
         if server.silent:
             text = f"no sign of life for more than {_SILENCE_S:g} s; its markers may be out of date"
             self.set_status(line, "warn", text)

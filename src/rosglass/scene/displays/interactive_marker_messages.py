@@ -58,7 +58,9 @@ HELP = {
         "<b>Ctrl + Shift:</b> Rotate around Z."
     ),
 }
-_MAX_CONTROLS, _MAX_SHAPES, _MAX_ENTRIES = 1000, 10_000, 1000
+_MAX_CONTROLS, _MAX_SHAPES = 1000, 10_000
+#: Entries of a menu, how deep they are in each other, and letters of a title.
+_MAX_ENTRIES, _MAX_DEPTH, _MAX_TITLE = 500, 10, 200
 #: Interactive markers that are shown.
 MAX_MARKERS = 2000
 # visualization_msgs/InteractiveMarkerUpdate: types.
@@ -194,26 +196,33 @@ def _read_menu(entries: Any) -> tuple[list[dict[str, Any]], dict[int, str], str]
     """Return the tree of a menu, what it wants to run, and what is wrong with it."""
     top: list[dict[str, Any]] = []
     nodes: dict[int, list[dict[str, Any]]] = {0: top}
+    depths = {0: 0}
     programs: dict[int, str] = {}
-    problem = ""
+    problems: list[str] = []
     if len(entries) > _MAX_ENTRIES:
-        problem = f"menu_entries: {len(entries)}, of which {_MAX_ENTRIES} are shown"
+        problems.append(f"menu_entries: {len(entries)}, of which {_MAX_ENTRIES} are shown")
     for entry in entries[:_MAX_ENTRIES]:
         above = nodes.get(entry.parent_id)
-        if above is None or entry.id in nodes:
-            problem = f"menu entry {entry.id}: its parent {entry.parent_id} is not above it"
-            if above is not None:
-                problem = f"menu entry {entry.id} is there twice, or has the id 0"
+        if above is None:
+            problems.append(f"menu entry {entry.id}: its parent {entry.parent_id} is not above it")
+            continue
+        if entry.id in nodes:
+            problems.append(f"menu entry {entry.id} is there twice, or has the id 0")
+            continue
+        depth = depths[entry.id] = depths[entry.parent_id] + 1
+        if depth > _MAX_DEPTH:
+            problems.append(f"menu entry {entry.id} is deeper than {_MAX_DEPTH} menus")
             continue
         children = nodes[entry.id] = []
         above.append({"id": entry.id, "title": _title(entry.title), "children": children})
         if entry.command_type:
             programs[entry.id] = entry.command
-    return top, programs, problem
+    return top, programs, problems[0] if problems else ""
 
 
 def _title(title: str) -> str:
     """Return the title of a menu entry; RViz's marks are boxes."""
+    title = title[:_MAX_TITLE]
     for mark, box in (("[x]", "\u2611"), ("[ ]", "\u2610")):
         if title.startswith(mark):
             return f"{box} {title.removeprefix(mark).strip()}"
