@@ -151,6 +151,41 @@ Visualization Manager:
     assert saved.displays[1].settings["Speed"] == 3
 
 
+def test_groups_in_groups_are_hidden_and_removed_with_them(
+    bench: SceneBench, tmp_path: Path
+) -> None:
+    file = tmp_path / "nested.rviz"
+    file.write_text(
+        """
+Visualization Manager:
+  Displays:
+    - Class: rviz_common/Group
+      Name: Outer
+      Enabled: true
+      Displays:
+        - Class: rviz_common/Group
+          Name: Inner
+          Enabled: true
+          Displays:
+            - {Class: rviz_default_plugins/Path, Name: Plan, Enabled: true, Topic: /plan}
+    - {Class: rviz_default_plugins/Grid, Name: Floor, Enabled: true}
+"""
+    )
+    view = bench.load()
+    assert view.load_config(file) == []
+    outer = view.scene.find("Outer")
+    publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
+    bench.wait(publisher.subscription_count)
+    outer.enabled = False
+    bench.wait(lambda: not publisher.subscription_count())
+    outer.enabled = True
+    bench.wait(publisher.subscription_count)
+    view.scene.remove(outer)
+    assert [one.name for one in view.scene.displays] == ["Floor"]
+    assert view.load_config(file) == []
+    assert len(view.scene.displays) == 4
+
+
 @pytest.mark.parametrize(
     ("text", "error"),
     [("", "not an RViz config"), ("- a\n- b", "not an RViz config"), ("a: [", "expected")],

@@ -409,9 +409,76 @@ def test_a_fixed_frame_that_does_not_exist_is_a_problem(bench: SceneBench) -> No
     StaticTransformBroadcaster(bench.robot).send_transform(
         Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "mast")
     )
-    bench.wait(lambda: view.scene.frames())
+    bench.wait(view.scene.frames)
     view.fixedFrame = "mapp"
     bench.wait(lambda: view.problem)
     assert "the fixed frame [mapp] does not exist; did you mean map?" in view.problem
     view.fixedFrame = "map"
     bench.wait(lambda: not view.problem)
+
+
+def test_a_jump_of_time_and_reset_begin_anew(bench: SceneBench) -> None:
+    from rosglass.comm.clock import ClockChange, Jump
+    from rosglass.comm.qos import QoS
+    from rosglass.comm.time import Duration
+
+    view = bench.load('PathDisplay { topic: "/plan" } MapDisplay { topic: "/map" }')
+    path, area = view.scene.displays
+    plan = bench.robot.create_publisher("/plan", "nav_msgs/Path")
+    latched = bench.robot.create_publisher("/map", "nav_msgs/OccupancyGrid", QoS.latched())
+    info = {"resolution": 1.0, "width": 1, "height": 1, "origin": {"orientation": {"w": 1.0}}}
+    header = {"frame_id": "map"}
+    latched.publish({"header": header, "info": info, "data": [0]})
+
+    def is_shown() -> bool:
+        plan.publish({"header": header})
+        return bool(len(path.root)) and area.cells is not None
+
+    def begin() -> None:
+        bench.wait(is_shown)
+
+    begin()
+    back = Jump(Duration.from_seconds(-3.0), ClockChange.NONE)
+    for _ in range(3):
+        view.scene.node.clock._notify(back)
+    bench.wait(lambda: not len(path.root))
+    begin()
+    view.reset()
+    assert not len(path.root)
+    assert area.cells is None
+    begin()
+
+
+def test_a_display_of_another_scene_is_refused(bench: SceneBench) -> None:
+    from rosglass.errors import Error
+
+    view = bench.load('SceneView { objectName: "other" }')
+    grid = view.scene.add("Grid")
+    other = view.findChild(type(view), "other").scene
+    with pytest.raises(Error, match="display 'Grid' is in another scene"):
+        other.add(grid)
+    assert other.displays == []
+
+
+def test_a_scene_ends_before_its_displays(bench: SceneBench, capfd: Any) -> None:
+    from rosglass.qt import is_alive, send_deferred_deletes
+    from rosglass.scene.scene import Scene
+
+    view = bench.load()
+    scene = Scene(None, view.scene._find_runtime())
+    display = scene.TYPES["Grid"](view, scene._find_runtime())
+    scene.adopt(display)
+    for one in (scene, display):
+        one.deleteLater()
+        send_deferred_deletes()
+        assert not is_alive(one)
+    assert "Signal source" not in capfd.readouterr().err
+
+
+def test_disabled_displays_report_nothing(bench: SceneBench) -> None:
+    view = bench.load('AxesDisplay { frame: "tool" } GridDisplay { frame: "tool" }')
+    bench.wait(lambda: all(one.statusLevel == "error" for one in view.scene.displays))
+    for display in view.scene.displays:
+        display.enabled = False
+        display.alpha = 0.2
+        assert display.statusText == ""

@@ -432,11 +432,7 @@ class SceneDisplays(PluginList):
         Raises:
             Error: It was removed before.
         """
-        waiting = [display.require()]
-        while waiting:
-            one = waiting.pop()
-            waiting += [inner for inner in self._scene.displays if inner.group is one]
-            self._scene.remove(one)
+        self._scene.remove(display.require())
         self.emit_changes()
 
     def emit_changes(self) -> None:

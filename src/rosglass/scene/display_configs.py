@@ -57,8 +57,9 @@ class GroupDisplay(Display):
 
     TYPE = "Group"
 
-    def _on_enabled(self) -> None:
-        super()._on_enabled()
+    def on_group_enabled(self) -> None:
+        """Show or hide what is in it, as it or its own group is shown or hidden."""
+        super().on_group_enabled()
         if self.scene is not None:
             for display in self.scene.displays:
                 if display.group is self:
@@ -73,7 +74,8 @@ def show_displays(scene: Scene, config: RvizConfig) -> list[str]:
     """
     notes = list(config.warnings)
     for display in scene.displays:
-        scene.remove(display)
+        if display.group is None:
+            scene.remove(display)
     try:
         scene.fixed_frame = config.fixed_frame or "map"
     except Error as error:

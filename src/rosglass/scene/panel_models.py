@@ -331,11 +331,7 @@ class DisplaysModel(QAbstractListModel):
         display = self._display_at(row)
         if display is None or self._view is None:
             return
-        scene = self._view.scene
-        for inner in scene.displays:
-            if inner.group is display:
-                scene.remove(inner)
-        scene.remove(display)
+        self._view.scene.remove(display)
 
     @Slot(int, int)
     def move(self, row: int, target: int) -> None:

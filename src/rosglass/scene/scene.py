@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import logging
 import math
+import time
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.executor import Dispatcher
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from rosglass.comm.clock import Jump
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.display import Display
@@ -35,6 +37,8 @@ __all__ = ["Scene"]
 _log = logging.getLogger("rosglass.scene")
 #: Milliseconds between two looks at transforms that have changed.
 _TRANSFORMS_MS = 33
+#: Seconds between two resets as the time jumps back again and again.
+_RESETS_S = 1.0
 
 
 class Scene(Element):
@@ -76,8 +80,16 @@ class Scene(Element):
         self._tree: FrameTree | None = None
         super().__init__(parent, runtime)
         self._timer = single_shot(self, self._follow)
-        self._tree_changed = False
+        self._reset_at = -math.inf
+        self._resets = single_shot(self, self.reset)
         self.root.on_change = self.changed.emit
+        root = self.root
+
+        def end() -> None:
+            # Its displays may be destroyed later.
+            root.on_change = None
+
+        self.destroyed.connect(end)
 
     def _find_runtime(self) -> Runtime | None:
         if self._runtime is None:
@@ -105,7 +117,8 @@ class Scene(Element):
             settings: Values of its properties, e.g. ``topic="/points"``.
 
         Raises:
-            Error: There is no such type or property, or a value does not fit.
+            Error: There is no such type or property, or a value does not fit; or the display is in
+                another scene.
         """
         if isinstance(kind, str):
             found = self.TYPES.get(kind) or self.TYPES.get(kind.rpartition("/")[2])
@@ -130,9 +143,15 @@ class Scene(Element):
         return display
 
     def adopt(self, display: Display) -> None:
-        """Show a display; one of another scene is not taken."""
+        """Show a display.
+
+        Raises:
+            Error: It is in another scene.
+        """
         if display in self._displays:
             return
+        if display.scene is not None and is_alive(display.scene):
+            raise Error(f"{display.label} is in another scene; make one for each scene")
         self._displays.append(display)
         root, displays = display.root, self._displays
 
@@ -153,13 +172,16 @@ class Scene(Element):
         self.displaysChanged.emit()
 
     def remove(self, display: Display) -> None:
-        """Remove a display.
+        """Remove a display, and if it is a group, the displays in it.
 
         Raises:
             Error: It is not in this scene.
         """
         if display not in self._displays:
             raise Error(f"{display.label} is not in this scene")
+        for inner in self.displays:
+            if inner.group is display and inner in self._displays:
+                self.remove(inner)
         self._displays.remove(display)
         display.leave()
         self.displayRemoved.emit(display)
@@ -333,8 +355,10 @@ class Scene(Element):
         watch = self._watch = link.buffer.on_update(
             weak_callback(self._on_transforms), session.executor
         )
+        jumps = wanted[0].clock.on_jump(weak_callback(self._on_jump), executor=session.executor)
 
         def leave() -> None:
+            jumps.close()
             watch.close()
             link.leave(self)
 
@@ -360,13 +384,27 @@ class Scene(Element):
         self._each(lambda display: display.on_fixed_frame())
         self.placed.emit()
 
+    def _on_jump(self, jump: Jump) -> None:  # noqa: ARG002 - the clock's signature
+        """Begin anew after a jump of the robot's time, but not at each of many."""
+        if is_alive(self) and not self._resets.isActive():
+            wait = self._reset_at + _RESETS_S - time.monotonic()
+            self._resets.start(int(max(wait, 0.0) * 1000))
+
+    @Slot()
     def reset(self) -> None:
-        """Drop all data that was received."""
-        self._each(lambda display: display.reset())
+        """Drop all data that was received, and subscribe anew: latched messages come again."""
+
+        def restart(display: Display) -> None:
+            display._close_endpoint()
+            display.reset()
+            display._schedule()
+
+        self._reset_at = time.monotonic()
+        self._each(restart)
 
     def _each(self, job: Callable[[Display], None]) -> None:
         for display in self._alive():
-            if display.enabled:
+            if display.shown:
                 try:
                     job(display)
                 except TransformException as error:

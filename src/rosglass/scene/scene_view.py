@@ -75,8 +75,6 @@ class SceneView(QQuickRhiItem):
     statusTextChanged = Signal()
     #: The camera was moved, or the size changed.
     cameraChanged = Signal()
-    #: A picture was drawn.
-    framePainted = Signal()
     sceneChanged = Signal()
     #: A config is about to replace what is shown.
     configLoading = Signal()
@@ -282,6 +280,11 @@ class SceneView(QQuickRhiItem):
     def adopt_tool(self, tool: Tool) -> None:
         """Take a tool that QML has declared inside this view."""
         self._tools.adopt(tool, declared=True)
+
+    @Slot()
+    def reset(self) -> None:
+        """Drop all data that was received, e.g. as a recording begins anew."""
+        self.scene.reset()
 
     def adopt_display(self, display: Display) -> None:
         """Show a display that QML has declared inside this view."""

@@ -37,6 +37,8 @@ class _InFrame(Display):
 
     def on_transforms(self) -> None:
         """Follow the frame."""
+        if not self.shown:
+            return
         pose = self.place_of(self.frame)
         self._body.visible = pose is not None
         if pose is not None:

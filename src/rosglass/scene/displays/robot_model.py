@@ -422,7 +422,7 @@ class RobotModelDisplay(Display):
 
     def _follow(self) -> None:
         scene = self.scene
-        if scene is None or not self._bodies or not self.enabled:
+        if scene is None or not self._bodies or not self.shown:
             return
         prefix = self.tfPrefix.strip("/")
         missing: list[tuple[str, str]] = []

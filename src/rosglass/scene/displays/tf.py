@@ -150,7 +150,7 @@ class TFDisplay(Display):
         # Frames that are not updated any more fade without a transform.
         super()._on_tick()
         now = time.monotonic()
-        if self.enabled and self._moves and now >= self._next_look:
+        if self.shown and self._moves and now >= self._next_look:
             self._next_look = now + _LOOK_S
             self._draw()
 
@@ -168,7 +168,7 @@ class TFDisplay(Display):
     def _draw(self) -> None:
         scene = self.scene
         buffer = scene.transforms if scene is not None else None
-        if scene is None or buffer is None or not self.enabled:
+        if scene is None or buffer is None or not self.shown:
             return
         tree = buffer.tree()
         shown: list[_Frame] = []

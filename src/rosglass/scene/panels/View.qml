@@ -72,6 +72,15 @@ ApplicationWindow {
                 }
             }
             Item { Layout.fillWidth: true }
+            ToolButton {
+                objectName: "reset"
+                text: "Reset"
+                focusPolicy: Qt.NoFocus
+                onClicked: scene.reset()
+                ToolTip.visible: hovered
+                ToolTip.delay: 500
+                ToolTip.text: "Drop all data that was received"
+            }
             ToolButton { text: "Panels"; checkable: true; checked: window.panels; onToggled: window.panels = checked }
         }
     }
