@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import struct
 from typing import TYPE_CHECKING, Any
 
@@ -177,7 +178,7 @@ def test_a_robot_whose_transforms_stop_fades(bench: SceneBench, monkeypatch: Any
     publish(bench, URDF)
     send_transforms(bench, "mast")
     broadcaster = TransformBroadcaster(bench.robot)
-    sent = iter(range(1, 10_000))
+    sent = itertools.count(1)
 
     def move() -> bool:
         stamp = Time.from_parts(next(sent), 0)
@@ -190,3 +191,20 @@ def test_a_robot_whose_transforms_stop_fades(bench: SceneBench, monkeypatch: Any
     assert "[base_link] may be somewhere else: no transform has come for" in robot.statusText
     bench.wait(lambda: move() and robot.root.alpha == 1.0)
     assert robot.statusLevel == "ok", robot.statusText
+
+
+def test_the_status_is_the_same_after_it_was_disabled(bench: SceneBench) -> None:
+    view = bench.load("RobotModelDisplay {}")
+    (robot,) = view.scene.displays
+    publish(bench, URDF.replace('<sphere radius="1"/>', '<mesh filename="file:///gone.stl"/>'))
+    send_transforms(bench, "base_link", "mast")
+    bench.wait(lambda: "Mesh gone.stl" in robot.statusText and "Link" not in robot.statusText)
+    before = robot.statusText
+    assert "URDF parsed OK" in before
+    robot.enabled = False
+    assert robot.statusText == ""
+    bench.wait.nothing_happens(0.2)
+    robot.enabled = True
+    bench.wait(lambda: robot.statusText == before)
+    bench.wait.nothing_happens(0.3)
+    assert robot.statusText == before

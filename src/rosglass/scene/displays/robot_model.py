@@ -15,7 +15,7 @@ from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import QtGui, Signal, Slot, is_alive
-from rosglass.scene.display import Display
+from rosglass.scene.display import Display, Status
 from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Group, Mesh, Shape
 from rosglass.scene.meshes import load_mesh_cached
 from rosglass.scene.resources import check_texture, locate_resource
@@ -307,6 +307,8 @@ class RobotModelDisplay(Display):
         self._root_link = ""
         self._switched: dict[str, bool] = {}
         self._text: str | None = None
+        #: What the status says of the description that is shown.
+        self._loaded_lines: dict[str, Status] = {}
         self._next = 0.0
         super().__init__(parent, runtime)
         self._again = single_shot(self, self._create_again)
@@ -339,7 +341,10 @@ class RobotModelDisplay(Display):
     def _factory(self, *wanted: Any) -> Callable[[], Any]:
         node, kind, name = wanted
         executor, take = self._executor, weak_callback(self._take_text)
-        self.set_status("URDF", "warn", f"waiting for the description: {kind.lower()} {name}")
+        # One that is shown already is not loaded again.
+        waiting = Status("warn", f"waiting for the description: {kind.lower()} {name}")
+        for line, status in (self._loaded_lines or {"URDF": waiting}).items():
+            self.set_status(line, *status)
 
         def on_text(text: str) -> None:
             executor.post(lambda: take(text, name))
@@ -363,6 +368,7 @@ class RobotModelDisplay(Display):
             return
         self._clear()
         if isinstance(result, Error):
+            self._loaded_lines = {"URDF": Status("error", str(result))}
             self.set_status("URDF", "error", str(result))
             return
         for name in result.robot.links:
@@ -371,16 +377,20 @@ class RobotModelDisplay(Display):
             self._body.add(link.root)
         self._root_link = result.robot.root
         report(self, links=sorted(self._bodies), robotName=result.robot.name)
-        self.set_status("URDF", "ok", "URDF parsed OK")
+        lines = {"URDF": Status("ok", "URDF parsed OK")}
         for number, warning in enumerate(result.robot.warnings[:_MAX_LINK_LINES]):
-            self.set_status(f"URDF {number + 1}", "warn", warning)
+            lines[f"URDF {number + 1}"] = Status("warn", warning)
         for name, problem in list(result.problems.items())[:_MAX_LINK_LINES]:
-            self.set_status(f"Mesh {name.rpartition('/')[2]}", "error", problem)
+            lines[f"Mesh {name.rpartition('/')[2]}"] = Status("error", problem)
+        self._loaded_lines = lines
+        for line, status in lines.items():
+            self.set_status(line, *status)
         self._restyle()
 
     def _clear(self) -> None:
         self._bodies.clear()
         self._body.clear()
+        self._loaded_lines = {}
         self.root.add(self._body)
         self.clear_status()
         report(self, links=[], robotName="")
