@@ -185,7 +185,9 @@ class Display(Configurable, TopicElement):
 
     @Slot()
     def _run_update(self) -> None:
-        if is_alive(self) and self.scene is None:
+        if not is_alive(self):
+            return
+        if self.scene is None:
             # Declared in QML inside a view; objects that Python makes are added by it.
             view = self.parent()
             while view is not None and not hasattr(view, "adopt_display"):
@@ -243,7 +245,7 @@ class Display(Configurable, TopicElement):
 
     def check_frame(self) -> None:
         """Fade what follows a frame that is not updated any more; called by the scene."""
-        frame = self.followed_frame() if self.shown else ""
+        frame = self.followed_frame().lstrip("/") if self.shown else ""
         silence = (
             0.0 if frame in ("", FIXED_FRAME) or self.scene is None else (self.scene.silence(frame))
         )
@@ -321,6 +323,7 @@ class Display(Configurable, TopicElement):
         """
         if self.scene is None:
             return None
+        frame = frame.lstrip("/")  # files of RViz 1 may have a slash
         if frame in ("", FIXED_FRAME):
             self.delete_status(status)
             return np.eye(4)
@@ -360,6 +363,7 @@ class Intake:
         on_ready: Called there when there is something to take.
         depth: How many wait there at most; older ones are dropped and counted.
         eager: Whether all fields are decoded at once.
+        needs_frame: Whether a message whose header names no frame is refused.
     """
 
     def __init__(
@@ -370,8 +374,10 @@ class Intake:
         on_ready: Callable[[], None],
         depth: int,
         eager: bool = False,
+        needs_frame: bool = False,
     ) -> None:
         self.prepare, self._types, self._eager = prepare, types, eager
+        self._needs_frame = needs_frame
         self._executor, self._on_ready = executor, on_ready
         self._lock = threading.Lock()
         self._items: deque[_Item] = deque(maxlen=depth)
@@ -407,7 +413,11 @@ class Intake:
             data = self.prepare(message)
             if data is not None:
                 whole = getattr(data, "source", None)
-                item = _Item(data, *frame_and_stamp(message if whole is None else whole))
+                whole = message if whole is None else whole
+                item = _Item(data, *frame_and_stamp(whole))
+                if self._needs_frame and not item.frame and "header" in whole:
+                    item = None
+                    raise Error("header.frame_id is empty: the publisher has to name the frame")
         except Error as reason:
             error = str(reason)
         except Exception as reason:  # what peers send never ends the thread
@@ -487,8 +497,21 @@ class OneTopicDisplay(Display):
             self._close_endpoint()  # not later: messages of it may be on their way
             self.reset()  # it would be old when the display is shown again
 
+    def _find_topic(self) -> str:
+        """Return the absolute name of the topic; empty, with a status, while there is none."""
+        if self.node is None or not self.shown or self.scene is None:
+            return ""
+        if not self._topic:
+            self.set_status("Topic", "warn", "no topic is chosen")
+            return ""
+        self._resolved = self._resolve(self._topic)
+        if not self._resolved:
+            self.set_status("Topic", "error", self._problem)
+        return self._resolved
+
     def _on_topic(self) -> None:
         self._topic = self.topic
+        self._set_problem("")
         self._resolved = ""
         self._close_endpoint()  # not later: messages of it may be on their way
         self.clear_status()
@@ -505,6 +528,8 @@ class TopicDisplay(OneTopicDisplay):
     """
 
     KEEPS_ALL: ClassVar[bool] = False
+    #: Whether parts of a message have frames of their own, as markers do.
+    HAS_FRAMES: ClassVar[bool] = False
     EAGER: ClassVar[bool] = False
 
     reliability = Setting(
@@ -542,22 +567,26 @@ class TopicDisplay(OneTopicDisplay):
 
     # -- the subscription ------------------------------------------------------------------------
 
+    def shows_all(self) -> bool:
+        """Return whether each message is shown, in order, and not only the newest."""
+        return self.KEEPS_ALL
+
+    def _on_length(self) -> None:
+        """Show more or fewer messages beside each other."""
+        self._restyle()
+        self._schedule()  # one that shows each receives more
+
     def profile(self) -> QoS:
         """Return what is requested of publishers."""
         return QoS(
-            depth=_MOST_WAITING if self.KEEPS_ALL else self.depth,
+            depth=_MOST_WAITING if self.shows_all() else self.depth,
             reliability=_RELIABILITY[self.reliability],
             durability=_DURABILITY[self.durability],
         )
 
     def _wanted(self) -> tuple[Any, ...] | None:
-        node = self.node
-        if node is None or not self.shown or not self._topic or self.scene is None:
-            return None
-        self._resolved = self._resolve(self._topic)
-        if not self._resolved:
-            return None
-        return node, (self._resolved, *self.further_topics(self._resolved)), self.profile()
+        topic = self._find_topic()
+        return (self.node, (topic, *self.further_topics(topic)), self.profile()) if topic else None
 
     def further_topics(self, topic: str) -> tuple[str, ...]:  # noqa: ARG002 - for subclasses
         """Return topics that are received beside `topic`, e.g. of updates."""
@@ -570,8 +599,9 @@ class TopicDisplay(OneTopicDisplay):
             self.MESSAGES,
             self._executor,
             weak_callback(self._on_items),
-            _MOST_WAITING if self.KEEPS_ALL else max(self.depth, 1),
+            _MOST_WAITING if self.shows_all() else max(self.depth, 1),
             self.EAGER,
+            needs_frame=not self.HAS_FRAMES,
         )
         return lambda: Subscriptions(node, topics, qos, intake)
 
@@ -660,19 +690,14 @@ class TopicDisplay(OneTopicDisplay):
         self._arrived = time.time()
         self.set_status("Topic", "ok", f"{intake.received} messages received")
         self._outdated = False
-        if self.KEEPS_ALL:
-            self._waiting.extend(items)
-            while len(self._waiting) > _MOST_WAITING:
-                self._waiting.popleft()
-        else:
-            self._waiting.extend(items[-self.depth :])
-            while len(self._waiting) > self.depth:
-                self._waiting.popleft()
+        self._waiting.extend(items)
         self._show_waiting()
+        while len(self._waiting) > (_MOST_WAITING if self.KEEPS_ALL else self.depth):
+            self._waiting.popleft()
 
     def _show_waiting(self) -> None:
         """Show what waits for its transform, as far as it is known now."""
-        if not self.KEEPS_ALL:
+        if not self.shows_all():
             # The newest that can be placed; older ones are of no use then.
             for at in range(len(self._waiting) - 1, -1, -1):
                 pose = self._place(self._waiting[at])
@@ -727,7 +752,12 @@ class TopicDisplay(OneTopicDisplay):
             self._show_waiting()
 
     def on_fixed_frame(self) -> None:
-        """Show the last message in the new fixed frame."""
+        """Show the last message in the new fixed frame; where earlier ones are is not known."""
+        if self.shows_all():
+            last, waiting = self._last, list(self._waiting)
+            self.reset()
+            self._last = last
+            self._waiting.extend(waiting)
         if self._last is not None:
             pose = self._place(self._last)
             if pose is None:

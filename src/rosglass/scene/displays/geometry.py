@@ -63,6 +63,10 @@ class _History(TopicDisplay):
         """Return how many messages are shown."""
         return 1
 
+    def shows_all(self) -> bool:
+        """Return whether earlier messages are shown as well."""
+        return self.length() > 1
+
     def draw(self, data: Any, group: Group) -> None:
         """Fill a group with what a message shows, in its frame."""
         raise NotImplementedError
@@ -86,13 +90,6 @@ class _History(TopicDisplay):
             kept.group.clear()
             self.draw(kept.data, kept.group)
 
-    def on_fixed_frame(self) -> None:
-        """Begin anew: earlier messages were placed in the former fixed frame."""
-        last = self._last
-        self.reset()
-        self._last = last
-        super().on_fixed_frame()
-
     def reset(self) -> None:
         """Drop all messages."""
         super().reset()
@@ -114,7 +111,9 @@ class PointStampedDisplay(_History):
     color = Setting("Color", "color", "#cc29cc", "Of the sphere.")
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
     radius = Setting("Radius", "float", 0.2, "In metres.", min=0.0)
-    historyLength = Setting("History Length", "int", 1, "How many are shown.", min=1, max=100_000)
+    historyLength = Setting(
+        "History Length", "int", 1, "How many are shown.", min=1, max=100_000, then="_on_length"
+    )
 
     def length(self) -> int:
         """Return how many messages are shown."""
@@ -173,7 +172,9 @@ class RangeDisplay(_History):
 
     color = Setting("Color", "color", "#ffffff", "Of the cone.")
     alpha = Setting("Alpha", "float", 0.5, "Opacity.", min=0.0, max=1.0)
-    bufferLength = Setting("Buffer Length", "int", 1, "How many are shown.", min=1)
+    bufferLength = Setting(
+        "Buffer Length", "int", 1, "How many are shown.", min=1, then="_on_length"
+    )
 
     def length(self) -> int:
         """Return how many messages are shown."""
@@ -223,7 +224,9 @@ class _Screw(_History):
 
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
     arrowWidth = Setting("Arrow Width", "float", 0.5, "In metres.", min=0.0)
-    historyLength = Setting("History Length", "int", 1, "How many are shown.", min=1, max=100_000)
+    historyLength = Setting(
+        "History Length", "int", 1, "How many are shown.", min=1, max=100_000, then="_on_length"
+    )
     hideSmallValues = Setting(
         "Hide Small Values", "bool", True, "Whether arrows shorter than their width are hidden."
     )

@@ -181,16 +181,13 @@ class PictureDisplay(OneTopicDisplay):
     # -- the stream ------------------------------------------------------------------------------
 
     def _wanted(self) -> tuple[Any, ...] | None:
-        node = self.node
-        if node is None or not self.shown or not self._topic or self.scene is None:
-            return None
-        self._resolved = self._resolve(self._topic)
-        if not self._resolved:
+        topic = self._find_topic()
+        if not topic:
             return None
         if not self._sinks:
             self.set_status("Topic", "warn", _NO_PANEL)
             return None
-        return node, self._resolved, self.transport
+        return self.node, topic, self.transport
 
     def _update(self) -> None:
         super()._update()

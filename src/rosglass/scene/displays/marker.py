@@ -593,6 +593,7 @@ class Markers(TopicDisplay):
 
     MESSAGES = ("visualization_msgs/Marker", "visualization_msgs/MarkerArray")
     KEEPS_ALL: ClassVar[bool] = True
+    HAS_FRAMES: ClassVar[bool] = True
     EAGER: ClassVar[bool] = True
 
     namespacesChanged = Signal()

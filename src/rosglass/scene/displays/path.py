@@ -36,7 +36,9 @@ class PathDisplay(TopicDisplay):
     lineWidth = Setting("Line Width", "float", 0.03, "Of billboards, in metres.", min=0.001)
     color = Setting("Color", "color", "#19ff00", "The colour of the line.")
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
-    bufferLength = Setting("Buffer Length", "int", 1, "How many paths are shown.", min=1, max=1000)
+    bufferLength = Setting(
+        "Buffer Length", "int", 1, "How many paths are shown.", min=1, max=1000, then="_on_length"
+    )
     offset = Setting("Offset", "vector", [0, 0, 0], "Of the path, in metres.")
     poseStyle = Setting(
         "Pose Style", "enum", "None", "How poses are drawn.", choices=["None", "Axes", "Arrows"]
@@ -55,6 +57,10 @@ class PathDisplay(TopicDisplay):
         #: The paths that are shown, the oldest first: poses, and matrices.
         self._paths: list[_Path] = []
         super().__init__(parent, runtime)
+
+    def shows_all(self) -> bool:
+        """Return whether earlier paths are shown as well."""
+        return bool(self.bufferLength > 1)
 
     def preparer(self) -> Any:
         """Return the function that reads poses."""

@@ -391,10 +391,9 @@ class OdometryDisplay(_WithCovariance):
         turned = math.acos(min(max(float(cosine), -1.0), 1.0))
         return bool(moved < self.positionTolerance and turned < self.angleTolerance)
 
-    def on_fixed_frame(self) -> None:
-        """Begin anew: earlier poses were placed in the former fixed frame."""
-        self.reset()
-        super().on_fixed_frame()
+    def shows_all(self) -> bool:
+        """Return that each message counts."""
+        return True
 
 
 _BELOW_SHAPE = (

@@ -1,0 +1,118 @@
+"""What all displays of a topic do: bad names and frames, each message, another fixed frame."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from rosglass.scene.drawing import CYLINDER, SPHERE, Lines, Mesh
+
+if TYPE_CHECKING:
+    from conftest import SceneBench
+
+STAMP = {"sec": 5, "nanosec": 0}
+
+
+def parts(display: Any, shape: Any) -> list[Any]:
+    found = [(one, pose) for one, pose, _ in display.root.drawables()]
+    return [
+        (one, pose)
+        for one, pose in found
+        if (isinstance(one, Mesh) and one.shape is shape) or (shape is Lines and type(one) is Lines)
+    ]
+
+
+def test_a_header_without_a_frame_is_an_error(bench: SceneBench) -> None:
+    view = bench.load('PathDisplay { topic: "/plan" } MapDisplay { topic: "/map" }')
+    path, area = view.scene.displays
+    plan = bench.robot.create_publisher("/plan", "nav_msgs/Path")
+    grid = bench.robot.create_publisher("/map", "nav_msgs/OccupancyGrid")
+    info = {"resolution": 1.0, "width": 1, "height": 1, "origin": {"orientation": {"w": 1.0}}}
+
+    def send(**header: Any) -> bool:
+        plan.publish({"header": header})
+        grid.publish({"header": header, "info": info, "data": [0]})
+        return path.received > 0 and area.received > 0
+
+    bench.wait(send)
+    for display in (path, area):
+        assert display.statusLevel == "error"
+        assert "header.frame_id is empty" in display.statusText
+    assert not len(path.root)
+    bench.wait(lambda: send(frame_id="map") and path.statusLevel == area.statusLevel == "ok")
+
+
+def test_a_reference_frame_of_rviz_1_may_have_a_slash(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    view = bench.load('AxesDisplay { frame: "/map" } AxesDisplay { frame: "/mast" }')
+    StaticTransformBroadcaster(bench.robot).send_transform(
+        Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "mast")
+    )
+    bench.wait(view.scene.frames)
+    bench.wait(lambda: all(one.statusLevel == "ok" for one in view.scene.displays))
+
+
+def test_a_topic_that_is_none_is_a_status_until_it_is_one(bench: SceneBench) -> None:
+    view = bench.load('PathDisplay {} ImageDisplay {} PathDisplay { topic: "~plan" }')
+    path, image, wrong = view.scene.displays
+    for display in (path, image):
+        bench.wait(lambda display=display: display.statusLevel == "warn")
+        assert display.statusText == "Topic: no topic is chosen"
+    bench.wait(lambda: wrong.statusLevel == "error")
+    assert wrong.statusText.startswith("Topic: ")
+    assert "~plan" in wrong.statusText
+    wrong.topic = "/plan"
+    bench.wait(lambda: wrong.statusText == "Topic: No messages received")
+    assert wrong.problem == ""
+
+
+@pytest.mark.parametrize(
+    ("kind", "message", "settings", "shape"),
+    [
+        ("PointStamped", "geometry_msgs/PointStamped", {"historyLength": 20}, SPHERE),
+        ("Path", "nav_msgs/Path", {"bufferLength": 20}, Lines),
+        ("Odometry", "nav_msgs/Odometry", {"covariance": False}, CYLINDER),
+    ],
+)
+def test_each_message_of_a_history_is_shown_once_in_any_fixed_frame(
+    bench: SceneBench, kind: str, message: str, settings: dict[str, Any], shape: Any
+) -> None:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    view = bench.load()
+    StaticTransformBroadcaster(bench.robot).send_transform(
+        Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "odom")
+    )
+    bench.wait(view.scene.frames)
+    display = view.scene.add(kind, topic="/shown", **settings)
+    publisher = bench.robot.create_publisher("/shown", message)
+    bench.wait(lambda: display._endpoint is not None and publisher.subscription_count())
+    for number in range(12):
+        point = {"x": float(number), "y": 0.0, "z": 0.0}
+        pose = {"position": point, "orientation": {"w": 1.0}}
+        content: dict[str, Any] = {
+            "PointStamped": {"point": point},
+            "Path": {"poses": [{"pose": pose}, {"pose": pose}]},
+            "Odometry": {"pose": {"pose": pose}},
+        }[kind]
+        publisher.publish({"header": {"frame_id": "odom"}, **content})
+    bench.wait(lambda: display.received == 12)
+
+    def count() -> int:
+        return sum(one.count if shape is CYLINDER else 1 for one, _ in parts(display, shape))
+
+    assert count() == 12
+    view.fixedFrame = "odom"
+    # Where the earlier ones are in it is not known.
+    assert count() == 1
+    ((last, pose),) = parts(display, shape)
+    if shape is not Lines:
+        pose = pose @ last.instances["matrix"][0].reshape(4, 4).T
+        assert pose[0, 3] == pytest.approx(11.0 + 0.5 * (shape is CYLINDER))
+    else:
+        assert np.allclose(pose, np.eye(4))
