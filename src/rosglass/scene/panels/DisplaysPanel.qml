@@ -65,10 +65,7 @@ Pane {
                     hoverEnabled: true
                     onClicked: panel.current = row.index
                     onDoubleClicked: if (row.expandable) rows.toggle(row.index)
-                    ToolTip.visible: containsMouse && row.description !== ""
-                    ToolTip.delay: 800
-                    // No rich text: names come from the robot.
-                    ToolTip.text: row.description.replace(/</g, "\u2039")
+                    PlainToolTip { visible: parent.containsMouse && row.description !== ""; plain: row.description }
                 }
                 RowLayout {
                     anchors { fill: parent; leftMargin: 4 + 14 * row.depth; rightMargin: 10 }
@@ -77,6 +74,7 @@ Pane {
                     Text {
                         Layout.preferredWidth: 12
                         text: row.expandable ? (row.expanded ? "\u25be" : "\u25b8") : ""
+                        textFormat: Text.PlainText
                         color: palette.text
                         MouseArea { anchors.fill: parent; anchors.margins: -6; enabled: row.expandable; onClicked: rows.toggle(row.index) }
                     }
@@ -204,7 +202,7 @@ Pane {
                     clip: true
                     delegate: ItemDelegate {
                         width: ListView.view.width
-                        text: modelData.topic + "   " + modelData.display
+                        contentItem: Text { text: modelData.topic + "   " + modelData.display; textFormat: Text.PlainText; color: palette.text }
                         onClicked: { rows.add(modelData.display, modelData.topic); adding.close() }
                     }
                     Label {
@@ -219,7 +217,7 @@ Pane {
                     clip: true
                     delegate: ItemDelegate {
                         width: ListView.view.width
-                        text: modelData
+                        contentItem: Text { text: modelData; textFormat: Text.PlainText; color: palette.text }
                         onClicked: { rows.add(modelData, ""); adding.close() }
                     }
                 }

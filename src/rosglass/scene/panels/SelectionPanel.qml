@@ -16,7 +16,7 @@ Pane {
     ColumnLayout {
         anchors.fill: parent
         RowLayout {
-            Label { Layout.fillWidth: true; text: panel.count + " selected" }
+            Label { Layout.fillWidth: true; text: panel.count + " selected"; textFormat: Text.PlainText }
             Button { text: "Clear"; enabled: panel.count > 0; onClicked: panel.view.selection.clear() }
         }
         ListView {
@@ -47,6 +47,6 @@ Pane {
                 }
             }
         }
-        Label { visible: panel.count > list.count; text: "and " + (panel.count - list.count) + " more" }
+        Label { visible: panel.count > list.count; text: "and " + (panel.count - list.count) + " more"; textFormat: Text.PlainText }
     }
 }

@@ -42,11 +42,10 @@ Pane {
                             Layout.fillWidth: true
                             Layout.preferredWidth: 100
                             text: modelData.name
+                            textFormat: Text.PlainText
                             elide: Text.ElideRight
                             HoverHandler { id: hover }
-                            ToolTip.visible: hover.hovered && modelData.description !== ""
-                            ToolTip.delay: 500
-                            ToolTip.text: modelData.description
+                            PlainToolTip { visible: hover.hovered && modelData.description !== ""; plain: modelData.description }
                         }
                         TextField {
                             Layout.fillWidth: true

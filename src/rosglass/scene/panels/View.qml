@@ -66,9 +66,10 @@ ApplicationWindow {
                     // Keys are the view's.
                     focusPolicy: Qt.NoFocus
                     onClicked: modelData.select()
-                    ToolTip.visible: hovered
-                    ToolTip.delay: 500
-                    ToolTip.text: modelData.description + (modelData.shortcutKey ? " (" + modelData.shortcutKey.toUpperCase() + ")" : "")
+                    PlainToolTip {
+                        visible: parent.hovered
+                        plain: modelData.description + (modelData.shortcutKey ? " (" + modelData.shortcutKey.toUpperCase() + ")" : "")
+                    }
                 }
             }
             Item { Layout.fillWidth: true }
@@ -77,9 +78,7 @@ ApplicationWindow {
                 text: "Reset"
                 focusPolicy: Qt.NoFocus
                 onClicked: scene.reset()
-                ToolTip.visible: hovered
-                ToolTip.delay: 500
-                ToolTip.text: "Drop all data that was received"
+                PlainToolTip { visible: parent.hovered; plain: "Drop all data that was received" }
             }
             ToolButton { text: "Panels"; checkable: true; checked: window.panels; onToggled: window.panels = checked }
         }
@@ -145,8 +144,8 @@ ApplicationWindow {
             Label { text: program.time; textFormat: Text.PlainText }
             ToolSeparator { }
             Label { Layout.fillWidth: true; visible: program.message !== ""; text: program.message; textFormat: Text.PlainText; elide: Text.ElideRight }
-            Label { objectName: "status"; Layout.fillWidth: true; visible: program.message === ""; text: scene.statusText; textFormat: Text.StyledText; elide: Text.ElideRight }
-            Label { text: program.frameRate + " fps" }
+            Label { objectName: "status"; Layout.fillWidth: true; visible: program.message === ""; text: scene.statusText.replace(/<[^>]*>/g, "").replace(/&lt;/g, "<").replace(/&amp;/g, "&"); textFormat: Text.PlainText; elide: Text.ElideRight }
+            Label { text: program.frameRate + " fps"; textFormat: Text.PlainText }
         }
     }
 

@@ -44,7 +44,7 @@ Pane {
             delegate: RowLayout {
                 width: ListView.view.width
                 height: 24
-                Label { Layout.fillWidth: true; Layout.preferredWidth: 100; text: modelData.name; elide: Text.ElideRight }
+                Label { Layout.fillWidth: true; Layout.preferredWidth: 100; text: modelData.name; textFormat: Text.PlainText; elide: Text.ElideRight }
                 TextField {
                     Layout.fillWidth: true
                     Layout.preferredWidth: 120
@@ -54,6 +54,6 @@ Pane {
                 }
             }
         }
-        Label { Layout.fillWidth: true; visible: panel.problem !== ""; text: panel.problem; wrapMode: Text.Wrap; color: "#c62818" }
+        Label { Layout.fillWidth: true; visible: panel.problem !== ""; text: panel.problem; textFormat: Text.PlainText; wrapMode: Text.Wrap; color: "#c62818" }
     }
 }
