@@ -57,9 +57,11 @@ def test_a_reference_frame_of_rviz_1_may_have_a_slash(bench: SceneBench) -> None
 
 
 def test_a_topic_that_is_none_is_a_status_until_it_is_one(bench: SceneBench) -> None:
-    view = bench.load('PathDisplay {} ImageDisplay {} PathDisplay { topic: "~plan" }')
-    path, image, wrong = view.scene.displays
-    for display in (path, image):
+    view = bench.load(
+        'PathDisplay {} ImageDisplay {} InteractiveMarkersDisplay {} PathDisplay { topic: "~plan" }'
+    )
+    *empty, wrong = view.scene.displays
+    for display in empty:
         bench.wait(lambda display=display: display.statusLevel == "warn")
         assert display.statusText == "Topic: no topic is chosen"
     bench.wait(lambda: wrong.statusLevel == "error")

@@ -183,7 +183,6 @@ class Drawable(Item):
         look: Counts changes of colours, sizes and the like, which are few numbers.
         count: How many of its kind there are; nothing is drawn for 0.
         layer: Translucent drawables of a lower layer are drawn first, e.g. maps.
-        double_sided: Not used by kinds without faces.
     """
 
     def __init__(self) -> None:

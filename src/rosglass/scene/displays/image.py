@@ -189,6 +189,12 @@ class PictureDisplay(OneTopicDisplay):
             return None
         return self.node, topic, self.transport
 
+    def on_group_enabled(self) -> None:
+        """Show or hide the panels, as it or its group is shown or hidden."""
+        super().on_group_enabled()
+        if self.scene is not None:
+            report(self, active=self.shown)
+
     def _update(self) -> None:
         super()._update()
         report(self, active=self.shown)

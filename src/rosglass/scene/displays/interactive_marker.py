@@ -278,7 +278,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
 
     def _wanted(self) -> tuple[Any, ...] | None:
         node = self.node
-        if node is None or not self.shown or not self.namespace or self.scene is None:
+        if not self._find_topic() or not self.namespace:
             return None
         self._resolved = self._resolve(f"{self.namespace}/update")
         if not self._resolved:
