@@ -200,3 +200,33 @@ def test_what_would_be_lost_is_asked_for(bench: SceneBench, tmp_path: Path) -> N
     assert [one.name for one in view.scene.displays] == ["Grid", "TF"]
     program.open(str(tmp_path / "none.rviz"))
     assert "there is no such file" in program.message
+
+
+def test_reset_in_the_tool_bar_drops_what_was_received(bench: SceneBench) -> None:
+    from PySide6.QtCore import QObject
+    from PySide6.QtQml import QQmlApplicationEngine
+
+    from rosglass.qml import install
+    from rosglass.qt import send_deferred_deletes
+    from rosglass.scene.program import WINDOW, ViewProgram
+
+    engine, program = QQmlApplicationEngine(), ViewProgram()
+    install(engine, bench.session)
+    engine.rootContext().setContextProperty("program", program)
+    engine.load(str(WINDOW))
+    (window,) = engine.rootObjects()
+    scene = window.findChild(QObject, "scene").scene
+    path = scene.add("Path", topic="/plan")
+    publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
+
+    def is_shown() -> bool:
+        publisher.publish({"header": {"frame_id": scene.fixed_frame}})
+        return bool(len(path.root))
+
+    bench.wait(is_shown)
+    window.findChild(QObject, "reset").clicked.emit()
+    assert not len(path.root)
+    bench.wait(is_shown)
+    window.close()
+    engine.deleteLater()
+    send_deferred_deletes()
