@@ -223,10 +223,12 @@ def test_reset_in_the_tool_bar_drops_what_was_received(bench: SceneBench) -> Non
         publisher.publish({"header": {"frame_id": scene.fixed_frame}})
         return bool(len(path.root))
 
-    bench.wait(is_shown)
-    window.findChild(QObject, "reset").clicked.emit()
-    assert not len(path.root)
-    bench.wait(is_shown)
-    window.close()
-    engine.deleteLater()
-    send_deferred_deletes()
+    try:
+        bench.wait(is_shown)
+        window.findChild(QObject, "reset").clicked.emit()
+        assert not len(path.root)
+        bench.wait(is_shown)
+    finally:
+        window.close()
+        engine.deleteLater()
+        send_deferred_deletes()
