@@ -15,6 +15,7 @@ void main()
     vec4 eye = frame.view * (object.model * vec4(position, 1.0));
     if (object.a.x > 0.5) {
         gl_Position = frame.projection * eye;
+        offset.y *= sign(frame.projection[1][1]);  // Vulkan's y points down
         gl_Position.xy += 2.0 * offset * frame.viewport.z * gl_Position.w / frame.viewport.xy;
     } else {
         eye.xy += offset;
