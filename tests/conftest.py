@@ -14,7 +14,7 @@ import ports
 import pytest
 import waiting
 
-pytest.register_assert_rewrite("overlay_contract")
+pytest.register_assert_rewrite("overlay_contract", "view_contract")
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator

@@ -140,7 +140,7 @@ def test_a_plain_rviz_keeps_it(
     assert done.stdout.splitlines()[-1] == "True", done.stderr
     assert "View Controller" in done.stdout
     app.view_entry.shown = False
-    assert settings.namespace == "~hector_view_controller"
+    assert settings.namespace == ""
     app.load_config(plain)
     wait(lambda: settings.namespace == "/robot/camera")
 

@@ -1,399 +1,57 @@
-"""RViz's camera, moved by robots: with rospy, roscpp and ROS's shell tools, built by catkin."""
+"""RViz's camera, moved by robots: see :mod:`view_contract`."""
 
 from __future__ import annotations
 
-import json
-import math
-import queue
-import shutil
-import subprocess
-import threading
-from contextlib import closing
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from view_contract import *  # noqa: F403 - the tests
+from view_contract import Camera
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-HERE = Path(__file__).parent
-CATKIN, MESSAGES = Path("/usr/bin/catkin_make"), Path("/usr/share/std_msgs/msg")
-PACKAGES = (
-    "catkin ros-message-generation ros-message-runtime ros-std-msgs ros-geometry-msgs libroscpp-dev"
-)
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-LEFT = (0.0, 0.0, math.sin(math.pi / 4), math.cos(math.pi / 4))
+    from collections.abc import Callable
+    from pathlib import Path
 
 
-def near(found: Any, wanted: Any, within: float = 0.01) -> bool:
-    return all(abs(a - b) < within for a, b in zip(found, wanted, strict=True))
+class RvizCamera(Camera):
+    """RViz's camera."""
 
+    no_frames = ("", "nowhere_at_all")
 
-def point(x: float, y: float, z: float) -> dict[str, float]:
-    return {"x": x, "y": y, "z": z}
+    def __init__(self, app: Any, view: Any, wait: Any, eye: Callable[[], Any]) -> None:
+        self._app, self.view, self.session, self.wait = app, view, app.session, wait
+        self.eye = eye  # type: ignore[method-assign]
+        self._manager = app.window.manager
 
+    @property
+    def services(self) -> Any:
+        return self._app.view_services
 
-@pytest.fixture
-def view(steered: Any) -> Any:
-    return steered
+    def eye(self) -> tuple[float, float, float]:
+        raise NotImplementedError
 
+    def set_fixed_frame(self, frame: str) -> None:
+        self._manager.setFixedFrame(frame)
 
-class Robot:
-    """Asks a rospy process while RViz goes on."""
+    def set_property(self, name: str, value: Any) -> None:
+        found = self._manager.getViewManager().getCurrent()
+        for part in name.split("/"):
+            found = found.subProp(part)
+        found.setValue(value)
 
-    def __init__(self, process: Any, answers: queue.Queue[Any]) -> None:
-        self._process, self._answers = process, answers
-        self.namespace = ""
-        self._wait: Any = None
+    def select_view(self, class_id: str) -> None:
+        self._manager.getViewManager().setCurrentViewControllerType(class_id)
 
-    def begin(self, wait: Callable[..., None], namespace: str) -> Robot:
-        self._wait, self.namespace = wait, namespace
-        return self
+    def save_config(self, file: Path) -> None:
+        self._app.save_config(file)
 
-    def ask(self, do: str, **what: Any) -> Any:
-        self.begin_to_ask(do, **what)
-        return self.answer()
+    def load_config(self, file: Path) -> None:
+        self._app.load_config(file)
 
-    def begin_to_ask(self, do: str, **what: Any) -> None:
-        self._process.stdin.write(json.dumps({"do": do, **what}) + "\n")
-        self._process.stdin.flush()
-
-    def answer(self) -> Any:
-        self._wait(lambda: not self._answers.empty() or self._process.poll() is not None)
-        return self._answers.get_nowait()
-
-    def call(self, service: str, type: str, **request: Any) -> Any:
-        return self.ask("call", service=self.namespace + service, type=type, request=request)
-
-    def tf(self, child: str, *translation: float, rotation: Any = UPRIGHT) -> None:
-        self.ask("tf", parent="map", child=child, translation=translation, rotation=rotation)
-
-
-@pytest.fixture(scope="module")
-def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A catkin workspace with our definitions and a program in C++, built; where it is."""
-    import rosglass.interfaces
-
-    for needed in (CATKIN, MESSAGES):
-        if not needed.exists():
-            pytest.skip(f"{needed} is missing: sudo apt install {PACKAGES}")
-    root = tmp_path_factory.mktemp("workspace")
-    definitions = Path(rosglass.interfaces.__file__).parent / "definitions/ros1"
-    for package in (definitions / "hector_rviz_plugins", HERE / "camera_client"):
-        shutil.copytree(package, root / "src" / package.name)
-    env = {"PATH": "/usr/bin:/bin", "HOME": str(root), "ROS_LANG_DISABLE": "genlisp"}
-    command = [str(CATKIN), "-j2", "-C", str(root)]
-    done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return root
-
-
-def environment(master: str, home: str, workspace: Path) -> dict[str, str]:
-    """Return what the programs of a robot find, after ``source devel/setup.sh``."""
-    return {
-        "PATH": "/usr/bin:/bin",
-        "HOME": home,
-        "ROS_HOME": home,
-        "ROS_MASTER_URI": master,
-        "ROS_IP": "127.0.0.1",
-        "PYTHONPATH": str(workspace / "devel/lib/python3/dist-packages"),
-    }
-
-
-@pytest.fixture(scope="module")
-def robot_process(app: Any, master: str, workspace: Path, tmp_path_factory: Any) -> Iterator[Robot]:
-    home = str(tmp_path_factory.mktemp("robot"))
-    process = subprocess.Popen(
-        ["/usr/bin/python3", str(HERE / "rospy_view.py")],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        env=environment(master, home, workspace),
-    )
-    answers: queue.Queue[Any] = queue.Queue()
-
-    def read() -> None:
-        for line in process.stdout or ():
-            answers.put(json.loads(line))
-
-    threading.Thread(target=read, daemon=True).start()
-    yield Robot(process, answers)
-    process.kill()
-    process.wait()
+    def connect(self) -> None:
+        self._app.connect()
 
 
 @pytest.fixture
-def robot(app: Any, view: Any, robot_process: Robot, wait: Callable[..., None]) -> Robot:
-    return robot_process.begin(wait, f"{app.node_name}/hector_view_controller/")
-
-
-def test_robots_move_the_camera(
-    robot: Robot, view: Any, eye: Any, wait: Callable[..., None]
-) -> None:
-    assert robot.call("move_eye_and_focus", "MoveEyeAndFocus", eye=point(1, 2, 3)) == "done"
-    wait(lambda: near(eye(), (1, 2, 3)))
-    assert near(view.focus, (0, 0, 0))
-    assert robot.call("move_eye", "MoveEye", eye=point(2, 2, 3), disable_animation=True) == "done"
-    wait(lambda: near(eye(), (2, 2, 3)))
-    assert near(view.focus, (1, 0, 0))
-    assert robot.call("set_view_mode", "SetViewMode", mode={"mode": 1}) == "done"
-    wait(lambda: near(eye(), (1, 0, 500)))
-    flags = {"switch_to_3d_mode": True, "stop_tracking": True}
-    assert robot.call("move_eye", "MoveEye", eye=point(5, 5, 5), **flags) == "done"
-    wait(lambda: near(eye(), (5, 5, 5)))
-    assert view.mode == 0
-
-
-def test_service_errors_say_why_the_camera_is_not_moved(
-    robot: Robot, view: Any, caplog: Any
-) -> None:
-    away = {"header": {"frame_id": "nowhere"}, "eye": {"x": 1.0}}
-    assert "nowhere" in robot.call("move_eye", "MoveEye", **away)
-    assert "nowhere" in robot.call("move_eye_and_focus", "MoveEyeAndFocus", **away)
-    assert "nowhere" in robot.call("set_tracked_frame", "TrackFrame", frame="nowhere")
-    assert "7" in robot.call("set_view_mode", "SetViewMode", mode={"mode": 7})
-    assert "finite" in robot.call("move_eye", "MoveEye", eye={"x": math.inf})
-    assert "finite" in robot.call("move_eye", "MoveEye", eye={"y": math.nan})
-    assert "look somewhere" in robot.call("move_eye_and_focus", "MoveEyeAndFocus")
-    # A robot's mistakes are no errors of ours.
-    assert [record for record in caplog.records if record.levelname == "ERROR"] == []
-    assert near(view.eye, (4, 0, 3))
-
-
-def test_late_subscribers_hear_mode_and_tracked_frame(
-    robot: Robot, view: Any, wait: Callable[..., None]
-) -> None:
-    view.set_mode(1, animate=False)
-    view.track("map")
-    mode, frame = robot.namespace + "view_mode", robot.namespace + "tracked_frame"
-    robot.ask("listen", topic=mode, mode=True)
-    robot.ask("listen", topic=frame, mode=False)
-    wait(lambda: robot.ask("heard", topic=mode) == [1])
-    wait(lambda: robot.ask("heard", topic=frame) == ["map"])
-    view.set_mode(0)
-    view.track("")
-    wait(lambda: robot.ask("heard", topic=mode) == [1, 0])
-    wait(lambda: robot.ask("heard", topic=frame) == ["map", ""])
-
-
-def test_the_camera_follows_a_frame(
-    app: Any, robot: Robot, view: Any, eye: Any, wait: Callable[..., None]
-) -> None:
-    view.settings.tracking_gain = 1000.0
-    robot.tf("rover", 1.0, 2.0, 0.0)
-    wait(lambda: robot.call("set_tracked_frame", "TrackFrame", frame="rover") == "done")
-    wait(lambda: near(eye(), (5, 2, 3)))
-    # The rover turns to its left, and the camera with it.
-    robot.tf("rover", 1.0, 3.0, 0.0, rotation=LEFT)
-    wait(lambda: near(eye(), (1, 7, 3)))
-    # Moves are held as seen from it, and go on while it drives.
-    view.move_eye((1, 7, 5))
-    robot.tf("rover", 2.0, 3.0, 0.0, rotation=LEFT)
-    wait(lambda: near(eye(), (2, 7, 5)))
-    wait(lambda: not view.is_moving)
-    # Turning the view keeps it, shifting it does not.
-    orbit = app.window.manager.getViewManager().getCurrent()
-    orbit.subProp("Pitch").setValue(0.3)
-    wait.frames(6)
-    assert view.tracked_frame == "rover"
-    orbit.subProp("Focal Point").subProp("X").setValue(9.0)
-    wait(lambda: view.tracked_frame == "")
-    view.settings.tracking_gain = 3.0
-
-
-def test_a_lost_frame_is_reported_once(
-    app: Any, robot: Robot, view: Any, wait: Callable[..., None]
-) -> None:
-    told: list[str] = []
-    view.problem_changed.connect(told.append)
-    robot.tf("lost_rover", 1.0, 2.0, 0.0)
-    wait(lambda: robot.call("set_tracked_frame", "TrackFrame", frame="lost_rover") == "done")
-    app.window.manager.setFixedFrame("elsewhere")
-    wait(lambda: view.problem != "")
-    wait.nothing_happens(0.3)
-    assert len(told) == 1
-    assert "elsewhere" in view.problem
-    # It can be moved all the same.
-    view.move_eye((7, 7, 7), animate=False)
-    app.window.manager.setFixedFrame("map")
-    wait(lambda: view.problem == "")
-    assert view.tracked_frame == "lost_rover"
-
-
-def test_topics_and_services_can_be_withdrawn(
-    app: Any, robot: Robot, view: Any, wait: Callable[..., None]
-) -> None:
-    service = robot.namespace + "move_eye"
-    names = app.session.node.services
-    wait(lambda: service in str(names()))
-    view.settings.services = False
-    wait(lambda: service not in str(names()))
-    view.settings.services = True
-    wait(lambda: service in str(names()))
-
-
-def test_changing_ones_mind_while_they_are_made_leaves_them_there(
-    app: Any, robot: Robot, view: Any, wait: Callable[..., None]
-) -> None:
-    for _ in range(3):
-        view.settings.topics = False
-        view.settings.topics = True
-    wait(lambda: app.view_services.is_open or app.view_services.problem)
-    assert not app.view_services.problem
-    assert robot.namespace + "move_eye" in str(app.session.node.services())
-
-
-def test_catkin_makes_the_types_that_we_speak(robot: Robot, view: Any) -> None:
-    import rosglass
-
-    for name in ("ViewMode", "MoveEye", "MoveEyeAndFocus", "SetViewMode", "TrackFrame"):
-        kind = "msg" if name == "ViewMode" else "srv"
-        ours = rosglass.load(f"hector_rviz_plugins/{kind}/{name}", ros=1)
-        assert robot.ask("md5", kind=kind, type=name) == ours.md5
-
-
-def test_a_program_in_cpp_moves_the_camera(
-    app: Any,
-    view: Any,
-    eye: Any,
-    master: str,
-    workspace: Path,
-    tmp_path: Path,
-    wait: Callable[..., None],
-) -> None:
-    program = workspace / "devel/lib/camera_client/camera_client"
-    client = subprocess.Popen(
-        [str(program), app.view_services.namespace],
-        env=environment(master, str(tmp_path), workspace),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    wait(lambda: client.poll() is not None)
-    out, problems = client.communicate()
-    assert out.splitlines() == [
-        "move_eye refused",
-        "set_view_mode done",
-        "set_tracked_frame done",
-        "heard 1 'map'",
-        "move_eye_and_focus done",
-        "heard 0 ''",
-        "move_eye done",
-    ]
-    assert "nowhere" in problems
-    wait(lambda: near(eye(), (5, 6, 7)))
-
-
-def test_from_a_shell(
-    app: Any,
-    view: Any,
-    eye: Any,
-    master: str,
-    workspace: Path,
-    tmp_path: Path,
-    wait: Callable[..., None],
-) -> None:
-    def shell(line: str) -> str:
-        env = environment(master, str(tmp_path), workspace)
-        made = subprocess.Popen(
-            line, shell=True, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-        )
-        wait(lambda: made.poll() is not None)
-        return made.communicate()[0]
-
-    call = f"rosservice call {app.view_services.namespace}/move_eye"
-    assert "ERROR" not in shell(call + " '{eye: {x: 3, y: 2, z: 1}, disable_animation: true}'")
-    wait(lambda: near(eye(), (3, 2, 1)))
-    assert "nowhere" in shell(call + " '{header: {frame_id: nowhere}}'")
-
-
-def test_whatever_rviz_shows_calls_are_answered(
-    app: Any, robot: Robot, view: Any, eye: Any, wait: Callable[..., None]
-) -> None:
-    manager = app.window.manager
-    for kind in ("rviz/FPS", "rviz/ThirdPersonFollower", "rviz/XYOrbit"):
-        manager.getViewManager().setCurrentViewControllerType(kind)
-        assert robot.call("move_eye", "MoveEye", eye=point(1, 2, 3)) == "done"
-        wait(lambda: near(eye(), (1, 2, 3)))
-        manager.getViewManager().setCurrentViewControllerType(kind)
-        assert robot.call("set_view_mode", "SetViewMode", mode={"mode": 1}) == "done"
-        wait(lambda: not view.is_moving)
-    robot.tf("rover", 1.0, 2.0, 0.0)
-    there = {"header": {"frame_id": "rover"}, "eye": point(1, 2, 3)}
-    wait(lambda: robot.call("move_eye", "MoveEye", **there) == "done")
-    for fixed in ("", "nowhere_at_all"):
-        manager.setFixedFrame(fixed)
-        assert "fixed frame" in robot.call("move_eye", "MoveEye", **there)
-        # What is in the fixed frame itself needs no other.
-        assert robot.call("move_eye", "MoveEye", eye=point(1, 2, 3)) == "done"
-
-
-def test_calls_while_a_config_is_loaded(
-    app: Any, robot: Robot, view: Any, eye: Any, wait: Callable[..., None], tmp_path: Path
-) -> None:
-    file = tmp_path / "kept.rviz"
-    app.save_config(file)
-    service = robot.namespace + "move_eye"
-    request = {"eye": point(7, 8, 9), "disable_animation": True}
-    robot.begin_to_ask("call", service=service, type="MoveEye", request=request, times=30)
-    for _ in range(5):
-        app.load_config(file)
-        wait.frames(1)
-    assert robot.answer() == "done"
-    assert robot.call("move_eye", "MoveEye", **request) == "done"
-    wait(lambda: near(eye(), (7, 8, 9)))
-
-
-def test_a_hundred_calls_at_once(
-    robot: Robot, view: Any, eye: Any, wait: Callable[..., None]
-) -> None:
-    service = robot.namespace + "move_eye_and_focus"
-    request = {"eye": point(3, 4, 5), "focus": point(0, 0, 1)}
-    done = robot.ask("call", service=service, type="MoveEyeAndFocus", request=request, times=100)
-    assert done == "done"
-    service = robot.namespace + "set_view_mode"
-    request = {"mode": {"mode": 7}}
-    done = robot.ask("call", service=service, type="SetViewMode", request=request, times=100)
-    assert "no view mode 7" in done
-    wait(lambda: near(eye(), (3, 4, 5)))
-
-
-def test_another_node_offers_the_same(
-    app: Any, robot: Robot, view: Any, master: str, wait: Callable[..., None]
-) -> None:
-    first = app.session.node
-    app.session.shutdown()
-    wait(lambda: app.session.node is None)
-    assert not app.view_services.is_open
-    app.session.init("another_node")
-    wait(lambda: app.view_services.is_open)
-    assert app.session.node is not first
-    assert robot.call("set_view_mode", "SetViewMode", mode={"mode": 1}) == "done"
-    mode = robot.namespace + "view_mode"
-    robot.ask("listen", topic=mode, mode=True)
-    wait(lambda: 1 in robot.ask("heard", topic=mode))
-    # Another address.
-    second, app.session.url = app.session.node, master.replace("http", "ros1") + "/"
-    wait(lambda: app.session.node not in (None, second))
-    wait(lambda: app.view_services.is_open)
-    assert robot.call("set_view_mode", "SetViewMode", mode={"mode": 0}) == "done"
-    wait(lambda: robot.ask("heard", topic=mode)[-1] == 0)
-
-
-def test_a_second_node_of_the_name_ends_ours(
-    app: Any, steered: Any, master: str, wait: Callable[..., None]
-) -> None:
-    import rosglass
-
-    session = app.session
-    with closing(rosglass.connect(master.replace("http", "ros1"), name=session.name)):
-        wait(lambda: session.state == "failed")
-        assert "new node registered with same name" in session.detail
-        wait(lambda: not app.view_services.is_open)
-        assert app.view_services.problem == session.detail
-    # It does not come back by itself, but when it is told to.
-    session.shutdown()
-    app.connect()
-    wait(lambda: session.state == "connected" and app.view_services.is_open)
+def camera(app: Any, steered: Any, wait: Any, eye: Callable[[], Any]) -> RvizCamera:
+    return RvizCamera(app, steered, wait, eye)

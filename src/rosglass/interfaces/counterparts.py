@@ -45,7 +45,10 @@ RENAMED = {
 #: ROS 2's types with another name in ROS 1; of several names, the usual one.
 _BACK = {new: old for old, new in RENAMED.items()}
 #: Packages that have another name in ROS 2.
-_PACKAGES = {"topic_tools": "topic_tools_interfaces"}
+_PACKAGES = {
+    "hector_rviz_plugins": "hector_rviz_plugins_msgs",
+    "topic_tools": "topic_tools_interfaces",
+}
 _PACKAGES_BACK = {new: old for old, new in _PACKAGES.items()}
 #: ROS 1's primitives that are messages in ROS 2.
 _TIMES = {"time": "builtin_interfaces/msg/Time", "duration": "builtin_interfaces/msg/Duration"}

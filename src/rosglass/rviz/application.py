@@ -32,7 +32,8 @@ from rosglass.rviz.rendering import choice
 from rosglass.rviz.roscpp import connect_beside_rviz, name_node, shared_arguments
 from rosglass.rviz.rviz_object import ACCESS
 from rosglass.rviz.stack import Stack
-from rosglass.rviz.view_controller import ViewEntry, ViewKeys, ViewServices
+from rosglass.rviz.view_controller import ViewKeys, ViewServices
+from rosglass.rviz.view_entry import ViewEntry
 from rosglass.rviz.window import Window, config_file
 
 if TYPE_CHECKING:
@@ -186,7 +187,10 @@ class Application(Handle):
         #: The view controller of RViz's camera.
         self.view = self.rviz.view
         #: Keyboard navigation.
-        self.view_keys = ViewKeys(self.window, self.view, self.overlays)
+        self.view_keys = ViewKeys(
+            self.window.panel, self.view, self.window.before_frame, self._focus_is_elsewhere
+        )
+        self.window.closing.connect(self.view_keys.close)
         #: The ROS topics and services of the camera.
         self.view_services = ViewServices(self.view, self.session, self.node_name)
         #: The view controller's entry in the Displays panel.
@@ -333,6 +337,13 @@ class Application(Handle):
         for step in steps:
             _attempt(step)
         self._unhook()
+
+    def _focus_is_elsewhere(self) -> bool:
+        """Return whether an overlay has the keyboard focus, or is modal."""
+        overlays = self.overlays
+        return overlays.input.focused is not None or any(
+            one.is_modal for one in overlays.topmost_first()
+        )
 
     def _close_node(self) -> None:
         node = self.session.node

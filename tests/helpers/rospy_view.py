@@ -17,7 +17,7 @@ from tf2_msgs.msg import TFMessage
 
 told = {}
 told_lock = threading.Lock()
-transforms = {}
+subscribers, transforms = {}, {}
 
 
 def do_call(service, type, request, times=1):
@@ -38,8 +38,12 @@ def do_listen(topic, mode):
         with told_lock:
             told.setdefault(topic, []).append(message.mode if mode else message.data)
 
+    if topic in subscribers:
+        subscribers[topic].unregister()
+    with told_lock:
+        told[topic] = []
     kind = hector_rviz_plugins.msg.ViewMode if mode else std_msgs.msg.String
-    rospy.Subscriber(topic, kind, heard)
+    subscribers[topic] = rospy.Subscriber(topic, kind, heard)
 
 
 def do_heard(topic):
@@ -63,7 +67,7 @@ def do_md5(kind, type):
     return getattr(getattr(hector_rviz_plugins, kind), type)._md5sum
 
 
-rospy.init_node("robot", disable_signals=True)
+rospy.init_node("robot_with_rospy", disable_signals=True)
 for line in sys.stdin:
     asked = json.loads(line)
     answer = globals()["do_" + asked.pop("do")](**asked)
