@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Describe the QML modules for editors and qmllint: ``imports/*/plugins.qmltypes``.
+"""Describe the QML modules for editors and qmllint: ``imports*/*/plugins.qmltypes``.
 
 With ``--write`` the files are written; without, their differences are told. Run it with PySide6.
 """
@@ -14,13 +14,18 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.qml import modules, ros1, ros2
 from rosglass.qt import QtCore
+from rosglass.scene import modules as scene
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
 FOLDER = Path(modules.__file__).with_name("imports")
+#: Of modules that need Qt 6.
+FOLDER6 = FOLDER.with_name("imports6")
 #: What JavaScript may be given anything for, or gets objects of types that have no name in QML.
 _ANY = {"QJSValue", "QVariant", "PyObject", "QObject*", "QJSValueList"}
+#: Bases of Qt that its own descriptions leave out.
+_UNNAMED = {"QQuickRhiItem"}
 _HEAD = """import QtQuick.tooling 1.2
 
 // Written by scripts/qmltypes.py from the registered types; for editors and qmllint only.
@@ -31,7 +36,7 @@ Module {
 
 def files() -> dict[Path, str]:
     """Return what the files must hold."""
-    found = {}
+    found = {FOLDER6 / "RosScene" / "plugins.qmltypes": _module("RosScene", scene.TYPES)}
     for uri, module in (("Ros", ros1), ("Ros2", ros2)):
         found[FOLDER / uri / "plugins.qmltypes"] = _module(uri, module.TYPES)
         found[FOLDER / uri / "Native" / "plugins.qmltypes"] = _module(
@@ -54,8 +59,10 @@ def _module(uri: str, types: Mapping[str, type[QtCore.QObject]]) -> str:
 def _component(uri: str, kind: type[QtCore.QObject], exports: list[str]) -> str:
     meta = kind.staticMetaObject
     base = meta
-    # Bases of our own have no name in QML: what they have is listed with the type.
-    while not hasattr(QtCore, base.className()) and not base.className().startswith("QQuick"):
+    # Bases without a name in QML, such as our own: what they have is listed with the type.
+    while base.className() in _UNNAMED or not (
+        hasattr(QtCore, base.className()) or base.className().startswith("QQuick")
+    ):
         base = base.superClass()
     lines = [
         f'name: "{uri}.{meta.className()}"',

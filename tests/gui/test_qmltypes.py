@@ -88,6 +88,55 @@ Item {
     assert "noSuchCall" in found[2]
 
 
+def test_qmllint_knows_the_3d_view(tmp_path: Path) -> None:
+    file = tmp_path / "Main.qml"
+    file.write_text(
+        """import QtQuick
+import RosScene 1.0
+Item {
+    SceneView {
+        id: scene
+        anchors.fill: parent
+        fixedFrame: "map"; view: "FPS"; tool: "Measure"
+        background: "black"
+        GridDisplay { cellSize: 2; color: "red" }
+        PointCloud2Display { topic: "/points"; decayTime: 2 }
+        RobotModelDisplay { }
+        InteractiveMarkersDisplay { onMenuRequested: (entries, x, y) => console.log(x, y) }
+        CameraDisplay { id: camera; hiddenDisplays: ["TF"] }
+        ViewControllerDisplay { trackedFrame: "base_link"; mode2D: true }
+        SetGoalTool { topic: "/goal"; onPoseSet: (x, y, yaw) => console.log(yaw) }
+        Tool { name: "Mark"; onReleased: event => console.log(event.point) }
+        SceneOverlay { source: "Over.qml"; watch: true }
+        onCameraChanged: console.log(statusText, problem)
+    }
+    ImagePanel { display: camera; width: 640 }
+    DisplaysPanel { view: scene }
+    ViewsPanel { view: scene }
+    ToolsPanel { view: scene }
+    SelectionPanel { view: scene }
+    ImagePanels { view: scene }
+    Component.onCompleted: scene.reset()
+    property string text: scene.noSuchThing
+    GridDisplay { cellSizes: 3 }
+    SphereDisplay { }
+}"""
+    )
+    found = lint(file)
+    assert len(found) == 3, found
+    text = "\n".join(sorted(found))
+    for wrong in ("noSuchThing", "cellSizes", "SphereDisplay"):
+        assert wrong in text
+
+
+def test_the_panels_of_the_3d_view_are_known() -> None:
+    panels = IMPORT_PATHS[0].parents[1] / "scene" / "panels"
+    known = (IMPORT_PATHS[1] / "RosScene" / "qmldir").read_text()
+    # Those that are parts of others, and the program's window.
+    hidden = {"MarkerMenu.qml", "PlainToolTip.qml", "View.qml"}
+    assert {file.name for file in panels.glob("*.qml") if file.name not in known} == hidden
+
+
 class LanguageServer:
     """Speaks the Language Server Protocol with qmlls."""
 

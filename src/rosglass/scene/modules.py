@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import os
 from functools import cache
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import QUrl
 from PySide6.QtQml import qmlRegisterType
 
 from rosglass.scene.display_configs import GroupDisplay
@@ -64,7 +62,10 @@ from rosglass.scene.view_tools import (
     SelectTool,
 )
 
-__all__ = ["DISPLAYS", "PANELS", "TOOLS", "register"]
+if TYPE_CHECKING:
+    from rosglass.qt import QtCore
+
+__all__ = ["DISPLAYS", "TOOLS", "TYPES", "register"]
 
 #: The displays; in QML, each has the name of its class.
 DISPLAYS = (
@@ -100,15 +101,6 @@ DISPLAYS = (
     ViewControllerDisplay,
     WrenchStampedDisplay,
 )
-#: Panels written in QML.
-PANELS = (
-    "DisplaysPanel",
-    "ImagePanel",
-    "ImagePanels",
-    "SelectionPanel",
-    "ToolsPanel",
-    "ViewsPanel",
-)
 Scene.TYPES[QmlOverlayDisplay.TYPE] = QmlOverlayDisplay
 Scene.TYPES.update({display.TYPE: display for display in (*DISPLAYS, GroupDisplay)})
 #: The tools, likewise; ``Tool`` is the base of own ones.
@@ -124,6 +116,14 @@ TOOLS = (
     SetInitialPoseTool,
 )
 Tools.TYPES.update({tool.TYPE: tool for tool in TOOLS})
+#: The types by their names in QML; ``qml/imports6/RosScene`` has those that are written in QML.
+TYPES: dict[str, type[QtCore.QObject]] = {
+    **{
+        kind.__name__: kind
+        for kind in (SceneView, CameraView, PictureItem, Tool, DisplaysModel, *DISPLAYS, *TOOLS)
+    },
+    "SceneOverlay": OverlayElement,
+}
 
 
 @cache
@@ -136,11 +136,5 @@ def register() -> None:
     os.environ.setdefault("QSG_RENDER_LOOP", "basic")
     # PySide takes texts for names, which its hints do not say.
     register_type: Any = qmlRegisterType
-    for kind in (
-        SceneView, CameraView, PictureItem, Tool, DisplaysModel, *DISPLAYS, *TOOLS,
-    ):  # fmt: skip
-        register_type(kind, "RosScene", 1, 0, kind.__name__)
-    register_type(OverlayElement, "RosScene", 1, 0, "SceneOverlay")
-    for name in PANELS:
-        file = Path(__file__).with_name("panels") / f"{name}.qml"
-        register_type(QUrl.fromLocalFile(str(file)), "RosScene", 1, 0, name)
+    for name, kind in TYPES.items():
+        register_type(kind, "RosScene", 1, 0, name)
