@@ -279,6 +279,12 @@ def _view(parser: argparse.ArgumentParser) -> None:
         help="fill the screen with the 3D view alone, without panels; ignore attempts to close "
         "the window (Alt-F4); Ctrl-C and SIGTERM end it",
     )
+    parser.add_argument(
+        "--record",
+        metavar="VIDEO",
+        help="record the window as a video (.mp4, .mkv, .webm) until it is closed; needs "
+        '"rosglass[video]"',
+    )
     _add_interface_options(parser, "the window", "the window", after=3.0)
     parser.set_defaults(arguments=[], ros_arguments=[], looks_nearby=True)
     parser.epilog = (

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.qml.application import Application
+    from rosglass.scene.window_recorder import WindowRecorder
 
 __all__ = ["QUIET_MEDIA", "Picture", "format_log", "quiet_media", "run", "show"]
 
@@ -65,6 +66,7 @@ def show(
     verbose: bool = False,
     end_process: bool = False,
     longest_script: float = 5.0,
+    recorder: WindowRecorder | None = None,
     **options: Any,
 ) -> int:
     """Show a QML file in a window until it is closed.
@@ -76,6 +78,7 @@ def show(
         verbose: Show what is logged for developers, too.
         end_process: End the process soon after the interface, whatever still runs in it.
         longest_script: As for :class:`rosglass.qml.Session`.
+        recorder: What records the window, as long as it is shown.
         options: As for :class:`rosglass.qml.Application`.
 
     Returns:
@@ -87,14 +90,16 @@ def show(
         RosArgumentError: One of the arguments for ROS is not valid.
     """
     quiet_media()
-    if screenshot is not None:
+    if screenshot is not None or recorder is not None:
         # Grabbing waits for the renderer, which may wait for Python.
         os.environ["QSG_RENDER_LOOP"] = "basic"
 
     # Nothing created until the window is shown becomes garbage.
     gc.disable()
     try:
-        return _show(file, screenshot, after, verbose, end_process, longest_script, options)
+        return _show(
+            file, screenshot, after, verbose, end_process, longest_script, recorder, options
+        )
     except SystemExit as end:
         # A signal before anything was shown: objects would be deleted in any order.
         if end_process and isinstance(end.code, int):
@@ -113,6 +118,7 @@ def _show(
     verbose: bool,
     end_process: bool,
     longest_script: float,
+    recorder: WindowRecorder | None,
     options: dict[str, Any],
 ) -> int:
     from rosglass.qml.application import Application  # noqa: PLC0415
@@ -126,12 +132,34 @@ def _show(
 
     def shown() -> None:
         gc.enable()
+        if recorder is not None and app.window is not None:
+            recorder.start(app.window)
         if picture is not None:
             picture.take(app.quit, lambda target: _save(app, target))
 
     _call_later(0.0, shown)
+    if recorder is not None:
+        # While the window exists, and the program may still take some seconds.
+        app.qt.aboutToQuit.connect(recorder.close)
     code = app.run(end_process=end_process)
+    if recorder is not None:
+        code = _check_recording(recorder, code)
     return code if picture is None else picture.check(code)
+
+
+def _check_recording(recorder: WindowRecorder, code: int) -> int:
+    """Say what was recorded; return the program's exit code."""
+    status = recorder.close()
+    if not status.frames:
+        note(status.problem or f"{recorder.path} was not written: the window was not drawn")
+        return code or 1
+    size = recorder.path.stat().st_size / 1e6
+    lost = f", {status.dropped} DROPPED: the encoder is too slow" if status.dropped else ""
+    note(f"{recorder.path}: {status.frames} pictures, {status.duration:.1f} s, {size:.1f} MB{lost}")
+    if status.problem:
+        note(status.problem)
+        return code or 1
+    return code
 
 
 class Picture:

@@ -39,6 +39,12 @@ def run(args: argparse.Namespace) -> int:
             'the 3D view needs Qt 6: pip install "rosglass[qml]" (inside RViz\'s Python there is '
             "Qt 5; use another virtual environment)"
         ) from None
+    recorder = None
+    if args.record is not None:
+        # Not all programs need numpy and PyAV.
+        from rosglass.scene.window_recorder import WindowRecorder  # noqa: PLC0415
+
+        recorder = WindowRecorder(args.record)
     program = ViewProgram(
         args.config,
         args.fixed_frame,
@@ -46,6 +52,7 @@ def run(args: argparse.Namespace) -> int:
         overlays=[interface_file(file) for file in args.overlays],
         watch=args.watch,
         import_paths=args.import_paths,
+        recorder=recorder,
     )
     try:
         return show(
@@ -55,6 +62,7 @@ def run(args: argparse.Namespace) -> int:
             verbose=args.verbose > 1,
             end_process=True,
             longest_script=args.longest_script,
+            recorder=recorder,
             url=args.url,
             name=args.name or "rosglass_view",
             context={"program": program},

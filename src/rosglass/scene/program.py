@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rosglass.qml.session import Session
     from rosglass.scene.access import SceneAccess
     from rosglass.scene.scene_view import SceneView
+    from rosglass.scene.window_recorder import WindowRecorder
 
 __all__ = ["WINDOW", "ViewProgram", "config_file"]
 
@@ -74,6 +75,7 @@ class ViewProgram(QtCore.QObject):
         overlays: QML files to show over the view, the last one on top.
         watch: Whether to reload these when a file in their folders is saved.
         import_paths: Additional folders with QML modules, for these.
+        recorder: What records the window; None for nothing.
 
     Raises:
         Error: The config cannot be read.
@@ -88,6 +90,8 @@ class ViewProgram(QtCore.QObject):
     time = ReadOnly(str, "")
     message = ReadOnly(str, "")
     frameRate = ReadOnly(int, 0)
+    #: For how long the window is being recorded; empty while it is not.
+    recording = ReadOnly(str, "")
     kiosk = ReadOnly(bool, False)
     #: Whether an overlay wants the 3D view alone.
     bare = ReadOnly(bool, False)
@@ -101,6 +105,7 @@ class ViewProgram(QtCore.QObject):
         overlays: Sequence[str | os.PathLike[str]] = (),
         watch: bool = False,
         import_paths: Sequence[str | os.PathLike[str]] = (),
+        recorder: WindowRecorder | None = None,
     ) -> None:
         super().__init__()
         self._session: Session | None = None
@@ -116,6 +121,9 @@ class ViewProgram(QtCore.QObject):
         self._discarded = False
         self._said_at = self._next_look = 0.0
         self._counted, self._counted_at = 0, time.monotonic()
+        self._recorder = recorder
+        if recorder is not None:
+            recorder.failed.connect(self._on_recording_failed)
         report(self, kiosk=kiosk)
         self._timer = QtCore.QTimer(self)
         self._timer.setInterval(_REFRESH_MS)
@@ -191,6 +199,10 @@ class ViewProgram(QtCore.QObject):
         report(self, configName=Path(config.source).name)
         if notes:
             self.say(f"{len(notes)} notes on {Path(config.source).name}: {notes[0]}")
+
+    @Slot(str)
+    def _on_recording_failed(self, problem: str) -> None:
+        self.say(f"the recording has ended: {problem}")
 
     def say(self, text: str) -> None:
         """Show a message in the status bar for some seconds."""
@@ -274,6 +286,7 @@ class ViewProgram(QtCore.QObject):
             connected=session.state == "connected",
             connection=f"{session.state}: {session.detail}" if session.detail else session.state,
             time=f"ROS {ros_time:.2f}   wall {time.strftime('%H:%M:%S')}",
+            recording="" if self._recorder is None else self._recorder.text,
         )
 
 

@@ -145,6 +145,7 @@ ApplicationWindow {
             ToolSeparator { }
             Label { Layout.fillWidth: true; visible: program.message !== ""; text: program.message; textFormat: Text.PlainText; elide: Text.ElideRight }
             Label { objectName: "status"; Layout.fillWidth: true; visible: program.message === ""; text: scene.statusText.replace(/<[^>]*>/g, "").replace(/&lt;/g, "<").replace(/&amp;/g, "&"); textFormat: Text.PlainText; elide: Text.ElideRight }
+            Label { objectName: "recording"; visible: text !== ""; text: program.recording; textFormat: Text.PlainText; color: "#c02020" }
             Label { text: program.frameRate + " fps"; textFormat: Text.PlainText }
         }
     }
