@@ -132,6 +132,16 @@ def covariance(*variances: float) -> Any:
     return np.diag(variances).reshape(-1)
 
 
+#: The joints of the frames that are published.
+URDF = """<robot name="judge">
+  <link name="map"/><link name="base"/><link name="arm"/><link name="rail"/>
+  <joint name="turn" type="revolute"><parent link="map"/><child link="base"/>
+    <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="10" velocity="1"/></joint>
+  <joint name="swing" type="revolute"><parent link="base"/><child link="arm"/>
+    <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="20" velocity="1"/></joint>
+  <joint name="lift" type="prismatic"><parent link="base"/><child link="rail"/>
+    <limit lower="0" upper="1" effort="100" velocity="1"/></joint>
+</robot>"""
 #: Orientations whose x axes are z and y.
 Z_UP, Y_UP = (
     pose(0, 0, 0, 0, -math.pi / 2)["orientation"],
@@ -422,6 +432,18 @@ CASES: dict[str, tuple[list[dict[str, Any]], list[Message]]] = {
                      "ranges": np.full(51, 2.5, np.float32)}),
         ],
     ),
+    "efforts": (
+        [
+            display("Effort", "/joint_states", Scale=2.5, Width=0.08),
+            display("Effort", "/few_joint_states"),
+        ],
+        [
+            Message("/joint_states", "sensor_msgs/JointState",
+                    {"name": ["turn", "lift", "swing"], "effort": [3.0, 5.0, -25.0]}),
+            Message("/few_joint_states", "sensor_msgs/JointState",
+                    {"name": ["turn"], "effort": [-2.0]}),
+        ],
+    ),
     "interactive markers": (
         [
             display("InteractiveMarkers", Update_Topic="/server/update", Show_Descriptions=False,
@@ -468,6 +490,7 @@ class Pair:
 
         self.wait, self.folder, self._config = wait, folder, folder / "judge.rviz"
         self.robot = rosglass.connect(master.url, "robot")
+        self.robot.parameter_server.set("robot_description", URDF)
         self.session = Session(master.url)
         self.window = QQuickView()
         install(self.window.engine(), self.session)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtQml import qmlRegisterType
 
 from rosglass.scene.display_configs import GroupDisplay
+from rosglass.scene.displays.effort import EffortDisplay
 from rosglass.scene.displays.geometry import (
     AccelStampedDisplay,
     PointStampedDisplay,
@@ -73,6 +74,7 @@ DISPLAYS = (
     AxesDisplay,
     CameraDisplay,
     DepthCloudDisplay,
+    EffortDisplay,
     FluidPressureDisplay,
     GridCellsDisplay,
     GridDisplay,

@@ -11,7 +11,7 @@ import numpy as np
 
 from rosglass.errors import Error
 from rosglass.scene.display import TopicDisplay
-from rosglass.scene.displays.shapes import ArrowShapes
+from rosglass.scene.displays.shapes import ArrowShapes, rotation_of_z_to
 from rosglass.scene.drawing import CONE, SPHERE, Group, Lines, Mesh, instance_matrix
 from rosglass.scene.settings import Setting, rgb_of
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AccelStampedDisplay",
+    "HistoryDisplay",
     "PointStampedDisplay",
     "PolygonDisplay",
     "RangeDisplay",
@@ -50,7 +51,7 @@ class _Kept(NamedTuple):
     group: Group
 
 
-class _History(TopicDisplay):
+class HistoryDisplay(TopicDisplay):
     """A display of the last messages, each drawn on its own."""
 
     def __init__(
@@ -102,7 +103,7 @@ def _finite(name: str, *numbers: float) -> tuple[float, ...]:
     return numbers
 
 
-class PointStampedDisplay(_History):
+class PointStampedDisplay(HistoryDisplay):
     """A ``geometry_msgs/PointStamped``, as a sphere. See its page in ``docs/scene.md``."""
 
     TYPE = "PointStamped"
@@ -131,7 +132,7 @@ class PointStampedDisplay(_History):
         group.add(ball)
 
 
-class PolygonDisplay(_History):
+class PolygonDisplay(HistoryDisplay):
     """A ``geometry_msgs/PolygonStamped``, as its outline. See its page in ``docs/scene.md``."""
 
     TYPE = "Polygon"
@@ -164,7 +165,7 @@ def _read_corners(message: Any) -> NDArray[np.float32]:
     return np.concatenate([corners, corners[:1]])
 
 
-class RangeDisplay(_History):
+class RangeDisplay(HistoryDisplay):
     """A ``sensor_msgs/Range``, as a cone. See its page in ``docs/scene.md``."""
 
     TYPE = "Range"
@@ -215,7 +216,7 @@ def _read_range(message: Any) -> tuple[float, float]:
     return (value if inside else 0.0), abs(angle)
 
 
-class _Screw(_History):
+class _Screw(HistoryDisplay):
     """A display of a linear and an angular vector, as arrows."""
 
     #: Their names in the message, and the field that holds both.
@@ -283,7 +284,7 @@ def _circle(
 ) -> tuple[Lines, Mesh]:
     """Return most of a circle around an arrow, and its head: which way it turns."""
     place = np.eye(4)
-    place[:3, :3] = _rotation_of_z_to(axis)
+    place[:3, :3] = rotation_of_z_to(axis)
     place[:3, 3] = axis * length / 2
     angles = np.linspace(math.pi / 4, 2 * math.pi, 29)
     at = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1) * length / 4
@@ -301,15 +302,6 @@ def _circle(
     )
     head.set_instances((place @ local)[np.newaxis])
     return lines, head
-
-
-def _rotation_of_z_to(axis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the shortest rotation, 3 x 3, from z to a direction of length 1."""
-    x, y, z = axis.tolist()
-    if z < -1 + 1e-9:
-        return np.diag([1.0, -1.0, -1.0])
-    u, v = x / (1 + z), y / (1 + z)
-    return np.array([[1 - x * u, -x * v, x], [-y * u, 1 - y * v, y], [-x, -y, z]])
 
 
 class WrenchStampedDisplay(_Screw):

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from rosglass.qt import QtCore
     from rosglass.scene.urdf import Visual
 
-__all__ = ["RobotModelDisplay", "link_drawables", "read_texture"]
+__all__ = ["DescriptionSource", "RobotModelDisplay", "link_drawables", "read_texture"]
 
 #: Milliseconds until a parameter that is not there is looked up again.
 _RETRY_MS = 2000
@@ -54,7 +54,7 @@ _DESCRIPTION_KEYS = (
 _AUTOMATIC, _TOPIC, _FILE, _PARAMETER = "Automatic", "Topic", "File", "Parameter"
 
 
-class _Source:
+class DescriptionSource:
     """Where a description comes from: reads or receives it, and hands its text on.
 
     Args:
@@ -349,7 +349,7 @@ class RobotModelDisplay(Display):
         def on_text(text: str) -> None:
             executor.post(lambda: take(text, name))
 
-        return lambda: _Source(node, kind, name, on_text)
+        return lambda: DescriptionSource(node, kind, name, on_text)
 
     def _on_create_failed(self, error: Error) -> None:
         self.set_status("URDF", "error", str(error))

@@ -11,7 +11,7 @@ from rosglass.scene.drawing import CONE, CYLINDER, Group, Mesh
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ArrowShapes", "AxesShapes", "poses_matrices", "stack_poses"]
+__all__ = ["ArrowShapes", "AxesShapes", "poses_matrices", "rotation_of_z_to", "stack_poses"]
 
 #: Turns z, along which cylinders and cones stand, to x, y and z.
 _ALONG = np.zeros((3, 4, 4))
@@ -43,6 +43,15 @@ def poses_matrices(positions: Any, rotations: Any) -> NDArray[np.float64]:
     out[:, 2, 0], out[:, 2, 1] = 2 * (x * z - y * w), 2 * (y * z + x * w)
     out[:, 2, 2], out[:, :3, 3], out[:, 3, 3] = 1 - 2 * (x * x + y * y), at, 1
     return out
+
+
+def rotation_of_z_to(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the shortest rotation, 3 x 3, from z to a direction of length 1."""
+    x, y, z = axis.tolist()
+    if z < -1 + 1e-9:
+        return np.diag([1.0, -1.0, -1.0])
+    u, v = x / (1 + z), y / (1 + z)
+    return np.array([[1 - x * u, -x * v, x], [-y * u, 1 - y * v, y], [-x, -y, z]])
 
 
 def _along(

@@ -1,0 +1,423 @@
+"""The display Effort: the torques of a robot's joints, as arcs around their axes."""
+# ruff: noqa: N802, N815 - the names of slots and properties are QML's
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+
+from rosglass.errors import Error, ExtrapolationException, TransformException
+from rosglass.qml.callbacks import weak_callback
+from rosglass.qml.element import single_shot
+from rosglass.qml.properties import ReadOnly, report
+from rosglass.qt import Signal, Slot, is_alive
+from rosglass.scene.display import Status
+from rosglass.scene.displays.geometry import HistoryDisplay
+from rosglass.scene.displays.robot_model import DescriptionSource
+from rosglass.scene.displays.shapes import rotation_of_z_to
+from rosglass.scene.drawing import CONE, Lines, Mesh
+from rosglass.scene.point_colors import rainbow
+from rosglass.scene.settings import Setting
+from rosglass.scene.urdf import parse_urdf
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
+
+    from rosglass.qml.runtime import Runtime
+    from rosglass.qt import QtCore
+    from rosglass.scene.drawing import Group
+    from rosglass.scene.urdf import Joint
+
+__all__ = ["EffortDisplay"]
+
+#: Milliseconds until a description that is not there is looked up again.
+_RETRY_MS = 2000
+#: Seconds for which efforts may wait for the transforms of their time before that is an error.
+_LATE_S = 1.0
+#: Names that one message may have.
+_MAX_NAMES = 10_000
+#: Status lines of joints, before the rest is counted.
+_MAX_JOINT_LINES = 10
+#: Joints that are drawn: a torque turns them.
+_TURNING = ("revolute", "continuous")
+# RViz's arc: the radius in metres without an effort, what is added to the share of the limit, and
+# 30 of 32 points of a circle, clockwise from y.
+_INNER_M, _LEAST_PART = 0.05, 0.05
+_ANGLES = np.arange(30) * math.pi / 16
+_ARC = np.stack([np.sin(_ANGLES), np.cos(_ANGLES), np.zeros(30)], axis=1)
+
+
+class _NoDescriptionError(Error):
+    """The robot description cannot be received."""
+
+
+class _Endpoint:
+    """The subscription to joint states, and where the robot description comes from."""
+
+    def __init__(self, source: DescriptionSource, subscriptions: Any) -> None:
+        self._parts = (source, subscriptions)
+
+    def close(self) -> None:
+        """Close both; safe to call twice."""
+        for part in self._parts:
+            part.close()
+
+
+class _Efforts(NamedTuple):
+    """What is drawn of one message.
+
+    Attributes:
+        values: Effort and position in the message, by name of the joint.
+        poses: Of the joints in the fixed frame, with the axis along z; those that are known.
+    """
+
+    values: dict[str, tuple[float, int]]
+    poses: dict[str, NDArray[np.float64]]
+
+
+class _Part:
+    """What a pick of an arc finds."""
+
+    def __init__(self, display: EffortDisplay, name: str, effort: float) -> None:
+        self.display, self._name, self._effort = display, name, effort
+
+    def __repr__(self) -> str:
+        return f"effort of joint {self._name}"
+
+    def describe(self) -> list[tuple[str, str]]:
+        """Return the lines of the Selection panel."""
+        limit = self.display.maxEffort(self._name)
+        return [
+            ("Joint", self._name),
+            ("Effort", f"{self._effort:g} Nm"),
+            ("Max Effort", f"{limit:g} Nm"),
+        ]
+
+
+def _read_efforts(message: Any) -> _Efforts:
+    names, efforts = message.name, np.asarray(message.effort, np.float64)
+    if len(names) != len(efforts):
+        hint = "; the publisher measures none" if not len(efforts) else ""
+        raise Error(f"name has {len(names)} entries, effort {len(efforts)}{hint}")
+    if len(names) > _MAX_NAMES:
+        raise Error(f"name: {len(names)} joints are more than the {_MAX_NAMES} that are read")
+    values = efforts.tolist()
+    return _Efforts({str(name): (values[at], at) for at, name in enumerate(names)}, {})
+
+
+def _joints_of(text: str, source: str) -> tuple[str, dict[str, Joint]]:
+    """Return the robot's name, and its joints that turn."""
+    if not text.strip():
+        raise Error(f"{source}: the robot description is empty")
+    robot = parse_urdf(text, source)
+    return robot.name, {
+        name: joint for name, joint in robot.joints.items() if joint.type in _TURNING
+    }
+
+
+class EffortDisplay(HistoryDisplay):
+    """The efforts of ``sensor_msgs/JointState``. See its page in ``docs/scene.md``."""
+
+    TYPE = "Effort"
+    MESSAGES = ("sensor_msgs/JointState",)
+    # Joint states name no frame: each joint has its own.
+    HAS_FRAMES = True
+
+    alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
+    width = Setting("Width", "float", 0.02, "Of the arcs, in metres.", min=0.0)
+    scale = Setting(
+        "Scale", "float", 1.0, "Diameter of an arc at the joint's limit, in metres.", min=0.0
+    )
+    historyLength = Setting(
+        "History Length", "int", 1, "How many are shown.", min=1, max=100_000, then="_on_length"
+    )
+    robotDescription = Setting(
+        "Robot Description", "string", "robot_description",
+        "Of the description: the parameter's name in ROS 1, the topic's in ROS 2.",
+        then="_on_source",
+    )  # fmt: skip
+    tfPrefix = Setting(
+        "TF Prefix", "string", "", "In front of the names of links, with a slash.",
+        then="_on_prefix",
+    )  # fmt: skip
+
+    jointsChanged = Signal()
+    #: Names of the joints that have a limit of their effort.
+    joints: ReadOnly[list[str]] = ReadOnly(cast("type[list[str]]", "QStringList"), [])
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        #: All joints that turn; None until the description is read.
+        self._turning: dict[str, Joint] | None = None
+        self._robot_name = ""
+        self._switched: dict[str, bool] = {}
+        self._text: str | None = None
+        self._urdf = Status("warn", "")
+        #: What :meth:`_place` has found for the message that :meth:`show` gets next.
+        self._poses: dict[str, NDArray[np.float64]] = {}
+        super().__init__(parent, runtime)
+        self._again = single_shot(self, self._create_again)
+
+    # -- the description -------------------------------------------------------------------------
+
+    def _on_source(self) -> None:
+        self._text = self._turning = None
+        self.reset()
+        self.clear_status()
+        report(self, joints=[])
+        self._close_endpoint()
+        self._schedule()
+
+    def _wanted(self) -> tuple[Any, ...] | None:
+        wanted = super()._wanted()
+        name = self.robotDescription.strip()
+        if wanted is not None and not name:
+            self.set_status("URDF", "error", "Robot Description is empty: name it")
+            return None
+        return None if wanted is None else (*wanted, name)
+
+    def _factory(self, *wanted: Any) -> Callable[[], Any]:
+        node, *rest, name = wanted
+        kind = "Parameter" if hasattr(node, "parameter_server") else "Topic"
+        subscribe = super()._factory(node, *rest)
+        executor, take = self._executor, weak_callback(self._take_text)
+        if self._turning is None:
+            self._urdf = Status("warn", f"waiting for the description: {kind.lower()} {name}")
+        self.set_status("URDF", *self._urdf)
+
+        def on_text(text: str) -> None:
+            executor.post(lambda: take(text, name))
+
+        def create() -> _Endpoint:
+            try:
+                source = DescriptionSource(node, kind, name, on_text)
+            except Error as error:
+                raise _NoDescriptionError(str(error)) from None
+            try:
+                return _Endpoint(source, subscribe())
+            except Error:
+                source.close()
+                raise
+
+        return create
+
+    def _on_create_failed(self, error: Error) -> None:
+        if isinstance(error, _NoDescriptionError):
+            self._set_urdf("error", str(error))
+            self._again.start(_RETRY_MS)
+        else:
+            super()._on_create_failed(error)
+
+    def _set_urdf(self, level: str, text: str) -> None:
+        self._urdf = Status(level, text)
+        self.set_status("URDF", level, text)
+
+    def _take_text(self, text: str, source: str) -> None:
+        if not is_alive(self) or self.scene is None or text == self._text:
+            return
+        self._text = text
+        self.scene.load(
+            lambda: _joints_of(text, source), lambda result: self._set_robot(text, result)
+        )
+
+    def _set_robot(self, text: str, result: tuple[str, dict[str, Joint]] | Error) -> None:
+        if not is_alive(self) or text != self._text:
+            return
+        if isinstance(result, Error):
+            self._turning = None
+            self._set_urdf("error", str(result))
+            report(self, joints=[])
+            return
+        self._robot_name, self._turning = result
+        limited = sorted(name for name in self._turning if self._limit_of(name) is not None)
+        report(self, joints=limited)
+        text = f"Robot model parsed Ok: {len(limited)} joints with a limit of their effort"
+        self._set_urdf("ok" if limited else "warn", text)
+        self._show_waiting()
+
+    def _limit_of(self, name: str) -> float | None:
+        """Return the limit of a joint's effort in Nm; None where there is none."""
+        joint = (self._turning or {}).get(name)
+        if joint is None or joint.limits is None or joint.limits.effort <= 0:
+            return None
+        return joint.limits.effort
+
+    # -- the joints ------------------------------------------------------------------------------
+
+    @Slot(str, bool)
+    def setJointEnabled(self, joint: str, enabled: bool) -> None:
+        """Show or hide the effort of a joint."""
+        self._switched[joint] = enabled
+        self._restyle()
+
+    @Slot(str, result=bool)
+    def isJointEnabled(self, joint: str) -> bool:
+        """Return whether the effort of a joint is shown."""
+        return self._switched.get(joint, True)
+
+    @Slot(str, result=float)
+    def maxEffort(self, joint: str) -> float:
+        """Return the limit of a joint's effort in Nm; 0 where there is none."""
+        return self._limit_of(joint) or 0.0
+
+    @Slot(str, result=float)
+    def effort(self, joint: str) -> float:
+        """Return the effort of a joint in Nm, in the newest message shown; NaN without one."""
+        values = self._kept[-1].data.values if self._kept else {}
+        return float(values.get(joint, (math.nan, 0))[0])
+
+    # -- messages --------------------------------------------------------------------------------
+
+    def length(self) -> int:
+        """Return how many messages are shown."""
+        return int(self.historyLength)
+
+    def preparer(self) -> Callable[[Any], Any]:
+        """Return the function that reads names and efforts."""
+        return _read_efforts
+
+    def _on_prefix(self) -> None:
+        self.on_fixed_frame()
+
+    def _frame_of(self, joint: Joint) -> str:
+        prefix = self.tfPrefix.strip("/")
+        return f"{prefix}/{joint.child}" if prefix else joint.child
+
+    def _place(self, item: Any) -> NDArray[np.float64] | None:
+        if self._turning is None or self.scene is None:
+            return None
+        drawn = [name for name in item.data.values if self._limit_of(name) is not None]
+        self._poses, missing = self._find_poses(drawn, item.stamp)
+        is_late = time.monotonic() - self._placed_at > _LATE_S
+        errors = list(missing.values())
+        # Transforms of a moment often come after the data; a frame that does not exist may never.
+        if errors and not is_late and (isinstance(errors[0], ExtrapolationException)):
+            return None
+        if errors and not self._poses:
+            if is_late or not item.stamp:
+                frame = self._frame_of(self._turning[next(iter(missing))])
+                self.set_status("Transform", "error", f"no transform from [{frame}]: {errors[0]}")
+            return None
+        self._placed_at = time.monotonic()
+        self.set_status("Transform", "ok", "Transform OK")
+        self._report_joints(item.data, missing)
+        return np.eye(4)
+
+    def _find_poses(
+        self, names: list[str], stamp: int
+    ) -> tuple[dict[str, NDArray[np.float64]], dict[str, TransformException]]:
+        """Return the poses of joints, and why others are not known; those yet to come first."""
+        assert self._turning is not None
+        assert self.scene is not None
+        found: dict[str, NDArray[np.float64]] = {}
+        missing: dict[str, TransformException] = {}
+        for name in names:
+            joint = self._turning[name]
+            try:
+                pose = self.scene.look_up(self._frame_of(joint), stamp)
+            except TransformException as error:
+                missing[name] = error
+                continue
+            turn = np.eye(4)
+            turn[:3, :3] = rotation_of_z_to(np.array(joint.axis))
+            found[name] = pose @ turn
+        late = {k: e for k, e in missing.items() if isinstance(e, ExtrapolationException)}
+        return found, {**late, **missing}
+
+    def _report_joints(self, data: _Efforts, missing: Mapping[str, TransformException]) -> None:
+        """Say which efforts are not drawn, and why."""
+        assert self._turning is not None
+        lines: dict[str, Status] = {}
+        for name, (value, at) in data.values.items():
+            joint = self._turning.get(name)
+            if joint is None:
+                continue
+            limit = joint.limits.effort if joint.limits is not None else None
+            if limit is None or limit <= 0:
+                found = "no <limit>" if limit is None else f'<limit effort="{limit:g}">'
+                text = f"the description has {found}: an effort above 0 is needed"
+                lines[name] = Status("warn", text)
+            elif not math.isfinite(value):
+                lines[name] = Status("error", f"effort[{at}] is {value}")
+            elif name in missing:
+                frame = self._frame_of(joint)
+                lines[name] = Status("error", f"no transform from [{frame}]: {missing[name]}")
+        shown = {f"Joint {name}": lines[name] for name in list(lines)[:_MAX_JOINT_LINES]}
+        if len(lines) > len(shown):
+            worst = "error" if any(one.level == "error" for one in lines.values()) else "warn"
+            shown["Joints"] = Status(worst, f"{len(lines)} joints of the message are not drawn")
+        elif not self._turning.keys() & data.values.keys():
+            text = f"name has no revolute or continuous joint of the robot {self._robot_name!r}"
+            shown["Joints"] = Status("warn", text)
+        for line in list(self.status_lines):
+            if line.startswith("Joint") and line not in shown:
+                self.delete_status(line)
+        for line, status in shown.items():
+            self.set_status(line, *status)
+
+    def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:
+        """Show the efforts of a message."""
+        poses, self._poses = self._poses, {}
+        if not poses and self._turning is not None:
+            # In a new fixed frame, where joints were at the time may not be known any more.
+            drawn = [name for name in data.values if self._limit_of(name) is not None]
+            poses, _ = self._find_poses(drawn, 0)
+        super().show(data._replace(poses=poses), pose, frame, stamp)
+
+    def draw(self, data: Any, group: Group) -> None:
+        """Draw an arc and its head for each joint."""
+        for name, pose in data.poses.items():
+            effort, limit = data.values[name][0], self._limit_of(name)
+            if limit is None or not math.isfinite(effort) or not self.isJointEnabled(name):
+                continue
+            part = min(abs(effort) / limit, 1.0) + _LEAST_PART
+            rgba = (*rainbow(np.array(min(part, 1.0))).tolist(), self.alpha)
+            radius = _INNER_M + part * self.scale / 2
+            turn = -1.0 if effort > 0 else 1.0
+            arc = Lines(self.width, in_metres=True)
+            arc.set_strip(radius * _ARC * (-1.0 if effort < 0 else 1.0, 1.0, 1.0), rgba)
+            head = Mesh(CONE, rgba)
+            length, wide = 2 * self.width, 4 * self.width
+            # From where the arc begins, along x.
+            head.set_instances(
+                np.array(
+                    [
+                        [0.0, 0, turn * length, 0],
+                        [turn * wide, 0, 0, radius],
+                        [0, wide, 0, 0],
+                        [0, 0, 0, 1],
+                    ]
+                )[np.newaxis]
+            )
+            owner = _Part(self, name, effort)
+            for item in (arc, head):
+                item.pose, item.owner = pose, owner
+            group.add(arc, head)
+
+    # -- files -----------------------------------------------------------------------------------
+
+    def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
+        """Take the settings of a file of either RViz, and which joints it shows."""
+        joints = saved.get("Joints")
+        for name, state in (joints if isinstance(joints, dict) else {}).items():
+            shown = state.get("Value") if isinstance(state, dict) else state
+            if isinstance(shown, bool):
+                self._switched[str(name)] = shown
+        return super().load_settings(saved)
+
+    def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
+        """Return the settings for a file of one RViz, with the joints that are shown."""
+        kept = super().save_settings(older, ros)
+        joints = dict(kept["Joints"]) if isinstance(kept.get("Joints"), dict) else {}
+        for name, shown in self._switched.items():
+            inner = joints.get(name)
+            joints[name] = {**(inner if isinstance(inner, dict) else {}), "Value": shown}
+        if joints:
+            kept["Joints"] = joints
+        return kept

@@ -1,0 +1,343 @@
+"""The display Effort."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from rosglass.scene.drawing import CONE, Lines, Mesh
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from conftest import SceneBench
+
+URDF = """<robot name="arm">
+  <link name="base"/><link name="upper"/><link name="lower"/><link name="wheel"/>
+  <link name="free"/><link name="rail"/>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
+    <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="10" velocity="1"/></joint>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/>
+    <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="4" velocity="1"/></joint>
+  <joint name="drive" type="continuous"><parent link="base"/><child link="wheel"/>
+    <axis xyz="0 0 1"/><limit effort="2" velocity="1"/></joint>
+  <joint name="caster" type="continuous"><parent link="base"/><child link="free"/></joint>
+  <joint name="lift" type="prismatic"><parent link="base"/><child link="rail"/>
+    <limit lower="0" upper="1" effort="100" velocity="1"/></joint>
+</robot>"""
+STATES = "sensor_msgs/JointState"
+
+
+class Robot:
+    """Publishes a description, joint states and the frames of the links."""
+
+    def __init__(self, bench: SceneBench) -> None:
+        from rosglass.comm import Durability, QoS
+        from rosglass.tf import StaticTransformBroadcaster
+
+        self.bench = bench
+        latched = QoS(1, durability=Durability.TRANSIENT_LOCAL)
+        self.descriptions = bench.robot.create_publisher(
+            "/robot_description", "std_msgs/String", qos=latched
+        )
+        self.states = bench.robot.create_publisher("/joint_states", STATES)
+        self.static = StaticTransformBroadcaster(bench.robot)
+
+    def place(self, *links: str, prefix: str = "") -> None:
+        from rosglass import Time
+        from rosglass.tf import Transform
+
+        self.static.send_transform(
+            [
+                Transform((float(at), 0.0, 0.0), (0, 0, 0, 1), Time(1), "map", f"{prefix}{link}")
+                for at, link in enumerate(links)
+            ]
+        )
+
+    def send(self, efforts: dict[str, float], **fields: Any) -> None:
+        self.bench.wait(self.states.subscription_count)
+        self.states.publish(
+            {"name": list(efforts), "effort": np.array(list(efforts.values())), **fields}
+        )
+
+
+@pytest.fixture
+def robot(bench: SceneBench) -> Robot:
+    return Robot(bench)
+
+
+def add(bench: SceneBench, robot: Robot, urdf: str = URDF, **settings: Any) -> Any:
+    """Show the display, and wait for the description."""
+    display = bench.load().scene.add("Effort", topic="/joint_states", **settings)
+    robot.descriptions.publish({"data": urdf})
+    bench.wait(lambda: "waiting" not in display.statusText and "URDF: " in display.statusText)
+    return display
+
+
+def arcs(display: Any) -> list[tuple[Any, Any]]:
+    """Return lines and their poses."""
+    found = display.root.drawables()
+    return [(one, pose) for one, pose, _ in found if isinstance(one, Lines)]
+
+
+def radius_of(lines: Any) -> float:
+    return float(np.linalg.norm(lines.rows["start"][0]))
+
+
+def test_an_effort_is_an_arc_as_large_as_its_share_of_the_limit(
+    bench: SceneBench, robot: Robot
+) -> None:
+    display = add(bench, robot)
+    assert "URDF: Robot model parsed Ok" in display.statusText
+    assert display.joints == ["drive", "elbow", "shoulder"]
+    assert (display.maxEffort("shoulder"), display.maxEffort("caster")) == (10.0, 0.0)
+    robot.place("upper", "lower", "wheel")
+    robot.send({"shoulder": 5.0, "elbow": -8.0, "drive": 0.0, "lift": 50.0})
+    bench.wait(lambda: len(arcs(display)) == 3)
+    assert display.statusLevel == "ok", display.statusText
+    by_joint = {lines.owner.describe()[0][1]: (lines, pose) for lines, pose in arcs(display)}
+    shoulder, pose = by_joint["shoulder"]
+    # RViz's radius: 5 cm, and half a metre for the share of the limit and 5 %.
+    assert radius_of(shoulder) == pytest.approx(0.05 + 0.55 / 2)
+    assert (shoulder.width, shoulder.in_metres) == (pytest.approx(0.02), True)
+    assert pose[:3, 3].tolist() == [0.0, 0.0, 0.0]
+    assert radius_of(by_joint["elbow"][0]) == pytest.approx(0.05 + 1.05 / 2), "no more than 100 %"
+    assert by_joint["elbow"][0].rows["first"][0].tolist() == [255, 0, 0, 255], "red at the limit"
+    assert radius_of(by_joint["drive"][0]) == pytest.approx(0.05 + 0.05 / 2)
+    assert shoulder.owner.describe() == [
+        ("Joint", "shoulder"),
+        ("Effort", "5 Nm"),
+        ("Max Effort", "10 Nm"),
+    ]
+    assert display.effort("elbow") == -8.0
+    assert math.isnan(display.effort("neck"))
+    display.scale, display.width, display.alpha = 2.0, 0.1, 0.5
+    found = {lines.owner.describe()[0][1]: lines for lines, _ in arcs(display)}
+    assert radius_of(found["shoulder"]) == pytest.approx(0.05 + 0.55)
+    assert (found["shoulder"].width, found["shoulder"].opaque) == (pytest.approx(0.1), False)
+    display.setJointEnabled("shoulder", False)
+    assert len(arcs(display)) == 2
+    assert not display.isJointEnabled("shoulder")
+
+
+@pytest.mark.parametrize("axis", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0, -1, 0), (1, 1, 0)])
+@pytest.mark.parametrize("effort", [5.0, -5.0])
+def test_the_head_points_where_the_torque_turns(
+    bench: SceneBench, robot: Robot, axis: tuple[int, int, int], effort: float
+) -> None:
+    words = " ".join(map(str, axis))
+    display = add(bench, robot, URDF.replace('<axis xyz="0 1 0"/>', f'<axis xyz="{words}"/>'))
+    robot.place("upper", "lower")
+    robot.send({"elbow": effort})
+    bench.wait(lambda: len(arcs(display)) == 1)
+    ((lines, pose),) = arcs(display)
+    (head,) = (one for one, _, _ in display.root.drawables() if isinstance(one, Mesh))
+    assert head.shape is CONE
+    matrix = pose @ head.instances["matrix"][0].reshape(4, 4).T
+    start, tip = (matrix @ (0, 0, 0, 1))[:3], (matrix @ (0, 0, 1, 1))[:3]
+    centre = pose[:3, 3]
+    turning = np.cross(start - centre, tip - start)
+    along = turning / np.linalg.norm(turning)
+    assert along == pytest.approx(np.sign(effort) * np.array(axis) / np.linalg.norm(axis), abs=1e-5)
+    # The arc begins at the head, and lies on its other side.
+    first = (pose @ [*lines.rows["start"][0], 1])[:3]
+    second = (pose @ [*lines.rows["end"][0], 1])[:3]
+    assert first == pytest.approx(start, abs=1e-5)
+    assert (second - first) @ (tip - start) < 0
+
+
+def test_what_is_not_drawn_is_in_the_status(bench: SceneBench, robot: Robot) -> None:
+    display = add(bench, robot)
+    robot.place("upper", "wheel")
+    robot.send({"shoulder": float("nan"), "elbow": 1.0, "drive": float("-inf"), "caster": 1.0})
+    bench.wait(lambda: "Joint elbow" in display.statusText)
+    assert display.statusLevel == "error"
+    lines = display.status_lines
+    assert lines["Joint shoulder"] == ("error", "effort[0] is nan")
+    assert lines["Joint drive"] == ("error", "effort[2] is -inf")
+    assert lines["Joint elbow"].text.startswith("no transform from [lower]: ")
+    assert lines["Joint caster"] == (
+        "warn",
+        "the description has no <limit>: an effort above 0 is needed",
+    )
+    assert arcs(display) == []
+    robot.place("upper", "lower", "wheel")
+    robot.send({"shoulder": 1.0, "elbow": 1.0, "drive": 1.0})
+    bench.wait(lambda: len(arcs(display)) == 3)
+    assert display.statusLevel == "ok", display.statusText
+    robot.send({"neck": 1.0})
+    bench.wait(lambda: "Joints: " in display.statusText)
+    expected = "name has no revolute or continuous joint of the robot 'arm'"
+    assert display.status_lines["Joints"] == ("warn", expected)
+    assert arcs(display) == []
+
+
+def test_a_limit_of_zero_is_none(bench: SceneBench, robot: Robot) -> None:
+    display = add(bench, robot, URDF.replace('effort="10"', 'effort="0"'))
+    assert display.joints == ["drive", "elbow"]
+    robot.place("upper")
+    robot.send({"shoulder": 1000.0})
+    bench.wait(lambda: "Joint shoulder" in display.statusText)
+    text = 'the description has <limit effort="0">: an effort above 0 is needed'
+    assert display.status_lines["Joint shoulder"] == ("warn", text)
+    assert arcs(display) == []
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        (
+            {"name": ["shoulder"], "effort": []},
+            "name has 1 entries, effort 0; the publisher measures none",
+        ),
+        (
+            {"name": ["shoulder"], "effort": [1.0, 2.0]},
+            "name has 1 entries, effort 2",
+        ),
+        (
+            {"name": ["j"] * 10_001, "effort": np.zeros(10_001)},
+            "name: 10001 joints are more than the 10000 that are read",
+        ),
+    ],
+)
+def test_arrays_that_do_not_fit_are_errors(
+    bench: SceneBench, robot: Robot, fields: dict[str, Any], text: str
+) -> None:
+    display = add(bench, robot)
+    robot.place("upper")
+    robot.send({"shoulder": 5.0})
+    bench.wait(lambda: len(arcs(display)) == 1)
+    robot.states.publish(fields)
+    bench.wait(lambda: display.statusLevel == "error")
+    assert display.status_lines["Message"] == ("error", text)
+    assert len(arcs(display)) == 1, "the last good message stays"
+
+
+def test_a_broken_description_is_an_error_until_a_good_one_comes(
+    bench: SceneBench, robot: Robot
+) -> None:
+    display = add(bench, robot, "<robot")
+    assert display.statusLevel == "error"
+    assert "URDF: robot_description:1" in display.statusText
+    robot.place("upper")
+    robot.send({"shoulder": 5.0})
+    bench.wait(lambda: display.received == 1)
+    assert arcs(display) == []
+    robot.descriptions.publish({"data": URDF})
+    bench.wait(lambda: len(arcs(display)) == 1)
+    assert display.statusLevel == "ok", display.statusText
+
+
+def test_efforts_are_where_the_joints_were_at_their_time(bench: SceneBench, robot: Robot) -> None:
+    from rosglass import Time
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    display = add(bench, robot)
+    moving = TransformBroadcaster(bench.robot)
+
+    def move(second: int) -> None:
+        at = (float(second), 0.0, 0.0)
+        stamp = Time.from_parts(second, 0)
+        moving.send_transform(Transform(at, (0, 0, 0, 1), stamp, "map", "upper"))
+
+    def stamped(nanoseconds: int) -> dict[str, Any]:
+        return {"stamp": {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9}}
+
+    move(100)
+    bench.wait(lambda: "upper" in display.scene.frames())
+    robot.send({"shoulder": 5.0}, header=stamped(100_500_000_000))
+    bench.wait(lambda: display.received == 1)
+    assert arcs(display) == []
+    move(101)
+    bench.wait(lambda: len(arcs(display)) == 1)
+    assert arcs(display)[0][1][0, 3] == pytest.approx(100.5)
+    # One that is older than all transforms is not shown as if it was of now.
+    robot.send({"shoulder": 5.0}, header=stamped(2_000_000_000))
+    later = itertools.count(102)
+    bench.wait(lambda: move(next(later)) or "no transform from [upper]" in display.statusText)
+    assert display.statusLevel == "error"
+
+
+def test_a_prefix_names_the_frames_and_messages_have_a_history(
+    bench: SceneBench, robot: Robot
+) -> None:
+    display = add(bench, robot, tfPrefix="/r1/", historyLength=2)
+    robot.place("upper", prefix="r1/")
+    for effort in (1.0, 5.0, 10.0):
+        robot.send({"shoulder": effort})
+    bench.wait(lambda: display.received == 3 and len(arcs(display)) == 2)
+    found = sorted(radius_of(lines) for lines, _ in arcs(display))
+    assert found == pytest.approx([0.05 + 0.55 / 2, 0.05 + 1.05 / 2])
+
+
+def test_settings_and_joints_are_written_for_either_rviz(bench: SceneBench) -> None:
+    view = bench.load()
+    for ros, name in ((1, "robot_description"), (2, "/robot_description")):
+        class_id = {1: "rviz/Effort", 2: "rviz_default_plugins/Effort"}[ros]
+        topic: Any = "/joints" if ros == 1 else {"Value": "/joints", "Depth": 7}
+        saved = {
+            "Class": class_id,
+            "Alpha": 0.5,
+            "Width": 0.1,
+            "Scale": 3,
+            "History Length": 4,
+            "Robot Description": name,
+            "TF Prefix": "r1",
+            "Joints": {"elbow": {"Value": False}},
+            "Topic": topic,
+        }
+        display = view.scene.add("Effort")
+        assert display.load_settings(saved) == []
+        assert (display.alpha, display.width, display.scale) == (0.5, pytest.approx(0.1), 3.0)
+        assert (display.historyLength, display.robotDescription) == (4, name)
+        assert (display.tfPrefix, display.topic) == ("r1", "/joints")
+        assert not display.isJointEnabled("elbow")
+        display.setJointEnabled("wrist", False)
+        kept = display.save_settings(saved, ros)
+        assert kept["Joints"] == {"elbow": {"Value": False}, "wrist": {"Value": False}}
+        assert kept["Robot Description"] == name
+        assert (kept["Topic"] if ros == 1 else kept["Topic"]["Value"]) == "/joints"
+
+
+def test_the_dialog_offers_it_for_joint_states(bench: SceneBench, robot: Robot) -> None:
+    from rosglass.scene.panel_models import DisplaysModel
+
+    view = bench.load()
+    model = DisplaysModel()
+    model.view = view
+    wanted = {"topic": "/joint_states", "type": "sensor_msgs/JointState", "display": "Effort"}
+    bench.wait(lambda: wanted in [dict(one) for one in model.suggestions()])
+    assert "Effort" in model.types()
+    assert robot.states is not None
+
+
+def test_in_ros1_the_description_is_a_parameter(
+    make_bench: Callable[[str], SceneBench], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosmaster import RosMaster
+
+    from rosglass.scene.displays import effort
+
+    monkeypatch.setattr(effort, "_RETRY_MS", 200)
+    with RosMaster(tmp_path) as master:
+        bench = make_bench(master.url)
+        try:
+            display = bench.load().scene.add(
+                "Effort", topic="/joint_states", robotDescription="arm_description"
+            )
+            bench.wait(lambda: display.statusLevel == "error")
+            assert "URDF: parameter /arm_description is not set on" in display.statusText
+            bench.robot.parameter_server.set("arm_description", URDF)  # type: ignore[attr-defined]
+            bench.wait(lambda: "Robot model parsed Ok" in display.statusText)
+            robot = Robot(bench)
+            robot.place("upper")
+            robot.send({"shoulder": 5.0})
+            bench.wait(lambda: len(arcs(display)) == 1)
+            assert display.statusLevel == "ok", display.statusText
+        finally:
+            bench.close()
