@@ -400,6 +400,23 @@ def test_meshes_have_their_textures_and_are_made_in_another_thread(
     assert painted not in drawables(display)
 
 
+def test_meshes_of_markers_come_from_web_servers(
+    bench: SceneBench, show: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from web_server import WebServer
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with WebServer() as web:
+        web.files["/flat.obj"] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+        display = show(
+            marker(10, 0, mesh_resource=f"{web.url}/flat.obj"),
+            marker(10, 1, mesh_resource=f"{web.url}/gone.obj"),
+        )
+        bench.wait(lambda: len(drawables(display)) == 1 and "shapes/1" in display.status_lines)
+        text = display.status_lines["shapes/1"].text
+        assert f"{web.url}/gone.obj: the server answers 404 Not Found" in text
+
+
 def test_meshes_that_are_kept_are_bounded() -> None:
     from rosglass.errors import Error
     from rosglass.scene.displays.marker import MESH, MarkerMeshes, MarkerRecord

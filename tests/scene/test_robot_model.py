@@ -6,6 +6,7 @@ import itertools
 import struct
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 from rosglass.scene.drawing import BOX, CYLINDER, SPHERE
@@ -143,6 +144,89 @@ def test_meshes_come_from_files_and_missing_ones_are_named(
     green = (bench.picture().astype(int) - (0, 255, 0)).clip(0).max(axis=2) < 30
     assert green.sum() > 100
     send.close()
+
+
+STL = bytes(80) + struct.pack("<I12fH", 1, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 2, 0, 0)
+OBJ = b"""mtllib paint.mtl
+v 0 0 0\nv 2 0 0\nv 0 2 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl wood\nf 1/1 2/2 3/3
+"""
+MTL = b"newmtl wood\nKd 1 1 1\nmap_Kd textures/wood.png\n"
+
+
+def with_meshes(*uris: str) -> str:
+    visuals = "".join(
+        f'<visual><geometry><mesh filename="{uri}"/></geometry></visual>' for uri in uris
+    )
+    return f'<robot name="far"><link name="base_link">{visuals}</link></robot>'
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    for variable in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH"):
+        monkeypatch.delenv(variable, raising=False)
+
+
+@pytest.mark.usefixtures("cache")
+def test_meshes_and_what_they_name_come_from_the_robot(bench: SceneBench) -> None:
+    from PySide6.QtCore import QBuffer, QByteArray, QIODevice
+    from PySide6.QtGui import QImage
+
+    picture, file = QImage(4, 4, QImage.Format.Format_RGB32), QByteArray()
+    picture.fill(0x00FF00)
+    buffer = QBuffer(file)
+    buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+    assert picture.save(buffer, "PNG")
+    files = {"arm.obj": OBJ, "paint.mtl": MTL, "textures/wood.png": bytes(file.data())}
+
+    def answer(request: Any) -> dict[str, Any]:
+        found = files.get(request.path.removeprefix("package://far/meshes/"))
+        if found is None:
+            return {"status_code": 0, "error_reason": f"no file {request.path}"}
+        return {"status_code": 1, "body": np.frombuffer(found, np.uint8)}
+
+    kind = "rviz_resource_interfaces/srv/GetResource"
+    server = bench.robot.create_service_server("/rviz/get_resource", kind, answer)
+    view = bench.load("RobotModelDisplay {}")
+    (robot,) = view.scene.displays
+    publish(bench, with_meshes("package://far/meshes/arm.obj", "package://far/meshes/gone.stl"))
+    send = send_transforms(bench, "base_link")
+    bench.wait(lambda: len(list(robot.root.drawables())) == 1)
+    ((mesh, _, _),) = robot.root.drawables()
+    assert mesh.texture is not None
+    assert mesh.texture[0, 0].tolist() == [0, 255, 0, 255]
+    green = (bench.picture().astype(int) - (0, 255, 0)).clip(0).max(axis=2) < 30
+    assert green.sum() > 100
+    line = robot.status_lines["Mesh gone.stl"]
+    assert line.level == "error"
+    assert "there is no package 'far' in ROS_PACKAGE_PATH" in line.text
+    assert "nor does the robot serve it: the service /rviz/get_resource does not have it" in (
+        line.text
+    )
+    # It is there now: Reset asks again.
+    files["gone.stl"] = STL
+    view.reset()
+    bench.wait(lambda: len(list(robot.root.drawables())) == 2)
+    assert robot.statusLevel == "ok", robot.statusText
+    send.close()
+    server.close()
+
+
+@pytest.mark.usefixtures("cache")
+def test_meshes_come_from_web_servers(bench: SceneBench) -> None:
+    from web_server import WebServer
+
+    with WebServer() as web:
+        web.files["/arm.stl"] = STL
+        view = bench.load("RobotModelDisplay {}")
+        (robot,) = view.scene.displays
+        publish(bench, with_meshes(*[f"{web.url}/arm.stl"] * 3, f"{web.url}/gone.stl?token=1"))
+        send = send_transforms(bench, "base_link")
+        bench.wait(lambda: len(list(robot.root.drawables())) == 3)
+        assert sorted(path for path, _ in web.requests) == ["/arm.stl", "/gone.stl?token=1"]
+        (line,) = (one for name, one in robot.status_lines.items() if name.startswith("Mesh"))
+        assert f"{web.url}/gone.stl?token=1: the server answers 404 Not Found" in line.text
+        send.close()
 
 
 def test_settings_are_written_for_either_rviz(bench: SceneBench) -> None:

@@ -127,7 +127,8 @@ def _add_interface_options(
     parser.add_argument(
         "--allow-network",
         action="store_true",
-        help="let the interface load images, QML files and modules from other machines (http:)",
+        help="let the interface load images, QML files, modules and meshes from other machines "
+        "(http:)",
     )
     parser.add_argument(
         "--longest-script",

@@ -30,7 +30,14 @@ if TYPE_CHECKING:
     from types import TracebackType
 
 
-__all__ = ["NETWORK_HINT", "QuitOnSignal", "close_network", "end_process_within", "require_display"]
+__all__ = [
+    "NETWORK_HINT",
+    "QuitOnSignal",
+    "close_network",
+    "end_process_within",
+    "is_network_closed",
+    "require_display",
+]
 
 _ADVICE = (
     "run it where there is a screen, over `ssh -X`, or on a virtual screen: "
@@ -270,6 +277,11 @@ def close_network() -> None:
     kinds = proxy.ProxyType
     if proxy.applicationProxy().type() in (kinds.DefaultProxy, kinds.NoProxy):
         proxy.setApplicationProxy(proxy(kinds.Socks5Proxy, "127.0.0.1", _refusing_port()[1]))
+
+
+def is_network_closed() -> bool:
+    """Return whether :func:`close_network` was called."""
+    return close_network.cache_info().currsize > 0
 
 
 @cache

@@ -20,18 +20,19 @@ import struct
 import threading
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
-from urllib.parse import unquote
+from urllib.parse import unquote, urlsplit
 
 import numpy as np
 
 from rosglass.errors import ArgumentError, Error, UnsupportedError
 from rosglass.interfaces.type_descriptions import system_cache_folder
 from rosglass.scene.collada import read_collada
-from rosglass.scene.resources import check_texture, locate_resource
+from rosglass.scene.resources import check_texture, locate_resource, make_room
 from rosglass.scene.triangles import (
     MAX_TRIANGLES,
     Colour,
@@ -58,7 +59,16 @@ if TYPE_CHECKING:
     Floats: TypeAlias = NDArray[np.float32]
     Integers: TypeAlias = NDArray[np.int64]
 
-__all__ = ["MAX_TRIANGLES", "MeshError", "MeshPart", "load_mesh", "load_mesh_cached"]
+__all__ = [
+    "MAX_TRIANGLES",
+    "MeshError",
+    "MeshPart",
+    "ending_of",
+    "load_mesh",
+    "load_mesh_cached",
+    "read_mesh_file",
+    "read_resource",
+]
 
 #: As large as an STL file with that many triangles.
 _MAX_FILE_BYTES = 512 << 20
@@ -87,7 +97,21 @@ def load_mesh(data: str | os.PathLike[str] | bytes, name: str = "") -> list[Mesh
     return _parsed(*_content(data, name))
 
 
-def load_mesh_cached(data: str | os.PathLike[str] | bytes, name: str = "") -> list[MeshPart]:
+def read_resource(uri: str) -> bytes:
+    """Return the bytes of a file on this machine that a robot, a marker or a mesh names.
+
+    Raises:
+        Error: There is no such file; it is too large, or can't be read.
+    """
+    path = os.fspath(locate_resource(uri))
+    return read_mesh_file(path, path)
+
+
+def load_mesh_cached(
+    data: str | os.PathLike[str] | bytes,
+    name: str = "",
+    read: Callable[[str], bytes] = read_resource,
+) -> list[MeshPart]:
     """Read a mesh, from the cache on disk if its content was read before.
 
     The cache is the folder ``rosglass/meshes`` in the system's cache folder (``XDG_CACHE_HOME``),
@@ -96,6 +120,7 @@ def load_mesh_cached(data: str | os.PathLike[str] | bytes, name: str = "") -> li
     Args:
         data: As for :func:`load_mesh`.
         name: As for :func:`load_mesh`.
+        read: Returns the bytes of another file that the mesh names, by its URI or path.
 
     Raises:
         MeshError: As for :func:`load_mesh`.
@@ -103,13 +128,13 @@ def load_mesh_cached(data: str | os.PathLike[str] | bytes, name: str = "") -> li
         ArgumentError: As for :func:`load_mesh`.
     """
     content, name, base = _content(data, name)
-    if base.lower().endswith(".gltf"):  # of several files
-        return _parsed(content, name, base)
+    if ending_of(base) == ".gltf":  # of several files
+        return _parsed(content, name, base, read)
     cache = _Cache(system_cache_folder("meshes"))
-    key = _cache_key(content, name, base)
+    key = _cache_key(content, name, base, read)
     parts = cache.get(key)
     if parts is None:
-        parts = _parsed(content, name, base)
+        parts = _parsed(content, name, base, read)
         cache.put(key, parts)
     return parts
 
@@ -127,8 +152,17 @@ def _content(data: str | os.PathLike[str] | bytes, name: str) -> tuple[bytes, st
     return read_mesh_file(base, name), name, base
 
 
-def _parsed(content: bytes, name: str, base: str) -> list[MeshPart]:
-    reader = _reader(base, name)
+def ending_of(uri: str) -> str:
+    """Return the ending of a file's name in lower case, such as ``.stl``; a URL's has no query."""
+    if uri.lower().startswith(("http:", "https:")):
+        uri = urlsplit(uri).path
+    return Path(uri).suffix.lower()
+
+
+def _parsed(
+    content: bytes, name: str, base: str, read: Callable[[str], bytes] = read_resource
+) -> list[MeshPart]:
+    reader = _reader(base, name, read)
     try:
         parts = [part for part in reader(content, name, base) if part.triangles]
         if not parts:
@@ -156,17 +190,20 @@ def read_mesh_file(path: str, name: str) -> bytes:
         raise MeshError(f"{name}: the mesh can't be read: {error}") from None
 
 
-def _reader(base: str, name: str) -> Callable[[bytes, str, str], Sequence[MeshPart]]:
-    ending = Path(base).suffix.lower()
+def _reader(
+    base: str, name: str, read: Callable[[str], bytes]
+) -> Callable[[bytes, str, str], Sequence[MeshPart]]:
+    ending = ending_of(base)
+    with_trimesh = partial(_read_with_trimesh, read=read)
     readers: dict[str, Callable[[bytes, str, str], Sequence[MeshPart]]] = {
         ".stl": _read_stl,
         ".stlb": _read_stl,
         ".dae": read_collada,
-        ".obj": _read_obj,
-        ".glb": _read_with_trimesh,
-        ".gltf": _read_with_trimesh,
-        ".ply": _read_with_trimesh,
-        ".off": _read_with_trimesh,
+        ".obj": partial(_read_obj, read=read),
+        ".glb": with_trimesh,
+        ".gltf": with_trimesh,
+        ".ply": with_trimesh,
+        ".off": with_trimesh,
     }
     if ending not in readers:
         raise UnsupportedError(
@@ -176,11 +213,12 @@ def _reader(base: str, name: str) -> Callable[[bytes, str, str], Sequence[MeshPa
     return readers[ending]
 
 
-def _file_beside(base: str, reference: str, name: str) -> bytes | None:
+def _file_beside(
+    base: str, reference: str, name: str, read: Callable[[str], bytes]
+) -> bytes | None:
     """Return the bytes of a file that a mesh file names; log and return None if there is none."""
     try:
-        path = locate_resource(relative(base, reference))
-        return read_mesh_file(os.fspath(path), os.fspath(path))
+        return read(relative(base, reference))
     except Error as error:
         _log.warning("%s: %s", name, error)
         return None
@@ -196,15 +234,15 @@ _MAX_LIBRARIES = 16
 _MTLLIB = re.compile(rb"^[ \t]*mtllib[ \t]+(.+?)\s*$", re.MULTILINE)
 
 
-def _cache_key(content: bytes, name: str, base: str) -> str:
+def _cache_key(content: bytes, name: str, base: str, read: Callable[[str], bytes]) -> str:
     """Return a hash of all that a mesh is made of, and of the folder of its textures."""
-    folder, _, file = base.rpartition("/")
-    about = f"{_CACHE_VERSION} {Path(file).suffix} {folder}"
+    folder = base.rpartition("/")[0]
+    about = f"{_CACHE_VERSION} {ending_of(base)} {folder}"
     digest = hashlib.blake2b(about.encode("utf-8", "replace"), digest_size=20)
     digest.update(content)
-    if base.lower().endswith(".obj"):
+    if ending_of(base) == ".obj":
         for library in list(dict.fromkeys(_MTLLIB.findall(content)))[:_MAX_LIBRARIES]:
-            beside = _file_beside(base, library.decode("utf-8", "replace"), name)
+            beside = _file_beside(base, library.decode("utf-8", "replace"), name, read)
             digest.update(b"-" if beside is None else beside)
     return digest.hexdigest()
 
@@ -251,7 +289,7 @@ class _Cache:
         part_file = self._folder / f"{key}.{os.getpid()}.{threading.get_ident()}"
         try:
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            self._make_room(size)
+            make_room(self._folder, size, _MAX_CACHE_BYTES)
             # Other processes see either the whole file or none.
             with part_file.open("wb") as file:
                 np.savez(file, **arrays)  # type: ignore[arg-type]
@@ -260,20 +298,6 @@ class _Cache:
             _log.info("meshes are not kept in %s: %s", self._folder, error)
             with suppress(OSError):
                 part_file.unlink()
-
-    def _make_room(self, size: int) -> None:
-        entries = []
-        for path in self._folder.iterdir():
-            with suppress(OSError):
-                about = path.stat()
-                entries.append((about.st_mtime, about.st_size, path))
-        total = size + sum(entry[1] for entry in entries)
-        for _, taken, path in sorted(entries):
-            if total <= _MAX_CACHE_BYTES:
-                return
-            with suppress(OSError):
-                path.unlink()
-            total -= taken
 
 
 def _part_of(file: Any, about: dict[str, Any]) -> MeshPart:
@@ -344,13 +368,13 @@ def _read_text_stl(data: bytes, name: str) -> MeshPart:
 # -- OBJ -----------------------------------------------------------------------------------------
 
 
-def _read_obj(data: bytes, name: str, base: str) -> list[MeshPart]:
-    return _Obj(name, base).parts(data.decode("utf-8", "replace"))
+def _read_obj(data: bytes, name: str, base: str, read: Callable[[str], bytes]) -> list[MeshPart]:
+    return _Obj(name, base, read).parts(data.decode("utf-8", "replace"))
 
 
 class _Obj:
-    def __init__(self, name: str, base: str) -> None:
-        self._name, self._base = name, base
+    def __init__(self, name: str, base: str, read: Callable[[str], bytes]) -> None:
+        self._name, self._base, self._read = name, base, read
         self._libraries: dict[str, None] = {}
         self._materials: dict[str | None, tuple[Colour, str | None]] = {}
         #: The lines of vertices, texture coordinates and normals.
@@ -458,7 +482,7 @@ class _Obj:
             ) from None
 
     def _read_materials(self, file: str) -> None:
-        data = _file_beside(self._base, file, self._name)
+        data = _file_beside(self._base, file, self._name, self._read)
         if data is None:
             return
         material: str | None = None
@@ -489,8 +513,10 @@ class _Obj:
 # -- glTF, PLY and OFF, through trimesh ----------------------------------------------------------
 
 
-def _read_with_trimesh(data: bytes, name: str, base: str) -> list[MeshPart]:
-    ending = Path(base).suffix.lower().removeprefix(".")
+def _read_with_trimesh(
+    data: bytes, name: str, base: str, read: Callable[[str], bytes]
+) -> list[MeshPart]:
+    ending = ending_of(base).removeprefix(".")
     try:
         trimesh: Any = import_module("trimesh")  # few need it, and it takes long
     except ImportError:
@@ -502,7 +528,7 @@ def _read_with_trimesh(data: bytes, name: str, base: str) -> list[MeshPart]:
     has_normals = _check_gltf(data, name) if is_gltf else _check_header(data, name)
     resolver = None
     if ending == "gltf":
-        resolver = _Resolver(base, name)
+        resolver = _Resolver(base, name, read)
     try:
         scene = trimesh.load(
             BytesIO(data), file_type=ending, resolver=resolver, force="scene", process=False
@@ -571,14 +597,14 @@ def _trimesh_material(material: Any, name: str) -> tuple[Colour | None, bytes | 
 class _Resolver:
     """Reads the files beside a .gltf file for trimesh."""
 
-    def __init__(self, base: str, name: str) -> None:
-        self._base, self._name = base, name
+    def __init__(self, base: str, name: str, read: Callable[[str], bytes]) -> None:
+        self._base, self._name, self._read = base, name, read
 
     def get(self, reference: str) -> bytes:
         return self[reference]
 
     def __getitem__(self, reference: str) -> bytes:
-        data = _file_beside(self._base, unquote(reference), self._name)
+        data = _file_beside(self._base, unquote(reference), self._name, self._read)
         if data is None:
             raise MeshError(f"{self._name}: {reference} is missing")
         return data

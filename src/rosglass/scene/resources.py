@@ -21,7 +21,7 @@ from rosglass.interfaces.provider import workspace, workspace_variables
 if TYPE_CHECKING:
     from rosglass.interfaces.provider import Folders
 
-__all__ = ["ResourceError", "check_texture", "locate_resource"]
+__all__ = ["ResourceError", "check_texture", "locate_resource", "make_room"]
 
 #: Longest side of a texture that graphics cards take everywhere.
 _MAX_SIDE = 16_384
@@ -113,6 +113,31 @@ def _existing(path: Path, uri: str) -> Path:
     if not stat.S_ISREG(mode):
         raise ResourceError(f"{shown}: this is no file")
     return path
+
+
+def make_room(folder: Path, size: int, limit: int) -> None:
+    """Remove the files of a cache that were used longest ago, until another one fits.
+
+    Args:
+        folder: The cache's folder.
+        size: Bytes of the new file.
+        limit: Bytes of all files together.
+
+    Raises:
+        OSError: The folder can't be listed.
+    """
+    entries = []
+    for path in folder.iterdir():
+        with suppress(OSError):
+            about = path.stat()
+            entries.append((about.st_mtime, about.st_size, path))
+    total = size + sum(entry[1] for entry in entries)
+    for _, taken, path in sorted(entries):
+        if total <= limit:
+            return
+        with suppress(OSError):
+            path.unlink()
+        total -= taken
 
 
 def check_texture(

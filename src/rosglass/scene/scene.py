@@ -19,6 +19,7 @@ from rosglass.qml.tf_buffer import TfLink
 from rosglass.qt import Property, Signal, Slot, is_alive
 from rosglass.rviz.property_values import shown
 from rosglass.scene.drawing import Group, instance_matrix
+from rosglass.scene.resource_retriever import ResourceRetriever
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -70,6 +71,7 @@ class Scene(Element):
     ) -> None:
         self.root = Group()
         self.draws_in_software = False
+        self._resources = ResourceRetriever()
         self._fixed_frame = "map"
         self._displays: list[Display] = []
         self._link: TfLink | None = None
@@ -309,13 +311,13 @@ class Scene(Element):
         hint = "" if known or tree is None else similar(frame, tree)
         self._set_problem("" if known else f"the fixed frame [{frame}] does not exist{hint}")
 
-    def load(self, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
+    def load(self, work: Callable[[ResourceRetriever], Any], done: Callable[[Any], None]) -> None:
         """Run a job that takes long, such as reading meshes, in a thread of the scene.
 
         Not on the session's worker, where the endpoints of the cockpit would wait for it.
 
         Args:
-            work: The job.
+            work: The job, called with what finds meshes and textures.
             done: Called in the GUI thread with its result, or with the error that it raised.
         """
         if self._session is None:
@@ -324,11 +326,11 @@ class Scene(Element):
         if self._loader is None:
             self._loader = Dispatcher("rosglass-scene")
             self._cleanup["loader"] = self._loader.close
-        executor = self._executor
+        executor, resources = self._executor, self._resources
 
         def run() -> None:
             try:
-                result = work()
+                result = work(resources)
             except Error as error:
                 result = error
             except Exception as error:
@@ -356,8 +358,10 @@ class Scene(Element):
             weak_callback(self._on_transforms), session.executor
         )
         jumps = wanted[0].clock.on_jump(weak_callback(self._on_jump), executor=session.executor)
+        resources = self._resources = ResourceRetriever(wanted[0])
 
         def leave() -> None:
+            session.background(resources.close)
             jumps.close()
             watch.close()
             link.leave(self)
@@ -370,6 +374,7 @@ class Scene(Element):
         if leave is not None:
             leave()
         self._link = self._watch = self._tree = None
+        self._resources = ResourceRetriever()
 
     def _on_transforms(self) -> None:
         if is_alive(self) and not self._timer.isActive():
@@ -400,6 +405,7 @@ class Scene(Element):
             display._schedule()
 
         self._reset_at = time.monotonic()
+        self._resources.retry()
         self._each(restart)
 
     def _each(self, job: Callable[[Display], None]) -> None:

@@ -223,7 +223,7 @@ class EffortDisplay(HistoryDisplay):
             return
         self._text = text
         self.scene.load(
-            lambda: _joints_of(text, source), lambda result: self._set_robot(text, result)
+            lambda _: _joints_of(text, source), lambda result: self._set_robot(text, result)
         )
 
     def _set_robot(self, text: str, result: tuple[str, dict[str, Joint]] | Error) -> None:

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from rosglass.messages import Message
     from rosglass.qml.runtime import Runtime
     from rosglass.scene.camera import Camera
+    from rosglass.scene.resource_retriever import ResourceRetriever
     from rosglass.scene.scene import Scene
     from rosglass.scene.tools import PointerEvent
 
@@ -627,7 +628,9 @@ class InteractiveMarkersDisplay(TopicDisplay):
 
     # -- meshes ----------------------------------------------------------------------------------
 
-    def _in_background(self, work: Callable[[], Any], then: Callable[[Any], None]) -> None:
+    def _in_background(
+        self, work: Callable[[ResourceRetriever], Any], then: Callable[[Any], None]
+    ) -> None:
         if self.scene is not None:
             self.scene.load(work, then)
 

@@ -35,7 +35,6 @@ from rosglass.scene.drawing import (
     Shape,
 )
 from rosglass.scene.meshes import load_mesh_cached
-from rosglass.scene.resources import locate_resource
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -44,6 +43,7 @@ if TYPE_CHECKING:
 
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
+    from rosglass.scene.resource_retriever import ResourceRetriever
     from rosglass.scene.scene import Scene
 
 __all__ = [
@@ -460,15 +460,15 @@ class _MeshFile(NamedTuple):
     problem: str
 
 
-def _read_mesh(uri: str) -> _MeshFile:
+def _read_mesh(uri: str, resources: ResourceRetriever) -> _MeshFile:
     """Read a mesh and its textures; takes seconds for large ones."""
     made: list[tuple[Mesh, tuple[float, ...] | None]] = []
     problem = ""
-    for part in load_mesh_cached(locate_resource(uri), uri):
+    for part in load_mesh_cached(resources.find(uri), uri, resources.read):
         mesh = Mesh(Shape(part.positions, part.normals, part.indices, uv=part.uv))
         if part.texture is not None:
             try:
-                mesh.set_texture(read_texture(part.texture, uri))
+                mesh.set_texture(read_texture(part.texture, uri, resources))
             except (Error, OSError) as error:
                 problem = str(error)
         made.append((mesh, part.colour))
@@ -479,13 +479,14 @@ class MarkerMeshes:
     """Loads the meshes of markers in the scene's thread; until then they draw nothing.
 
     Args:
-        background: Runs a function in another thread, and one with its result in the GUI thread.
+        background: Runs a function in another thread, with what finds files, and one with its
+            result in the GUI thread.
         on_loaded: Called in the GUI thread with the URI, and with why it failed or "".
     """
 
     def __init__(
         self,
-        background: Callable[[Callable[[], Any], Callable[[Any], None]], None],
+        background: Callable[[Callable[[ResourceRetriever], Any], Callable[[Any], None]], None],
         on_loaded: Callable[[str, str], None],
     ) -> None:
         self._background, self._on_loaded = background, on_loaded
@@ -505,7 +506,10 @@ class MarkerMeshes:
                 raise Error(f"more than {_MAX_READING} meshes are being read; send it again later")
             self._files[uri] = None
             self._reading += 1
-            self._background(lambda: _read_mesh(uri), lambda result: self._loaded(uri, result))
+            self._background(
+                lambda resources: _read_mesh(uri, resources),
+                lambda result: self._loaded(uri, result),
+            )
         file = self._files[uri] = self._files.pop(uri)
         for part, own in file.parts if file is not None else ():
             colour: tuple[float, ...] = marker.colour
@@ -912,7 +916,9 @@ class Markers(TopicDisplay):
 
     # -- meshes ----------------------------------------------------------------------------------
 
-    def _in_background(self, work: Callable[[], Any], then: Callable[[Any], None]) -> None:
+    def _in_background(
+        self, work: Callable[[ResourceRetriever], Any], then: Callable[[Any], None]
+    ) -> None:
         if self.scene is not None:
             self.scene.load(work, then)
 

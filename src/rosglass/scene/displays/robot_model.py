@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
@@ -17,7 +16,7 @@ from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import QtGui, Signal, Slot, is_alive
 from rosglass.scene.display import Display, Status
 from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Group, Mesh, Shape
-from rosglass.scene.meshes import load_mesh_cached
+from rosglass.scene.meshes import ending_of, load_mesh_cached
 from rosglass.scene.resources import check_texture, locate_resource
 from rosglass.scene.rviz_formats import (
     DescriptionSetting,
@@ -37,6 +36,7 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Node
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
+    from rosglass.scene.resource_retriever import ResourceRetriever
     from rosglass.scene.urdf import Visual
 
 __all__ = ["DescriptionSource", "RobotModelDisplay", "link_drawables", "read_texture"]
@@ -124,13 +124,18 @@ def _matrix(*scale: float, along: float = 0.0) -> NDArray[np.float64]:
     return matrix
 
 
-def read_texture(source: str | bytes, name: str) -> NDArray[np.uint8]:
+def read_texture(source: str | bytes, name: str, resources: ResourceRetriever) -> NDArray[np.uint8]:
     """Return the pixels of a picture, (h, w, 4).
+
+    Args:
+        source: Its URI or path, or its bytes.
+        name: Of the picture or its mesh, for errors.
+        resources: Reads the file.
 
     Raises:
         Error: It is missing, too large, or no picture.
     """
-    data = source if isinstance(source, bytes) else Path(locate_resource(source)).read_bytes()
+    data = source if isinstance(source, bytes) else resources.read(source)
     check_texture(data, name)
     image = QtGui.QImage.fromData(data)
     if image.isNull():
@@ -141,7 +146,13 @@ def read_texture(source: str | bytes, name: str) -> NDArray[np.uint8]:
     return whole.reshape(image.height(), image.width(), 4)
 
 
-def link_drawables(visual: Visual, problems: dict[str, str], *, plain: bool = False) -> list[Mesh]:
+def link_drawables(
+    visual: Visual,
+    problems: dict[str, str],
+    resources: ResourceRetriever,
+    *,
+    plain: bool = False,
+) -> list[Mesh]:
     """Return what a visual or collision of a link draws, in the link's frame.
 
     Reads mesh files: not for the GUI thread.
@@ -149,6 +160,7 @@ def link_drawables(visual: Visual, problems: dict[str, str], *, plain: bool = Fa
     Args:
         visual: The visual.
         problems: What could not be loaded is added, by the name of the file.
+        resources: Reads meshes and textures.
         plain: Whether materials of files do not count, as for collisions.
     """
     geometry = visual.geometry
@@ -173,7 +185,7 @@ def link_drawables(visual: Visual, problems: dict[str, str], *, plain: bool = Fa
         mesh.set_instances((visual.origin @ local)[np.newaxis])
         made.append(mesh)
     if isinstance(geometry, MeshFile):
-        made += _mesh_drawables(visual, geometry, own, problems, plain)
+        made += _mesh_drawables(visual, geometry, own, problems, resources, plain)
     if (
         material is not None
         and material.texture
@@ -181,7 +193,7 @@ def link_drawables(visual: Visual, problems: dict[str, str], *, plain: bool = Fa
         and not isinstance(geometry, MeshFile)
     ):
         try:
-            pixels = read_texture(material.texture, material.texture)
+            pixels = read_texture(material.texture, material.texture, resources)
             for mesh in made:
                 mesh.set_texture(pixels)
         except (Error, OSError) as error:
@@ -194,15 +206,16 @@ def _mesh_drawables(
     geometry: MeshFile,
     own: tuple[float, float, float, float],
     problems: dict[str, str],
+    resources: ResourceRetriever,
     plain: bool,
 ) -> list[Mesh]:
     try:
-        path = locate_resource(geometry.uri)
-        parts = load_mesh_cached(path, geometry.uri)
+        found = resources.find(geometry.uri)
+        parts = load_mesh_cached(found, geometry.uri, resources.read)
     except (Error, OSError) as error:
         problems[geometry.uri] = str(error)
         return []
-    is_stl = path.suffix.lower() in (".stl", ".stlb")
+    is_stl = ending_of(geometry.uri) in (".stl", ".stlb")
     made = []
     for part in parts:
         shape = Shape(part.positions, part.normals, part.indices, uv=part.uv)
@@ -213,14 +226,14 @@ def _mesh_drawables(
         mesh.set_instances((visual.origin @ _matrix(*geometry.scale))[np.newaxis])
         if part.texture is not None and not plain:
             try:
-                mesh.set_texture(read_texture(part.texture, geometry.uri))
+                mesh.set_texture(read_texture(part.texture, geometry.uri, resources))
             except (Error, OSError) as error:
                 problems[geometry.uri] = str(error)
         made.append(mesh)
     return made
 
 
-def _load(text: str, source: str) -> _Loaded:
+def _load(text: str, source: str, resources: ResourceRetriever) -> _Loaded:
     """Read a description and its meshes; takes seconds for large ones."""
     if not text.strip():
         raise Error(f"{source}: the robot description is empty")
@@ -228,9 +241,9 @@ def _load(text: str, source: str) -> _Loaded:
     problems: dict[str, str] = {}
     visuals, collisions = {}, {}
     for name, link in robot.links.items():
-        visuals[name] = [m for v in link.visuals for m in link_drawables(v, problems)]
+        visuals[name] = [m for v in link.visuals for m in link_drawables(v, problems, resources)]
         collisions[name] = [
-            m for v in link.collisions for m in link_drawables(v, problems, plain=True)
+            m for v in link.collisions for m in link_drawables(v, problems, resources, plain=True)
         ]
     return _Loaded(robot, visuals, collisions, problems)
 
@@ -361,7 +374,10 @@ class RobotModelDisplay(Display):
             return
         self._text = text
         self.set_status("URDF", "warn", "loading the robot and its meshes")
-        self.scene.load(lambda: _load(text, source), lambda result: self._show(text, result))
+        self.scene.load(
+            lambda resources: _load(text, source, resources),
+            lambda result: self._show(text, result),
+        )
 
     def _show(self, text: str, result: _Loaded | Error) -> None:
         if not is_alive(self) or text != self._text:
@@ -394,6 +410,11 @@ class RobotModelDisplay(Display):
         self.root.add(self._body)
         self.clear_status()
         report(self, links=[], robotName="")
+
+    def reset(self) -> None:
+        """Load the robot again if a mesh is missing: it may be there now."""
+        if any(line.startswith("Mesh ") for line in self._loaded_lines):
+            self._text = None
 
     def followed_frame(self) -> str:
         """Return the frame of the robot's root link."""
