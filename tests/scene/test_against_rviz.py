@@ -179,6 +179,10 @@ INTERACTIVE_MARKERS = [
     Message("/server/update", "visualization_msgs/InteractiveMarkerUpdate",
             {"server_id": "judge", "seq_num": 1}),
 ]  # fmt: skip
+#: A wall, and then something before its middle; some pixels are not known.
+OCCLUSIONS = np.full((2, 20, 30), 3000)
+OCCLUSIONS[1, 5:15, 8:20] = 1200
+OCCLUSIONS[1, 2:4] = 0
 CASES: dict[str, tuple[list[dict[str, Any]], list[Message]]] = {
     "grids and axes": (
         [
@@ -476,6 +480,25 @@ CASES: dict[str, tuple[list[dict[str, Any]], list[Message]]] = {
                      "data": (np.arange(600, dtype="<u2") % 30 * 40 + 1000).tobytes()}),
         ],
     ),
+    "occlusions": (
+        [
+            display("DepthCloud", Depth_Map_Topic="/camera/depth/image_raw",
+                    Color_Transformer="AxisColor",
+                    Occlusion_Compensation={"Value": True, "Occlusion Time-Out": 30.0}),
+        ],
+        [
+            Message("/camera/depth/camera_info", "sensor_msgs/CameraInfo",
+                    {"header": HEADER, "width": 30, "height": 20,
+                     "K": [20.0, 0, 15, 0, 20.0, 10, 0, 0, 1],
+                     "P": [20.0, 0, 15, 0, 0, 20.0, 10, 0, 0, 0, 1, 0]}),
+            *(
+                Message("/camera/depth/image_raw", "sensor_msgs/Image",
+                        {"header": HEADER, "width": 30, "height": 20, "encoding": "16UC1",
+                         "step": 60, "data": depths.astype("<u2").tobytes()})
+                for depths in OCCLUSIONS
+            ),
+        ],
+    ),
 }  # fmt: skip
 
 
@@ -666,7 +689,7 @@ def test_pictures_are_those_of_rviz(pair: Pair, case: str) -> None:
             until = time.monotonic() + TIMEOUT_S
             while True:
                 # RViz drops depth images before the first camera info; servers say they are there.
-                if case == "depth images" or messages is INTERACTIVE_MARKERS:
+                if case in {"depth images", "occlusions"} or messages is INTERACTIVE_MARKERS:
                     for publisher, one in zip(publishers, messages, strict=True):
                         publisher.publish(one.fields)
                 ours, theirs = pair.ours(), pair.theirs()

@@ -590,6 +590,84 @@ def test_a_depth_cloud_keeps_its_topics_in_files() -> None:
         assert "Topic" not in kept
 
 
+def test_hidden_points_stay_until_they_time_out(bench: SceneBench) -> None:
+    camera = Camera(bench, "occlusionCompensation: true; occlusionTimeOut: 10")
+    camera.send("/camera/depth/camera_info", CAMERA)
+    display = camera.depth([4000] * 4, 1)
+    assert display.points == 4
+    # Two pixels are hidden by something nearer, one is not known any more.
+    display = camera.depth([2000, 2000, 0, 4000], 2)
+    assert display.points == 6
+    assert "Occlusion: [3] points are of earlier images, 10 s old at most" in display.statusText
+    assert display.statusLevel == "ok", display.statusText
+    ((shown, _, _),) = display.root.drawables()
+    depths = sorted(np.round(shown.xyz()[:, 2], 3).tolist())
+    assert depths == [2.0, 2.0, 4.0, 4.0, 4.0, 4.0]
+    assert camera.depth([2000, 2000, 0, 4000], 11).points == 6
+    assert camera.depth([2000, 2000, 0, 4000], 12).points == 3, "10 s after the first image"
+    assert camera.depth([2000, 2000, 3000, 0], 13).points == 4, "the last pixel was seen before"
+    display.occlusionCompensation = False
+    assert camera.depth([0, 0, 0, 4000], 14).points == 1
+    assert "Occlusion" not in display.statusText
+    display.occlusionCompensation = True
+    assert camera.depth([0, 0, 0, 4000], 15).points == 1, "nothing of before is known"
+
+
+def test_hidden_points_are_dropped_when_the_camera_moves(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    camera = Camera(bench, "occlusionCompensation: true")
+    camera.send("/camera/depth/camera_info", CAMERA)
+    near = [2000, 2000, 0, 4000]
+    camera.depth([4000] * 4, 1)
+    assert camera.depth(near, 2).points == 6
+    broadcaster = StaticTransformBroadcaster(bench.robot)
+
+    def move(height: float, roll: float = math.pi) -> None:
+        turn = (math.sin(roll / 2), 0, 0, math.cos(roll / 2))
+        broadcaster.send_transform(Transform((0, 0, height), turn, Time(), "map", "camera"))
+        scene = bench.view.scene
+        bench.wait(lambda: abs(scene.look_up("camera")[2, 3] - height) < 1e-6)
+
+    move(10.005)
+    assert camera.depth(near, 3).points == 6, "not as far as 1 cm"
+    move(9.98)
+    assert camera.depth(near, 4).points == 3
+    assert camera.depth(near, 5).points == 3
+    assert camera.depth([1000] * 4, 6).points == 4 + 3
+    move(9.985, math.pi + math.radians(0.6))
+    assert camera.depth([1000] * 4, 7).points == 4, "turned by more than 0.5 degrees"
+    assert "[0] points are of earlier images" in camera.display.statusText
+
+
+def test_the_brightness_of_hidden_points_is_half(bench: SceneBench) -> None:
+    camera = Camera(bench, 'occlusionCompensation: true; colorTopic: "/camera/rgb/image_raw"')
+    camera.send("/camera/depth/camera_info", CAMERA)
+    camera.color((0, 200, 100), 1)
+    camera.depth([4000] * 4, 1)
+    camera.color((200, 0, 0), 2)
+    # What hides is out of the picture.
+    camera.depth([60, 60, 60, 60], 2)
+    bench.wait(lambda: camera.display.points == 8)
+    assert tuple(bench.picture()[CENTER[0] - 40, CENTER[1] - 40]) == (0, 100, 50)
+
+
+def test_occlusion_compensation_is_kept_in_files() -> None:
+    from rosglass.scene.displays.point_cloud import DepthCloudDisplay
+
+    display = DepthCloudDisplay()
+    saved = {
+        "Depth Map Topic": "/depth",
+        "Occlusion Compensation": {"Occlusion Time-Out": 5, "Value": True},
+    }
+    assert display.load_settings(saved) == []
+    assert (display.occlusionCompensation, display.occlusionTimeOut) == (True, 5.0)
+    for ros in (1, 2):
+        kept = display.save_settings(saved, ros)
+        assert kept["Occlusion Compensation"] == saved["Occlusion Compensation"]
+
+
 @pytest.mark.parametrize("ros", [1, 2])
 def test_a_depth_image_of_either_ros_is_a_cloud(ros: int) -> None:
     from rosglass.messages import load

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import sys
-from typing import TYPE_CHECKING, Any, TypeAlias
+import threading
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from rosglass.tf.transform import Transform
 
 __all__ = [
+    "OcclusionBuffer",
     "cloud_from_columns",
     "cloud_from_depth_image",
     "cloud_from_laser_scan",
@@ -216,6 +218,29 @@ def cloud_from_depth_image(depth: Any, camera_info: Any, color: Any = None) -> C
     Raises:
         DecodeError: Sizes, encodings or the calibration do not fit.
     """
+    return _depth_cloud(_read_depth(depth, camera_info, color).values)
+
+
+class _DepthPixels(NamedTuple):
+    """The known pixels of a depth image.
+
+    Attributes:
+        values: x, y, z and the packed color of each, float32.
+        known: Their numbers in the image, row by row.
+        camera: Size of the image and its projection: what tells one camera from another.
+    """
+
+    values: NDArray[np.float32]
+    known: NDArray[np.intp]
+    camera: tuple[float, ...]
+
+
+def _depth_cloud(values: Array) -> Cloud:
+    types = {"x": np.float32, "y": np.float32, "z": np.float32, "rgb": np.uint32}
+    return _cloud(types, values.view(np.uint32))
+
+
+def _read_depth(depth: Any, camera_info: Any, color: Any) -> _DepthPixels:
     image = _raw_image(depth)
     if image.encoding not in {"16UC1", "mono16", "32FC1"}:
         raise DecodeError(
@@ -240,8 +265,69 @@ def cloud_from_depth_image(depth: Any, camera_info: Any, color: Any = None) -> C
     colors[:] = 0xFFFFFF
     if color is not None:
         colors[:] = _packed_colors(_raw_image(color), image).reshape(-1).take(known)
-    types = {"x": np.float32, "y": np.float32, "z": np.float32, "rgb": np.uint32}
-    return _cloud(types, values)
+    return _DepthPixels(values, known, (image.width, image.height, fx, fy, cx, cy))
+
+
+#: Metres by which a point has to be nearer than another one to hide it, as in RViz.
+_OCCLUSION_DISTANCE_M = 0.01
+
+
+class OcclusionBuffer:
+    """What a depth camera that stands still has seen behind the nearer objects of its images.
+
+    Its points are those that RViz's Occlusion Compensation adds: for each pixel, the last one that
+    nothing nearer has hidden since, at half the brightness. Used in any thread.
+
+    Attributes:
+        timeout_s: Seconds for which a hidden point is kept.
+    """
+
+    def __init__(self, timeout_s: float = 30.0) -> None:
+        self.timeout_s = timeout_s
+        self._lock = threading.Lock()
+        self._camera: tuple[float, ...] = ()
+        self._points: NDArray[np.float32] = np.zeros((0, 4), np.float32)
+        self._depths: NDArray[np.float32] = np.zeros(0, np.float32)
+        self._expiries_s: NDArray[np.float64] = np.zeros(0)
+
+    def reset(self) -> None:
+        """Forget all points, as the camera has moved."""
+        with self._lock:
+            self._camera = ()
+
+    def add(self, depth: Any, camera_info: Any, color: Any, now_s: float) -> tuple[Cloud, int]:
+        """Return the cloud of an image and of what it hides, and how many points that is.
+
+        Args:
+            depth: As for :func:`cloud_from_depth_image`.
+            camera_info: Likewise; another calibration resets the buffer.
+            color: Likewise.
+            now_s: Time of the image, seconds.
+
+        Returns:
+            The cloud, with the points that are hidden as its last ones, and their number.
+
+        Raises:
+            DecodeError: Sizes, encodings or the calibration do not fit.
+        """
+        pixels = _read_depth(depth, camera_info, color)
+        values, known = pixels.values, pixels.known
+        with self._lock:
+            if pixels.camera != self._camera:
+                self._camera, count = pixels.camera, int(pixels.camera[0] * pixels.camera[1])
+                self._points = np.zeros((count, 4), np.float32)
+                self._depths, self._expiries_s = np.zeros(count, np.float32), np.zeros(count)
+            self._depths[self._expiries_s < now_s] = 0
+            covers = values[:, 2] < self._depths[known] - np.float32(_OCCLUSION_DISTANCE_M)
+            seen, fresh = known[~covers], values[~covers]
+            is_hidden = self._depths != 0
+            is_hidden[seen] = False
+            hidden = self._points[is_hidden]
+            self._points[seen] = fresh
+            colors = self._points.view(np.uint32)[:, 3]
+            colors[seen] = fresh.view(np.uint32)[:, 3] >> np.uint32(1) & np.uint32(0x7F7F7F)
+            self._depths[seen], self._expiries_s[seen] = fresh[:, 2], now_s + self.timeout_s
+        return _depth_cloud(np.concatenate([values, hidden])), len(hidden)
 
 
 def _raw_image(message: Any) -> RawImage:

@@ -11,6 +11,7 @@ import pytest
 from rosglass.errors import ArgumentError, DecodeError
 from rosglass.messages import load
 from rosglass.scene.cloud_sources import (
+    OcclusionBuffer,
     cloud_from_columns,
     cloud_from_depth_image,
     cloud_from_laser_scan,
@@ -252,3 +253,69 @@ def test_bad_depth_images_are_refused(
     colored = None if color is None else image(pixels, "rgb8") | color
     with pytest.raises(DecodeError, match=text):
         cloud_from_depth_image(image(DEPTH, "16UC1") | depth, camera() | info, colored)
+
+
+# ---- occlusion compensation
+
+
+class RvizLayers:
+    """RViz's Occlusion Compensation, pixel by pixel."""
+
+    def __init__(self, timeout_s: float) -> None:
+        self.timeout_s = timeout_s
+        self.kept: dict[int, tuple[float, float, int]] = {}
+
+    def add(self, depths: np.ndarray, colors: np.ndarray, now_s: float) -> list[tuple[float, int]]:
+        """Return depth and color of all points of an image."""
+        found = []
+        for pixel, (depth, color) in enumerate(zip(depths.tolist(), colors.tolist(), strict=True)):
+            if pixel in self.kept and self.kept[pixel][1] < now_s:
+                del self.kept[pixel]
+            kept = self.kept.get(pixel)
+            if depth == 0:
+                found += [(kept[0], kept[2])] if kept else []
+                continue
+            found.append((depth, color))
+            if kept and depth < kept[0] - 0.01:
+                found.append((kept[0], kept[2]))
+            else:
+                half = (color >> 1) & 0x7F7F7F
+                self.kept[pixel] = (depth, now_s + self.timeout_s, half)
+        return found
+
+
+def test_hidden_points_are_those_of_rviz() -> None:
+    random = np.random.default_rng(1)
+    ours, theirs = OcclusionBuffer(3.0), RvizLayers(3.0)
+    info = camera()
+    for now_s in range(30):
+        depths = random.integers(0, 4, 20) * 500 + random.integers(0, 30, 20)
+        depths[random.random(20) < 0.3] = 0
+        rgb = random.integers(0, 256, (20, 3)).astype(np.uint8)
+        depth = image(depths.astype("<u2").reshape(4, 5), "16UC1")
+        color = image(rgb.reshape(4, 5, 3), "rgb8")
+        cloud, hidden = ours.add(depth, info, color, float(now_s))
+        packed = (rgb.astype(int) @ (0x10000, 0x100, 1)).astype(int)
+        expected = theirs.add(depths / 1000, packed, float(now_s))
+        found = zip(cloud.column("z").tolist(), cloud.values("rgb").tolist(), strict=True)
+        assert sorted((round(z, 4), int(c)) for z, c in found) == sorted(
+            (round(z, 4), c) for z, c in expected
+        )
+        assert hidden == len(expected) - np.count_nonzero(depths)
+        # Hidden ones come last.
+        order = [int(c) in set(packed.tolist()) for c in cloud.values("rgb").tolist()]
+        assert order[: len(order) - hidden] == [True] * (len(order) - hidden)
+
+
+def test_another_camera_has_seen_nothing() -> None:
+    buffer = OcclusionBuffer()
+    far = image(np.full((2, 2), 4000, "<u2"), "16UC1")
+    near = image(np.full((2, 2), 1000, "<u2"), "16UC1")
+    info = camera()
+    assert buffer.add(far, info, None, 0.0)[1] == 0
+    assert buffer.add(near, info, None, 1.0)[1] == 4
+    other = camera(binning_x=2)
+    assert buffer.add(near, other, None, 2.0)[1] == 0
+    assert buffer.add(far, other, None, 2.0)[1] == 0
+    buffer.reset()
+    assert buffer.add(near, other, None, 3.0)[1] == 0

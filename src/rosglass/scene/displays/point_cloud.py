@@ -7,8 +7,11 @@ vertices; the GUI thread places it and sets a few numbers of the shader.
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 from collections import deque
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
 
 import numpy as np
@@ -19,6 +22,7 @@ from rosglass.images.compressed import decompress, decompress_depth
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Slot
 from rosglass.scene.cloud_sources import (
+    OcclusionBuffer,
     cloud_from_columns,
     cloud_from_depth_image,
     cloud_from_laser_scan,
@@ -88,6 +92,7 @@ class _Prepared(NamedTuple):
         source: The message that it is from, if others belong to it, or it is needed again.
         duration_ns: Time from the first ray of a laser scan to its last one, nanoseconds.
         pixel_m: Size of a pixel of a depth image at a depth of 1 m, metres.
+        hidden: How many of the last points are of earlier depth images.
     """
 
     cloud: Cloud
@@ -98,6 +103,7 @@ class _Prepared(NamedTuple):
     source: Any = None
     duration_ns: int = 0
     pixel_m: float = 0.0
+    hidden: int = 0
 
 
 class _ColorSettings(NamedTuple):
@@ -567,6 +573,8 @@ def _prepare_scan(scan: Any, settings: _ColorSettings) -> _Prepared:
 
 #: Encodings of depth images; others are color images.
 _DEPTH_ENCODINGS = ("16UC1", "mono16", "32FC1")
+#: Motion of a depth camera after which hidden points are dropped, as in RViz.
+_MOVED_M, _MOVED_DEG = 0.01, 0.5
 #: In the format of compressed ones.
 _COMPRESSED_DEPTH = "compressedDepth"
 
@@ -624,7 +632,7 @@ class _DepthMatcher:
             depth = self._depths[at]
             stamp = frame_and_stamp(depth)[1]
             # Until one of this time or a later one is there, a nearer one may follow.
-            if max(time for time, _ in colors) >= stamp:
+            if max(when for when, _ in colors) >= stamp:
                 for _ in range(at + 1):
                     self._depths.popleft()
                 return depth, self._info, min(colors, key=lambda one: abs(one[0] - stamp))[1]
@@ -632,7 +640,10 @@ class _DepthMatcher:
 
 
 def _prepare_depth(
-    message: Any, matcher: _DepthMatcher, settings: _ColorSettings
+    message: Any,
+    matcher: _DepthMatcher,
+    settings: _ColorSettings,
+    occlusion: OcclusionBuffer | None,
 ) -> _Prepared | None:
     found = matcher.match(message)
     if found is None:
@@ -644,7 +655,15 @@ def _prepare_depth(
             f"the depth image is {image.width}x{image.height} pixels, the camera info "
             f"{info.width}x{info.height}; use the camera info of the depth image"
         )
-    cloud = cloud_from_depth_image(image, info, None if color is None else _decompress(color))
+    colors = None if color is None else _decompress(color)
+    hidden = 0
+    if occlusion is None:
+        cloud = cloud_from_depth_image(image, info, colors)
+    else:
+        # RViz takes the time of arrival, which says less of an image that was recorded.
+        stamp = frame_and_stamp(depth)[1]
+        now_s = stamp * 1e-9 if stamp else time.monotonic()
+        cloud, hidden = occlusion.add(image, info, colors, now_s)
     if color is not None and color.header.frame_id != depth.header.frame_id:
         text = (
             f"the frame of the depth image is [{depth.header.frame_id}], that of the color image "
@@ -653,7 +672,15 @@ def _prepare_depth(
         cloud.warnings = (*cloud.warnings, text)
     focal_px = float(info["p" if "p" in info else "P"][0]) / max(info.binning_x, 1)
     pixel_m = min(1 / abs(focal_px), _MAX_SIZE_M)
-    return settings.prepare(cloud)._replace(source=depth, pixel_m=pixel_m)
+    return settings.prepare(cloud)._replace(source=depth, pixel_m=pixel_m, hidden=hidden)
+
+
+def _has_moved(pose: NDArray[np.float64], before: NDArray[np.float64]) -> bool:
+    """Return whether a camera has moved so far that what it has seen before is elsewhere."""
+    turn = before[:3, :3].T @ pose[:3, :3]
+    angle = math.degrees(math.acos(min(max((float(np.trace(turn)) - 1) / 2, -1.0), 1.0)))
+    moved = float(np.linalg.norm(pose[:3, 3] - before[:3, 3]))
+    return moved > _MOVED_M or angle > _MOVED_DEG
 
 
 def _decompress(message: Any) -> Any:
@@ -687,11 +714,23 @@ class DepthCloudDisplay(CloudDisplay):
         "Auto Size/Auto Size Factor", "float", 1.0, "What that size is multiplied with.",
         min=0.0001, max=_MAX_SIZE_M,
     )  # fmt: skip
+    occlusionCompensation = Setting(
+        "Occlusion Compensation", "bool", False,
+        "Whether points stay when nearer ones hide them, until the camera moves.",
+        then="_on_occlusion",
+    )  # fmt: skip
+    occlusionTimeOut = Setting(
+        "Occlusion Compensation/Occlusion Time-Out", "float", 30.0,
+        "Seconds for which hidden points stay.", min=0.0, max=1e9,
+    )  # fmt: skip
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         self._matcher = _DepthMatcher("", "", 1)
+        self._occlusion = OcclusionBuffer()
+        #: Where the camera was when the buffer was reset; None before the first image.
+        self._camera_pose: NDArray[np.float64] | None = None
         super().__init__(parent, runtime)
 
     def further_topics(self, topic: str) -> tuple[str, ...]:
@@ -716,7 +755,54 @@ class DepthCloudDisplay(CloudDisplay):
     def preparer(self) -> Callable[[Message], Any]:
         """Return the function that waits for what belongs together, and makes a cloud of it."""
         matcher, settings = self._matcher, self._color_settings()
-        return lambda message: _prepare_depth(message, matcher, settings)
+        occlusion = self._occlusion if self.occlusionCompensation else None
+        return lambda message: _prepare_depth(message, matcher, settings, occlusion)
+
+    def _on_occlusion(self) -> None:
+        self._forget_hidden()
+        self._restyle()
+
+    def _restyle(self) -> None:
+        self._occlusion.timeout_s = self.occlusionTimeOut
+        super()._restyle()
+
+    def _forget_hidden(self) -> None:
+        self._occlusion.reset()
+        self._camera_pose = None
+        self.delete_status("Occlusion")
+
+    def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:
+        """Show a cloud, without points that were hidden before the camera has moved."""
+        if self.occlusionCompensation:
+            before = self._camera_pose
+            if before is None or _has_moved(pose, before):
+                self._camera_pose = pose
+                if before is not None:
+                    self._occlusion.reset()
+                    data = self._without_hidden(data)
+            text = f"[{data.hidden}] points are of earlier images, {self.occlusionTimeOut:g} s old"
+            self.set_status("Occlusion", "ok", f"{text} at most")
+        super().show(data, pose, frame, stamp)
+
+    def _without_hidden(self, data: _Prepared) -> _Prepared:
+        if not data.hidden:
+            return data
+        cloud, count = data.cloud, data.cloud.point_count - data.hidden
+        size = count * cloud.layout.point_step
+        layout = replace(cloud.layout, width=count, row_step=size)
+        seen = Cloud(layout, cloud.data[:size], cloud.warnings)
+        new = self._current_settings().prepare(seen)
+        return new._replace(source=data.source, pixel_m=data.pixel_m)
+
+    def on_fixed_frame(self) -> None:
+        """Show the last cloud in the new fixed frame, in which the camera may be elsewhere."""
+        self._forget_hidden()
+        super().on_fixed_frame()
+
+    def reset(self) -> None:
+        """Drop all clouds, and what the camera has seen."""
+        super().reset()
+        self._forget_hidden()
 
     def _point_size(self, data: _Prepared) -> tuple[float, bool]:
         if self.autoSize and self.style != "Points":
