@@ -688,8 +688,12 @@ def test_pictures_are_those_of_rviz(pair: Pair, case: str) -> None:
             pair.wait(lambda lasting=lasting: all(p.subscription_count() == 2 for p in lasting))
             until = time.monotonic() + TIMEOUT_S
             while True:
-                # RViz drops depth images before the first camera info; servers say they are there.
-                if case in {"depth images", "occlusions"} or messages is INTERACTIVE_MARKERS:
+                # RViz drops depth images before the first camera info; servers say they are there;
+                # efforts fade when they are not sent any more.
+                if (
+                    case in {"depth images", "efforts", "occlusions"}
+                    or messages is INTERACTIVE_MARKERS
+                ):
                     for publisher, one in zip(publishers, messages, strict=True):
                         publisher.publish(one.fields)
                 ours, theirs = pair.ours(), pair.theirs()

@@ -151,7 +151,12 @@ def test_the_head_points_where_the_torque_turns(
     assert (second - first) @ (tip - start) < 0
 
 
-def test_what_is_not_drawn_is_in_the_status(bench: SceneBench, robot: Robot) -> None:
+def test_what_is_not_drawn_is_in_the_status(
+    bench: SceneBench, robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene.displays import effort
+
+    monkeypatch.setattr(effort, "_COMBINED_S", 0.0)
     display = add(bench, robot)
     robot.place("upper", "wheel")
     robot.send({"shoulder": float("nan"), "elbow": 1.0, "drive": float("-inf"), "caster": 1.0})
@@ -206,8 +211,15 @@ def test_a_limit_of_zero_is_none(bench: SceneBench, robot: Robot) -> None:
     ],
 )
 def test_arrays_that_do_not_fit_are_errors(
-    bench: SceneBench, robot: Robot, fields: dict[str, Any], text: str
+    bench: SceneBench,
+    robot: Robot,
+    monkeypatch: pytest.MonkeyPatch,
+    fields: dict[str, Any],
+    text: str,
 ) -> None:
+    from rosglass.scene.displays import effort
+
+    monkeypatch.setattr(effort, "_COMBINED_S", 0.0)
     display = add(bench, robot)
     robot.place("upper")
     robot.send({"shoulder": 5.0})
@@ -260,6 +272,59 @@ def test_efforts_are_where_the_joints_were_at_their_time(bench: SceneBench, robo
     robot.send({"shoulder": 5.0}, header=stamped(2_000_000_000))
     later = itertools.count(102)
     bench.wait(lambda: move(next(later)) or "no transform from [upper]" in display.statusText)
+    assert display.statusLevel == "error"
+
+
+def test_joints_of_several_publishers_are_shown_together(
+    bench: SceneBench, robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene.displays import effort
+
+    display = add(bench, robot)
+    robot.place("upper", "lower", "wheel")
+    robot.send({"shoulder": 5.0})
+    robot.send({"elbow": 1.0})
+    # A gripper that measures no efforts.
+    robot.send({}, name=["finger"])
+    bench.wait(lambda: len(arcs(display)) == 2 and display.received == 3)
+    assert display.statusLevel == "ok", display.statusText
+    assert (display.effort("shoulder"), display.effort("elbow")) == (5.0, 1.0)
+    robot.send({"elbow": 2.0})
+    bench.wait(lambda: display.effort("elbow") == 2.0)
+    assert len(arcs(display)) == 2
+    # One that is not sent any more is not shown any more.
+    monkeypatch.setattr(effort, "_COMBINED_S", 0.0)
+    robot.send({"elbow": 3.0})
+    bench.wait(lambda: display.effort("elbow") == 3.0)
+    assert len(arcs(display)) == 1
+
+
+def test_joint_states_that_stop_fade(
+    bench: SceneBench, robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene import display as module
+
+    monkeypatch.setattr(module, "_CONTINUOUS_S", 0.5)
+    display = add(bench, robot)
+    robot.place("upper")
+    robot.send({"shoulder": 5.0})
+    bench.wait(lambda: len(arcs(display)) == 1)
+    bench.wait(lambda: display.root.alpha < 1.0)
+    assert "Data: no message for " in display.statusText
+    robot.send({"shoulder": 5.0})
+    bench.wait(lambda: display.root.alpha == 1.0)
+    assert display.statusLevel == "ok", display.statusText
+
+
+def test_another_robot_has_other_limits(bench: SceneBench, robot: Robot) -> None:
+    display = add(bench, robot)
+    robot.place("upper")
+    robot.send({"shoulder": 5.0})
+    bench.wait(lambda: len(arcs(display)) == 1)
+    robot.descriptions.publish({"data": URDF.replace('effort="10"', 'effort="5"')})
+    bench.wait(lambda: radius_of(arcs(display)[0][0]) == pytest.approx(0.05 + 1.05 / 2))
+    robot.descriptions.publish({"data": "<robot"})
+    bench.wait(lambda: arcs(display) == [])
     assert display.statusLevel == "error"
 
 

@@ -521,6 +521,32 @@ def test_a_depth_image_has_the_color_of_its_time(bench: SceneBench) -> None:
     )
 
 
+def test_color_images_that_stop_are_an_error(bench: SceneBench) -> None:
+    camera = Camera(bench, 'colorTopic: "/camera/rgb/image_raw"')
+    camera.send("/camera/depth/camera_info", CAMERA)
+    camera.color((255, 0, 0), 2)
+    assert camera.depth([4000] * 4, 2).statusLevel == "ok"
+    assert camera.depth([4000] * 4, 5).statusLevel == "ok", "its color image may follow"
+    display = camera.depth([4000] * 4, 6)
+    assert display.statusLevel == "error"
+    text = "the last color image of /camera/rgb/image_raw is 4 s older than the depth image"
+    assert text in display.statusText
+    assert camera.color((0, 255, 0), 6).statusLevel == "ok", display.statusText
+
+
+def test_depth_images_that_stop_fade(bench: SceneBench, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rosglass.scene import display as module
+
+    monkeypatch.setattr(module, "_CONTINUOUS_S", 0.5)
+    camera = Camera(bench)
+    camera.send("/camera/depth/camera_info", CAMERA)
+    display = camera.depth([4000] * 4, 1)
+    bench.wait(lambda: display.root.alpha < 1.0)
+    assert "Data: no message for " in display.statusText
+    camera.depth([4000] * 4, 2)
+    bench.wait(lambda: display.root.alpha == 1.0)
+
+
 def test_depth_and_color_images_may_be_compressed(bench: SceneBench) -> None:
     cv2 = pytest.importorskip("cv2", reason="compressed images need OpenCV")
     topics = {

@@ -118,3 +118,38 @@ def test_each_message_of_a_history_is_shown_once_in_any_fixed_frame(
         assert pose[0, 3] == pytest.approx(11.0 + 0.5 * (shape is CYLINDER))
     else:
         assert np.allclose(pose, np.eye(4))
+
+
+def test_what_is_shown_fades_while_newer_data_waits_for_its_transform(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    view = bench.load('PointStampedDisplay { topic: "/point" } GridDisplay {}')
+    display = view.scene.displays[0]
+    points = bench.robot.create_publisher("/point", "geometry_msgs/PointStamped")
+    moving = TransformBroadcaster(bench.robot)
+
+    def move(second: int) -> None:
+        stamp = Time.from_parts(second, 0)
+        moving.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), stamp, "map", "arm"))
+
+    def send(second: int) -> None:
+        stamp = {"sec": second, "nanosec": 0}
+        points.publish({"header": {"frame_id": "arm", "stamp": stamp}})
+
+    bench.wait(points.subscription_count)
+    move(10)
+    bench.wait(lambda: "arm" in view.scene.frames())
+    send(10)
+    bench.wait(lambda: len(parts(display, SPHERE)) == 1)
+    assert (display.root.alpha, display.statusLevel) == (1.0, "ok")
+    # Nothing else is received after this one.
+    send(11)
+    bench.wait(lambda: display.root.alpha < 1.0 and display.statusLevel == "error")
+    assert "Transform: no transform from [arm]: Lookup would require" in display.statusText
+    assert "Data: the transform of the newest message is not known; the last message is of" in (
+        display.statusText
+    )
+    move(11)
+    bench.wait(lambda: display.root.alpha == 1.0)
+    assert display.statusLevel == "ok", display.statusText

@@ -78,6 +78,8 @@ _DURABILITY = {
 _MOST_WAITING = 1000
 #: Seconds for which data may wait for its transform before that is an error.
 _LATE_S = 1.0
+#: Seconds without a message after which data that is sent all the time is out of date.
+_CONTINUOUS_S = 3.0
 #: Seconds without a transform after which a frame that is followed may be somewhere else.
 _SILENT_S = 5.0
 #: Opacity of data whose publisher or connection is gone.
@@ -525,9 +527,12 @@ class TopicDisplay(OneTopicDisplay):
     Attributes:
         KEEPS_ALL: Whether each message counts, as for markers; otherwise the newest does.
         EAGER: Whether all fields of a message are decoded at once, which is faster if all are used.
+        IS_CONTINUOUS: Whether publishers send all the time, so that what is shown is out of date
+            after 3 s without a message, as pictures are.
     """
 
     KEEPS_ALL: ClassVar[bool] = False
+    IS_CONTINUOUS: ClassVar[bool] = False
     #: Whether parts of a message have frames of their own, as markers do.
     HAS_FRAMES: ClassVar[bool] = False
     EAGER: ClassVar[bool] = False
@@ -549,7 +554,9 @@ class TopicDisplay(OneTopicDisplay):
         #: Whether the publisher or the connection of what is shown is gone.
         self._is_gone = False
         self._last: _Item | None = None
-        self._arrived = 0.0
+        #: The newest message, which may still wait for its transform.
+        self._newest: _Item | None = None
+        self._arrived = self._arrived_at = 0.0
         super().__init__(parent, runtime)
 
     def _load_topic(self, given: TopicSetting) -> None:
@@ -645,15 +652,34 @@ class TopicDisplay(OneTopicDisplay):
         return self._last is None
 
     def _show_age(self) -> None:
-        """Fade data whose publisher or connection is gone, and say so."""
-        gone = self._outdated and self._last is not None and self.enabled
-        self._is_gone = bool(gone)
+        """Fade data that is out of date, and say so."""
+        reason = ""
+        if self._last is not None and self.enabled:
+            silence_s = self._steady() - self._arrived_at
+            if self._outdated:
+                reason = "its publisher is gone"
+            elif self.IS_CONTINUOUS and silence_s > _CONTINUOUS_S:
+                reason = f"no message for {silence_s:.0f} s that could be shown"
+            elif self._is_late():
+                reason = "the transform of the newest message is not known"
+        self._is_gone = bool(reason)
         self._fade()
-        if gone:
+        if reason:
             when = time.strftime("%H:%M:%S", time.localtime(self._arrived))
-            self.set_status("Data", "warn", f"its publisher is gone; the last message is of {when}")
+            self.set_status("Data", "warn", f"{reason}; the last message is of {when}")
         else:
             self.delete_status("Data")
+
+    def _is_late(self) -> bool:
+        """Return whether the newest message has waited for its transform for long."""
+        waits = bool(self._waiting) and self._waiting[-1] is self._newest
+        return waits and time.monotonic() - self._placed_at > _LATE_S
+
+    def check_frame(self) -> None:
+        """Try again to place what waits, so that the status says why it is not shown."""
+        if self._waiting and self.shown:
+            self._show_waiting()
+        super().check_frame()
 
     def _fade(self) -> None:
         faded = self._is_gone or self._frame_is_silent
@@ -687,7 +713,8 @@ class TopicDisplay(OneTopicDisplay):
             self.delete_status("Message")
         if not items:
             return
-        self._arrived = time.time()
+        self._arrived, self._arrived_at = time.time(), self._steady()
+        self._newest = items[-1]
         self.set_status("Topic", "ok", f"{intake.received} messages received")
         self._outdated = False
         self._waiting.extend(items)
@@ -755,8 +782,9 @@ class TopicDisplay(OneTopicDisplay):
         """Show the last message in the new fixed frame; where earlier ones are is not known."""
         if self.shows_all():
             last, waiting = self._last, list(self._waiting)
+            newest = self._newest
             self.reset()
-            self._last = last
+            self._last, self._newest = last, newest
             self._waiting.extend(waiting)
         if self._last is not None:
             pose = self._place(self._last)
@@ -771,7 +799,7 @@ class TopicDisplay(OneTopicDisplay):
     def reset(self) -> None:
         """Drop all messages."""
         self._waiting.clear()
-        self._last = None
+        self._last = self._newest = None
         self.root.clear()
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -39,6 +40,8 @@ __all__ = ["EffortDisplay"]
 _RETRY_MS = 2000
 #: Seconds for which efforts may wait for the transforms of their time before that is an error.
 _LATE_S = 1.0
+#: Seconds for which the joints of other messages are shown beside those of the newest one.
+_COMBINED_S = 3.0
 #: Names that one message may have.
 _MAX_NAMES = 10_000
 #: Status lines of joints, before the rest is counted.
@@ -99,15 +102,49 @@ class _Part:
         ]
 
 
-def _read_efforts(message: Any) -> _Efforts:
-    names, efforts = message.name, np.asarray(message.effort, np.float64)
-    if len(names) != len(efforts):
-        hint = "; the publisher measures none" if not len(efforts) else ""
-        raise Error(f"name has {len(names)} entries, effort {len(efforts)}{hint}")
-    if len(names) > _MAX_NAMES:
-        raise Error(f"name: {len(names)} joints are more than the {_MAX_NAMES} that are read")
-    values = efforts.tolist()
-    return _Efforts({str(name): (values[at], at) for at, name in enumerate(names)}, {})
+class _JointStates:
+    """Reads joint states, and combines those of several publishers, as arms and grippers have.
+
+    Used in the node's threads.
+
+    Args:
+        combines: Whether joints that other messages have had in the last 3 s are added.
+    """
+
+    def __init__(self, combines: bool) -> None:
+        self._combines = combines
+        self._lock = threading.Lock()
+        #: Effort, position in its message and time of arrival, by name of the joint.
+        self._latest: dict[str, tuple[float, int, float]] = {}
+
+    def read(self, message: Any) -> _Efforts | None:
+        """Return the efforts to show; None for a message without any, beside others that have some.
+
+        Raises:
+            Error: Names and efforts do not fit, or no message has efforts.
+        """
+        names, efforts = message.name, np.asarray(message.effort, np.float64)
+        now = time.monotonic()
+        with self._lock:
+            self._latest = {
+                name: one
+                for name, one in self._latest.items()
+                if self._combines and now - one[2] < _COMBINED_S
+            }
+            if not len(efforts) and self._latest:
+                return None
+            if len(names) != len(efforts):
+                hint = "; the publisher measures none" if not len(efforts) else ""
+                raise Error(f"name has {len(names)} entries, effort {len(efforts)}{hint}")
+            if len(names) > _MAX_NAMES:
+                raise Error(
+                    f"name: {len(names)} joints are more than the {_MAX_NAMES} that are read"
+                )
+            values = efforts.tolist()
+            own = {str(name): (values[at], at, now) for at, name in enumerate(names)}
+            combined = {**self._latest, **own}
+            self._latest = combined if len(combined) <= _MAX_NAMES else own
+            return _Efforts({name: one[:2] for name, one in self._latest.items()}, {})
 
 
 def _joints_of(text: str, source: str) -> tuple[str, dict[str, Joint]]:
@@ -127,6 +164,7 @@ class EffortDisplay(HistoryDisplay):
     MESSAGES = ("sensor_msgs/JointState",)
     # Joint states name no frame: each joint has its own.
     HAS_FRAMES = True
+    IS_CONTINUOUS = True
 
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
     width = Setting("Width", "float", 0.02, "Of the arcs, in metres.", min=0.0)
@@ -233,12 +271,14 @@ class EffortDisplay(HistoryDisplay):
             self._turning = None
             self._set_urdf("error", str(result))
             report(self, joints=[])
+            self._restyle()
             return
         self._robot_name, self._turning = result
         limited = sorted(name for name in self._turning if self._limit_of(name) is not None)
         report(self, joints=limited)
         text = f"Robot model parsed Ok: {len(limited)} joints with a limit of their effort"
         self._set_urdf("ok" if limited else "warn", text)
+        self._restyle()
         self._show_waiting()
 
     def _limit_of(self, name: str) -> float | None:
@@ -280,7 +320,8 @@ class EffortDisplay(HistoryDisplay):
 
     def preparer(self) -> Callable[[Any], Any]:
         """Return the function that reads names and efforts."""
-        return _read_efforts
+        # Beside earlier messages, each is shown as it is.
+        return _JointStates(combines=not self.shows_all()).read
 
     def _on_prefix(self) -> None:
         self.on_fixed_frame()

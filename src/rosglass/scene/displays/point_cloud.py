@@ -573,6 +573,8 @@ def _prepare_scan(scan: Any, settings: _ColorSettings) -> _Prepared:
 
 #: Encodings of depth images; others are color images.
 _DEPTH_ENCODINGS = ("16UC1", "mono16", "32FC1")
+#: Seconds that color images may be behind depth images, which wait for them.
+_MAX_BEHIND_S = 3.0
 #: Motion of a depth camera after which hidden points are dropped, as in RViz.
 _MOVED_M, _MOVED_DEG = 0.01, 0.5
 #: In the format of compressed ones.
@@ -636,6 +638,12 @@ class _DepthMatcher:
                 for _ in range(at + 1):
                     self._depths.popleft()
                 return depth, self._info, min(colors, key=lambda one: abs(one[0] - stamp))[1]
+        behind_s = (frame_and_stamp(self._depths[-1])[1] - max(when for when, _ in colors)) * 1e-9
+        if behind_s > _MAX_BEHIND_S:
+            raise Error(
+                f"the last color image of {self._color_topic} is {behind_s:.0f} s older than the "
+                "depth image"
+            )
         return None
 
 
@@ -696,6 +704,7 @@ class DepthCloudDisplay(CloudDisplay):
 
     TYPE = "DepthCloud"
     MESSAGES = ("sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/CameraInfo")
+    IS_CONTINUOUS = True
 
     transport = Setting(
         "Depth Map Transport Hint", "enum", "raw", "How depth images are transported.",
