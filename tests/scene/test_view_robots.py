@@ -5,12 +5,15 @@ What its display, its keys and its files do is in ``test_view_controller.py``.
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
 from rosmaster import RosMaster
 from view_contract import *  # noqa: F403 - the tests
-from view_contract import Camera
+from view_contract import Camera, use_through_restarts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -84,3 +87,30 @@ def camera(make_bench: Callable[[str], SceneBench], ros_master: RosMaster) -> It
     bench = make_bench(ros_master.url)
     yield SceneCamera(bench)
     bench.close()
+
+
+CONFIG = """
+Visualization Manager:
+  Displays:
+    - {Class: rosglass/ViewController, Name: View Controller, Enabled: true}
+  Global Options: {Fixed Frame: map}
+"""
+
+
+def test_the_command_offers_it_also_to_another_master(app: Any, tmp_path: Path) -> None:
+    config = tmp_path / "robot.rviz"
+    config.write_text(CONFIG)
+    with RosMaster(tmp_path / "ros") as own_master, (tmp_path / "log").open("w") as log:
+        command = [sys.executable, "-m", "rosglass", "view", str(config), "--name", "rviz"]
+        process = subprocess.Popen(
+            [*command, "--url", own_master.url],
+            env={**os.environ, "QT_QUICK_BACKEND": ""},
+            stdout=log,
+            stderr=log,
+        )
+        try:
+            use_through_restarts(own_master, "/rviz/hector_view_controller")
+            assert process.poll() is None
+        finally:
+            process.kill()
+            process.wait()
