@@ -397,7 +397,11 @@ class RobotModelDisplay(Display):
         for number, warning in enumerate(result.robot.warnings[:_MAX_LINK_LINES]):
             lines[f"URDF {number + 1}"] = Status("warn", warning)
         for name, problem in list(result.problems.items())[:_MAX_LINK_LINES]:
-            lines[f"Mesh {name.rpartition('/')[2]}"] = Status("error", problem)
+            line = f"Mesh {name.rpartition('/')[2]}"
+            lines[f"Mesh {name}" if line in lines else line] = Status("error", problem)
+        if len(result.problems) > _MAX_LINK_LINES:
+            text = f"{len(result.problems)} meshes and textures could not be loaded"
+            lines["Meshes"] = Status("error", text)
         self._loaded_lines = lines
         for line, status in lines.items():
             self.set_status(line, *status)
