@@ -471,4 +471,5 @@ class SceneDisplays(PluginList):
 
     @Slot()
     def _on_event(self) -> None:
-        self._on_change()
+        if is_alive(self._view):  # its displays are destroyed with it
+            self._on_change()
