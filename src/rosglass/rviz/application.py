@@ -17,8 +17,7 @@ from rosglass.qml.modules import import_folder
 from rosglass.qml.process import QuitOnSignal, close_network, end_process_within, require_display
 from rosglass.qml.session import Session
 from rosglass.qt import QtCore, run_event_loop
-from rosglass.ros1.options import Ros1Options
-from rosglass.ros1.remapping_arguments import Arguments
+from rosglass.ros1.options import Arguments, Ros1Options
 from rosglass.rviz import roscpp
 from rosglass.rviz.access import RvizAccess
 from rosglass.rviz.entries import Entries, OverlayMenu
