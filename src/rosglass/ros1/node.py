@@ -24,7 +24,7 @@ from rosglass.ros1.parameter_namespace import RemoteNamespace, Ros1Parameters
 from rosglass.ros1.parameter_server import ParameterServer, StartParameters
 from rosglass.ros1.services import Services
 from rosglass.ros1.type_discovery import fetch
-from rosglass.wires.tcpros.announced_types import AnnouncedTypes
+from rosglass.wires.tcpros.core import AnnouncedTypes
 from rosglass.wires.tcpros.node import TcprosNode
 
 if TYPE_CHECKING:
