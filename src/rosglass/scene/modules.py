@@ -40,11 +40,10 @@ from rosglass.scene.displays.pose import (
     PoseDisplay,
     PoseWithCovarianceDisplay,
 )
-from rosglass.scene.displays.qml_overlay import QmlOverlayDisplay
+from rosglass.scene.displays.qml_overlay import OverlayElement, QmlOverlayDisplay
 from rosglass.scene.displays.robot_model import RobotModelDisplay
 from rosglass.scene.displays.tf import TFDisplay
 from rosglass.scene.displays.view_controller import ViewControllerDisplay
-from rosglass.scene.overlay_element import OverlayElement
 from rosglass.scene.panel_models import DisplaysModel
 from rosglass.scene.publishing_tools import (
     Nav2GoalTool,
