@@ -23,7 +23,6 @@ from rosglass.scene.displays.image import CameraDisplay, CameraView, ImageDispla
 from rosglass.scene.displays.interactive_marker import InteractiveMarkersDisplay
 from rosglass.scene.displays.map import GridCellsDisplay, MapDisplay
 from rosglass.scene.displays.marker import MarkerArrayDisplay, MarkerDisplay
-from rosglass.scene.displays.path import PathDisplay
 from rosglass.scene.displays.point_cloud import (
     DepthCloudDisplay,
     FluidPressureDisplay,
@@ -36,6 +35,7 @@ from rosglass.scene.displays.point_cloud import (
 )
 from rosglass.scene.displays.pose import (
     OdometryDisplay,
+    PathDisplay,
     PoseArrayDisplay,
     PoseDisplay,
     PoseWithCovarianceDisplay,
