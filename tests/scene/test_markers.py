@@ -123,7 +123,7 @@ def test_colours_of_points_count(show: Callable[..., Any]) -> None:
     assert lines.rows["first"].tolist() == [[255, 0, 0, 255]]
     assert lines.rows["last"].tolist() == [[0, 255, 0, 255]]
     assert isinstance(cloud, Points)
-    assert cloud.colouring.mode == "bgra"
+    assert cloud.coloring.mode == "bgra"
 
 
 def test_a_lifetime_ends(bench: SceneBench, show: Callable[..., Any]) -> None:

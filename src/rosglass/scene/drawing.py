@@ -8,7 +8,8 @@ given: a change gives a new one, so that a renderer in another thread may still 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ __all__ = [
     "CONE",
     "CYLINDER",
     "SPHERE",
-    "Colouring",
+    "Coloring",
     "Drawable",
     "Group",
     "Item",
@@ -257,17 +258,31 @@ def _checked(name: str, given: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.
     return array
 
 
-class Colouring(NamedTuple):
-    """How points get their colours, in the shader.
+@dataclass(frozen=True, slots=True)
+class Coloring:
+    """How points get their colors, in the shader.
+
+    With the vertex's position and channel, the color is::
+
+        flat      first
+        bgra      channel.bgr, with channel.a if per_point_alpha
+        rainbow   rainbow(invert ? part : 1.0 - part)    value = channel
+        gradient  mix(first, last, part)                 value = channel
+        axis      the same as rainbow                    value = dot(axis, vec4(position, 1.0))
+
+        part = high != low ? (value - low) / (high - low) : 0.0;
+        if (!(abs(part) < 1e30)) part = 0.0;  // NaN as well
+        part = clamp(part, 0.0, 1.0);
 
     Attributes:
-        mode: ``flat``, ``bgra`` (the bytes of the channel), ``rainbow`` or ``gradient`` (by the
-            channel), ``axis`` (rainbow by the place).
-        low, high: The range of the channel, or of the axis in metres.
-        invert: Whether the rainbow is turned around.
-        first, last: RGB at both ends of a gradient; `first` is the flat colour.
-        axis: Four numbers; x, y, z of a point in its own frame and 1 are multiplied with these.
-        per_point_alpha: Whether points are as opaque as the channel's fourth byte says.
+        mode: ``flat``, ``bgra``, ``rainbow``, ``gradient`` or ``axis``.
+        low: Value at which the part is 0.
+        high: Value at which the part is 1.
+        invert: Whether the rainbow is red at `high`.
+        first: Color of flat points, or at `low`: red, green, blue from 0 to 1.
+        last: Color at `high`.
+        axis: What x, y, z of a point in its own frame and 1 are multiplied with.
+        per_point_alpha: Whether points are as transparent as their channel says.
     """
 
     mode: str = "flat"
@@ -294,7 +309,7 @@ class Points(Drawable):
         size: Pixels of the screen for ``points``, metres for the others.
         size_by_depth: Whether metres are multiplied with z of each point, as the pixels of depth
             images are as large as they are far away.
-        colouring: How they get their colours.
+        coloring: How they get their colours.
         alpha: Opacity, 0 to 1.
     """
 
@@ -306,7 +321,7 @@ class Points(Drawable):
         self.stride, self.position, self.channel = 16, 0, -1
         self.channel_is_bytes = False
         self.style, self.size, self.size_by_depth = "points", 3.0, False
-        self.colouring = Colouring()
+        self.coloring = Coloring()
         self.alpha = 1.0
         self._box: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
         self._boxed = -1
@@ -355,7 +370,7 @@ class Points(Drawable):
             rgba = rgba_bytes(colours, len(xyz))
             rows.view(np.uint8).reshape(-1, 16)[:, 12:] = rgba[:, (2, 1, 0, 3)]
             clear = bool((rgba[:, 3] < 255).any())
-            self.colouring = self.colouring._replace(mode="bgra", per_point_alpha=clear)
+            self.coloring = replace(self.coloring, mode="bgra", per_point_alpha=clear)
         self.set_data(
             rows.reshape(-1).view(np.uint8),
             len(xyz),
@@ -370,7 +385,7 @@ class Points(Drawable):
         style: str | None = None,
         size: float | None = None,
         size_by_depth: bool | None = None,
-        colouring: Colouring | None = None,
+        coloring: Coloring | None = None,
         alpha: float | None = None,
     ) -> None:
         """Change what is given.
@@ -380,19 +395,19 @@ class Points(Drawable):
         """
         if style is not None and style not in self.STYLES:
             raise Error(f"style {style!r} is none of {', '.join(self.STYLES)}")
-        before = (self.style, self.size, self.size_by_depth, self.colouring, self.alpha)
+        before = (self.style, self.size, self.size_by_depth, self.coloring, self.alpha)
         self.style = self.style if style is None else style
         self.size = self.size if size is None else size
         self.size_by_depth = self.size_by_depth if size_by_depth is None else size_by_depth
-        self.colouring = self.colouring if colouring is None else colouring
+        self.coloring = self.coloring if coloring is None else coloring
         self.alpha = self.alpha if alpha is None else alpha
-        if before != (self.style, self.size, self.size_by_depth, self.colouring, self.alpha):
+        if before != (self.style, self.size, self.size_by_depth, self.coloring, self.alpha):
             self.changed()
 
     @property
     def opaque(self) -> bool:
         """Whether nothing behind it shines through."""
-        paint = self.colouring
+        paint = self.coloring
         return self.alpha >= OPAQUE and not (paint.mode == "bgra" and paint.per_point_alpha)
 
     def xyz(self) -> NDArray[np.float32]:

@@ -439,7 +439,7 @@ class _PointsOnDevice(_OnDevice):
 
     def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
         points = self.drawable
-        paint = points.colouring
+        paint = points.coloring
         block[0] = (1, 1, 1, points.alpha * alpha)
         flag = paint.per_point_alpha if paint.mode == "bgra" else paint.invert
         block[1] = (_MODES[paint.mode], paint.low, paint.high, flag)
