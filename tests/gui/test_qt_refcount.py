@@ -26,7 +26,10 @@ def test_the_version_that_does_not_is_refused() -> None:
             _refuse_broken_binding("PySide6", (6, 12, 0))
     else:
         _refuse_broken_binding("PySide6", (6, 12, 0))
-    _refuse_broken_binding("PySide6", (6, 11, 3))
+    for old in ((6, 8, 0), (6, 10, 1)):
+        with pytest.raises(UnsupportedError, match=r"old interface .*PySide6-Essentials>=6.11"):
+            _refuse_broken_binding("PySide6", old)
+    _refuse_broken_binding("PySide6", (6, 11, 0))
     _refuse_broken_binding("PySide2", (5, 15, 8))
 
 

@@ -70,11 +70,18 @@ def choose_binding(loaded: frozenset[str], wanted: str = "") -> str:
 
 
 def _refuse_broken_binding(binding: str, version: tuple[int, ...]) -> None:
-    """Refuse a binding that is known to crash the interpreter.
+    """Refuse a binding that is known to crash the interpreter, or to show what is out of date.
 
     On Python 3.11 or older, PySide6 6.12 releases a reference to None too often in each call that
-    returns nothing; after some thousand calls the interpreter aborts.
+    returns nothing; after some thousand calls the interpreter aborts. From 6.8.3 to 6.10,
+    ``QQmlEngine.clearComponentCache()`` keeps files that are in use: an interface that is loaded
+    again is the old one.
     """
+    if binding == "PySide6" and version[:2] < (6, 11):
+        raise UnsupportedError(
+            f"PySide6 {'.'.join(map(str, version))} goes on with the old interface when a QML file "
+            'is saved; install a newer one with: pip install -U "PySide6-Essentials>=6.11,<6.12"'
+        )
     if binding == "PySide6" and version[:2] == (6, 12) and sys.version_info < (3, 12):
         raise UnsupportedError(
             f"PySide6 {'.'.join(map(str, version))} corrupts reference counts on Python "

@@ -2,10 +2,9 @@
 
 One :class:`SceneRenderer` belongs to one view. In :meth:`~SceneRenderer.synchronize` the GUI thread
 waits; it takes a :class:`Frame`, the list of what is to be drawn. :meth:`~SceneRenderer.render`
-uploads what has
-changed and draws it. What is not in the list any more is freed.
+uploads what has changed and draws it. What is not in the list any more is freed.
 
-What PySide needs (found in 6.8 and 6.11): data goes over as ``VoidPtr``; resources of QRhi are
+What PySide needs: data goes over as ``VoidPtr``; resources of QRhi are
 freed with ``deleteLater()`` only; an exception in :meth:`render` must never leave an update batch
 or a pass open.
 """
