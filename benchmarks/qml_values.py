@@ -62,7 +62,7 @@ QtObject {
 
 def load() -> Any:
     import rosglass
-    from rosglass.messages.loading import default_library
+    from rosglass.messages.types import default_library
 
     default_library().add_text(TYPE, _TEXT)
     return rosglass.load(TYPE)

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("PySide6.QtQuick", reason="the cockpit needs the extra `qml`")
 
-from rosglass.demo.keyboard import HeldKeys
+from rosglass.demo.app import HeldKeys
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -730,7 +730,7 @@ def test_a_file_is_reloaded(over: Over) -> None:
 def test_overlays_come_and_go(over: Over) -> None:
     """What they followed is not followed any longer."""
     for _ in range(3):
-        here = over.qml("Item { property var t: [rviz.view, rviz.displays] }")
+        here = over.qml("Item { property var t: [rviz.toolManager, rviz.view, rviz.displays] }")
         over.remove(here.overlay)
         over.access.displays.add("rviz/Axes").remove()
         over.frames(1)

@@ -18,15 +18,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from waiting import eventually
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from rosmaster import RosMaster
 
 HERE = Path(__file__).parent
 CATKIN, MESSAGES = Path("/usr/bin/catkin_make"), Path("/usr/share/std_msgs/msg")
 PACKAGES = (
     "catkin ros-message-generation ros-message-runtime ros-std-msgs ros-geometry-msgs libroscpp-dev"
 )
+#: Seconds in which a program starts, or finds a master that is started anew.
+PROGRAM_TIMEOUT_S = 40.0
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 LEFT = (0.0, 0.0, math.sin(math.pi / 4), math.cos(math.pi / 4))
 
@@ -120,6 +125,27 @@ class Robot:
 
     def tf(self, child: str, *translation: float, rotation: Any = UPRIGHT) -> None:
         self.ask("tf", parent="map", child=child, translation=translation, rotation=rotation)
+
+
+def use_through_restarts(master: RosMaster, namespace: str) -> None:
+    """Use the camera of a program as a robot does, before and after the master is started anew."""
+    import rosglass
+
+    for mode in (1, 0):
+        with rosglass.connect(master.url, "robot") as robot:
+            kind = "hector_rviz_plugins/srv/SetViewMode"
+            client = robot.create_service_client(f"{namespace}/set_view_mode", kind)
+            assert client.wait_for_server(PROGRAM_TIMEOUT_S)
+            client.call({"mode": {"mode": mode}}, timeout=PROGRAM_TIMEOUT_S)
+            heard: list[int] = []
+            robot.create_subscription(
+                f"{namespace}/view_mode",
+                "hector_rviz_plugins/msg/ViewMode",
+                lambda message, heard=heard: heard.append(message.mode),
+            )
+            eventually(lambda mode=mode, heard=heard: mode in heard, timeout=PROGRAM_TIMEOUT_S)
+            assert heard[-1] == mode
+        master.restart()
 
 
 @pytest.fixture(scope="module")

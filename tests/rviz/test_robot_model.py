@@ -9,8 +9,7 @@ from xml.etree import ElementTree
 import rosglass
 from rosglass.comm import QoS, Time
 from rosglass.demo import telemetry
-from rosglass.demo.equipment import Equipment
-from rosglass.demo.model import urdf
+from rosglass.demo.equipment import Equipment, urdf
 from rosglass.demo.simulation import RobotState
 
 

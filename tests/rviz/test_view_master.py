@@ -9,16 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from rosmaster import RosMaster
-from waiting import eventually
+from view_contract import use_through_restarts
 
 from rosglass.errors import ConnectionLostError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
-
-PATIENCE = 40.0
-SERVICE = "/rviz/hector_view_controller/set_view_mode"
 
 
 @pytest.fixture
@@ -52,22 +49,7 @@ def rviz(screen: str, own_master: RosMaster, tmp_path: Path) -> Iterator[Any]:
 
 
 def test_the_services_come_back_without_a_restart(rviz: Any, own_master: RosMaster) -> None:
-    import rosglass
-
-    for mode in (1, 0):
-        with rosglass.connect(own_master.url, "robot") as robot:
-            client = robot.create_service_client(SERVICE, "hector_rviz_plugins/srv/SetViewMode")
-            assert client.wait_for_server(PATIENCE)
-            client.call({"mode": {"mode": mode}}, timeout=PATIENCE)
-            heard: list[int] = []
-            robot.create_subscription(
-                "/rviz/hector_view_controller/view_mode",
-                "hector_rviz_plugins/msg/ViewMode",
-                lambda message, heard=heard: heard.append(message.mode),
-            )
-            eventually(lambda mode=mode, heard=heard: mode in heard, timeout=PATIENCE)
-            assert heard[-1] == mode
-        own_master.restart()
+    use_through_restarts(own_master, "/rviz/hector_view_controller")
     assert rviz.poll() is None
 
 

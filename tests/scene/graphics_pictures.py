@@ -20,7 +20,7 @@ from rosglass.demo.processes import VirtualScreen
 from rosglass.scene.drawing import (
     BOX,
     SPHERE,
-    Colouring,
+    Coloring,
     Drawable,
     Group,
     Labels,
@@ -54,8 +54,8 @@ def by_channel(mode: str) -> Points:
     rows[:, 3] = np.arange(40)
     rows[7, 0] = np.nan
     made.set_data(rows, 40, 16, channel=12)
-    paint = Colouring(mode, 0, 40, first=(1, 1, 0), last=(0, 0.2, 1), axis=(10, 0, 0, 20))
-    made.set_look(style="flat squares", size=0.3, colouring=paint)
+    paint = Coloring(mode, 0, 40, first=(1, 1, 0), last=(0, 0.2, 1), axis=(10, 0, 0, 20))
+    made.set_look(style="flat squares", size=0.3, coloring=paint)
     return made
 
 

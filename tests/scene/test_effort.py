@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+import time
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -79,14 +80,57 @@ def add(bench: SceneBench, robot: Robot, urdf: str = URDF, **settings: Any) -> A
     return display
 
 
-def arcs(display: Any) -> list[tuple[Any, Any]]:
-    """Return lines and their poses."""
-    found = display.root.drawables()
-    return [(one, pose) for one, pose, _ in found if isinstance(one, Lines)]
+class Arc(NamedTuple):
+    """What is drawn of a joint, in the fixed frame.
+
+    Attributes:
+        colour: RGBA bytes.
+        centre: Of the circle.
+        first, second: The first points of the arc.
+        head, tip: From where to where its head is.
+        lines: What draws it, with others.
+    """
+
+    colour: list[int]
+    centre: Any
+    first: Any
+    second: Any
+    head: Any
+    tip: Any
+    lines: Any
+
+    @property
+    def radius(self) -> float:
+        return float(np.linalg.norm(self.first - self.centre))
 
 
-def radius_of(lines: Any) -> float:
-    return float(np.linalg.norm(lines.rows["start"][0]))
+def arcs(display: Any) -> list[tuple[str, Arc]]:
+    """Return what is drawn, by joint; of a history the oldest first."""
+    found: list[tuple[str, Arc]] = []
+    drawn = [(one, pose) for one, pose, _ in display.root.drawables()]
+    for (lines, pose), (heads, other) in zip(drawn[::2], drawn[1::2], strict=True):
+        assert (type(lines), type(heads), heads.shape) == (Lines, Mesh, CONE)
+        assert (pose == other).all()
+        assert lines.owner.names == heads.owner.names
+
+        def at(point: Any, pose: Any = pose) -> Any:
+            return (pose @ [*point[:3], 1])[:3]
+
+        for number, name in enumerate(lines.owner.names):
+            rows = lines.rows[29 * number : 29 * number + 29]
+            matrix = heads.instances["matrix"][number].reshape(4, 4).T
+            first, second, opposite = at(rows["start"][0]), at(rows["end"][0]), rows["start"][16]
+            arc = Arc(
+                rows["first"][0].tolist(),
+                (first + at(opposite)) / 2,
+                first,
+                second,
+                at(matrix @ (0, 0, 0, 1)),
+                at(matrix @ (0, 0, 1, 1)),
+                lines,
+            )
+            found.append((name, arc))
+    return found
 
 
 def test_an_effort_is_an_arc_as_large_as_its_share_of_the_limit(
@@ -100,16 +144,18 @@ def test_an_effort_is_an_arc_as_large_as_its_share_of_the_limit(
     robot.send({"shoulder": 5.0, "elbow": -8.0, "drive": 0.0, "lift": 50.0})
     bench.wait(lambda: len(arcs(display)) == 3)
     assert display.statusLevel == "ok", display.statusText
-    by_joint = {lines.owner.describe()[0][1]: (lines, pose) for lines, pose in arcs(display)}
-    shoulder, pose = by_joint["shoulder"]
+    by_joint = dict(arcs(display))
+    shoulder, elbow = by_joint["shoulder"], by_joint["elbow"]
     # RViz's radius: 5 cm, and half a metre for the share of the limit and 5 %.
-    assert radius_of(shoulder) == pytest.approx(0.05 + 0.55 / 2)
-    assert (shoulder.width, shoulder.in_metres) == (pytest.approx(0.02), True)
-    assert pose[:3, 3].tolist() == [0.0, 0.0, 0.0]
-    assert radius_of(by_joint["elbow"][0]) == pytest.approx(0.05 + 1.05 / 2), "no more than 100 %"
-    assert by_joint["elbow"][0].rows["first"][0].tolist() == [255, 0, 0, 255], "red at the limit"
-    assert radius_of(by_joint["drive"][0]) == pytest.approx(0.05 + 0.05 / 2)
-    assert shoulder.owner.describe() == [
+    assert shoulder.radius == pytest.approx(0.05 + 0.55 / 2)
+    assert shoulder.centre == pytest.approx([0, 0, 0], abs=1e-6)
+    assert elbow.centre == pytest.approx([1, 0, 0])
+    assert (shoulder.lines.width, shoulder.lines.in_metres) == (pytest.approx(0.02), True)
+    assert elbow.radius == pytest.approx(0.05 + 1.05 / 2), "no more than 100 %"
+    assert elbow.colour == [255, 0, 0, 255], "red at the limit"
+    assert by_joint["drive"].radius == pytest.approx(0.05 + 0.05 / 2)
+    at = shoulder.lines.owner.names.index("shoulder")
+    assert shoulder.lines.owner.describe(29 * at + 28) == [
         ("Joint", "shoulder"),
         ("Effort", "5 Nm"),
         ("Max Effort", "10 Nm"),
@@ -117,9 +163,9 @@ def test_an_effort_is_an_arc_as_large_as_its_share_of_the_limit(
     assert display.effort("elbow") == -8.0
     assert math.isnan(display.effort("neck"))
     display.scale, display.width, display.alpha = 2.0, 0.1, 0.5
-    found = {lines.owner.describe()[0][1]: lines for lines, _ in arcs(display)}
-    assert radius_of(found["shoulder"]) == pytest.approx(0.05 + 0.55)
-    assert (found["shoulder"].width, found["shoulder"].opaque) == (pytest.approx(0.1), False)
+    shoulder = dict(arcs(display))["shoulder"]
+    assert shoulder.radius == pytest.approx(0.05 + 0.55)
+    assert (shoulder.lines.width, shoulder.lines.opaque) == (pytest.approx(0.1), False)
     display.setJointEnabled("shoulder", False)
     assert len(arcs(display)) == 2
     assert not display.isJointEnabled("shoulder")
@@ -135,20 +181,13 @@ def test_the_head_points_where_the_torque_turns(
     robot.place("upper", "lower")
     robot.send({"elbow": effort})
     bench.wait(lambda: len(arcs(display)) == 1)
-    ((lines, pose),) = arcs(display)
-    (head,) = (one for one, _, _ in display.root.drawables() if isinstance(one, Mesh))
-    assert head.shape is CONE
-    matrix = pose @ head.instances["matrix"][0].reshape(4, 4).T
-    start, tip = (matrix @ (0, 0, 0, 1))[:3], (matrix @ (0, 0, 1, 1))[:3]
-    centre = pose[:3, 3]
-    turning = np.cross(start - centre, tip - start)
+    ((_, arc),) = arcs(display)
+    turning = np.cross(arc.head - arc.centre, arc.tip - arc.head)
     along = turning / np.linalg.norm(turning)
     assert along == pytest.approx(np.sign(effort) * np.array(axis) / np.linalg.norm(axis), abs=1e-5)
     # The arc begins at the head, and lies on its other side.
-    first = (pose @ [*lines.rows["start"][0], 1])[:3]
-    second = (pose @ [*lines.rows["end"][0], 1])[:3]
-    assert first == pytest.approx(start, abs=1e-5)
-    assert (second - first) @ (tip - start) < 0
+    assert arc.first == pytest.approx(arc.head, abs=1e-5)
+    assert (arc.second - arc.first) @ (arc.tip - arc.head) < 0
 
 
 def test_what_is_not_drawn_is_in_the_status(
@@ -267,7 +306,7 @@ def test_efforts_are_where_the_joints_were_at_their_time(bench: SceneBench, robo
     assert arcs(display) == []
     move(101)
     bench.wait(lambda: len(arcs(display)) == 1)
-    assert arcs(display)[0][1][0, 3] == pytest.approx(100.5)
+    assert arcs(display)[0][1].centre == pytest.approx([100.5, 0, 0])
     # One that is older than all transforms is not shown as if it was of now.
     robot.send({"shoulder": 5.0}, header=stamped(2_000_000_000))
     later = itertools.count(102)
@@ -299,6 +338,25 @@ def test_joints_of_several_publishers_are_shown_together(
     assert len(arcs(display)) == 1
 
 
+def test_states_at_a_high_rate_are_drawn_30_times_per_second(
+    bench: SceneBench, robot: Robot
+) -> None:
+    display = add(bench, robot)
+    robot.place("upper")
+    robot.send({"shoulder": 0.0})
+    bench.wait(lambda: len(arcs(display)) == 1)
+    drawn = []
+    show = display.show
+    display.show = lambda *given: drawn.append(time.monotonic()) or show(*given)
+    for number in range(300):
+        robot.send({"shoulder": number / 100})
+        bench.wait.settled(bench.session)
+    bench.wait(lambda: display.effort("shoulder") == 2.99)
+    assert display.received == 301
+    assert min(np.diff(drawn)) > 0.025
+    del display.show
+
+
 def test_joint_states_that_stop_fade(
     bench: SceneBench, robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -322,7 +380,7 @@ def test_another_robot_has_other_limits(bench: SceneBench, robot: Robot) -> None
     robot.send({"shoulder": 5.0})
     bench.wait(lambda: len(arcs(display)) == 1)
     robot.descriptions.publish({"data": URDF.replace('effort="10"', 'effort="5"')})
-    bench.wait(lambda: radius_of(arcs(display)[0][0]) == pytest.approx(0.05 + 1.05 / 2))
+    bench.wait(lambda: arcs(display)[0][1].radius == pytest.approx(0.05 + 1.05 / 2))
     robot.descriptions.publish({"data": "<robot"})
     bench.wait(lambda: arcs(display) == [])
     assert display.statusLevel == "error"
@@ -336,7 +394,7 @@ def test_a_prefix_names_the_frames_and_messages_have_a_history(
     for effort in (1.0, 5.0, 10.0):
         robot.send({"shoulder": effort})
     bench.wait(lambda: display.received == 3 and len(arcs(display)) == 2)
-    found = sorted(radius_of(lines) for lines, _ in arcs(display))
+    found = [arc.radius for _, arc in arcs(display)]
     assert found == pytest.approx([0.05 + 0.55 / 2, 0.05 + 1.05 / 2])
 
 

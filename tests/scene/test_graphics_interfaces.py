@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pytest
+from lavapipe import lavapipe
 from pictures import drawn, unmatched
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 HERE = Path(__file__).parent
-#: Of Mesa's Vulkan on the processor: a graphics card would draw other pixels.
-DRIVERS = ("/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d")
 #: The share of drawn pixels that may have no similar one beside them: edges of letters.
 MOST_UNMATCHED = 0.01
 _TIMEOUT_S = 60
@@ -29,14 +28,6 @@ class Result(NamedTuple):
 
     pictures: dict[str, NDArray[np.uint8]]
     found: dict[str, Any]
-
-
-def lavapipe() -> str:
-    """Return the file that names lavapipe to Vulkan's loader; skip the test if there is none."""
-    for folder in DRIVERS:
-        for file in sorted(Path(folder).glob("lvp_icd*.json")):
-            return str(file)
-    pytest.skip("Mesa's Vulkan is not installed: sudo apt-get install mesa-vulkan-drivers")
 
 
 def start(interface: str, folder: Path, **variables: str) -> subprocess.Popen[str]:
@@ -63,7 +54,7 @@ def result(process: subprocess.Popen[str], folder: Path) -> Result:
 @pytest.fixture(scope="module")
 def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, Result]:
     """What OpenGL and Vulkan have drawn, side by side."""
-    driver = lavapipe()
+    driver = lavapipe()  # a graphics card would draw other pixels
     folder = tmp_path_factory.mktemp("graphics")
     opengl = start("opengl", folder / "opengl")
     vulkan = start("vulkan", folder / "vulkan", VK_ICD_FILENAMES=driver)

@@ -123,7 +123,7 @@ def test_colours_of_points_count(show: Callable[..., Any]) -> None:
     assert lines.rows["first"].tolist() == [[255, 0, 0, 255]]
     assert lines.rows["last"].tolist() == [[0, 255, 0, 255]]
     assert isinstance(cloud, Points)
-    assert cloud.colouring.mode == "bgra"
+    assert cloud.coloring.mode == "bgra"
 
 
 def test_a_lifetime_ends(bench: SceneBench, show: Callable[..., Any]) -> None:
@@ -348,24 +348,50 @@ def test_labels_of_wild_texts_are_bounded(bench: SceneBench, show: Callable[...,
     assert bench.view.problem == ""
 
 
+def textured_triangle(folder: Path) -> str:
+    """Write a triangle with a green texture; return its URI."""
+    from PySide6.QtGui import QImage
+
+    image = QImage(2, 2, QImage.Format.Format_RGBA8888)
+    image.fill(0xFF00FF00)
+    image.save(str(folder / "green.png"))
+    (folder / "quad.mtl").write_text("newmtl paint\nKd 1 1 1\nmap_Kd green.png\n")
+    (folder / "quad.obj").write_text(
+        "mtllib quad.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+        "usemtl paint\nf 1/1 2/2 3/3\n"
+    )
+    return f"file://{folder}/quad.obj"
+
+
+def test_markers_with_one_mesh_share_its_texture(
+    bench: SceneBench, show: Callable[..., Any], tmp_path: Path
+) -> None:
+    uri = textured_triangle(tmp_path)
+    first = marker(10, mesh_resource=uri, mesh_use_embedded_materials=True)
+    # Another color, which needs a drawable of its own.
+    second = {**first, "id": 1, "color": {**RED, "g": 0.5}}
+    display = show(first, second)
+    bench.wait(lambda: len(drawables(display)) == 2)
+    bench.picture()
+    (renderer,) = bench.view._renderers
+    (image,) = renderer._device.images.values()
+    assert image.users == 2
+    show({**first, "action": DELETE})
+    bench.picture()
+    assert (list(renderer._device.images.values()), image.users) == ([image], 1)
+    show({**second, "action": DELETE})
+    bench.picture()
+    assert renderer._device.images == {}
+
+
 def test_meshes_have_their_textures_and_are_made_in_another_thread(
     bench: SceneBench,
     show: Callable[..., Any],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from PySide6.QtGui import QImage
-
     from rosglass.scene.displays import marker as module
 
-    image = QImage(2, 2, QImage.Format.Format_RGBA8888)
-    image.fill(0xFF00FF00)
-    image.save(str(tmp_path / "green.png"))
-    (tmp_path / "quad.mtl").write_text("newmtl paint\nKd 1 1 1\nmap_Kd green.png\n")
-    (tmp_path / "quad.obj").write_text(
-        "mtllib quad.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
-        "usemtl paint\nf 1/1 2/2 3/3\n"
-    )
     threads = []
 
     class Shape(module.Shape):
@@ -374,7 +400,7 @@ def test_meshes_have_their_textures_and_are_made_in_another_thread(
             super().__init__(*args, **options)
 
     monkeypatch.setattr(module, "Shape", Shape)
-    uri = f"file://{tmp_path}/quad.obj"
+    uri = textured_triangle(tmp_path)
     display = show(
         marker(10, mesh_resource=uri, mesh_use_embedded_materials=True),
         marker(10, 1, mesh_resource=uri),

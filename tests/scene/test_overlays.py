@@ -252,3 +252,16 @@ def test_rosglass_view_shows_a_file_once(bench: Any, panel: Path, tmp_path: Path
     bench.wait(lambda: display.overlay is not None and display.overlay.loaded)
     interfaces = [inner for item in view.childItems() for inner in item.childItems()]
     assert sorted(item.property("color").name() for item in interfaces) == ["#00ff00", "#ff0000"]
+
+
+def test_a_view_with_listed_displays_is_destroyed_in_silence(bench: Any, capfd: Any) -> None:
+    from PySide6.QtCore import QUrl
+
+    from rosglass.qt import is_alive
+    from rosglass.scene.access import access_of
+
+    view = bench.load("GridDisplay { }")
+    bench.wait(lambda: len(access_of(view).displays.all) == 1)
+    bench.window.setSource(QUrl())
+    bench.wait(lambda: not is_alive(view))
+    assert "Traceback" not in capfd.readouterr().err

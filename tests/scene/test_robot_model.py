@@ -229,6 +229,18 @@ def test_meshes_come_from_web_servers(bench: SceneBench) -> None:
         send.close()
 
 
+@pytest.mark.usefixtures("cache")
+def test_missing_meshes_of_the_same_name_are_all_in_the_status(bench: SceneBench) -> None:
+    view = bench.load("RobotModelDisplay {}")
+    (robot,) = view.scene.displays
+    publish(bench, with_meshes("file:///left/hand.stl", "file:///right/hand.stl"))
+    bench.wait(lambda: "/right/hand.stl: there is no such file" in robot.statusText)
+    assert "/left/hand.stl: there is no such file" in robot.statusText
+    publish(bench, with_meshes(*(f"file:///{number}.stl" for number in range(30))))
+    bench.wait(lambda: "Meshes: 30 meshes and textures could not be loaded" in robot.statusText)
+    assert sum(line.startswith("Mesh ") for line in robot.status_lines) == 10
+
+
 def test_settings_are_written_for_either_rviz(bench: SceneBench) -> None:
     view = bench.load()
     robot = view.scene.add("RobotModel", alpha=0.5)

@@ -449,6 +449,26 @@ def test_a_jump_of_time_and_reset_begin_anew(bench: SceneBench) -> None:
     begin()
 
 
+def test_reset_forgets_transforms_that_are_not_static(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform, TransformBroadcaster
+
+    view = bench.load()
+    static = StaticTransformBroadcaster(bench.robot)
+    static.send_transform(Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "base_link", "laser"))
+    moving = TransformBroadcaster(bench.robot)
+
+    def is_known() -> bool:
+        moving.send_transform(Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "base_link"))
+        return {"map", "base_link", "laser"} <= set(view.scene.frames())
+
+    bench.wait(is_known)
+    bench.wait.settled(bench.session)
+    view.reset()
+    assert view.scene.frames() == ["base_link", "laser"]
+    bench.wait(is_known)
+
+
 def test_a_display_of_another_scene_is_refused(bench: SceneBench) -> None:
     from rosglass.errors import Error
 

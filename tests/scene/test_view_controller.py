@@ -211,6 +211,60 @@ def test_settings_of_a_file_of_rviz_count(bench: SceneBench, tmp_path: Path) -> 
     assert (settings.animation_duration, settings.tracking_gain, settings.keys) == (1.0, 5.0, True)
 
 
+HECTOR = """
+Visualization Manager:
+  Displays: []
+  Global Options: {Fixed Frame: map}
+  Views:
+    Current:
+      2D Mode: false
+      Angle: 0
+      Animation Duration: 0.25
+      Class: hector_rviz_plugins/HectorViewController
+      Distance: 5
+      Enable Services: true
+      Enable Topics: true
+      Eye: {X: 1, Y: 2, Z: 8}
+      Focus: {X: 1, Y: 2, Z: 0}
+      Keyboard Navigation: true
+      Movement speed (m/s): 2.5
+      Name: Current View
+      Tracked Frame: map
+      Tracked Frame P-Gain: 7
+      Up: {X: 0, Y: 0, Z: 1}
+"""
+
+
+def test_a_view_of_hector_rviz_plugins_becomes_an_orbit(bench: SceneBench, tmp_path: Path) -> None:
+    ours, saved = tmp_path / "hector.rviz", tmp_path / "saved.rviz"
+    ours.write_text(HECTOR)
+    view = bench.load()
+    (note,) = view.load_config(ours)
+    assert "HectorViewController: shown as an Orbit with the display View Controller" in note
+    assert view.view == "Orbit"
+    assert near(view.camera().eye, (1, 2, 8), 0.1)
+    (display,) = view.scene.displays
+    assert (display.animationDuration, display.movementSpeed, display.trackingGain) == (
+        0.25,
+        2.5,
+        7,
+    )
+    bench.wait(lambda: services_of(bench))
+    assert control(bench).view.tracked_frame == "map"
+    view.save_config(saved)
+    assert "Up:" not in saved.read_text().partition("Views:")[0]
+    assert view.load_config(saved) == []
+    assert [one.name for one in view.scene.displays] == ["View Controller"]
+    ours.write_text(HECTOR.replace("2D Mode: false", "2D Mode: true"))
+    view.load_config(ours)
+    bench.wait(lambda: view.view == "TopDownOrtho")
+    # What does not fit is left out, and named.
+    ours.write_text(HECTOR.replace("Eye: {X: 1, Y: 2, Z: 8}", "Eye: high"))
+    notes = view.load_config(ours)
+    assert any("Eye: expected a mapping" in note for note in notes), notes
+    assert near(view.camera().focus, (1, 2, 0), 0.1)
+
+
 def test_displays_of_a_view_show_the_same(bench: SceneBench) -> None:
     first = show(bench, 'namespace: "/first"')
     second = bench.view.scene.add("rosglass/ViewController")

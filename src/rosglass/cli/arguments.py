@@ -156,12 +156,7 @@ def _add_interface_options(
 # -- interfaces ----------------------------------------------------------------------------------
 
 
-def _run(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "file",
-        metavar="FILE.qml",
-        help="the interface; package://name/path for a file in a package",
-    )
+def _add_robot_url(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--url",
         default="",
@@ -169,6 +164,25 @@ def _run(parser: argparse.ArgumentParser) -> None:
         "recording; default: ROSGLASS_URL, or ROS's own variables, or the Zenoh router "
         "or ROS 1 master of this machine",
     )
+
+
+def _add_3d_view(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--fixed-frame",
+        metavar="FRAME",
+        default="",
+        help="the fixed frame, instead of the one in the config",
+    )
+    parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
+
+
+def _run(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "file",
+        metavar="FILE.qml",
+        help="the interface; package://name/path for a file in a package",
+    )
+    _add_robot_url(parser)
     parser.add_argument("--name", default="", help="node name, instead of the one in the file")
     parser.add_argument(
         "--watch",
@@ -218,13 +232,7 @@ def _rviz(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         help="time to wait for the master (default: no limit)",
     )
-    parser.add_argument(
-        "--fixed-frame",
-        metavar="FRAME",
-        default="",
-        help="the fixed frame, instead of the one in the config",
-    )
-    parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
+    _add_3d_view(parser)
     parser.add_argument(
         "--bare",
         action="store_true",
@@ -259,21 +267,9 @@ def _view(parser: argparse.ArgumentParser) -> None:
     )
     complete(config, "*.rviz")
     _add_overlays(parser)
-    parser.add_argument(
-        "--url",
-        default="",
-        help="URL of the robot, e.g. zenoh://192.168.1.5:7447, or replay:FILE for a "
-        "recording; default: ROSGLASS_URL, or ROS's own variables, or the Zenoh router "
-        "or ROS 1 master of this machine",
-    )
+    _add_robot_url(parser)
     parser.add_argument("--name", default="", help="node name (default: rosglass_view)")
-    parser.add_argument(
-        "--fixed-frame",
-        metavar="FRAME",
-        default="",
-        help="the fixed frame, instead of the one in the config",
-    )
-    parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
+    _add_3d_view(parser)
     parser.add_argument(
         "--kiosk",
         action="store_true",

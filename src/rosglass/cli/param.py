@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rosglass.cli.connecting import await_graph, connect, explained_wait, names_ros1
+from rosglass.cli.connecting import as_ros1, await_graph, connect, explained_wait, names_ros1
 from rosglass.cli.messages import print_json, to_yaml
 from rosglass.cli.output import Style, note
 from rosglass.comm import ParameterType
 from rosglass.comm.names import similar
-from rosglass.errors import Error
+from rosglass.errors import Error, UnsupportedError
 from rosglass.ros2.parameter_files import dump, parse_value, write
 
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Iterator
+    from types import ModuleType
 
     from rosglass.comm import Node, ParameterClient, ParameterValue
+    from rosglass.ros1.parameter_server import ParameterServer
 
 __all__ = ["run"]
 
@@ -36,10 +39,8 @@ _REQUIRED = {
 def run(args: argparse.Namespace) -> int:
     """Run the subcommand."""
     if names_ros1(args):
-        from rosglass.cli import param_ros1  # noqa: PLC0415 - loads all of ROS 1
-
         with connect(args) as node:
-            return param_ros1.run(args.what, node, args)
+            return _run_ros1(node, args)
     for name in _REQUIRED[args.what]:
         if getattr(args, name) is None:
             usage = " ".join(needed.upper() for needed in _REQUIRED[args.what])
@@ -208,4 +209,126 @@ _HANDLERS = {
     "delete": _delete,
     "dump": _dump,
     "load": _load,
+}
+
+
+def _run_ros1(node: Node, args: argparse.Namespace) -> int:
+    """Run a subcommand in ROS 1, where one server has the parameters of all nodes."""
+    if args.what not in _ROS1_HANDLERS:
+        name = _name(args, args.parameter)
+        raise UnsupportedError(
+            f"ROS 1 knows nothing of a parameter but its value: rosglass param get {name}"
+        )
+    _ROS1_HANDLERS[args.what](_server(node), args)
+    return 0
+
+
+def _server(node: Node) -> ParameterServer:
+    ros1 = as_ros1(node)
+    assert ros1 is not None
+    return ros1.parameter_server
+
+
+def _rosparam_files() -> ModuleType:
+    from rosglass.ros1 import rosparam_files  # noqa: PLC0415 - loads all of ROS 1
+
+    return rosparam_files
+
+
+def _name(args: argparse.Namespace, parameter: str | None) -> str:
+    """Return an absolute name, given in full or as node and parameter, as in ROS 2."""
+    whole = args.node if parameter is None else f"{args.node}/{parameter}"
+    return "/" + whole.strip("/")
+
+
+def _list_ros1(server: ParameterServer, args: argparse.Namespace) -> None:
+    namespace = "/" + (args.node or "").strip("/")
+    names = server.names(namespace, timeout=args.timeout)
+    if not names and namespace != "/":
+        # Raises, with similar names, unless it is a parameter itself, or an empty namespace.
+        if not isinstance(server.get(namespace, timeout=args.timeout), dict):
+            names = [namespace]
+        else:
+            note(f"the namespace {namespace} is empty")
+    elif not names:
+        note("no parameters are set")
+    if args.json:
+        print_json(names)
+    else:
+        print("".join(f"{name}\n" for name in names), end="")
+
+
+def _get_ros1(server: ParameterServer, args: argparse.Namespace) -> None:
+    name = _name(args, args.parameter)
+    value = server.get(name, timeout=args.timeout)
+    if args.json:
+        print_json({name: value})
+    else:
+        print(to_yaml(list(value) if isinstance(value, bytes) else value).rstrip("\n"))
+
+
+def _set_ros1(server: ParameterServer, args: argparse.Namespace) -> None:
+    parameter, text = args.parameter, args.value
+    if text is None:
+        parameter, text = None, parameter
+    if text is None:
+        raise Error(f"say to what value {args.node} shall be set: rosglass param set NAME VALUE")
+    name = _name(args, parameter)
+    # Empty quotes are an empty text.
+    value = _rosparam_files().parse_value(text, f"the value {text!r}") if text else ""
+    server.set(name, value, timeout=args.timeout)
+    _print_done(args, name, "set")
+
+
+def _delete_ros1(server: ParameterServer, args: argparse.Namespace) -> None:
+    name = _name(args, args.parameter)
+    server.delete(name, timeout=args.timeout)
+    _print_done(args, name, "deleted")
+
+
+def _dump_ros1(server: ParameterServer, args: argparse.Namespace) -> None:
+    namespace = "/" + (args.node or "").strip("/")
+    if args.output:
+        server.save(args.output, namespace, timeout=args.timeout)
+        return
+    value = server.get(namespace, timeout=args.timeout)
+    if args.json:
+        print_json(value)
+    else:
+        print(_rosparam_files().dump(value), end="")
+
+
+def _load_ros1(server: ParameterServer, args: argparse.Namespace) -> None:
+    file, namespace = _file(args)
+    names = server.load(file, namespace, timeout=args.timeout)
+    if args.json:
+        print_json(names)
+    else:
+        print(f"{len(names)} parameters set: {', '.join(names)}")
+
+
+def _file(args: argparse.Namespace) -> tuple[str, str]:
+    """Distinguish a file and a namespace: ``FILE``, ``FILE NAMESPACE`` or ``NODE FILE``."""
+    first, second = args.node, args.file
+    if second is None:
+        return first, "/"
+    if Path(first).is_file() and not Path(second).is_file():
+        first, second = second, first
+    return second, "/" + first.strip("/")
+
+
+def _print_done(args: argparse.Namespace, name: str, done: str) -> None:
+    if args.json:
+        print_json({"successful": True, "reason": ""})
+    else:
+        print(f"{name} is {done}")
+
+
+_ROS1_HANDLERS = {
+    "list": _list_ros1,
+    "get": _get_ros1,
+    "set": _set_ros1,
+    "delete": _delete_ros1,
+    "dump": _dump_ros1,
+    "load": _load_ros1,
 }

@@ -1,4 +1,4 @@
-"""The cockpit as a program: window, node, and the figures it prints when it ends."""
+"""The cockpit as a program: window, held keys, node, and the figures it prints when it ends."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rosglass.demo import keyboard, pictures
+from rosglass.demo import pictures
 from rosglass.demo.figures import CameraFigures, Latency, ProcessFigures, table
 from rosglass.errors import Error, QmlError
 from rosglass.qml import Session
@@ -15,12 +15,12 @@ from rosglass.qml.log import install_message_handler
 from rosglass.qml.process import QuitOnSignal, close_network, require_display
 from rosglass.qml.runner import Runner
 from rosglass.qml.subscription import Subscription
-from rosglass.qt import QtCore, QtGui, QtQuick
+from rosglass.qt import QtCore, QtGui, QtQml, QtQuick
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-__all__ = ["AUTOPILOT", "Cockpit"]
+__all__ = ["AUTOPILOT", "Cockpit", "HeldKeys"]
 
 _QML = Path(__file__).with_name("cockpit") / "main.qml"
 #: Movements of the stick without an operator: start in seconds, right, down.
@@ -58,7 +58,8 @@ class Cockpit:
         )
         close_network()
         pictures.register()
-        keyboard.register()
+        register_type: Any = QtQml.qmlRegisterType  # PySide6's annotation wants bytes for names
+        register_type(HeldKeys, "RosglassDemo", 1, 0, "HeldKeys")
         self.session = Session(url)
         self._closed = False
         self._runner = Runner(_QML, self.session)
@@ -204,3 +205,62 @@ class Cockpit:
 
     def _all(self, kind: type) -> list[Any]:
         return list(self.window.findChildren(kind))
+
+
+#: Milliseconds of a tick, and ticks from a release until it counts. Two, so that after a pause a
+#: press that waits in the queue is handled between them.
+_TICK, _TICKS = 16, 2
+
+
+class HeldKeys(QtCore.QObject):
+    """Distinguishes released keys from repeating ones.
+
+    On X11, a key held down repeats as releases and presses, and Qt marks those as repeats only if
+    both wait in its queue; on an idle window most do not. A press within 32 ms of the release of
+    the same key is therefore a repeat, and a release counts only if no such press follows.
+
+    Not a Timer of QML's, which ticks with the frames and would report a release late.
+    """
+
+    #: A key was released, 16 to 32 ms ago.
+    lifted = QtCore.Signal(int)
+
+    def __init__(self, parent: QtCore.QObject | None = None) -> None:
+        super().__init__(parent)
+        self._down: set[int] = set()
+        self._leaving: dict[int, int] = {}
+        self._timer = QtCore.QTimer(self)
+        self._timer.setTimerType(QtCore.Qt.TimerType.PreciseTimer)
+        self._timer.setInterval(_TICK)
+        self._timer.timeout.connect(self._tick)
+
+    @QtCore.Slot(int, result=bool)
+    def press(self, key: int) -> bool:
+        """Handle a key's press; return False if it is a repeat."""
+        repeats = self._leaving.pop(key, None) is not None or key in self._down
+        if not repeats:
+            self._down.add(key)
+        return not repeats
+
+    @QtCore.Slot(int)
+    def lift(self, key: int) -> None:
+        """Handle a key's release, even if another window received the press."""
+        self._leaving[key] = _TICKS
+        if not self._timer.isActive():
+            self._timer.start()
+
+    @QtCore.Slot()
+    def clear(self) -> None:
+        """Forget all keys without a signal: their release may go to another window."""
+        self._down.clear()
+
+    @QtCore.Slot()
+    def _tick(self) -> None:
+        gone = [key for key, ticks in self._leaving.items() if ticks == 1]
+        self._leaving = {key: ticks - 1 for key, ticks in self._leaving.items() if ticks > 1}
+        if not self._leaving:
+            self._timer.stop()
+        for key in gone:
+            if key in self._down:
+                self._down.remove(key)
+                self.lifted.emit(key)

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from rosglass.errors import ConversionError, DecodeError
 from rosglass.messages import layout
-from rosglass.messages.conversion import complete, convert
 from rosglass.messages.emit_read import Reader
 from rosglass.messages.emit_write import nested_write_function, write_function
 from rosglass.messages.layout import ANYWHERE, START, Cursor, Wire
-from rosglass.messages.message import await_fill, plain_class, shell_class
+from rosglass.messages.message import await_fill, complete, convert, plain_class, shell_class
 from rosglass.messages.schema import Kind
 from rosglass.messages.sequences import MessageSequence
 from rosglass.messages.source import MAX_EMPTY, OddValueError, Source

@@ -14,10 +14,9 @@ from rosglass.errors import ConversionError
 from rosglass.interfaces import Counterparts
 from rosglass.interfaces.definition import ArrayKind
 from rosglass.messages.codec import codec_of
-from rosglass.messages.loading import ActionType, ServiceType, default_library
 from rosglass.messages.message import plain_class
 from rosglass.messages.sequences import MessageSequence
-from rosglass.messages.types import MessageType
+from rosglass.messages.types import ActionType, MessageType, ServiceType, default_library
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

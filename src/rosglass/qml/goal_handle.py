@@ -1,4 +1,4 @@
-"""Handles of goals in QML: of sent goals, and of goals that a server executes."""
+"""Goals in QML: handles of sent goals and of those that a server executes, and their states."""
 # ruff: noqa: N802, N815 - the names of slots and signals are QML's
 
 from __future__ import annotations
@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import time
 from concurrent.futures import Future
+from enum import IntEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.action_client import GoalStatus
@@ -13,13 +14,6 @@ from rosglass.comm.time import Time
 from rosglass.errors import Error
 from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import given_fields, named
-from rosglass.qml.enums import (
-    ActionCommStates,
-    ActionTerminalStates,
-    comm_state_of,
-    status_code,
-    terminal_state_of,
-)
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.properties import ReadOnly
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
@@ -36,15 +30,122 @@ if TYPE_CHECKING:
     from rosglass.qml.log import Caller
     from rosglass.qml.runtime import Runtime
 
-
 __all__ = [
+    "ActionCommStates",
+    "ActionGoalStatus",
+    "ActionTerminalStates",
     "GoalCallbacks",
     "GoalHandle",
     "RosGoalHandle",
     "ServerGoalHandle",
+    "comm_state_of",
     "let_go",
+    "status_code",
     "tell_cancelling",
+    "terminal_state_of",
 ]
+
+
+class ActionGoalStatus(QtCore.QObject):
+    """The status of a goal; same numbers as ``action_msgs/msg/GoalStatus``."""
+
+    @QtCore.QEnum
+    class Status(IntEnum):
+        """``Unknown`` until the server accepts the goal, and if the outcome is unknown."""
+
+        Unknown = 0
+        Accepted = 1
+        Executing = 2
+        Canceling = 3
+        Succeeded = 4
+        Canceled = 5
+        Aborted = 6
+
+
+class ActionCommStates(QtCore.QObject):
+    """The communication state of a goal, as actionlib's ``CommState``."""
+
+    @QtCore.QEnum
+    class State(IntEnum):
+        """The states, in the order in which a goal goes through them."""
+
+        WAITING_FOR_GOAL_ACK = 0
+        PENDING = 1
+        ACTIVE = 2
+        WAITING_FOR_RESULT = 3
+        WAITING_FOR_CANCEL_ACK = 4
+        RECALLING = 5
+        PREEMPTING = 6
+        DONE = 7
+
+
+class ActionTerminalStates(QtCore.QObject):
+    """The final state of a goal, as actionlib's ``TerminalState``; UNKNOWN until it ends."""
+
+    @QtCore.QEnum
+    class State(IntEnum):
+        """The outcome that the server reported, or LOST."""
+
+        RECALLED = 0
+        REJECTED = 1
+        PREEMPTED = 2
+        ABORTED = 3
+        SUCCEEDED = 4
+        LOST = 5
+        UNKNOWN = 6
+
+
+_Status, _Comm, _Terminal = (
+    ActionGoalStatus.Status,
+    ActionCommStates.State,
+    ActionTerminalStates.State,
+)
+#: Values of GoalStatus -> codes. A rejected goal counts as aborted, as in the reference plugin.
+_CODES = {
+    "accepted": _Status.Accepted,
+    "executing": _Status.Executing,
+    "canceling": _Status.Canceling,
+    "succeeded": _Status.Succeeded,
+    "canceled": _Status.Canceled,
+    "aborted": _Status.Aborted,
+    "rejected": _Status.Aborted,
+}
+_COMM = {
+    "pending": _Comm.WAITING_FOR_GOAL_ACK,
+    "accepted": _Comm.PENDING,
+    "executing": _Comm.ACTIVE,
+    "canceling": _Comm.PREEMPTING,
+}
+_TERMINAL = {
+    "succeeded": _Terminal.SUCCEEDED,
+    "canceled": _Terminal.PREEMPTED,
+    "aborted": _Terminal.ABORTED,
+    "rejected": _Terminal.REJECTED,
+    "lost": _Terminal.LOST,
+}
+
+
+def status_code(status: GoalStatus) -> ActionGoalStatus.Status:
+    """Return the code of a status in ``Ros2 1.0``."""
+    return _CODES.get(status.value, _Status.Unknown)
+
+
+def comm_state_of(status: GoalStatus) -> ActionCommStates.State:
+    """Return the actionlib state that corresponds to the status of a ROS 2 goal."""
+    return _COMM.get(status.value, _Comm.WAITING_FOR_RESULT)
+
+
+def terminal_state_of(status: GoalStatus, executed: bool) -> ActionTerminalStates.State:
+    """Return actionlib's terminal state of a goal.
+
+    Args:
+        status: The goal's status.
+        executed: Whether it was executed; a goal cancelled before that was recalled.
+    """
+    if status.value == "canceled" and not executed:
+        return _Terminal.RECALLED
+    return _TERMINAL.get(status.value, _Terminal.UNKNOWN)
+
 
 #: Released when JavaScript collects a handle: PySide 6.11 never frees the Python half.
 _HELD = ("_goal", "_callbacks", "_forget", "_value", "_feedback", "_result", "_shown")

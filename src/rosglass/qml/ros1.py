@@ -17,7 +17,7 @@ from rosglass.interfaces.provider import workspace, workspace_variables
 from rosglass.qml.action_client import RosActionClient
 from rosglass.qml.action_server import RosActionServer, server_functions
 from rosglass.qml.dialect import Dialect, within_namespace
-from rosglass.qml.enums import ActionCommStates, ActionGoalStatus, ActionTerminalStates
+from rosglass.qml.goal_handle import ActionCommStates, ActionGoalStatus, ActionTerminalStates
 from rosglass.qml.image_publisher import RosImagePublisher
 from rosglass.qml.image_sinks import ImageItem
 from rosglass.qml.image_subscription import ImageTransportManager, ImageTransportSubscriber

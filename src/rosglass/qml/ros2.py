@@ -13,7 +13,7 @@ from rosglass.comm.time import Time
 from rosglass.errors import Error, InvalidNameError
 from rosglass.qml.action_client import ActionClient
 from rosglass.qml.action_server import ActionServer, server_functions
-from rosglass.qml.enums import ActionGoalStatus, ClockTypes
+from rosglass.qml.goal_handle import ActionGoalStatus
 from rosglass.qml.image_publisher import ImagePublisher
 from rosglass.qml.image_sinks import ImageItem
 from rosglass.qml.image_subscription import ImageTransportManager, ImageTransportSubscription
@@ -23,6 +23,7 @@ from rosglass.qml.message_item_model import MessageItemModel
 from rosglass.qml.parameter import Parameter
 from rosglass.qml.publisher import Publisher
 from rosglass.qml.replay import Replay
+from rosglass.qml.runtime import own_runtime
 from rosglass.qml.service_client import ServiceClient
 from rosglass.qml.service_server import ServiceServer, server_function
 from rosglass.qml.singleton import (
@@ -37,7 +38,7 @@ from rosglass.qml.synchronized_subscription import SynchronizedSubscription
 from rosglass.qml.tf_buffer import TfBuffer, TfTransformListener
 from rosglass.qml.tf_transform import TfBroadcaster, TfTransform
 from rosglass.qml.waiting import FOLDER_TIMEOUT_S, within
-from rosglass.qt import QJSValue, QtCore, Signal, Slot
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -51,6 +52,21 @@ _T = TypeVar("_T")
 _log = logging.getLogger("rosglass.qml")
 #: Package list of an install space; see ament's resource index, section "File System Index".
 _LIST = "share/ament_index/resource_index/packages"
+
+
+class ClockTypes(QtCore.QObject):
+    """Clock types, numbered as in rcl (``rcl_clock_type_t``).
+
+    Values of a time's ``clockType``, a property in the Qt 5 plugin and a function in the Qt 6 one.
+    """
+
+    def _get(self, number: int) -> QJSValue:
+        return own_runtime(self).clock(number)
+
+    Uninitialized = Property(QJSValue, lambda self: self._get(0), constant=True)
+    Ros = Property(QJSValue, lambda self: self._get(1), constant=True)
+    System = Property(QJSValue, lambda self: self._get(2), constant=True)
+    Steady = Property(QJSValue, lambda self: self._get(3), constant=True)
 
 
 class AmentIndex(QtCore.QObject):

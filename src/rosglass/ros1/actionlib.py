@@ -20,7 +20,7 @@ from rosglass.messages import ActionType, MessageType
 
 if TYPE_CHECKING:
     from rosglass.messages import Message
-    from rosglass.wires.tcpros.announced_types import AnnouncedTypes
+    from rosglass.wires.tcpros.core import AnnouncedTypes
     from rosglass.wires.tcpros.graph import Graph
 
 __all__ = [

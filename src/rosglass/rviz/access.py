@@ -1,4 +1,4 @@
-"""RViz's tools, displays, views, camera and config, for Python and for the object ``rviz``."""
+"""Tools, displays, views, camera and config of a 3D view, for Python and the object ``rviz``."""
 
 from __future__ import annotations
 
@@ -8,31 +8,38 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from rosglass.errors import Error
-from rosglass.qt import QtCore, Signal
-from rosglass.rviz.camera import Camera, Picker, RvizPicker
-from rosglass.rviz.displays import Displays
+from rosglass.qt import QtCore, Signal, Slot
+from rosglass.rviz.camera import Camera, RvizPicker
+from rosglass.rviz.displays import RvizDisplays
 from rosglass.rviz.host import Hook
-from rosglass.rviz.tools import Tools
+from rosglass.rviz.tools import RvizTools
 from rosglass.rviz.trackers import Frames, Trackers
-from rosglass.rviz.view import RvizCurrentView, RvizViews, View, Views
+from rosglass.rviz.view import RvizCurrentView, RvizViews, View
 from rosglass.rviz.window import config_file
 
 if TYPE_CHECKING:
     from rosglass.qml.session import Session
+    from rosglass.rviz.camera import Picker
+    from rosglass.rviz.displays import Displays
+    from rosglass.rviz.tools import Tools
+    from rosglass.rviz.view import Views
     from rosglass.rviz.window import Window
 
-__all__ = ["Access"]
+__all__ = ["Access", "RvizAccess"]
 
 _log = logging.getLogger("rosglass.rviz")
+#: Milliseconds over which the frame rate is measured.
+_MEASUREMENT_PERIOD_MS = 1000
 
 
 class Access(QtCore.QObject):
-    """The interface to RViz, ``Application.rviz``; use it in the GUI thread only.
+    """The seam to a 3D view; use it in the GUI thread only.
 
-    Its parts are created on first use.
+    docs/architecture.md, section 6, has the members. Derived classes have the parts, created on
+    first use, and the properties that only have a type here.
     """
 
-    #: RViz is about to draw.
+    #: The view is about to draw.
     before_frame = Signal()
     #: A config file was loaded, which replaces all displays, views and tools. Argument: its path.
     config_loaded = Signal(str)
@@ -45,10 +52,97 @@ class Access(QtCore.QObject):
     #: :attr:`frame_rate` has changed.
     frame_rate_changed = Signal()
 
+    if TYPE_CHECKING:
+
+        @property
+        def tools(self) -> Tools:
+            """The tools."""
+
+        @property
+        def displays(self) -> Displays:
+            """The displays."""
+
+        @property
+        def frames(self) -> Frames:
+            """The robot's coordinate frames."""
+
+        @property
+        def view(self) -> View:
+            """The camera."""
+
+        @property
+        def views(self) -> Views:
+            """The view types and the saved views."""
+
+        @property
+        def picker(self) -> Picker:
+            """Picking of 3D points, and screenshots."""
+
+        @property
+        def trackers(self) -> Trackers:
+            """Trackers of points in the 3D view."""
+
+        #: The frame in which everything is placed.
+        fixed_frame: str
+        #: Whether the window fills the screen.
+        fullscreen: bool
+        #: Whether only the 3D view is shown.
+        bare: bool
+
+    def __init__(self, parent: QtCore.QObject | None = None) -> None:
+        super().__init__(parent)
+        self._frame_rate, self._measured_since = 0.0, time.monotonic()
+        self._drawn_before = self._frames_drawn()
+        self._timer = QtCore.QTimer(self)
+        self._timer.setInterval(_MEASUREMENT_PERIOD_MS)
+        self._timer.timeout.connect(self._measure)
+        self._timer.start()
+
+    @property
+    def frame_rate(self) -> float:
+        """Frames drawn in the last second."""
+        return self._frame_rate
+
+    def load_config(self, file: str) -> None:
+        """Load a ``.rviz`` file from the event loop, after the current event.
+
+        Raises:
+            Error: The file is missing or is not an RViz config.
+        """
+        raise NotImplementedError(f"{type(self).__name__} must implement load_config()")
+
+    def save_config(self, file: str = "") -> None:
+        """Save a ``.rviz`` file, by default to the file it was loaded from.
+
+        Raises:
+            Error: The file cannot be written, or no config is loaded and no file is given.
+        """
+        raise NotImplementedError(f"{type(self).__name__} must implement save_config()")
+
+    def close(self) -> None:
+        """Stop observing the view and the robot; safe to call twice."""
+        self._timer.stop()
+
+    def _frames_drawn(self) -> int:
+        """Return how many frames were drawn so far."""
+        raise NotImplementedError(f"{type(self).__name__} must implement _frames_drawn()")
+
+    @Slot()
+    def _measure(self) -> None:
+        now, drawn = time.monotonic(), self._frames_drawn()
+        rate = max(drawn - self._drawn_before, 0) / max(now - self._measured_since, 0.001)
+        self._drawn_before, self._measured_since = drawn, now
+        if round(rate, 1) != self._frame_rate:
+            self._frame_rate = round(rate, 1)
+            self.frame_rate_changed.emit()
+
+
+class RvizAccess(Access):
+    """The interface to RViz, ``Application.rviz``."""
+
     def __init__(self, window: Window, session: Session) -> None:
+        self.window, self._session, self._frames = window, session, 0
         super().__init__()
-        self.window, self._session = window, session
-        self._frame_rate, self._frames_drawn, self._measured_since = 0.0, 0, time.monotonic()
         window.before_frame.connect(self._on_frame)
         window.config_loaded.connect(self.config_loaded)
         window.bare.changed.connect(self.bare_changed)
@@ -56,24 +150,20 @@ class Access(QtCore.QObject):
         window.fullscreen_changed.connect(
             lambda _: QtCore.QTimer.singleShot(0, self.fullscreen_changed.emit)
         )
-        self._timer = QtCore.QTimer(self)
-        self._timer.setInterval(1000)
-        self._timer.timeout.connect(self._measure)
-        self._timer.start()
         options = window.manager.getRootDisplayGroup().subProp("Global Options")
         # RViz has no signal for a changed fixed frame.
         self._hook = Hook(self.fixed_frame_changed.emit)
         self._hook.watch(options.subProp("Fixed Frame"), "changed()")
 
     @cached_property
-    def tools(self) -> Tools:
+    def tools(self) -> RvizTools:
         """RViz's tools."""
-        return Tools(self.window)
+        return RvizTools(self.window)
 
     @cached_property
-    def displays(self) -> Displays:
+    def displays(self) -> RvizDisplays:
         """RViz's displays."""
-        return Displays(self.window)
+        return RvizDisplays(self.window)
 
     @cached_property
     def frames(self) -> Frames:
@@ -90,12 +180,12 @@ class Access(QtCore.QObject):
         return view
 
     @cached_property
-    def views(self) -> Views:
+    def views(self) -> RvizViews:
         """The view types and the saved views."""
         return RvizViews(self.window)
 
     @cached_property
-    def picker(self) -> Picker:
+    def picker(self) -> RvizPicker:
         """Picking of 3D points, and screenshots."""
         return RvizPicker(self.window)
 
@@ -161,26 +251,16 @@ class Access(QtCore.QObject):
             raise Error("no config file is loaded; give the file to save to")
         self.window.save_config(file)
 
-    @property
-    def frame_rate(self) -> float:
-        """Frames that RViz drew in the last second."""
-        return self._frame_rate
-
     def close(self) -> None:
         """Stop observing RViz and the robot; safe to call twice."""
-        self._timer.stop()
+        super().close()
         for name, part in list(self.__dict__.items()):
             if name in ("displays", "frames"):
                 part.close()
 
-    def _on_frame(self) -> None:
-        self._frames_drawn += 1
-        self.before_frame.emit()
+    def _frames_drawn(self) -> int:
+        return self._frames
 
-    def _measure(self) -> None:
-        now = time.monotonic()
-        rate = round(self._frames_drawn / max(now - self._measured_since, 0.001), 1)
-        self._frames_drawn, self._measured_since = 0, now
-        if rate != self._frame_rate:
-            self._frame_rate = rate
-            self.frame_rate_changed.emit()
+    def _on_frame(self) -> None:
+        self._frames += 1
+        self.before_frame.emit()

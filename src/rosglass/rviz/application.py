@@ -17,10 +17,9 @@ from rosglass.qml.modules import import_folder
 from rosglass.qml.process import QuitOnSignal, close_network, end_process_within, require_display
 from rosglass.qml.session import Session
 from rosglass.qt import QtCore, run_event_loop
-from rosglass.ros1.options import Ros1Options
-from rosglass.ros1.remapping_arguments import Arguments
+from rosglass.ros1.options import Arguments, Ros1Options
 from rosglass.rviz import roscpp
-from rosglass.rviz.access import Access
+from rosglass.rviz.access import RvizAccess
 from rosglass.rviz.entries import Entries, OverlayMenu
 from rosglass.rviz.host import cpp_function, require_rviz
 from rosglass.rviz.lost_screen import LostScreen
@@ -175,7 +174,7 @@ class Application(Handle):
         self._screen = LostScreen(self.window.ids, [roscpp.shut_down, self._close_node])
         self.window.before_frame.connect(self._screen.check)
         #: Interface to RViz's tools, displays, views and camera.
-        self.rviz = Access(self.window, self.session)
+        self.rviz = RvizAccess(self.window, self.session)
         self.session.shared[ACCESS] = self.rviz
         #: The overlays, lowest first.
         self.overlays = Stack(self.window)

@@ -1,4 +1,4 @@
-"""RViz's displays: list, status, properties, adding and removing."""
+"""The displays of a 3D view, and of RViz: list, status, properties, adding and removing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rosglass.comm.names import similar
 from rosglass.errors import Error
 from rosglass.qt import QtCore, Signal
 from rosglass.rviz.host import Hook, address, as_pyside, class_of
-from rosglass.rviz.plugins import DISPLAY, PluginList, declared, require_class_id
+from rosglass.rviz.plugins import DISPLAY, Plugin, PluginList, declared
 from rosglass.rviz.properties import (
     child_properties,
     describe_properties,
@@ -20,21 +20,23 @@ from rosglass.rviz.property_values import shown
 from rosglass.rviz.tools import loading_error
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from rosglass.rviz.window import Window
 
-__all__ = ["Display", "Displays", "Status", "plain_name", "status_of"]
+__all__ = ["Display", "Displays", "RvizDisplays", "Status"]
 
 
 #: Milliseconds between checks for changes that RViz does not signal.
 _PERIOD_MS = 200
 _MAX_NAME_LENGTH = 1000
+#: Of a path in errors.
+_MAX_SHOWN = 120
 _SIGNALS = ("displayAdded(rviz::Display*)", "displayRemoved(rviz::Display*)")
 
 
 class Status(NamedTuple):
-    """The status of a display, or of RViz."""
+    """The status of a display, or of the 3D view."""
 
     #: ``ok``, ``warn`` or ``error``.
     level: str
@@ -42,49 +44,17 @@ class Status(NamedTuple):
     text: str
 
 
-def status_of(item: Any) -> Status:
-    """Return the status of a display; of RViz for the root display group."""
-    for index in range(item.numChildren()):
-        child = item.childAt(index)
-        if class_of(child) == "rviz::StatusList":
-            level = str(child.getName()).rpartition(":")[2].strip().lower()
-            each = [child.childAt(at) for at in range(child.numChildren())]
-            lines = [f"{one.getName()}: {one.getValue()}" for one in each]
-            return Status(level or "ok", "\n".join(lines))
-    return Status("ok", "")
+class Display(Plugin):
+    """One display, created by :class:`Displays`; name and class stay readable after removal.
 
+    Derived classes implement the methods that raise NotImplementedError here.
+    """
 
-class Display:
-    """One display, created by :class:`Displays`; name and class stay readable after removal."""
-
-    def __init__(self, owner: Displays, handle: Any) -> None:
-        self._owner = owner
-        #: RViz's display; None after removal.
-        self.handle: Any = handle
-        #: The class id, e.g. ``rviz/Grid``.
-        self.class_id = str(handle.getClassId())
-        self._state = self._read()
+    _REMOVED = "was removed; ask for it again"
 
     def _read(self) -> tuple[str, bool, Status]:
-        if self.handle is None:
-            return self._state
-        handle = self.handle
-        return str(handle.getName()), bool(handle.isEnabled()), status_of(handle)
-
-    def refresh(self) -> bool:
-        """Read the state from RViz; return whether it has changed."""
-        before, self._state = self._state, self._read()
-        return before != self._state
-
-    @property
-    def exists(self) -> bool:
-        """Whether RViz has not removed it."""
-        return self.handle is not None
-
-    @property
-    def at(self) -> int:
-        """Its address in memory; 0 after removal."""
-        return 0 if self.handle is None else address(self.handle)
+        """Return name, whether it is shown, and status."""
+        raise NotImplementedError(f"{type(self).__name__} must implement _read()")
 
     @property
     def name(self) -> str:
@@ -93,11 +63,12 @@ class Display:
         Raises:
             Error: When setting it: the name is not a line of text, or the display was removed.
         """
-        return self._read()[0]
+        return str(self._now()[0])
 
     @name.setter
     def name(self, name: str) -> None:
-        self.require().setName(plain_name(name))
+        self.require()
+        self._rename(_plain_name(name))
         self._owner.emit_changes()
 
     @property
@@ -107,25 +78,29 @@ class Display:
         Raises:
             Error: When setting it: the display was removed.
         """
-        return self.exists and self._read()[1]
+        return self.exists and bool(self._now()[1])
 
     @enabled.setter
     def enabled(self, enabled: bool) -> None:
-        self.require().setEnabled(enabled)
+        self.require()
+        self._enable(enabled)
         self._owner.emit_changes()
 
     @property
     def status(self) -> Status:
         """Its status; an error after removal."""
-        return self._read()[2] if self.exists else Status("error", f"{self.name} was removed")
+        if not self.exists:
+            return Status("error", f"{self.name} was removed")
+        status: Status = self._now()[2]
+        return status
 
     def properties(self) -> list[dict[str, Any]]:
-        """Return all its properties; see :func:`rosglass.rviz.properties.describe_properties`.
+        """Return all its properties as nested dicts; see `describe_properties` of RViz.
 
         Raises:
             Error: The display was removed.
         """
-        return describe_properties(self.require())
+        raise NotImplementedError(f"{type(self).__name__} must implement properties()")
 
     def get(self, path: str | Sequence[str]) -> Any:
         """Return the value of a property; see :func:`rosglass.rviz.properties.read_property`.
@@ -136,7 +111,8 @@ class Display:
         Raises:
             Error: The property does not exist, or the display was removed.
         """
-        return read_property(find_property(self.require(), path, self.name))
+        self.require()
+        return self._get(joined_path(path))
 
     def set(self, path: str | Sequence[str], value: Any) -> None:
         """Change a property; see :func:`rosglass.rviz.properties.write_property`.
@@ -149,49 +125,196 @@ class Display:
             Error: The property does not exist, does not accept the value, or the display was
                 removed.
         """
-        found = find_property(self.require(), path, self.name)
-        write_property(found, value, f"{self.name}/{path}")
+        self.require()
+        self._set(joined_path(path), value)
         self._owner.emit_changes()
 
-    def remove(self) -> None:
-        """Remove the display from RViz.
+    def _rename(self, name: str) -> None:
+        raise NotImplementedError(f"{type(self).__name__} must implement _rename()")
+
+    def _enable(self, enabled: bool) -> None:
+        raise NotImplementedError(f"{type(self).__name__} must implement _enable()")
+
+    def _get(self, path: str) -> Any:
+        raise NotImplementedError(f"{type(self).__name__} must implement _get()")
+
+    def _set(self, path: str, value: Any) -> None:
+        raise NotImplementedError(f"{type(self).__name__} must implement _set()")
+
+
+class Displays(PluginList):
+    """The displays of a 3D view, including those in groups.
+
+    `changed` reports a new name, a new status, and showing or hiding. Derived classes implement
+    the methods that raise NotImplementedError here.
+    """
+
+    NOUN, EXAMPLE = "display", "rviz/Grid"
+
+    #: :attr:`status` has changed.
+    status_changed = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._status: Status | None = None
+
+    @property
+    def status(self) -> Status:
+        """The view's own status, e.g. an error for an unknown fixed frame."""
+        raise NotImplementedError(f"{type(self).__name__} must implement status")
+
+    def find(self, name: str) -> Display | None:
+        """Return the first display with the given name; None if there is none."""
+        return next((display for display in self._items if display.name == name), None)
+
+    def get(self, path: str | Sequence[str]) -> Any:
+        """Return the value of a property of any display, or of the view.
+
+        Args:
+            path: Path of the property, e.g. ``Grid/Color`` or ``Global Options/Background Color``.
+
+        Raises:
+            Error: The property does not exist.
+        """
+        display, rest = self._split(joined_path(path))
+        return self._get_option(rest) if display is None else display.get(rest)
+
+    def set(self, path: str | Sequence[str], value: Any) -> None:
+        """Change a property of any display, or of the view; see :meth:`get`.
+
+        Raises:
+            Error: The property does not exist, or does not accept the value.
+        """
+        display, rest = self._split(joined_path(path))
+        if display is None:
+            self._set_option(rest, value)
+            self.emit_changes()
+        else:
+            display.set(rest, value)
+
+    def options(self) -> list[dict[str, Any]]:
+        """Return the view's global options as nested dicts; see `describe_properties` of RViz."""
+        raise NotImplementedError(f"{type(self).__name__} must implement options()")
+
+    def _split(self, path: str) -> tuple[Display | None, str]:
+        """Return the display of a path and the path below it; None for one of the view.
+
+        Raises:
+            Error: Neither a display nor a property of the view has the first name.
+        """
+        for display in self._items:
+            if path.startswith(f"{display.name}/"):
+                return display, path[len(display.name) + 1 :]
+        first, _, below = path.partition("/")
+        found = self.find(first)
+        if found is not None and not below:
+            own = next((one["name"] for one in found.properties()), "Alpha")
+            example = f"{first}/{own}"
+            raise Error(f"{first!r} is a display; name one of its properties, e.g. {example!r}")
+        known = [*self._option_names(), *(display.name for display in self._items)]
+        if first not in known:
+            hint = similar(first, known) or f"; there are: {', '.join(known)}"
+            raise Error(f"nothing in the Displays panel is called {shown(first)}{hint}")
+        return None, path
+
+    def add(self, class_id: str, name: str = "", *, enabled: bool = True) -> Display:
+        """Append a display.
+
+        Args:
+            class_id: RViz's class id, e.g. ``rviz/Grid``.
+            name: Its name; by default the class name.
+            enabled: Whether to show it.
+
+        Raises:
+            Error: The class does not exist, or could not be loaded.
+        """
+        class_id = self._require_class_id(class_id)
+        title = _plain_name(name) if name else class_id.rpartition("/")[2]
+        made: Display = self._item_of(self._add(class_id, title, enabled))
+        self.emit_changes()
+        return made
+
+    def remove(self, display: Display) -> None:
+        """Remove a display, and if it is a group, the displays in it.
 
         Raises:
             Error: It was removed before.
         """
-        self._owner.remove(self)
+        self._remove(display.require())
+        self.emit_changes()
 
-    def require(self) -> Any:
-        """Return RViz's display.
+    def close(self) -> None:
+        """Stop checking for changes; safe to call twice."""
+
+    def _option_names(self) -> Iterable[str]:
+        """Return the names of the view's properties at the top of the panel."""
+        raise NotImplementedError(f"{type(self).__name__} must implement _option_names()")
+
+    def _get_option(self, path: str) -> Any:
+        raise NotImplementedError(f"{type(self).__name__} must implement _get_option()")
+
+    def _set_option(self, path: str, value: Any) -> None:
+        raise NotImplementedError(f"{type(self).__name__} must implement _set_option()")
+
+    def _add(self, class_id: str, name: str, enabled: bool) -> Any:
+        """Append a display and return its handle."""
+        raise NotImplementedError(f"{type(self).__name__} must implement _add()")
+
+    def _remove(self, handle: Any) -> None:
+        raise NotImplementedError(f"{type(self).__name__} must implement _remove()")
+
+    def _sync_rest(self) -> Callable[[], None]:
+        before, self._status = self._status, self.status
+        return self.status_changed.emit if self._status != before else lambda: None
+
+
+class RvizDisplay(Display):
+    """One display of RViz."""
+
+    _REMOVED = "was removed or moved; ask for it again"
+
+    def __init__(self, owner: RvizDisplays, handle: Any) -> None:
+        super().__init__(owner, handle, str(handle.getClassId()))
+
+    def _read(self) -> tuple[str, bool, Status]:
+        handle = self.handle
+        return str(handle.getName()), bool(handle.isEnabled()), _status_of(handle)
+
+    def properties(self) -> list[dict[str, Any]]:
+        """Return all its properties; see :func:`rosglass.rviz.properties.describe_properties`.
 
         Raises:
-            Error: It was removed.
+            Error: The display was removed.
         """
-        if self.handle is None:
-            raise Error(f"the display {self.name} was removed or moved; ask for it again")
-        return self.handle
+        return describe_properties(self.require())
+
+    def _rename(self, name: str) -> None:
+        self.handle.setName(name)
+
+    def _enable(self, enabled: bool) -> None:
+        self.handle.setEnabled(enabled)
+
+    def _get(self, path: str) -> Any:
+        return read_property(find_property(self.handle, path, self.name))
+
+    def _set(self, path: str, value: Any) -> None:
+        name = f"{self.name}/{path}"[:_MAX_SHOWN]
+        write_property(find_property(self.handle, path, self.name), value, name)
 
 
-class Displays(PluginList):
-    """The displays of an RViz, including those in groups.
+class RvizDisplays(Displays):
+    """The displays of an RViz.
 
-    `changed` reports a new name, a new status, and showing or hiding. A display that the user
-    drags to another group is removed and added again.
+    A display that the user drags to another group is removed and added again.
     """
-
-    #: :attr:`status` has changed.
-    status_changed = Signal()
 
     def __init__(self, window: Window) -> None:
         super().__init__()
         self._window = window
         self._hook = Hook(self._on_change)
         self._root = window.manager.getRootDisplayGroup()
-        self._items: list[Display]
-        self._status = status_of(self._root)
         self._groups: set[int] = set()
-        self._sync_items()
-        self._known = list(self._items)
+        self._start()
         self._timer = QtCore.QTimer(self)
         self._timer.setInterval(_PERIOD_MS)
         self._timer.timeout.connect(self.emit_changes)
@@ -205,94 +328,35 @@ class Displays(PluginList):
     @property
     def status(self) -> Status:
         """RViz's own status, e.g. an error for an unknown fixed frame."""
-        return status_of(self._root)
-
-    def find(self, name: str) -> Display | None:
-        """Return the first display with the given name; None if there is none."""
-        return next((display for display in self._items if display.name == name), None)
-
-    def get(self, path: str | Sequence[str]) -> Any:
-        """Return the value of a property of any display, or of RViz.
-
-        Args:
-            path: Path of the property, e.g. ``Grid/Color`` or ``Global Options/Background Color``.
-
-        Raises:
-            Error: The property does not exist.
-        """
-        return read_property(self._find_property(path))
-
-    def set(self, path: str | Sequence[str], value: Any) -> None:
-        """Change a property of any display, or of RViz; see :meth:`get`.
-
-        Raises:
-            Error: The property does not exist, or does not accept the value.
-        """
-        names = path if isinstance(path, str) else "/".join(map(str, path))
-        write_property(self._find_property(names), value, names[:120])
-        self.emit_changes()
+        return _status_of(self._root)
 
     def options(self) -> list[dict[str, Any]]:
         """Return RViz's global options; see `describe_properties`."""
         return describe_properties(self._root)
 
-    def _find_property(self, path: str | Sequence[str]) -> Any:
-        names = path if isinstance(path, str) else "/".join(map(str, path))
-        for display in self._items:
-            if names.startswith(f"{display.name}/"):
-                rest = names[len(display.name) + 1 :]
-                return find_property(display.require(), rest, display.name)
-        self._require_known(names)
-        return find_property(self._root, names, "RViz")
+    def close(self) -> None:
+        """Stop checking for changes; safe to call twice."""
+        self._timer.stop()
 
-    def _require_known(self, path: str) -> None:
-        """Raise an Error if no display or property of RViz has the first name of a path."""
-        first, _, below = path.partition("/")
-        displays = [display.name for display in self._items]
-        known = [*(str(c.getName()) for c in child_properties(self._root)), *displays]
-        display = self.find(first)
-        if display is not None and not below:
-            example = f"{first}/{next(child_properties(display.handle)).getName()}"
-            raise Error(f"{first!r} is a display; name one of its properties, e.g. {example!r}")
-        if first not in known:
-            hint = similar(first, known) or f"; there are: {', '.join(known)}"
-            raise Error(f"nothing in the Displays panel is called {shown(first)}{hint}")
+    def _option_names(self) -> Iterable[str]:
+        return (str(child.getName()) for child in child_properties(self._root))
 
-    def add(self, class_id: str, name: str = "", *, enabled: bool = True) -> Display:
-        """Append a display.
+    def _get_option(self, path: str) -> Any:
+        return read_property(find_property(self._root, path, "RViz"))
 
-        Args:
-            class_id: Class id, e.g. ``rviz/Grid``.
-            name: Its name; by default the class name.
-            enabled: Whether to show it.
+    def _set_option(self, path: str, value: Any) -> None:
+        write_property(find_property(self._root, path, "RViz"), value, path[:_MAX_SHOWN])
 
-        Raises:
-            Error: The class does not exist, or could not be loaded.
-        """
-        class_id = require_class_id(class_id, DISPLAY)
-        shown = plain_name(name) if name else class_id.rpartition("/")[2]
-        handle = self._window.manager.createDisplay(class_id, shown, enabled)
+    def _add(self, class_id: str, name: str, enabled: bool) -> Any:
+        handle = self._window.manager.createDisplay(class_id, name, enabled)
         text = loading_error(handle, class_id, DISPLAY)
         if text:
-            self._delete(handle)
+            self._remove(handle)
             self.emit_changes()
             raise Error(f"no display was added: {text}")
-        self._sync_items()
-        at = address(handle)
-        made = next(display for display in self._items if display.at == at)
-        self.emit_changes()
-        return made
+        return handle
 
-    def remove(self, display: Display) -> None:
-        """Remove a display, and if it is a group, the displays in it.
-
-        Raises:
-            Error: It was removed before.
-        """
-        self._delete(display.require())
-        self.emit_changes()
-
-    def _delete(self, handle: Any) -> None:
+    def _remove(self, handle: Any) -> None:
         self._window.flush_panels()
         wrapped = as_pyside(handle, QtCore.QObject)
         # Like RViz's panel: delete it later, because other threads may have emitted its signals.
@@ -300,28 +364,36 @@ class Displays(PluginList):
         handle.getParent().takeChild(handle)
         wrapped.deleteLater()
 
-    def _sync_rest(self) -> Callable[[], None]:
-        before, self._status = self._status, self.status
-        return self.status_changed.emit if self._status != before else lambda: None
+    def _key(self, handle: Any) -> int:
+        return address(handle)
 
-    def close(self) -> None:
-        """Stop checking for changes; safe to call twice."""
-        self._timer.stop()
+    def _create(self, handle: Any) -> Display:
+        return RvizDisplay(self, handle)
 
-    def _sync_items(self) -> None:
-        known = {display.at: display for display in self._items}
+    def _handles(self) -> list[Any]:
         found, groups = [], set()
         for handle, is_group in _walk(self._root):
-            at = address(handle)
             if handle is not self._root:
-                found.append(known.pop(at) if at in known else Display(self, handle))
+                found.append(handle)
             if is_group:
+                at = address(handle)
                 groups.add(at)
                 if at not in self._groups:
                     self._hook.watch(handle, *_SIGNALS)
-        self._items, self._groups = found, groups
-        for display in known.values():
-            display.handle = None
+        self._groups = groups
+        return found
+
+
+def _status_of(item: Any) -> Status:
+    """Return the status of a display of RViz; of RViz for the root display group."""
+    for index in range(item.numChildren()):
+        child = item.childAt(index)
+        if class_of(child) == "rviz::StatusList":
+            level = str(child.getName()).rpartition(":")[2].strip().lower()
+            each = [child.childAt(at) for at in range(child.numChildren())]
+            lines = [f"{one.getName()}: {one.getValue()}" for one in each]
+            return Status(level or "ok", "\n".join(lines))
+    return Status("ok", "")
 
 
 def _walk(group: Any) -> Iterator[tuple[Any, bool]]:
@@ -335,7 +407,7 @@ def _walk(group: Any) -> Iterator[tuple[Any, bool]]:
             yield group.getDisplayAt(index), False
 
 
-def plain_name(name: object) -> str:
+def _plain_name(name: object) -> str:
     """Return the name of a display unchanged.
 
     Raises:
@@ -349,3 +421,8 @@ def plain_name(name: object) -> str:
     ):
         return name
     raise Error(f"expected a name, a text of one line, got {shown(name)}")
+
+
+def joined_path(path: str | Sequence[str]) -> str:
+    """Return a path that is given as a text or as a list of names as a text."""
+    return path if isinstance(path, str) else "/".join(map(str, path))

@@ -1,15 +1,15 @@
-"""RViz's tools: list, selection, adding and removing."""
+"""The tools of a 3D view, and of RViz: list, selection, adding and removing."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.names import similar
-from rosglass.errors import Error
+from rosglass.errors import Error, UnsupportedError
 from rosglass.qt import Signal
 from rosglass.rviz.host import Hook, address, mangled_class_of, pyqt
 from rosglass.rviz.overlay import QML_CLASS, REFERENCE_QML_CLASS
-from rosglass.rviz.plugins import DISPLAY, TOOL, PluginList, declared, require_class_id
+from rosglass.rviz.plugins import DISPLAY, TOOL, Plugin, PluginList, declared
 from rosglass.rviz.qt5 import QtGui
 
 if TYPE_CHECKING:
@@ -17,50 +17,39 @@ if TYPE_CHECKING:
 
     from rosglass.rviz.window import Window
 
-__all__ = ["Tool", "Tools", "loading_error"]
+__all__ = ["RvizTools", "Tool", "Tools", "loading_error"]
 
 #: RViz's placeholder classes for tools and displays that could not be loaded.
 _FAILED = ("N4rviz10FailedToolE", "N4rviz13FailedDisplayE")
 
 
-class Tool:
-    """One tool, created by :class:`Tools`; its members stay readable after removal."""
+class Tool(Plugin):
+    """One tool, created by :class:`Tools`; its members stay readable after removal.
 
-    def __init__(self, owner: Tools, handle: Any) -> None:
-        self._owner = owner
-        #: RViz's tool; None after removal.
-        self.handle: Any = handle
-        #: The class id, e.g. ``rviz/Measure``; not unique.
-        self.class_id = str(handle.getClassId())
-        key = str(handle.getShortcutKey())
-        #: The key that selects it, e.g. ``m``; empty for none.
-        self.shortcut_key = "" if key == "\0" else key
-        self._name = str(handle.getName())
-        self._description = ""
-        self.refresh()
+    Args:
+        owner: The list.
+        handle: What the 3D view has.
+        class_id: RViz's class id, e.g. ``rviz/Measure``; not unique.
+        shortcut_key: The key that selects it, e.g. ``m``; empty for none.
+    """
 
-    def refresh(self) -> bool:
-        """Read name and description from RViz; return whether they have changed."""
-        before = (self._name, self._description)
-        if self.handle is not None:
-            self._name = str(self.handle.getName())
-            self._description = " ".join(str(self.handle.getDescription()).split())
-        return before != (self._name, self._description)
+    def __init__(self, owner: Tools, handle: Any, class_id: str, shortcut_key: str) -> None:
+        self.shortcut_key = shortcut_key
+        super().__init__(owner, handle, class_id)
 
-    @property
-    def exists(self) -> bool:
-        """Whether RViz has not removed it."""
-        return self.handle is not None
+    def _read(self) -> tuple[str, str]:
+        """Return name and description."""
+        raise NotImplementedError(f"{type(self).__name__} must implement _read()")
 
     @property
     def name(self) -> str:
         """The text of its button; not unique."""
-        return self._name
+        return str(self._state[0])
 
     @property
     def description(self) -> str:
         """Description of the tool."""
-        return self._description
+        return str(self._state[1])
 
     @property
     def selected(self) -> bool:
@@ -75,13 +64,104 @@ class Tool:
         """
         self._owner.select(self)
 
-    def remove(self) -> None:
-        """Remove the tool from RViz.
+    def picture(self) -> Any:
+        """Return its icon, a ``QPixmap``; a null pixmap if it has none."""
+        raise NotImplementedError(f"{type(self).__name__} must implement picture()")
+
+
+class Tools(PluginList):
+    """The tools of a 3D view; `changed` reports a new name or description.
+
+    Derived classes also implement :meth:`_select`, :meth:`_add` and :meth:`_remove`.
+    """
+
+    NOUN, EXAMPLE = "tool", "rviz/Measure"
+
+    #: Another tool was selected.
+    selected = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._known_current: Tool | None = None
+
+    @property
+    def current(self) -> Tool | None:
+        """The selected tool; None if there is none."""
+        raise NotImplementedError(f"{type(self).__name__} must implement current")
+
+    def find(self, class_id: str) -> Tool | None:
+        """Return the first tool of a class; None if there is none."""
+        return next((tool for tool in self._items if tool.class_id == class_id), None)
+
+    def select(self, tool: Tool) -> None:
+        """Select a tool.
 
         Raises:
             Error: It was removed.
         """
-        self._owner.remove(self)
+        tool.require()
+        self._select(tool)
+        self.emit_changes()
+
+    def add(self, class_id: str) -> Tool:
+        """Add a tool.
+
+        Args:
+            class_id: RViz's class id, e.g. ``rviz/Measure``.
+
+        Raises:
+            Error: The class does not exist, or could not be loaded.
+        """
+        made: Tool = self._item_of(self._add(self._require_class_id(class_id)))
+        self.emit_changes()
+        return made
+
+    def ask_for_new(self) -> None:
+        """Open a dialog for adding a tool, from the event loop.
+
+        Raises:
+            UnsupportedError: There is none.
+        """
+        raise UnsupportedError("there is no dialog for adding tools; give addTool() a class id")
+
+    def remove(self, tool: Tool) -> None:
+        """Remove a tool; if it was selected, the first one is selected.
+
+        Raises:
+            Error: It was removed before.
+        """
+        tool.require()
+        self._remove(tool)
+        self.emit_changes()
+
+    def remove_all(self) -> None:
+        """Remove all tools."""
+        raise NotImplementedError(f"{type(self).__name__} must implement remove_all()")
+
+    def _select(self, tool: Tool) -> None:
+        raise NotImplementedError(f"{type(self).__name__} must implement _select()")
+
+    def _add(self, class_id: str) -> Any:
+        """Add a tool and return its handle."""
+        raise NotImplementedError(f"{type(self).__name__} must implement _add()")
+
+    def _remove(self, tool: Tool) -> None:
+        raise NotImplementedError(f"{type(self).__name__} must implement _remove()")
+
+    def _sync_rest(self) -> Callable[[], None]:
+        before, self._known_current = self._known_current, self.current
+        return self.selected.emit if self._known_current is not before else lambda: None
+
+
+class RvizTool(Tool):
+    """One tool of RViz."""
+
+    def __init__(self, owner: RvizTools, handle: Any) -> None:
+        key = str(handle.getShortcutKey())
+        super().__init__(owner, handle, str(handle.getClassId()), "" if key == "\0" else key)
+
+    def _read(self) -> tuple[str, str]:
+        return str(self.handle.getName()), " ".join(str(self.handle.getDescription()).split())
 
     def picture(self) -> Any:
         """Return the largest size of its icon, a ``QPixmap``; a null pixmap if it has no icon."""
@@ -103,23 +183,17 @@ class Tool:
         return None if self.handle is None else self.handle.getIcon()
 
 
-class Tools(PluginList):
-    """The tools of an RViz; `changed` reports a new name or description."""
-
-    #: Another tool was selected.
-    selected = Signal()
+class RvizTools(Tools):
+    """The tools of an RViz."""
 
     def __init__(self, window: Window) -> None:
         super().__init__()
         self._window = window
         self._hook = Hook(self._on_change)
         self._manager = window.manager.getToolManager()
-        self._items: list[Tool]
-        self._known_current: Tool | None = None
         signals = ("toolAdded(Tool*)", "toolRemoved(Tool*)", "toolChanged(Tool*)")
         self._hook.watch(self._manager, *signals, "toolRefreshed(Tool*)")
-        self._sync_items()
-        self._known, self._known_current = list(self._items), self.current
+        self._start()
 
     @property
     def classes(self) -> list[str]:
@@ -135,76 +209,40 @@ class Tools(PluginList):
         at = address(handle)
         return next((t for t in self._items if t.exists and address(t.handle) == at), None)
 
-    def find(self, class_id: str) -> Tool | None:
-        """Return the first tool of a class; None if there is none."""
-        return next((tool for tool in self._items if tool.class_id == class_id), None)
-
-    def select(self, tool: Tool) -> None:
-        """Select a tool.
-
-        Raises:
-            Error: It was removed.
-        """
-        self._manager.setCurrentTool(self._handle(tool))
-        self.emit_changes()
-
-    def add(self, class_id: str) -> Tool:
-        """Add a tool.
-
-        Raises:
-            Error: The class does not exist, or could not be loaded.
-        """
-        class_id = require_class_id(class_id, TOOL)
-        handle = self._manager.addTool(class_id)
-        text = loading_error(handle, class_id, TOOL)
-        made = next(tool for tool in reversed(self._items) if tool.handle is not None)
-        if text:
-            self._manager.removeTool(self._manager.numTools() - 1)
-            self.emit_changes()
-            raise Error(f"no tool was added: {text}")
-        self.emit_changes()
-        return made
-
     def ask_for_new(self) -> None:
         """Open RViz's dialog for adding a tool, from the event loop."""
         core = pyqt()
         frame, queued = self._window.frame, core.Qt.QueuedConnection
         core.QMetaObject.invokeMethod(frame, "openNewToolDialog", queued)
 
-    def remove(self, tool: Tool) -> None:
-        """Remove a tool; if it was selected, RViz selects its first one.
-
-        Raises:
-            Error: It was removed before.
-        """
-        self._handle(tool)
-        self._manager.removeTool(self._items.index(tool))
-        self.emit_changes()
-
     def remove_all(self) -> None:
         """Remove all tools; the mouse does nothing in the 3D view until one is added."""
         self._manager.removeAll()
         self.emit_changes()
 
-    def _sync_rest(self) -> Callable[[], None]:
-        before, self._known_current = self._known_current, self.current
-        return self.selected.emit if self._known_current is not before else lambda: None
+    def _handles(self) -> list[Any]:
+        return [self._manager.getTool(index) for index in range(self._manager.numTools())]
 
-    def _handle(self, tool: Tool) -> Any:
-        if tool.handle is None or tool not in self._items:
-            raise Error(f"the tool {tool.name} was removed")
-        return tool.handle
+    def _key(self, handle: Any) -> int:
+        return address(handle)
 
-    def _sync_items(self) -> None:
-        manager = self._manager
-        handles = [manager.getTool(index) for index in range(manager.numTools())]
-        known = {address(tool.handle): tool for tool in self._items}
-        self._items = [
-            known.pop(address(handle)) if address(handle) in known else Tool(self, handle)
-            for handle in handles
-        ]
-        for removed in known.values():
-            removed.handle = None
+    def _create(self, handle: Any) -> Tool:
+        return RvizTool(self, handle)
+
+    def _select(self, tool: Tool) -> None:
+        self._manager.setCurrentTool(tool.handle)
+
+    def _add(self, class_id: str) -> Any:
+        handle = self._manager.addTool(class_id)
+        text = loading_error(handle, class_id, TOOL)
+        if text:
+            self._manager.removeTool(self._manager.numTools() - 1)
+            self.emit_changes()
+            raise Error(f"no tool was added: {text}")
+        return handle
+
+    def _remove(self, tool: Tool) -> None:
+        self._manager.removeTool(self._items.index(tool))
 
 
 def loading_error(handle: Any, class_id: str, base: str) -> str:

@@ -1,4 +1,4 @@
-"""The seam by which overlays know a scene: the members of RViz's ``Access``, over a ``SceneView``.
+"""The seam by which overlays know a scene: :class:`rosglass.rviz.access.Access` over a view.
 
 QML that was written for overlays over RViz runs unchanged over a scene: the object ``rviz`` is the
 same. docs/architecture.md, section 6, has the members. Class ids are those of RViz 1, as these
@@ -8,26 +8,26 @@ interfaces know them (``rviz/Grid``); those of RViz 2 are accepted as well.
 from __future__ import annotations
 
 import logging
-import time
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from PySide6.QtQuick import QQuickWindow
 
 from rosglass.comm.names import similar
-from rosglass.errors import Error, UnsupportedError
+from rosglass.errors import Error
 from rosglass.qml.image_sinks import window_of
 from rosglass.qml.modules import locate
 from rosglass.qml.runtime import runtime_of
-from rosglass.qt import QtCore, QtGui, Signal, Slot, is_alive
+from rosglass.qt import QtCore, QtGui, Slot, is_alive
+from rosglass.rviz import displays, tools
+from rosglass.rviz.access import Access
 from rosglass.rviz.camera import Picker
 from rosglass.rviz.orbit import Orbit, Point
-from rosglass.rviz.plugins import PluginList
-from rosglass.rviz.property_values import shown
+from rosglass.rviz.property_values import KINDS
 from rosglass.rviz.trackers import Frames, Trackers
 from rosglass.rviz.view import CurrentView, View, Views
-from rosglass.scene.access_displays import SceneDisplays
 from rosglass.scene.rviz_config import RvizConfig, ViewConfig
+from rosglass.scene.rviz_formats import DISPLAYS as DISPLAY_IDS
 from rosglass.scene.rviz_formats import TOOLS as TOOL_IDS
 from rosglass.scene.rviz_formats import VIEWS as VIEW_IDS
 from rosglass.scene.rviz_formats import class_id_of, display_type, tool_type, view_type
@@ -35,9 +35,12 @@ from rosglass.scene.tools import Tools
 from rosglass.scene.views import VIEWS, TopDownOrthoView, create_view
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from rosglass.qml.session import Session
+    from rosglass.rviz.property_values import Kind
+    from rosglass.scene.display import Display
+    from rosglass.scene.scene import Scene
     from rosglass.scene.scene_view import SceneView
     from rosglass.scene.tools import Tool
 
@@ -47,6 +50,7 @@ _log = logging.getLogger("rosglass.scene")
 #: Directions in which a pick looks around, and the shares of its radius.
 _AROUND = [(1, 0), (-1, 0), (0, 1), (0, -1), (0.7, 0.7), (-0.7, 0.7), (0.7, -0.7), (-0.7, -0.7)]
 _RINGS = (0.34, 0.67, 1.0)
+_OPTIONS = "Global Options"
 #: Size of a tool's icon in pixels.
 _ICON_PX = 48
 
@@ -57,46 +61,28 @@ def access_of(view: SceneView) -> SceneAccess:
     return found or SceneAccess(view)
 
 
-class SceneAccess(QtCore.QObject):
-    """The interface of overlays to a scene; use it in the GUI thread only.
+class SceneAccess(Access):
+    """The interface of overlays to a scene.
 
-    Its parts are created on first use.
+    `before_frame` also reports that something that the view follows has moved.
 
     Args:
         view: The view.
     """
 
-    #: The view is about to draw, or what it follows has moved.
-    before_frame = Signal()
-    #: A config file was loaded, which replaces all displays. Argument: its path.
-    config_loaded = Signal(str)
-    #: :attr:`fullscreen` has changed.
-    fullscreen_changed = Signal()
-    #: :attr:`bare` has changed.
-    bare_changed = Signal()
-    #: :attr:`fixed_frame` has changed.
-    fixed_frame_changed = Signal()
-    #: :attr:`frame_rate` has changed.
-    frame_rate_changed = Signal()
-
     def __init__(self, view: SceneView) -> None:
-        super().__init__(view)
         self.scene_view = view
+        super().__init__(view)
         self._bare = self._full = False
         self._window: QQuickWindow | None = None
         #: Whether the window is about to draw.
         self.is_drawing = False
-        self._frame_rate, self._drawn, self._measured_since = 0.0, view.frames_drawn, _now()
         view.windowChanged.connect(self._on_window)
         view.sceneChanged.connect(self._watch_scene)
         self._watch_scene()
         view.fixedFrameChanged.connect(self.fixed_frame_changed)
         view.configLoading.connect(self._on_config_loading)
         view.configLoaded.connect(self.config_loaded)
-        self._timer = QtCore.QTimer(self)
-        self._timer.setInterval(1000)
-        self._timer.timeout.connect(self._measure)
-        self._timer.start()
         self._on_window(window_of(view))
         parts = self.__dict__
         view.destroyed.connect(lambda *_: _close_parts(parts))
@@ -193,11 +179,6 @@ class SceneAccess(QtCore.QObject):
             self._bare = bare
             self.bare_changed.emit()
 
-    @property
-    def frame_rate(self) -> float:
-        """Pictures that were drawn in the last second; a view at rest draws none."""
-        return self._frame_rate
-
     def load_config(self, file: str) -> None:
         """Load a ``.rviz`` file from the event loop, after the current event.
 
@@ -235,7 +216,7 @@ class SceneAccess(QtCore.QObject):
 
     def close(self) -> None:
         """Stop observing the view and the robot; safe to call twice."""
-        self._timer.stop()
+        super().close()
         _close_parts(self.__dict__)
 
     # The view's events.
@@ -284,14 +265,12 @@ class SceneAccess(QtCore.QObject):
         if "view" in self.__dict__:
             self.view.end_motion()
 
+    def _frames_drawn(self) -> int:
+        return self.scene_view.frames_drawn
+
     @Slot()
     def _measure(self) -> None:
-        now, drawn = _now(), self.scene_view.frames_drawn
-        rate = round(max(drawn - self._drawn, 0) / max(now - self._measured_since, 0.001), 1)
-        self._drawn, self._measured_since = drawn, now
-        if rate != self._frame_rate:
-            self._frame_rate = rate
-            self.frame_rate_changed.emit()
+        super()._measure()
         if "displays" in self.__dict__:
             self.displays.emit_changes()
 
@@ -300,10 +279,6 @@ def _close_parts(parts: dict[str, Any]) -> None:
     for name in ("displays", "frames", "view"):
         if name in parts:
             parts[name].close()
-
-
-def _now() -> float:
-    return time.monotonic()
 
 
 class SceneCamera:
@@ -473,66 +448,16 @@ class ScenePicker(Picker):
         return window.grabWindow()
 
 
-class SceneTool:
-    """One tool, created by :class:`SceneTools`; its members stay readable after removal.
-
-    It has the members of :class:`rosglass.rviz.tools.Tool`, which has their descriptions.
-    """
+class SceneTool(tools.Tool):
+    """One tool of a scene's view."""
 
     def __init__(self, owner: SceneTools, tool: Tool) -> None:
-        self._owner = owner
-        #: The tool; None after removal.
-        self.tool: Tool | None = tool
-        #: RViz 1's class id, e.g. ``rviz/Measure``.
-        self.class_id = (
-            TOOL_IDS.get(tool.TYPE, ("", ""))[0] or tool.class_id or f"rosglass/{tool.name}"
-        )
-        self.shortcut_key = str(tool.shortcutKey)
-        self._state = ("", "")
-        self.refresh()
+        class_id = TOOL_IDS.get(tool.TYPE, ("", ""))[0] or tool.class_id or f"rosglass/{tool.name}"
+        super().__init__(owner, tool, class_id, str(tool.shortcutKey))
 
-    def refresh(self) -> bool:
-        """Read name and description; return whether they have changed."""
-        before, tool = self._state, self.tool
-        if tool is not None and is_alive(tool):
-            self._state = (tool.name, tool.description)
-        return before != self._state
-
-    @property
-    def exists(self) -> bool:
-        """Whether it was not removed."""
-        return self.tool is not None
-
-    @property
-    def name(self) -> str:
-        """The text of its button; not unique."""
-        return self._state[0]
-
-    @property
-    def description(self) -> str:
-        """Description of the tool."""
-        return self._state[1]
-
-    @property
-    def selected(self) -> bool:
-        """Whether it is the selected tool."""
-        return self.exists and self._owner.current is self
-
-    def select(self) -> None:
-        """Select the tool.
-
-        Raises:
-            Error: It was removed.
-        """
-        self._owner.select(self)
-
-    def remove(self) -> None:
-        """Remove the tool.
-
-        Raises:
-            Error: It was removed before.
-        """
-        self._owner.remove(self)
+    def _read(self) -> tuple[str, str]:
+        tool = self.handle
+        return (tool.name, tool.description) if is_alive(tool) else self._state
 
     def picture(self) -> Any:
         """Return its icon, a ``QPixmap``: the first letters of its name's words."""
@@ -555,20 +480,15 @@ class SceneTool:
         return picture
 
 
-class SceneTools(PluginList):
-    """The tools of a view; it has the members of :class:`rosglass.rviz.tools.Tools`."""
-
-    #: Another tool was selected.
-    selected = Signal()
+class SceneTools(tools.Tools):
+    """The tools of a scene's view."""
 
     def __init__(self, view: SceneView) -> None:
         super().__init__()
         self._view, self._tools = view, view.tools
-        self._items: list[SceneTool]
-        self._sync_items()
-        self._known, self._known_current = list(self._items), self.current
-        self._tools.changed.connect(self._on_event)
-        self._tools.currentChanged.connect(self._on_event)
+        self._start()
+        self._tools.changed.connect(self._on_change)
+        self._tools.currentChanged.connect(self._on_change)
 
     @property
     def classes(self) -> list[str]:
@@ -576,101 +496,348 @@ class SceneTools(PluginList):
         return sorted(filter(None, (TOOL_IDS[kind][0] for kind in Tools.TYPES if kind in TOOL_IDS)))
 
     @property
-    def current(self) -> SceneTool | None:
+    def current(self) -> tools.Tool | None:
         """The selected tool; None if there is none."""
         found = self._tools.property("current") if is_alive(self._tools) else None
-        return next((one for one in self._items if one.exists and one.tool is found), None)
+        return next((one for one in self._items if one.exists and one.handle is found), None)
 
-    def find(self, class_id: str) -> SceneTool | None:
-        """Return the first tool of a class; None if there is none."""
+    def find(self, class_id: str) -> tools.Tool | None:
+        """Return the first tool of a class, by the id of RViz 1 or 2; None if there is none."""
+        found = super().find(class_id)
         wanted = tool_type(class_id)
-        return next(
-            (
-                one
-                for one in self._items
-                if one.class_id == class_id
-                or (wanted and one.tool is not None and wanted == one.tool.TYPE)
-            ),
-            None,
-        )
-
-    def select(self, tool: SceneTool) -> None:
-        """Select a tool.
-
-        Raises:
-            Error: It was removed.
-        """
-        self._tools.select(self._require(tool))
-        self.emit_changes()
-
-    def add(self, class_id: str) -> SceneTool:
-        """Add a tool.
-
-        Args:
-            class_id: RViz's class id, e.g. ``rviz/Measure`` or ``rviz_default_plugins/Measure``.
-
-        Raises:
-            Error: There is no such class.
-        """
-        if not isinstance(class_id, str) or class_id.count("/") != 1:
-            near = similar(class_id, self.classes) if isinstance(class_id, str) else ""
-            raise Error(f"expected a class id, e.g. 'rviz/Measure', got {shown(class_id)}{near}")
-        if tool_type(class_id) not in Tools.TYPES:
-            hint = similar(class_id, self.classes) or f"; there are: {', '.join(self.classes)}"
-            if display_type(class_id):
-                hint = " of tools; it is a display: use addDisplay"
-            raise Error(f"no tool was added: there is no class {class_id:.80}{hint}")
-        made = self._tools.add(class_id)
-        self._sync_items()
-        found = next(one for one in self._items if one.tool is made)
-        self.emit_changes()
+        if found is None and wanted:
+            found = next((one for one in self._items if wanted == one.handle.TYPE), None)
         return found
-
-    def remove(self, tool: SceneTool) -> None:
-        """Remove a tool; if it was selected, the first one is selected.
-
-        Raises:
-            Error: It was removed before.
-        """
-        self._tools.remove(self._require(tool))
-        self.emit_changes()
 
     def remove_all(self) -> None:
         """Remove all tools; the mouse moves the camera until one is added."""
         self._tools.clear()
         self.emit_changes()
 
-    def ask_for_new(self) -> None:
-        """Not possible here.
+    def emit_changes(self) -> None:
+        """Emit the signals of all changes since the last call."""
+        if is_alive(self._view):
+            super().emit_changes()
+
+    def _select(self, tool: tools.Tool) -> None:
+        self._tools.select(tool.handle)
+
+    def _add(self, class_id: str) -> Any:
+        if tool_type(class_id) not in Tools.TYPES:
+            hint = similar(class_id, self.classes) or f"; there are: {', '.join(self.classes)}"
+            if display_type(class_id):
+                hint = " of tools; it is a display: use addDisplay"
+            raise Error(f"no tool was added: there is no class {class_id:.80}{hint}")
+        return self._tools.add(class_id)
+
+    def _remove(self, tool: tools.Tool) -> None:
+        self._tools.remove(tool.handle)
+
+    def _handles(self) -> list[Any]:
+        return list(self._tools)
+
+    def _create(self, handle: Any) -> tools.Tool:
+        return SceneTool(self, handle)
+
+
+class _Property(NamedTuple):
+    """One property of a display, or of the view.
+
+    Attributes:
+        kind: What it holds.
+        description: For the panel.
+        read: Returns its value.
+        write: Sets it.
+    """
+
+    kind: Kind
+    description: str
+    read: Callable[[], Any]
+    write: Callable[[Any], object]
+
+
+#: Properties by their path.
+_Tree = dict[str, _Property]
+
+
+def _plain_value(kind: Kind, value: Any) -> Any:
+    """Return a value as interfaces get it: ``#rrggbb`` for colours, x, y and z for vectors."""
+    if kind.NAME == "color":
+        return str(value.name())
+    if kind.NAME in ("vector", "quaternion"):
+        return {name.lower(): number for name, number in kind.saved(value).items()}
+    return value
+
+
+def _properties_of(display: Display) -> _Tree:
+    def of(setting: Any) -> _Property:
+        return _Property(
+            setting.kind,
+            setting.description,
+            lambda: getattr(display, setting.name),
+            lambda value: display.setProperty(setting.name, value),
+        )
+
+    return {path: of(setting) for path, setting in display.SETTINGS.items()}
+
+
+def _find(tree: _Tree, path: str, whose: str) -> tuple[_Property, str]:
+    """Return a property, and the name of one of its numbers for the path of that number.
+
+    Raises:
+        Error: There is none; the text says which there are.
+    """
+    if path in tree:
+        return tree[path], ""
+    above, _, last = path.rpartition("/")
+    if above in tree and not tree[above].kind.HOLDS_OTHERS:
+        parts = list(tree[above].kind.saved(tree[above].read()))
+        if last in parts:
+            return tree[above], last
+        raise Error(f"{whose} has no property {path!r:.120}; there are: {_joined(above, parts)}")
+    if any(one.startswith(f"{path}/") for one in tree):
+        return _CONTAINER, ""
+    hint = similar(path, tree) or f"; there are: {', '.join(_children(tree, '')) or 'none'}"
+    raise Error(f"{whose} has no property {path!r:.120}{hint}")
+
+
+_CONTAINER = _Property(KINDS["container"](), "", lambda: None, lambda _: None)
+
+
+def _joined(above: str, names: Iterable[str]) -> str:
+    return ", ".join(f"{above}/{name}" for name in names)
+
+
+def _children(tree: _Tree, above: str) -> list[str]:
+    """Return the names of the properties below a path, in their order."""
+    start = f"{above}/" if above else ""
+    below = (path.removeprefix(start) for path in tree if path.startswith(start))
+    return list(dict.fromkeys(path.partition("/")[0] for path in below))
+
+
+def _read(tree: _Tree, path: str, whose: str) -> Any:
+    found, part = _find(tree, path, whose)
+    value = _plain_value(found.kind, found.read())
+    return value[part.lower()] if part else value
+
+
+def _write(tree: _Tree, path: str, value: Any, whose: str) -> None:
+    found, part = _find(tree, path, whose)
+    name = f"{whose}/{path}" if whose else path
+    if found is _CONTAINER or found.kind.NAME == "container":
+        raise Error(f"{name} has no value of its own, only properties below it")
+    kind: Any = found.kind
+    try:
+        if part:
+            given = kind.with_part(found.read(), part, value)
+        else:
+            given = kind.read(_colour(value) if kind.NAME == "color" else value)
+    except Error as error:
+        raise Error(f"{name}: {error}") from None
+    if kind.NAME == "color" and given.alpha() != 255:
+        raise Error(f"{name}: this colour has no transparency; set the property Alpha")
+    found.write(given)
+
+
+def _colour(value: Any) -> Any:
+    """Return a colour that RViz writes as ``255; 0; 0`` as Qt's."""
+    if isinstance(value, str) and value.count(";") == 2:
+        try:
+            return QtGui.QColor(*(int(part) for part in value.split(";")))
+        except ValueError:
+            return value
+    return value
+
+
+def _describe(tree: _Tree, above: str = "") -> list[dict[str, Any]]:
+    """Return the properties below a path as nested dicts, as for RViz."""
+    found = []
+    for name in _children(tree, above):
+        path = f"{above}/{name}" if above else name
+        one = tree.get(path, _CONTAINER)
+        value = _plain_value(one.kind, one.read())
+        below = _describe(tree, path)
+        if not one.kind.HOLDS_OTHERS:
+            below = [_part(path, part, number) for part, number in value.items()]
+        found.append(_described(name, path, value, one.kind.NAME, one.description, below))
+    return found
+
+
+def _part(path: str, name: str, number: float) -> dict[str, Any]:
+    upper = name.upper()
+    return _described(upper, f"{path}/{upper}", number, "float", "", [])
+
+
+def _described(
+    name: str, path: str, value: Any, kind: str, description: str, below: list[dict[str, Any]]
+) -> dict[str, Any]:
+    return {
+        "name": name,
+        "path": path,
+        "value": value,
+        "kind": kind,
+        "description": description,
+        "readOnly": False,
+        "hidden": False,
+        "properties": below,
+    }
+
+
+def _class_id(kind: str) -> str:
+    """Return RViz 1's class id of a type, or RViz 2's of one that only RViz 2 has."""
+    one, two = DISPLAY_IDS.get(kind, ("", ""))
+    return one or two or (kind if "/" in kind else f"rosglass/{kind}")
+
+
+class SceneDisplay(displays.Display):
+    """One display of a scene."""
+
+    def __init__(self, owner: SceneDisplays, display: Display) -> None:
+        class_id = str(getattr(display, "class_id", "")) or _class_id(display.TYPE)
+        super().__init__(owner, display, class_id)
+
+    def _read(self) -> tuple[str, bool, displays.Status]:
+        display = self.handle
+        if not is_alive(display):
+            return self._state  # type: ignore[no-any-return]
+        return (
+            display.name,
+            display.enabled,
+            displays.Status(display.statusLevel, display.statusText),
+        )
+
+    def properties(self) -> list[dict[str, Any]]:
+        """Return all its properties as nested dicts.
 
         Raises:
-            UnsupportedError: Always.
+            Error: The display was removed.
         """
-        raise UnsupportedError("there is no dialog for adding tools; give addTool() a class id")
+        return _describe(_properties_of(self.require()))
+
+    def _rename(self, name: str) -> None:
+        self.handle.name = name
+
+    def _enable(self, enabled: bool) -> None:
+        self.handle.enabled = enabled
+
+    def _get(self, path: str) -> Any:
+        return _read(_properties_of(self.handle), path, self.name)
+
+    def _set(self, path: str, value: Any) -> None:
+        _write(_properties_of(self.handle), path, value, self.name)
+
+
+class SceneDisplays(displays.Displays):
+    """The displays of a scene."""
+
+    def __init__(self, view: SceneView) -> None:
+        super().__init__()
+        self._view = view
+        self._followed: set[int] = set()
+        self._start()
+        view.fixedFrameChanged.connect(self._on_change)
+        view.sceneChanged.connect(self._watch_scene)
+        self._watch_scene()
+
+    @property
+    def _scene(self) -> Scene:
+        return self._view.scene
+
+    @Slot()
+    def _watch_scene(self) -> None:
+        self._scene.displayAdded.connect(self._on_change)
+        self._scene.displayRemoved.connect(self._on_change)
+        self._on_change()
+
+    @property
+    def classes(self) -> list[str]:
+        """RViz's class ids of the displays that can be added."""
+        return sorted(_class_id(kind) for kind in self._scene.TYPES)
+
+    @property
+    def status(self) -> displays.Status:
+        """The view's own status, e.g. an error for an unknown fixed frame."""
+        problem = str(self._view.property("problem"))
+        if problem:
+            return displays.Status("error", f"View: {problem}")
+        buffer, fixed = self._scene.transforms, self._scene.fixed_frame
+        if buffer is None:
+            return displays.Status("warn", "Fixed Frame: there is no connection to the robot yet")
+        known = buffer.tree()
+        if fixed in known:
+            return displays.Status("ok", "Fixed Frame: OK")
+        if not known:
+            return displays.Status("warn", "Fixed Frame: nothing is received on /tf and /tf_static")
+        hint = similar(fixed, known)
+        return displays.Status("error", f"Fixed Frame: there is no frame {fixed!r}{hint}")
+
+    def options(self) -> list[dict[str, Any]]:
+        """Return the global options."""
+        return _describe(self._options())
 
     def emit_changes(self) -> None:
         """Emit the signals of all changes since the last call."""
         if is_alive(self._view):
             super().emit_changes()
 
-    def _require(self, tool: SceneTool) -> Tool:
-        if tool.tool is None:
-            raise Error(f"the tool {tool.name} was removed")
-        return tool.tool
-
-    def _sync_items(self) -> None:
-        known = {id(one.tool): one for one in self._items if one.tool is not None}
-        self._items = [
-            known.pop(id(tool)) if id(tool) in known else SceneTool(self, tool)
-            for tool in self._tools
-        ]
-        for gone in known.values():
-            gone.tool = None
-
-    def _sync_rest(self) -> Callable[[], None]:
-        before, self._known_current = self._known_current, self.current
-        return self.selected.emit if self._known_current is not before else lambda: None
-
     @Slot()
-    def _on_event(self) -> None:
-        self._on_change()
+    def _on_change(self) -> None:
+        if is_alive(self._view):  # its displays are destroyed with it
+            super()._on_change()
+
+    def _options(self) -> _Tree:
+        scene, view = self._scene, self._view
+        return {
+            f"{_OPTIONS}/Fixed Frame": _Property(
+                KINDS["frame"](),
+                "The frame in which everything is placed.",
+                lambda: scene.fixed_frame,
+                lambda frame: setattr(scene, "fixed_frame", frame),
+            ),
+            f"{_OPTIONS}/Background Color": _Property(
+                KINDS["color"](),
+                "What is behind everything.",
+                lambda: view.property("background"),
+                lambda colour: view.setProperty("background", colour),
+            ),
+        }
+
+    def _option_names(self) -> list[str]:
+        return [_OPTIONS]
+
+    def _get_option(self, path: str) -> Any:
+        return _read(self._options(), path, "the view")
+
+    def _set_option(self, path: str, value: Any) -> None:
+        _write(self._options(), path, value, "")
+
+    def _add(self, class_id: str, name: str, enabled: bool) -> Any:
+        kind = display_type(class_id) or class_id
+        if kind not in self._scene.TYPES:
+            hint = similar(class_id, self.classes) or f"; there are: {', '.join(self.classes)}"
+            raise Error(f"no display was added: there is no class {class_id:.80}{hint}")
+        display = self._scene.add(kind, name)
+        display.enabled = enabled
+        return display
+
+    def _remove(self, handle: Any) -> None:
+        self._scene.remove(handle)
+
+    def _create(self, handle: Any) -> displays.Display:
+        return SceneDisplay(self, handle)
+
+    def _handles(self) -> list[Any]:
+        found = [display for display in self._scene.displays if is_alive(display)]
+        for display in found:
+            if id(display) not in self._followed:
+                self._follow(display)
+        return found
+
+    def _follow(self, display: Any) -> None:
+        at = id(display)
+        self._followed.add(at)
+        for signal in (display.nameChanged, display.enabledChanged, display.statusChanged):
+            signal.connect(self._on_change)
+        display.destroyed.connect(self._on_change)
+        followed = self._followed
+        display.destroyed.connect(lambda *_: followed.discard(at))

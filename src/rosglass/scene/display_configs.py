@@ -9,9 +9,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
+from rosglass.rviz.orbit import Orbit, Point
+from rosglass.rviz.view_controller_settings import CONTROLLER_CLASS
 from rosglass.scene.display import Display
 from rosglass.scene.rviz_config import DisplayConfig
-from rosglass.scene.rviz_formats import DISPLAYS, class_id_of, ros_of, view_type
+from rosglass.scene.rviz_formats import (
+    DISPLAYS,
+    class_id_of,
+    read_bool,
+    read_vector,
+    ros_of,
+    setting_text,
+    view_type,
+)
 from rosglass.scene.views import VIEWS, create_view
 
 if TYPE_CHECKING:
@@ -30,6 +40,13 @@ __all__ = [
 
 #: Classes of other packages that rosglass has as well.
 _SAME = {"hector_rviz_overlay_controls/QmlOverlay": "rosglass/QmlOverlay"}
+#: A view of another package: an Orbit with a display View Controller has the same.
+_HECTOR_VIEW = "hector_rviz_plugins/HectorViewController"
+#: Its settings with another name in the display.
+_HECTOR_SETTINGS = {
+    "Movement speed (m/s)": "Movement Speed",
+    "Tracked Frame P-Gain": "Tracking Gain",
+}
 
 
 class UnknownDisplay(Display):
@@ -82,7 +99,28 @@ def show_displays(scene: Scene, config: RvizConfig) -> list[str]:
         notes.append(f"Fixed Frame: {error}")
     for one in config.displays:
         _add(scene, one, None, notes)
+    view = config.current_view
+    if view is not None and view.class_id == _HECTOR_VIEW:
+        _add_controller(scene, view, notes)
     return notes
+
+
+def _add_controller(scene: Scene, view: ViewConfig, notes: list[str]) -> None:
+    """Add the display View Controller for hector_rviz_plugins' view, unless there is one."""
+    found: Any = next((one for one in scene.displays if one.TYPE == CONTROLLER_CLASS), None)
+    if found is None:
+        own = {"Class": CONTROLLER_CLASS, "Name": "View Controller", "Enabled": True}
+        given = {_HECTOR_SETTINGS.get(name, name): value for name, value in view.settings.items()}
+        kept = {
+            name: given[name] for name in scene.TYPES[CONTROLLER_CLASS].SETTINGS if name in given
+        }
+        _add(scene, DisplayConfig({**kept, **own}), None, notes)
+        found = scene.displays[-1]
+    try:
+        found.mode2D = read_bool(view.settings.get("2D Mode", False))
+    except Error as error:
+        notes.append(f"view {view.class_id}: 2D Mode: {error}")
+    found.trackedFrame = setting_text(view.settings.get("Tracked Frame"))
 
 
 def _add(scene: Scene, one: DisplayConfig, group: GroupDisplay | None, notes: list[str]) -> None:
@@ -111,12 +149,38 @@ def _add(scene: Scene, one: DisplayConfig, group: GroupDisplay | None, notes: li
 
 def create_saved_view(saved: ViewConfig, notes: list[str]) -> ViewController | None:
     """Return the view that a config has; None, with a note, for one that rosglass does not have."""
+    if saved.class_id == _HECTOR_VIEW:
+        return _orbit_of_hector(saved, notes)
     kind = view_type(saved.class_id)
     if kind not in VIEWS:
         notes.append(f"view {saved.class_id}: rosglass has none; the view stays as it is")
         return None
     made = create_view(saved.class_id)
     notes += [f"view {kind}: {text}" for text in made.restore(saved.settings)]
+    return made
+
+
+def _orbit_of_hector(saved: ViewConfig, notes: list[str]) -> ViewController:
+    """Return hector_rviz_plugins' view as an Orbit."""
+
+    def point(name: str, default: Point) -> Point:
+        try:
+            given = saved.settings.get(name)
+            return default if given is None else Point(*read_vector(given, name))
+        except Error as error:
+            notes.append(f"view {saved.class_id}: {error}")
+            return default
+
+    orbit = Orbit.between(point("Eye", Point(4.0, 0.0, 3.0)), point("Focus", Point(0.0, 0.0, 0.0)))
+    made = create_view("Orbit")
+    for setting, value in (
+        ("Focal Point", orbit.focus),
+        ("Distance", orbit.distance),
+        ("Yaw", orbit.yaw),
+        ("Pitch", orbit.pitch),
+    ):
+        made.set(setting, value)
+    notes.append(f"view {saved.class_id}: shown as an Orbit with the display View Controller")
     return made
 
 

@@ -8,8 +8,8 @@ given: a change gives a new one, so that a renderer in another thread may still 
 from __future__ import annotations
 
 import math
-from copy import copy
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,7 +25,7 @@ __all__ = [
     "CONE",
     "CYLINDER",
     "SPHERE",
-    "Colouring",
+    "Coloring",
     "Drawable",
     "Group",
     "Item",
@@ -258,17 +258,31 @@ def _checked(name: str, given: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.
     return array
 
 
-class Colouring(NamedTuple):
-    """How points get their colours, in the shader.
+@dataclass(frozen=True, slots=True)
+class Coloring:
+    """How points get their colors, in the shader.
+
+    With the vertex's position and channel, the color is::
+
+        flat      first
+        bgra      channel.bgr, with channel.a if per_point_alpha
+        rainbow   rainbow(invert ? part : 1.0 - part)    value = channel
+        gradient  mix(first, last, part)                 value = channel
+        axis      the same as rainbow                    value = dot(axis, vec4(position, 1.0))
+
+        part = high != low ? (value - low) / (high - low) : 0.0;
+        if (!(abs(part) < 1e30)) part = 0.0;  // NaN as well
+        part = clamp(part, 0.0, 1.0);
 
     Attributes:
-        mode: ``flat``, ``bgra`` (the bytes of the channel), ``rainbow`` or ``gradient`` (by the
-            channel), ``axis`` (rainbow by the place).
-        low, high: The range of the channel, or of the axis in metres.
-        invert: Whether the rainbow is turned around.
-        first, last: RGB at both ends of a gradient; `first` is the flat colour.
-        axis: Four numbers; x, y, z of a point in its own frame and 1 are multiplied with these.
-        per_point_alpha: Whether points are as opaque as the channel's fourth byte says.
+        mode: ``flat``, ``bgra``, ``rainbow``, ``gradient`` or ``axis``.
+        low: Value at which the part is 0.
+        high: Value at which the part is 1.
+        invert: Whether the rainbow is red at `high`.
+        first: Color of flat points, or at `low`: red, green, blue from 0 to 1.
+        last: Color at `high`.
+        axis: What x, y, z of a point in its own frame and 1 are multiplied with.
+        per_point_alpha: Whether points are as transparent as their channel says.
     """
 
     mode: str = "flat"
@@ -295,7 +309,7 @@ class Points(Drawable):
         size: Pixels of the screen for ``points``, metres for the others.
         size_by_depth: Whether metres are multiplied with z of each point, as the pixels of depth
             images are as large as they are far away.
-        colouring: How they get their colours.
+        coloring: How they get their colours.
         alpha: Opacity, 0 to 1.
     """
 
@@ -307,7 +321,7 @@ class Points(Drawable):
         self.stride, self.position, self.channel = 16, 0, -1
         self.channel_is_bytes = False
         self.style, self.size, self.size_by_depth = "points", 3.0, False
-        self.colouring = Colouring()
+        self.coloring = Coloring()
         self.alpha = 1.0
         self._box: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
         self._boxed = -1
@@ -356,7 +370,7 @@ class Points(Drawable):
             rgba = rgba_bytes(colours, len(xyz))
             rows.view(np.uint8).reshape(-1, 16)[:, 12:] = rgba[:, (2, 1, 0, 3)]
             clear = bool((rgba[:, 3] < 255).any())
-            self.colouring = self.colouring._replace(mode="bgra", per_point_alpha=clear)
+            self.coloring = replace(self.coloring, mode="bgra", per_point_alpha=clear)
         self.set_data(
             rows.reshape(-1).view(np.uint8),
             len(xyz),
@@ -371,7 +385,7 @@ class Points(Drawable):
         style: str | None = None,
         size: float | None = None,
         size_by_depth: bool | None = None,
-        colouring: Colouring | None = None,
+        coloring: Coloring | None = None,
         alpha: float | None = None,
     ) -> None:
         """Change what is given.
@@ -381,19 +395,19 @@ class Points(Drawable):
         """
         if style is not None and style not in self.STYLES:
             raise Error(f"style {style!r} is none of {', '.join(self.STYLES)}")
-        before = (self.style, self.size, self.size_by_depth, self.colouring, self.alpha)
+        before = (self.style, self.size, self.size_by_depth, self.coloring, self.alpha)
         self.style = self.style if style is None else style
         self.size = self.size if size is None else size
         self.size_by_depth = self.size_by_depth if size_by_depth is None else size_by_depth
-        self.colouring = self.colouring if colouring is None else colouring
+        self.coloring = self.coloring if coloring is None else coloring
         self.alpha = self.alpha if alpha is None else alpha
-        if before != (self.style, self.size, self.size_by_depth, self.colouring, self.alpha):
+        if before != (self.style, self.size, self.size_by_depth, self.coloring, self.alpha):
             self.changed()
 
     @property
     def opaque(self) -> bool:
         """Whether nothing behind it shines through."""
-        paint = self.colouring
+        paint = self.coloring
         return self.alpha >= OPAQUE and not (paint.mode == "bgra" and paint.per_point_alpha)
 
     def xyz(self) -> NDArray[np.float32]:
@@ -495,10 +509,7 @@ class Shape:
         indices: (m, 3) or (m * 3) numbers of vertices; if None, each three vertices are a triangle.
         colours: RGBA for each vertex; white if None.
         uv: (n, 2) places in the texture, from its upper left corner; 0 if None.
-        one_sided: Whether triangles are seen only from the side where their corners are in
-            counter-clockwise order.
-        closed: Whether it is one-sided, and symmetric to x = 0: mirrored, it is still seen from
-            outside.
+        closed: Whether it has no holes and is symmetric to x = 0: its inner side is not drawn.
 
     Raises:
         Error: The shapes of the arrays don't fit, or an index is beyond the vertices.
@@ -516,10 +527,9 @@ class Shape:
         *,
         colours: ArrayLike | None = None,
         uv: ArrayLike | None = None,
-        one_sided: bool = False,
         closed: bool = False,
     ) -> None:
-        self.one_sided, self.closed = one_sided or closed, closed
+        self.closed = closed
         at = _checked("positions", positions, (3,))
         if indices is None:
             faces = np.arange(len(at) // 3 * 3, dtype=np.uint32).reshape(-1, 3)
@@ -548,12 +558,6 @@ class Shape:
         self.opaque = bool((rows["rgba"][:, 3] == 255).all())
         #: Corners of the box around it.
         self.box = _box_of(at[np.unique(faces)] if len(faces) else at[:0])
-
-    def mirrored(self) -> Shape:
-        """Return the same shape with its triangles turned, to be seen from the other side."""
-        other = copy(self)
-        other.faces = np.ascontiguousarray(self.faces[:, ::-1])
-        return other
 
 
 def _fitting(name: str, given: ArrayLike, at: NDArray[Any], width: int) -> NDArray[np.float32]:
@@ -832,40 +836,24 @@ class Labels(Drawable):
 
 
 def _box_shape() -> Shape:
-    corners, normals, uv = [], [], []
+    corners, normals = [], []
     for axis in range(3):
         for side in (-1.0, 1.0):
             u, v = (axis + 1) % 3, (axis + 2) % 3
-            normal = [side * (n == axis) for n in range(3)]
-            # Each side has the whole picture, as in RViz.
-            up = np.array([0.0, 0.0, 1.0] if axis < 2 else [0.0, 1.0, 0.0])
-            right = np.cross(up, normal)
             quad = [(-side, -1), (side, -1), (side, 1), (-side, 1)]
             for a, b in quad:
                 at = [0.0, 0.0, 0.0]
                 at[axis], at[u], at[v] = side * 0.5, a * 0.5, b * 0.5
                 corners.append(at)
-                normals.append(normal)
-                uv.append([0.5 + right @ at, 0.5 - up @ at])
+                normals.append([side * (n == axis) for n in range(3)])
     first = 4 * np.arange(6)[:, np.newaxis]
     faces = np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])])
-    return Shape(corners, normals, faces, uv=uv, closed=True)
+    return Shape(corners, normals, faces, closed=True)
 
 
-def _turned(
-    profile: list[tuple[float, float, float, float]],
-    around: int = 32,
-    uv: Callable[[NDArray[Any], float], NDArray[Any]] | None = None,
-) -> Shape:
-    """Return a shape turned around z.
-
-    Args:
-        profile: (radius, z, normal outward, normal along z) of each ring.
-        around: Sides of a ring.
-        uv: Places in a texture, (n, 2), of n shares of a turn and a z.
-    """
-    turns = np.linspace(0, 1, around + 1)
-    angles = 2 * np.pi * turns
+def _turned(profile: list[tuple[float, float, float, float]], around: int = 32) -> Shape:
+    """Return a shape turned around z: a profile of (radius, z, normal outward, normal along z)."""
+    angles = np.linspace(0, 2 * np.pi, around + 1)
     c, s = np.cos(angles), np.sin(angles)
     at = [np.stack([r * c, r * s, np.full_like(c, z)], axis=1) for r, z, _, _ in profile]
     normal = [np.stack([n * c, n * s, np.full_like(c, m)], axis=1) for _, _, n, m in profile]
@@ -876,23 +864,14 @@ def _turned(
         a = ring * (around + 1) + np.arange(around)
         b = a + around + 1
         faces += [np.stack([a, a + 1, b + 1], axis=1), np.stack([a, b + 1, b], axis=1)]
-    places = None if uv is None else np.concatenate([uv(turns, z) for _, z, _, _ in profile])
-    corners, normals = np.concatenate(at), np.concatenate(normal)
-    return Shape(corners, normals, np.concatenate(faces), uv=places, closed=True)
+    return Shape(np.concatenate(at), np.concatenate(normal), np.concatenate(faces), closed=True)
 
 
 def _sphere_shape(rings: int = 16) -> Shape:
     tilt = np.linspace(-np.pi / 2, np.pi / 2, rings + 1)
     return _turned(
-        [(0.5 * math.cos(t), 0.5 * math.sin(t), math.cos(t), math.sin(t)) for t in tilt],
-        2 * rings,
-        # A picture of the earth, as in RViz.
-        lambda turns, z: _places(turns + 0.5, math.acos(min(max(2 * z, -1.0), 1.0)) / math.pi),
+        [(0.5 * math.cos(t), 0.5 * math.sin(t), math.cos(t), math.sin(t)) for t in tilt], 2 * rings
     )
-
-
-def _places(across: NDArray[Any], down: float) -> NDArray[Any]:
-    return np.stack([across, np.full_like(across, down)], axis=1)
 
 
 #: One metre in every direction, around the origin.
@@ -908,8 +887,7 @@ CYLINDER = _turned(
         (0.5, 0.5, 1, 0),
         (0.5, 0.5, 0, 1),
         (0, 0.5, 0, 1),
-    ],
-    uv=lambda turns, z: _places(0.75 - turns, z + 0.5),
+    ]
 )
 _SLOPE = math.hypot(1, 0.5)
 #: Of one metre in diameter and height, from z = 0 to its tip at z = 1.

@@ -23,7 +23,6 @@ from rosglass.scene.displays.image import CameraDisplay, CameraView, ImageDispla
 from rosglass.scene.displays.interactive_marker import InteractiveMarkersDisplay
 from rosglass.scene.displays.map import GridCellsDisplay, MapDisplay
 from rosglass.scene.displays.marker import MarkerArrayDisplay, MarkerDisplay
-from rosglass.scene.displays.path import PathDisplay
 from rosglass.scene.displays.point_cloud import (
     DepthCloudDisplay,
     FluidPressureDisplay,
@@ -36,15 +35,15 @@ from rosglass.scene.displays.point_cloud import (
 )
 from rosglass.scene.displays.pose import (
     OdometryDisplay,
+    PathDisplay,
     PoseArrayDisplay,
     PoseDisplay,
     PoseWithCovarianceDisplay,
 )
-from rosglass.scene.displays.qml_overlay import QmlOverlayDisplay
+from rosglass.scene.displays.qml_overlay import OverlayElement, QmlOverlayDisplay
 from rosglass.scene.displays.robot_model import RobotModelDisplay
 from rosglass.scene.displays.tf import TFDisplay
 from rosglass.scene.displays.view_controller import ViewControllerDisplay
-from rosglass.scene.overlay_element import OverlayElement
 from rosglass.scene.panel_models import DisplaysModel
 from rosglass.scene.publishing_tools import (
     Nav2GoalTool,

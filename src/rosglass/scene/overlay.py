@@ -75,7 +75,7 @@ class SceneOverlay(LiveOverlay):
         import_paths: Sequence[str | os.PathLike[str]] = (),
         **options: Any,
     ) -> None:
-        access: Any = access_of(view)
+        access = access_of(view)
         super().__init__(
             file,
             access.session,

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosglass.errors import ArgumentError, shown
+from rosglass.scene.drawing import Coloring
 from rosglass.scene.point_clouds import (
     FLOAT32,
     Channel,
@@ -69,45 +70,17 @@ def rainbow(part: Array) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class PointColors:
+class PointColors(Coloring):
     """The colors of one cloud, as parameters of the shader, or computed here.
 
-    With the vertex's position and channel, the color is::
-
-        flat      first
-        bgra      channel.bgr, with channel.a if per_point_alpha
-        rainbow   rainbow(invert ? part : 1.0 - part)    value = channel
-        gradient  mix(first, last, part)                 value = channel
-        axis      the same as rainbow                    value = dot(axis, vec4(position, 1.0))
-
-        part = high != low ? (value - low) / (high - low) : 0.0;
-        if (!(abs(part) < 1e30)) part = 0.0;  // NaN as well
-        part = clamp(part, 0.0, 1.0);
-
     Attributes:
-        mode: ``flat``, ``bgra``, ``rainbow``, ``gradient`` or ``axis``.
         channel: The vertex's channel; None if it needs none.
-        low: Value at which the part is 0.
-        high: Value at which the part is 1.
-        invert: Whether the rainbow is red at `high`.
-        first: Color of flat points, or at `low`: red, green, blue from 0 to 1.
-        last: Color at `high`.
-        axis: What x, y, z (in the cloud's frame) and 1 are multiplied with.
-        per_point_alpha: Whether points are as transparent as their channel says.
         bounds: Lower and upper bound of the values in use, to show as Min and Max Intensity, or Min
             and Max Value; None if there are none.
         warning: Text for the display's status; empty if there is none.
     """
 
-    mode: str
     channel: Channel | None = None
-    low: float = 0.0
-    high: float = 1.0
-    invert: bool = False
-    first: Rgb = _WHITE
-    last: Rgb = _WHITE
-    axis: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 0.0)
-    per_point_alpha: bool = False
     bounds: tuple[float, float] | None = None
     warning: str = ""
 
@@ -218,7 +191,7 @@ class Rgb8(ColorTransformer):
             return _white("no field rgb or rgba of 4 bytes", cloud)
         channel = Channel((field.name,), is_color=True, is_grey=self._is_grey)
         alpha = cloud.layout.find("rgb") is None
-        return PointColors("bgra", channel, per_point_alpha=alpha)
+        return PointColors("bgra", channel=channel, per_point_alpha=alpha)
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,7 +215,7 @@ class RgbF32(ColorTransformer):
         """Return the colors of a cloud."""
         if not self.supports(cloud.layout):
             return _white("no fields r, g and b of float32", cloud)
-        return PointColors("bgra", Channel(("r", "g", "b"), is_color=True))
+        return PointColors("bgra", channel=Channel(("r", "g", "b"), is_color=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,12 +263,12 @@ class Intensity(ColorTransformer):
             low, high = cloud.channel_range(field.name) or (0.0, 0.0)
         return PointColors(
             "rainbow" if self.use_rainbow else "gradient",
-            Channel((field.name,)),
             low,
             high,
             self.invert_rainbow,
             _rgb(self.min_color),
             _rgb(self.max_color),
+            channel=Channel((field.name,)),
             bounds=(low, high),
         )
 

@@ -139,6 +139,8 @@ class _Device:
         self.sharp = self._sampler(QRhiSampler.Filter.Nearest, QRhiSampler.AddressMode.ClampToEdge)
         self.white: QRhiTexture | None = None
         self.shapes: dict[Shape, _ShapeBuffers] = {}
+        #: The images of meshes by the id of their pixels.
+        self.images: dict[int, _SharedImage] = {}
 
     def keep(self, resource: Any) -> Any:
         """Create a resource, and free it with the device at the latest.
@@ -165,6 +167,7 @@ class _Device:
             self.free(resource)
         self._pipelines.clear()
         self.shapes.clear()
+        self.images.clear()
 
     def _sampler(self, kind: Any, mode: Any) -> Any:
         return self.keep(self.rhi.newSampler(kind, kind, QRhiSampler.Filter.None_, mode, mode))
@@ -214,6 +217,28 @@ class _Device:
         entry = QRhiTextureUploadEntry(0, 0, part)
         batch.uploadTexture(old, QRhiTextureUploadDescription(entry))
         return old
+
+    def share_image(
+        self, batch: QRhiResourceUpdateBatch, pixels: NDArray[np.uint8] | None
+    ) -> _SharedImage | None:
+        """Return the texture of an image, uploaded once for all meshes that have it."""
+        if pixels is None:
+            return None
+        found = self.images.get(id(pixels))
+        if found is None:
+            found = self.images[id(pixels)] = _SharedImage(
+                pixels, self.texture(batch, pixels, None)
+            )
+        found.users += 1
+        return found
+
+    def leave_image(self, image: _SharedImage | None) -> None:
+        """Free an image that no other mesh has; None is allowed."""
+        if image is not None:
+            image.users -= 1
+            if not image.users:
+                self.free(image.texture)
+                self.images.pop(id(image.pixels), None)
 
     def white_texture(self, batch: QRhiResourceUpdateBatch) -> QRhiTexture:
         """Return what is bound where there is no image."""
@@ -306,6 +331,14 @@ class _ShapeBuffers:
         self.vertices = device.fill(batch, None, shape.rows)
         self.indices = device.fill(batch, None, shape.faces, QRhiBuffer.UsageFlag.IndexBuffer)
         self.count = shape.faces.size
+        self.users = 0
+
+
+class _SharedImage:
+    """The image of a mesh on the device, shared by all meshes that have the same pixels."""
+
+    def __init__(self, pixels: NDArray[np.uint8], texture: QRhiTexture) -> None:
+        self.pixels, self.texture = pixels, texture
         self.users = 0
 
 
@@ -405,7 +438,7 @@ class _PointsOnDevice(_OnDevice):
 
     def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
         points = self.drawable
-        paint = points.colouring
+        paint = points.coloring
         block[0] = (1, 1, 1, points.alpha * alpha)
         flag = paint.per_point_alpha if paint.mode == "bgra" else paint.invert
         block[1] = (_MODES[paint.mode], paint.low, paint.high, flag)
@@ -488,7 +521,7 @@ class _MeshOnDevice(_OnDevice):
         super().__init__(device, drawable)
         self._instances: Any = None
         self._shape: Shape | None = None
-        self._texture: QRhiTexture | None = None
+        self._image: _SharedImage | None = None
         self._textures = -1
 
     def prepare(
@@ -496,13 +529,10 @@ class _MeshOnDevice(_OnDevice):
     ) -> None:
         mesh = self.drawable
         if self._textures != mesh.textures:
-            if mesh.texture is None:
-                old, self._texture = self._texture, None
-                self.device.free(old)
-            else:
-                self._texture = self.device.texture(batch, mesh.texture, self._texture)
-            image = self._texture or self.device.white_texture(batch)
+            old, self._image = self._image, self.device.share_image(batch, mesh.texture)
+            image = self._image.texture if self._image else self.device.white_texture(batch)
             self.bind((image, self.device.smooth))
+            self.device.leave_image(old)
             self._textures = mesh.textures
         super().prepare(batch, place, alpha)
 
@@ -540,7 +570,7 @@ class _MeshOnDevice(_OnDevice):
             _Topology.Triangles,
             blend,
             self.bound,
-            self._shape.one_sided,
+            self._shape.closed,
         )
         self.begin(run, pipeline)
         run.commands.setVertexInput(
@@ -555,7 +585,8 @@ class _MeshOnDevice(_OnDevice):
     def close(self) -> None:
         super().close()
         self._leave_shape()
-        self.device.free(self._instances, self._texture)
+        self.device.leave_image(self._image)
+        self.device.free(self._instances)
 
 
 class _MapOnDevice(_OnDevice):

@@ -48,8 +48,9 @@ _MAX_BYTES, _MAX_CACHE_BYTES = 256 << 20, 512 << 20
 _READ_TIMEOUT_S, _FETCH_TIMEOUT_S, _APPEAR_TIMEOUT_S = 5.0, 60.0, 2.0
 #: Seconds for which the outcome for a URI is not asked for again, and how many are remembered.
 _REMEMBER_S, _MAX_REMEMBERED = 60.0, 1000
-#: Servers that may fail to answer within a minute until no others are tried.
-_MAX_FAILURES, _FAILURES_S = 3, 60.0
+#: Servers that may fail to answer within a minute until no others are tried; and seconds for which
+#: such a server has kept the others waiting, unlike one that refuses the connection.
+_MAX_FAILURES, _FAILURES_S, _SLOW_S = 3, 60.0, 1.0
 #: Bytes of a file that are kept in memory until it is asked for again, e.g. by another link.
 _MAX_KEPT_BYTES = 64 << 20
 _MAX_CLIENTS = 8
@@ -230,7 +231,8 @@ class ResourceRetriever:
         try:
             data = fetch(uri)
         except _Unanswered as reason:
-            self._failures.append(time.monotonic())
+            if time.monotonic() - now > _SLOW_S:
+                self._failures.append(time.monotonic())
             error = str(reason)
         except Error as reason:
             error = _plain(reason, uri)
@@ -299,9 +301,9 @@ class ResourceRetriever:
         service, path, kind = _SERVICE, uri, _SERVICE_TYPE
         if uri.lower().startswith("service:"):
             # RViz takes the type of the package resource_retriever_interfaces.
-            service, _, path = uri.partition("://")[2].partition(":")
+            service, colon, path = uri.partition("://")[2].partition(":")
             kind = ""
-            if not service or ":" in path:
+            if not service or not colon or ":" in path:
                 raise ResourceError("expected service://NAME:PATH")
         if not self._has_services():
             raise UnsupportedError("files of services are ROS 2's, and there is no such node")

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from rosglass.comm.text_files import check_yaml, explain_yaml_error, write_text
-from rosglass.errors import Error, ParameterError
+from rosglass.errors import Error, ParameterError, shown
 from rosglass.scene.rviz_formats import (
     DISPLAYS,
     TOOLS,
@@ -31,7 +31,6 @@ from rosglass.scene.rviz_formats import (
     require_ros,
     ros_of,
     setting_text,
-    shown,
     type_of,
     write_color,
 )

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.names import similar
 from rosglass.comm.qos import Durability, History, QoS, Reliability
-from rosglass.errors import Error
+from rosglass.errors import Error, shown
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -40,7 +40,6 @@ __all__ = [
     "require_ros",
     "ros_of",
     "setting_text",
-    "shown",
     "tool_type",
     "type_of",
     "view_type",
@@ -148,14 +147,6 @@ def setting_text(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return str(value) if isinstance(value, (str, int, float)) else ""
-
-
-def shown(value: Any) -> str:
-    """Return a value for an error, cut before it is formatted: it may be deep or large."""
-    if isinstance(value, (dict, list, tuple)):
-        noun = "a mapping" if isinstance(value, dict) else "a list"
-        return f"{noun} of {len(value)}"
-    return f"{value!r:.80}"
 
 
 def read_bool(value: Any, name: str = "value") -> bool:

@@ -83,7 +83,7 @@ class Scene(Element):
         super().__init__(parent, runtime)
         self._timer = single_shot(self, self._follow)
         self._reset_at = -math.inf
-        self._resets = single_shot(self, self.reset)
+        self._resets = single_shot(self, self._begin_anew)
         self.root.on_change = self.changed.emit
         root = self.root
 
@@ -397,7 +397,18 @@ class Scene(Element):
 
     @Slot()
     def reset(self) -> None:
-        """Drop all data that was received, and subscribe anew: latched messages come again."""
+        """Drop all data that was received, and subscribe anew: latched messages come again.
+
+        Transforms are dropped as well, except static ones, also for other users of the session's.
+        """
+        buffer = self.transforms
+        if buffer is not None:
+            buffer.clear()
+        self._begin_anew()
+
+    @Slot()
+    def _begin_anew(self) -> None:
+        """Drop what displays have received; after a jump, tf's listener clears the transforms."""
 
         def restart(display: Display) -> None:
             display._close_endpoint()

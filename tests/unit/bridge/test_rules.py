@@ -10,8 +10,8 @@ import pytest
 
 from rosglass import ConversionError, InvalidNameError, load
 from rosglass.bridge import Bridge, BridgeStatus, Direction, RelayStatus, Rule
+from rosglass.bridge.bridge import Rules
 from rosglass.bridge.relays import Outbox
-from rosglass.bridge.rules import Rules
 from rosglass.comm import Sample
 
 ROOT = Path(__file__).parents[3]

@@ -8,8 +8,7 @@ import pytest
 
 from rosglass.comm import Time
 from rosglass.demo import telemetry
-from rosglass.demo.equipment import Equipment
-from rosglass.demo.model import urdf
+from rosglass.demo.equipment import Equipment, urdf
 from rosglass.demo.simulation import RobotState
 
 ROBOT = ET.fromstring(urdf())

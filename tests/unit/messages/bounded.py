@@ -32,7 +32,7 @@ from rosglass.interfaces import (
 from rosglass.interfaces.type_descriptions import add_type_sources, type_sources
 from rosglass.messages import Message, MessageType, Translation, load
 from rosglass.wires.dds.type_lookup import describe_struct
-from rosglass.wires.tcpros.announced_types import AnnouncedTypes
+from rosglass.wires.tcpros.core import AnnouncedTypes
 
 CPU_S, MEMORY = 4, 200 << 20
 _IDL = {

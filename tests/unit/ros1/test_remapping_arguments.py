@@ -8,7 +8,7 @@ import pytest
 
 import rosglass
 from rosglass import RosArgumentError
-from rosglass.ros1.remapping_arguments import Arguments
+from rosglass.ros1.options import Arguments
 
 if TYPE_CHECKING:
     from tests.unit.ros1.conftest import FakeMaster

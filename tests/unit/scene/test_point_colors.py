@@ -39,7 +39,7 @@ def intensities(*values: float) -> Cloud:
 
 
 def shader(colors: PointColors, position: np.ndarray, channel: Any) -> list[float]:
-    """Compute one color step by step as the docstring of PointColors says."""
+    """Compute one color step by step as the docstring of Coloring says."""
     if colors.mode == "flat":
         return [*colors.first, 1.0]
     if colors.mode == "bgra":

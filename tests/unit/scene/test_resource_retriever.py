@@ -145,7 +145,8 @@ def test_a_body_without_an_end_is_cut_off(web: WebServer, monkeypatch: pytest.Mo
 def test_servers_that_do_not_answer_are_few(
     web: WebServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(resource_retriever, "_READ_TIMEOUT_S", 0.1)
+    monkeypatch.setattr(resource_retriever, "_READ_TIMEOUT_S", 0.2)
+    monkeypatch.setattr(resource_retriever, "_SLOW_S", 0.1)
     ended = threading.Event()
     web.files["/good.stl"] = b"mesh"
     for number in range(5):
@@ -163,6 +164,15 @@ def test_servers_that_do_not_answer_are_few(
     retriever = ResourceRetriever()
     assert retriever.find(f"{web.url}/good.stl") == b"mesh"
     ended.set()
+
+
+def test_servers_that_refuse_at_once_do_not_count(web: WebServer) -> None:
+    retriever = ResourceRetriever()
+    for number in range(5):
+        with pytest.raises(ResourceError, match=r"cannot be reached: .*refused"):
+            retriever.find(f"http://127.0.0.1:1/{number}.stl")
+    web.files["/good.stl"] = b"mesh"
+    assert retriever.find(f"{web.url}/good.stl") == b"mesh"
 
 
 def test_a_closed_network_is_closed_to_meshes(
@@ -278,7 +288,7 @@ def test_a_service_can_be_named(make_robot: Callable[..., Robot]) -> None:
     robot.response = ok(b"mesh")
     assert robot.retriever.find("service:///provider:foo/bar.stl") == b"mesh"
     assert robot.requests == [("foo/bar.stl", "")]
-    for uri in ("service://:a", "service:///provider:a:b"):
+    for uri in ("service://:a", "service:///provider", "service:///provider:a:b"):
         with pytest.raises(ResourceError, match="expected service://NAME:PATH"):
             robot.retriever.find(uri)
     with pytest.raises(Error, match=r"ROS 2's"):

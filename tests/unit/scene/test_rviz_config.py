@@ -579,7 +579,7 @@ def test_colors_that_cannot_be_written() -> None:
 def test_vectors() -> None:
     assert read_vector({"X": 1, "Y": "2.50", "Z": 3e-5}) == (1, 2.5, 3e-5)
     assert read_vector(write_vector((0, 0, 0, 1)), "Rotation", "XYZW") == (0, 0, 0, 1)
-    with pytest.raises(Error, match="Offset: expected a mapping of X, Y, Z, got a mapping of 1"):
+    with pytest.raises(Error, match=r"Offset: expected a mapping of X, Y, Z, got {.X.: 1}"):
         read_vector({"X": 1}, "Offset")
     with pytest.raises(Error, match="Offset/Y: expected a finite number, got 'nan'"):
         read_vector({"X": 1, "Y": "nan", "Z": 0}, "Offset")
@@ -643,7 +643,7 @@ def test_topics_of_both_formats() -> None:
 @pytest.mark.parametrize(
     ("settings", "fault"),
     [
-        ({"Topic": ["/a"]}, "Topic: expected a topic, got a list of 1"),
+        ({"Topic": ["/a"]}, "Topic: expected a topic, got \\['/a'\\]"),
         ({"Topic": {"Value": {}}}, "Topic/Value: expected a topic"),
         ({"Topic": {"Depth": "x"}}, "Topic/Depth: expected a finite number, got 'x'"),
         ({"Topic": {"Depth": -1}}, "Topic/Depth: expected at least 0"),

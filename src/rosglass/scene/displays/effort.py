@@ -38,6 +38,8 @@ __all__ = ["EffortDisplay"]
 
 #: Milliseconds until a description that is not there is looked up again.
 _RETRY_MS = 2000
+#: Seconds between two pictures of messages that arrive faster.
+_INTERVAL_S = 1 / 30
 #: Seconds for which efforts may wait for the transforms of their time before that is an error.
 _LATE_S = 1.0
 #: Seconds for which the joints of other messages are shown beside those of the newest one.
@@ -83,22 +85,32 @@ class _Efforts(NamedTuple):
     poses: dict[str, NDArray[np.float64]]
 
 
-class _Part:
-    """What a pick of an arc finds."""
+class _Owner:
+    """What a pick of arcs or their heads finds.
 
-    def __init__(self, display: EffortDisplay, name: str, effort: float) -> None:
-        self.display, self._name, self._effort = display, name, effort
+    Attributes:
+        names: Of the joints, in the order in which they are drawn.
+
+    Args:
+        display: The display.
+        efforts: Nm, by name of the joint.
+        rows: What is drawn of each joint: lines of an arc, or one head.
+    """
+
+    def __init__(self, display: EffortDisplay, efforts: dict[str, float], rows: int) -> None:
+        self.display, self.names = display, tuple(efforts)
+        self._efforts, self._rows = efforts, rows
 
     def __repr__(self) -> str:
-        return f"effort of joint {self._name}"
+        return f"efforts of {', '.join(self.names)}"
 
-    def describe(self) -> list[tuple[str, str]]:
-        """Return the lines of the Selection panel."""
-        limit = self.display.maxEffort(self._name)
+    def describe(self, number: int) -> list[tuple[str, str]]:
+        """Return the lines of the Selection panel for one of the rows."""
+        name = self.names[number // self._rows]
         return [
-            ("Joint", self._name),
-            ("Effort", f"{self._effort:g} Nm"),
-            ("Max Effort", f"{limit:g} Nm"),
+            ("Joint", name),
+            ("Effort", f"{self._efforts[name]:g} Nm"),
+            ("Max Effort", f"{self.display.maxEffort(name):g} Nm"),
         ]
 
 
@@ -199,8 +211,14 @@ class EffortDisplay(HistoryDisplay):
         self._urdf = Status("warn", "")
         #: What :meth:`_place` has found for the message that :meth:`show` gets next.
         self._poses: dict[str, NDArray[np.float64]] = {}
+        self._next_at = 0.0
         super().__init__(parent, runtime)
         self._again = single_shot(self, self._create_again)
+        self._throttle = single_shot(self, self._on_throttle)
+
+    @Slot()
+    def _on_throttle(self) -> None:
+        self._on_items()
 
     # -- the description -------------------------------------------------------------------------
 
@@ -314,6 +332,18 @@ class EffortDisplay(HistoryDisplay):
 
     # -- messages --------------------------------------------------------------------------------
 
+    def _on_items(self) -> None:
+        """Show what has arrived, at most 30 times per second: robots send states at 1 kHz."""
+        if not is_alive(self):
+            return
+        wait_s = self._next_at - time.monotonic()
+        if wait_s > 0:
+            if not self._throttle.isActive():
+                self._throttle.start(math.ceil(wait_s * 1000))
+            return
+        self._next_at = time.monotonic() + _INTERVAL_S
+        super()._on_items()
+
     def length(self) -> int:
         """Return how many messages are shown."""
         return int(self.historyLength)
@@ -413,33 +443,45 @@ class EffortDisplay(HistoryDisplay):
 
     def draw(self, data: Any, group: Group) -> None:
         """Draw an arc and its head for each joint."""
-        for name, pose in data.poses.items():
-            effort, limit = data.values[name][0], self._limit_of(name)
-            if limit is None or not math.isfinite(effort) or not self.isJointEnabled(name):
-                continue
-            part = min(abs(effort) / limit, 1.0) + _LEAST_PART
-            rgba = (*rainbow(np.array(min(part, 1.0))).tolist(), self.alpha)
-            radius = _INNER_M + part * self.scale / 2
-            turn = -1.0 if effort > 0 else 1.0
-            arc = Lines(self.width, in_metres=True)
-            arc.set_strip(radius * _ARC * (-1.0 if effort < 0 else 1.0, 1.0, 1.0), rgba)
-            head = Mesh(CONE, rgba)
-            length, wide = 2 * self.width, 4 * self.width
-            # From where the arc begins, along x.
-            head.set_instances(
-                np.array(
-                    [
-                        [0.0, 0, turn * length, 0],
-                        [turn * wide, 0, 0, radius],
-                        [0, wide, 0, 0],
-                        [0, 0, 0, 1],
-                    ]
-                )[np.newaxis]
-            )
-            owner = _Part(self, name, effort)
-            for item in (arc, head):
-                item.pose, item.owner = pose, owner
-            group.add(arc, head)
+        efforts = {
+            name: data.values[name][0]
+            for name in data.poses
+            if math.isfinite(data.values[name][0]) and self.isJointEnabled(name)
+        }
+        limits = {name: limit for name in efforts if (limit := self._limit_of(name)) is not None}
+        if not limits:
+            return
+        efforts = {name: efforts[name] for name in limits}
+        values = np.array(list(efforts.values()))
+        parts = np.minimum(np.abs(values) / list(limits.values()), 1.0) + _LEAST_PART
+        radii = _INNER_M + parts * self.scale / 2
+        colours = np.full((len(values), 4), self.alpha)
+        colours[:, :3] = rainbow(np.minimum(parts, 1.0))
+        poses = np.array([data.poses[name] for name in efforts])
+        # Near the first joint, numbers are small enough for the GPU.
+        base = poses[0]
+        poses = np.linalg.inv(base) @ poses
+
+        points = radii[:, np.newaxis, np.newaxis] * _ARC
+        points[values < 0, :, 0] *= -1
+        points = points @ poses[:, :3, :3].transpose(0, 2, 1) + poses[:, np.newaxis, :3, 3]
+        lines = np.stack([points[:, :-1], points[:, 1:]], axis=2)
+        arcs = Lines(self.width, in_metres=True)
+        arcs.set_segments(lines.reshape(-1, 2, 3), np.repeat(colours, lines.shape[1], axis=0))
+        arcs.owner = _Owner(self, efforts, lines.shape[1])
+
+        # From where the arc begins, along x.
+        turn = np.where(values > 0, -1.0, 1.0)
+        local = np.zeros((len(values), 4, 4))
+        local[:, 0, 2], local[:, 1, 0], local[:, 2, 1] = 2 * turn, 4 * turn, 4.0
+        local *= self.width
+        local[:, 1, 3], local[:, 3, 3] = radii, 1.0
+        heads = Mesh(CONE)
+        heads.set_instances(poses @ local, colours)
+        heads.owner = _Owner(self, efforts, 1)
+        for item in (arcs, heads):
+            item.pose = base
+        group.add(arcs, heads)
 
     # -- files -----------------------------------------------------------------------------------
 

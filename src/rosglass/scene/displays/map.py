@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -255,8 +256,8 @@ class GridCellsDisplay(TopicDisplay):
         self._restyle()
 
     def _restyle(self) -> None:
-        colouring = self._cells.colouring._replace(mode="flat", first=rgb_of(self.color))
-        self._cells.set_look(style="tiles", size=self._size, colouring=colouring, alpha=self.alpha)
+        coloring = replace(self._cells.coloring, mode="flat", first=rgb_of(self.color))
+        self._cells.set_look(style="tiles", size=self._size, coloring=coloring, alpha=self.alpha)
 
 
 def _read_cells(message: Any) -> tuple[NDArray[np.float32], float, float]:

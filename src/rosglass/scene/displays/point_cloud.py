@@ -29,7 +29,7 @@ from rosglass.scene.cloud_sources import (
     cloud_from_point_cloud,
 )
 from rosglass.scene.display import TopicDisplay, frame_and_stamp
-from rosglass.scene.drawing import Colouring, Points
+from rosglass.scene.drawing import Points
 from rosglass.scene.point_clouds import Cloud, CloudHistory, is_ordered, order_points
 from rosglass.scene.point_colors import (
     COLOR_TRANSFORMERS,
@@ -189,16 +189,7 @@ class _ShownCloud:
             size=size,
             size_by_depth=by_depth,
             alpha=display.alpha,
-            colouring=Colouring(
-                colors.mode,
-                colors.low,
-                colors.high,
-                colors.invert,
-                colors.first,
-                colors.last,
-                colors.axis,
-                data.is_translucent,
-            ),
+            coloring=replace(colors, per_point_alpha=data.is_translucent),
         )
         self.points.owner = self if display.selectable else None
         return colors

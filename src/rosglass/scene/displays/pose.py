@@ -1,4 +1,4 @@
-"""The displays Pose, PoseArray, PoseWithCovariance and Odometry, with their covariances."""
+"""The displays of poses: Pose, PoseArray, Path, PoseWithCovariance and Odometry."""
 # ruff: noqa: N815 - the names of properties are QML's
 
 from __future__ import annotations
@@ -15,14 +15,20 @@ from rosglass.scene.drawing import CONE, CYLINDER, SPHERE, Group, Lines, Mesh
 from rosglass.scene.settings import Setting, rgb_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from numpy.typing import NDArray
 
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
 
-__all__ = ["OdometryDisplay", "PoseArrayDisplay", "PoseDisplay", "PoseWithCovarianceDisplay"]
+__all__ = [
+    "OdometryDisplay",
+    "PathDisplay",
+    "PoseArrayDisplay",
+    "PoseDisplay",
+    "PoseWithCovarianceDisplay",
+]
 
 _MAX_POSES = 100_000
 #: Odometry messages that are kept where none is to be dropped.
@@ -73,22 +79,32 @@ class _Shaped(TopicDisplay):
 
     def _restyle(self) -> None:
         poses = np.array(self._poses).reshape(-1, 4, 4)
-        none = poses[:0]
-        self._arrows.set_arrows(
-            poses if self.shape == "Arrow" else none,
-            # RViz takes what it calls radius for the diameter.
-            (self.shaftLength, self.shaftRadius),
-            (self.headLength, self.headRadius),
-            (*rgb_of(self.color), self.alpha),
-        )
-        self._axes.set_axes(
-            poses if self.shape == "Axes" else none, self.axesLength, self.axesRadius, self.alpha
-        )
+        _set_shapes(self, self._arrows, self._axes, poses, "Arrow")
 
     def reset(self) -> None:
         """Drop all poses."""
         super().reset()
         self._poses = []
+
+
+def _set_shapes(
+    display: Any, arrows: ArrowShapes, axes: AxesShapes, poses: NDArray[np.float64], arrow: str
+) -> None:
+    """Draw poses as arrows if the display's shape is `arrow`, as axes if it is ``Axes``."""
+    none = poses[:0]
+    arrows.set_arrows(
+        poses if display.shape == arrow else none,
+        # RViz takes what it calls radius for the diameter.
+        (display.shaftLength, display.shaftRadius),
+        (display.headLength, display.headRadius),
+        (*rgb_of(display.color), display.alpha),
+    )
+    axes.set_axes(
+        poses if display.shape == "Axes" else none,
+        display.axesLength,
+        display.axesRadius,
+        display.alpha,
+    )
 
 
 def _read_pose(message: Any) -> NDArray[np.float64]:
@@ -144,35 +160,30 @@ class PoseArrayDisplay(TopicDisplay):
         self._restyle()
 
     def _restyle(self) -> None:
-        poses, none = self._poses, self._poses[:0]
-        colour = (*rgb_of(self.color), self.alpha)
+        flat = self._poses if self.shape == "Arrow (Flat)" else self._poses[:0]
         self._flat.set_segments(
-            _flat_arrows(poses if self.shape == "Arrow (Flat)" else none, self.arrowLength), colour
+            _flat_arrows(flat, self.arrowLength), (*rgb_of(self.color), self.alpha)
         )
-        self._arrows.set_arrows(
-            poses if self.shape == "Arrow (3D)" else none,
-            # RViz takes what it calls radius for the diameter.
-            (self.shaftLength, self.shaftRadius),
-            (self.headLength, self.headRadius),
-            colour,
-        )
-        self._axes.set_axes(
-            poses if self.shape == "Axes" else none, self.axesLength, self.axesRadius, self.alpha
-        )
+        _set_shapes(self, self._arrows, self._axes, self._poses, "Arrow (3D)")
 
 
 def _read_poses(message: Any) -> NDArray[np.float64]:
-    count = len(message.poses)
-    if count > _MAX_POSES:
-        raise Error(f"poses: {count} are more than the {_MAX_POSES} that are drawn")
-    rows = np.empty((count, 7))
-    for at, pose in enumerate(message.poses):
-        p, q = pose.position, pose.orientation
-        rows[at] = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+    rows = _rows(message.poses, len(message.poses), _MAX_POSES)
     bad = ~np.isfinite(rows).all(axis=1)
     if bad.any():
         raise Error(f"poses[{int(np.argmax(bad))}] has a number that is not finite")
     return poses_matrices(rows[:, :3], rows[:, 3:])
+
+
+def _rows(poses: Iterable[Any], count: int, most: int) -> NDArray[np.float64]:
+    """Return position and quaternion of each pose, (n, 7)."""
+    if count > most:
+        raise Error(f"poses: {count} are more than the {most} that are drawn")
+    rows = np.empty((count, 7))
+    for at, pose in enumerate(poses):
+        p, q = pose.position, pose.orientation
+        rows[at] = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+    return rows
 
 
 def _flat_arrows(poses: NDArray[np.float64], length: float) -> NDArray[np.float64]:
@@ -404,3 +415,108 @@ OdometryDisplay.SETTINGS = {
     f"Shape/{path}" if path in _BELOW_SHAPE else path: setting
     for path, setting in {**_WithCovariance.SETTINGS, **OdometryDisplay.SETTINGS}.items()
 }
+
+
+_MAX_PATH_POSES = 500_000
+
+
+class PathDisplay(TopicDisplay):
+    """A path. See its page in ``docs/scene.md``."""
+
+    TYPE = "Path"
+    MESSAGES = ("nav_msgs/Path",)
+
+    lineStyle = Setting(
+        "Line Style", "enum", "Lines", "How the line is drawn.", choices=["Lines", "Billboards"]
+    )
+    lineWidth = Setting("Line Width", "float", 0.03, "Of billboards, in metres.", min=0.001)
+    color = Setting("Color", "color", "#19ff00", "The colour of the line.")
+    alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
+    bufferLength = Setting(
+        "Buffer Length", "int", 1, "How many paths are shown.", min=1, max=1000, then="_on_length"
+    )
+    offset = Setting("Offset", "vector", [0, 0, 0], "Of the path, in metres.")
+    poseStyle = Setting(
+        "Pose Style", "enum", "None", "How poses are drawn.", choices=["None", "Axes", "Arrows"]
+    )
+    axesLength = Setting("Length", "float", 0.3, "Of axes, in metres.", min=0.0)
+    axesRadius = Setting("Radius", "float", 0.03, "Of axes, in metres.", min=0.0)
+    poseColor = Setting("Pose Color", "color", "#ff55ff", "Of arrows.")
+    shaftLength = Setting("Shaft Length", "float", 0.1, "Of arrows, metres.", min=0.0)
+    headLength = Setting("Head Length", "float", 0.2, "Of arrows, metres.", min=0.0)
+    shaftDiameter = Setting("Shaft Diameter", "float", 0.1, "In metres.", min=0.0)
+    headDiameter = Setting("Head Diameter", "float", 0.3, "In metres.", min=0.0)
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        #: The paths that are shown, the oldest first: poses, and matrices.
+        self._paths: list[_Path] = []
+        super().__init__(parent, runtime)
+
+    def shows_all(self) -> bool:
+        """Return whether earlier paths are shown as well."""
+        return bool(self.bufferLength > 1)
+
+    def preparer(self) -> Any:
+        """Return the function that reads poses."""
+        return _read_path
+
+    def show(self, data: NDArray[np.float64], pose: Any, frame: str, stamp: int) -> None:  # noqa: ARG002
+        """Show a path, beside earlier ones."""
+        path = _Path(data, self)
+        path.place(pose)
+        self._paths.append(path)
+        self.root.add(*path.parts)
+        self._restyle()
+
+    def reset(self) -> None:
+        """Drop all paths."""
+        super().reset()
+        self._paths.clear()
+
+    def _restyle(self) -> None:
+        while len(self._paths) > self.bufferLength:
+            for part in self._paths.pop(0).parts:
+                part.remove()
+        for path in self._paths:
+            path.restyle(self)
+
+
+class _Path:
+    """One path: a line, and axes or arrows at its poses."""
+
+    def __init__(self, poses: NDArray[np.float64], owner: PathDisplay) -> None:
+        self._poses = poses
+        self._line, self._axes, self._arrows = Lines(), AxesShapes(owner), ArrowShapes(owner)
+        self._line.owner = owner
+        self.parts = (self._line, self._axes, self._arrows)
+
+    def place(self, pose: NDArray[np.float64]) -> None:
+        for part in self.parts:
+            part.pose = pose
+
+    def restyle(self, display: PathDisplay) -> None:
+        shift = np.array([display.offset.x(), display.offset.y(), display.offset.z()])
+        points = self._poses[:, :3] + shift
+        self._line.in_metres = display.lineStyle == "Billboards"
+        self._line.set_strip(points, (*rgb_of(display.color), display.alpha))
+        self._line.set_look(width=display.lineWidth if self._line.in_metres else 1.0)
+        matrices = poses_matrices(points, self._poses[:, 3:])
+        none = matrices[:0]
+        style = display.poseStyle
+        self._axes.set_axes(
+            matrices if style == "Axes" else none, display.axesLength, display.axesRadius
+        )
+        self._arrows.set_arrows(
+            matrices if style == "Arrows" else none,
+            (display.shaftLength, display.shaftDiameter),
+            (display.headLength, display.headDiameter),
+            (*rgb_of(display.poseColor), display.alpha),
+        )
+
+
+def _read_path(message: Any) -> NDArray[np.float64]:
+    """Return position and quaternion of each pose, (n, 7)."""
+    poses = message.poses
+    return _rows((stamped.pose for stamped in poses), len(poses), _MAX_PATH_POSES)

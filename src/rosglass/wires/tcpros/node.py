@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from rosglass.comm import Handle, NodeName
     from rosglass.messages import ServiceType
     from rosglass.wires.base import OnRequest
-    from rosglass.wires.tcpros.announced_types import AnnouncedTypes
-    from rosglass.wires.tcpros.core import TcprosOptions
+    from rosglass.wires.tcpros.core import AnnouncedTypes, TcprosOptions
 
 __all__ = ["TcprosNode", "max_connections"]
 
