@@ -261,9 +261,14 @@ class ImageItem(QtQuick.QQuickPaintedItem):
         image = self._image
         if image is None:
             return
-        painter.setRenderHint(QtGui.QPainter.RenderHint.SmoothPixmapTransform, self.smooth())
         target, source = self._place(image)
+        smooth = QtGui.QPainter.RenderHint.SmoothPixmapTransform
+        painter.setRenderHint(smooth, self._is_smooth(target, source))
         painter.drawImage(target, image, source)
+
+    def _is_smooth(self, target: QtCore.QRectF, source: QtCore.QRectF) -> bool:  # noqa: ARG002 - for subclasses
+        """Return whether pixels are mixed where a part of the picture is drawn."""
+        return self.smooth()
 
     def _place(self, image: QtGui.QImage) -> tuple[QtCore.QRectF, QtCore.QRectF]:
         """Return the target rectangle and the part of the picture drawn in it."""

@@ -709,6 +709,10 @@ class PictureItem(ImageItem):
 
     display = Property(QtCore.QObject, _get_display, _set_display, notify=displayChanged)
 
+    def _is_smooth(self, target: QtCore.QRectF, source: QtCore.QRectF) -> bool:
+        """Return whether pixels are mixed: as in RViz, those that are magnified are not."""
+        return target.width() < source.width()
+
     def _place(self, image: QtGui.QImage) -> tuple[QtCore.QRectF, QtCore.QRectF]:
         """Return the part of the item where the picture is, and which part of it that is."""
         display = self._display
