@@ -8,6 +8,7 @@ given: a change gives a new one, so that a renderer in another thread may still 
 from __future__ import annotations
 
 import math
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -509,7 +510,10 @@ class Shape:
         indices: (m, 3) or (m * 3) numbers of vertices; if None, each three vertices are a triangle.
         colours: RGBA for each vertex; white if None.
         uv: (n, 2) places in the texture, from its upper left corner; 0 if None.
-        closed: Whether it has no holes and is symmetric to x = 0: its inner side is not drawn.
+        one_sided: Whether triangles are seen only from the side where their corners are in
+            counter-clockwise order.
+        closed: Whether it is one-sided, and symmetric to x = 0: mirrored, it is still seen from
+            outside.
 
     Raises:
         Error: The shapes of the arrays don't fit, or an index is beyond the vertices.
@@ -527,9 +531,10 @@ class Shape:
         *,
         colours: ArrayLike | None = None,
         uv: ArrayLike | None = None,
+        one_sided: bool = False,
         closed: bool = False,
     ) -> None:
-        self.closed = closed
+        self.one_sided, self.closed = one_sided or closed, closed
         at = _checked("positions", positions, (3,))
         if indices is None:
             faces = np.arange(len(at) // 3 * 3, dtype=np.uint32).reshape(-1, 3)
@@ -558,6 +563,12 @@ class Shape:
         self.opaque = bool((rows["rgba"][:, 3] == 255).all())
         #: Corners of the box around it.
         self.box = _box_of(at[np.unique(faces)] if len(faces) else at[:0])
+
+    def mirrored(self) -> Shape:
+        """Return the same shape with its triangles turned, to be seen from the other side."""
+        other = copy(self)
+        other.faces = np.ascontiguousarray(self.faces[:, ::-1])
+        return other
 
 
 def _fitting(name: str, given: ArrayLike, at: NDArray[Any], width: int) -> NDArray[np.float32]:
@@ -836,24 +847,40 @@ class Labels(Drawable):
 
 
 def _box_shape() -> Shape:
-    corners, normals = [], []
+    corners, normals, uv = [], [], []
     for axis in range(3):
         for side in (-1.0, 1.0):
             u, v = (axis + 1) % 3, (axis + 2) % 3
+            normal = [side * (n == axis) for n in range(3)]
+            # Each side has the whole picture, as in RViz.
+            up = np.array([0.0, 0.0, 1.0] if axis < 2 else [0.0, 1.0, 0.0])
+            right = np.cross(up, normal)
             quad = [(-side, -1), (side, -1), (side, 1), (-side, 1)]
             for a, b in quad:
                 at = [0.0, 0.0, 0.0]
                 at[axis], at[u], at[v] = side * 0.5, a * 0.5, b * 0.5
                 corners.append(at)
-                normals.append([side * (n == axis) for n in range(3)])
+                normals.append(normal)
+                uv.append([0.5 + right @ at, 0.5 - up @ at])
     first = 4 * np.arange(6)[:, np.newaxis]
     faces = np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])])
-    return Shape(corners, normals, faces, closed=True)
+    return Shape(corners, normals, faces, uv=uv, closed=True)
 
 
-def _turned(profile: list[tuple[float, float, float, float]], around: int = 32) -> Shape:
-    """Return a shape turned around z: a profile of (radius, z, normal outward, normal along z)."""
-    angles = np.linspace(0, 2 * np.pi, around + 1)
+def _turned(
+    profile: list[tuple[float, float, float, float]],
+    around: int = 32,
+    uv: Callable[[NDArray[Any], float], NDArray[Any]] | None = None,
+) -> Shape:
+    """Return a shape turned around z.
+
+    Args:
+        profile: (radius, z, normal outward, normal along z) of each ring.
+        around: Sides of a ring.
+        uv: Places in a texture, (n, 2), of n shares of a turn and a z.
+    """
+    turns = np.linspace(0, 1, around + 1)
+    angles = 2 * np.pi * turns
     c, s = np.cos(angles), np.sin(angles)
     at = [np.stack([r * c, r * s, np.full_like(c, z)], axis=1) for r, z, _, _ in profile]
     normal = [np.stack([n * c, n * s, np.full_like(c, m)], axis=1) for _, _, n, m in profile]
@@ -864,14 +891,23 @@ def _turned(profile: list[tuple[float, float, float, float]], around: int = 32) 
         a = ring * (around + 1) + np.arange(around)
         b = a + around + 1
         faces += [np.stack([a, a + 1, b + 1], axis=1), np.stack([a, b + 1, b], axis=1)]
-    return Shape(np.concatenate(at), np.concatenate(normal), np.concatenate(faces), closed=True)
+    places = None if uv is None else np.concatenate([uv(turns, z) for _, z, _, _ in profile])
+    corners, normals = np.concatenate(at), np.concatenate(normal)
+    return Shape(corners, normals, np.concatenate(faces), uv=places, closed=True)
 
 
 def _sphere_shape(rings: int = 16) -> Shape:
     tilt = np.linspace(-np.pi / 2, np.pi / 2, rings + 1)
     return _turned(
-        [(0.5 * math.cos(t), 0.5 * math.sin(t), math.cos(t), math.sin(t)) for t in tilt], 2 * rings
+        [(0.5 * math.cos(t), 0.5 * math.sin(t), math.cos(t), math.sin(t)) for t in tilt],
+        2 * rings,
+        # A picture of the earth, as in RViz.
+        lambda turns, z: _places(turns + 0.5, math.acos(min(max(2 * z, -1.0), 1.0)) / math.pi),
     )
+
+
+def _places(across: NDArray[Any], down: float) -> NDArray[Any]:
+    return np.stack([across, np.full_like(across, down)], axis=1)
 
 
 #: One metre in every direction, around the origin.
@@ -887,7 +923,8 @@ CYLINDER = _turned(
         (0.5, 0.5, 1, 0),
         (0.5, 0.5, 0, 1),
         (0, 0.5, 0, 1),
-    ]
+    ],
+    uv=lambda turns, z: _places(0.75 - turns, z + 0.5),
 )
 _SLOPE = math.hypot(1, 0.5)
 #: Of one metre in diameter and height, from z = 0 to its tip at z = 1.

@@ -570,7 +570,7 @@ class _MeshOnDevice(_OnDevice):
             _Topology.Triangles,
             blend,
             self.bound,
-            self._shape.closed,
+            self._shape.one_sided,
         )
         self.begin(run, pipeline)
         run.commands.setVertexInput(

@@ -25,6 +25,7 @@ from rosglass.scene.rviz_formats import (
     write_description,
 )
 from rosglass.scene.settings import Setting
+from rosglass.scene.triangles import moved
 from rosglass.scene.urdf import Box, Capsule, Cylinder, MeshFile, Robot, Sphere, parse_urdf
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.resource_retriever import ResourceRetriever
+    from rosglass.scene.triangles import MeshPart
     from rosglass.scene.urdf import Visual
 
 __all__ = ["DescriptionSource", "RobotModelDisplay", "link_drawables", "read_texture"]
@@ -45,6 +47,7 @@ __all__ = ["DescriptionSource", "RobotModelDisplay", "link_drawables", "read_tex
 _RETRY_MS = 2000
 #: RViz's colour of what has no material.
 _NO_MATERIAL = (1.0, 0.0, 0.0, 1.0)
+#: That of parts of mesh files without one.
 _GREY = (0.6, 0.6, 0.6, 1.0)
 #: Status lines of links without a transform, before the rest is counted.
 _MAX_LINK_LINES = 10
@@ -140,7 +143,7 @@ def read_texture(source: str | bytes, name: str, resources: ResourceRetriever) -
     image = QtGui.QImage.fromData(data)
     if image.isNull():
         raise Error(f"{name}: this is no picture that Qt can read")
-    image = image.convertToFormat(QtGui.QImage.Format.Format_RGBA8888)
+    image = image.convertToFormat(QtGui.QImage.Format.Format_RGBX8888)
     rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
     whole: NDArray[np.uint8] = rows[:, : 4 * image.width()].copy()
     return whole.reshape(image.height(), image.width(), 4)
@@ -150,8 +153,6 @@ def link_drawables(
     visual: Visual,
     problems: dict[str, str],
     resources: ResourceRetriever,
-    *,
-    plain: bool = False,
 ) -> list[Mesh]:
     """Return what a visual or collision of a link draws, in the link's frame.
 
@@ -161,7 +162,6 @@ def link_drawables(
         visual: The visual.
         problems: What could not be loaded is added, by the name of the file.
         resources: Reads meshes and textures.
-        plain: Whether materials of files do not count, as for collisions.
     """
     geometry = visual.geometry
     material = visual.material
@@ -185,17 +185,14 @@ def link_drawables(
         mesh.set_instances((visual.origin @ local)[np.newaxis])
         made.append(mesh)
     if isinstance(geometry, MeshFile):
-        made += _mesh_drawables(visual, geometry, own, problems, resources, plain)
-    if (
-        material is not None
-        and material.texture
-        and not plain
-        and not isinstance(geometry, MeshFile)
-    ):
+        made += _mesh_drawables(visual, geometry, own, problems, resources)
+    elif material is not None and material.texture:
         try:
             pixels = read_texture(material.texture, material.texture, resources)
             for mesh in made:
                 mesh.set_texture(pixels)
+                # RViz uses one or the other.
+                mesh.set_look(colour=(1.0, 1.0, 1.0, 1.0))
         except (Error, OSError) as error:
             problems[material.texture] = str(error)
     return made
@@ -207,7 +204,6 @@ def _mesh_drawables(
     own: tuple[float, float, float, float],
     problems: dict[str, str],
     resources: ResourceRetriever,
-    plain: bool,
 ) -> list[Mesh]:
     try:
         found = resources.find(geometry.uri)
@@ -218,19 +214,24 @@ def _mesh_drawables(
     is_stl = ending_of(geometry.uri) in (".stl", ".stlb")
     made = []
     for part in parts:
-        shape = Shape(part.positions, part.normals, part.indices, uv=part.uv)
-        colour = part.colour
-        if plain or colour is None:
-            colour = own if plain or is_stl or visual.material is not None else _GREY
-        mesh = Mesh(shape, colour)
-        mesh.set_instances((visual.origin @ _matrix(*geometry.scale))[np.newaxis])
-        if part.texture is not None and not plain:
+        scaled = moved(part, _matrix(*geometry.scale))
+        shape = Shape(scaled.positions, scaled.normals, scaled.indices, uv=part.uv, one_sided=True)
+        # In RViz, only STL files have no materials of their own.
+        mesh = Mesh(shape, own if is_stl else material_of(part))
+        mesh.set_instances(visual.origin[np.newaxis])
+        if part.texture is not None:
             try:
                 mesh.set_texture(read_texture(part.texture, geometry.uri, resources))
             except (Error, OSError) as error:
                 problems[geometry.uri] = str(error)
         made.append(mesh)
     return made
+
+
+def material_of(part: MeshPart) -> tuple[float, float, float, float]:
+    """Return the colour of a part of a mesh file that has materials: opaque, as in RViz."""
+    r, g, b, _ = part.colour or _GREY
+    return (r, g, b, 1.0)
 
 
 def _load(text: str, source: str, resources: ResourceRetriever) -> _Loaded:
@@ -243,7 +244,7 @@ def _load(text: str, source: str, resources: ResourceRetriever) -> _Loaded:
     for name, link in robot.links.items():
         visuals[name] = [m for v in link.visuals for m in link_drawables(v, problems, resources)]
         collisions[name] = [
-            m for v in link.collisions for m in link_drawables(v, problems, resources, plain=True)
+            m for v in link.collisions for m in link_drawables(v, problems, resources)
         ]
     return _Loaded(robot, visuals, collisions, problems)
 
