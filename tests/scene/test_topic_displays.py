@@ -153,3 +153,41 @@ def test_what_is_shown_fades_while_newer_data_waits_for_its_transform(bench: Sce
     move(11)
     bench.wait(lambda: display.root.alpha == 1.0)
     assert display.statusLevel == "ok", display.statusText
+
+
+def test_nothing_is_late_while_the_robots_time_stands_still(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    view = bench.load('PointStampedDisplay { topic: "/point" }')
+    (display,) = view.scene.displays
+    clock = bench.robot.create_publisher("/clock", "rosgraph_msgs/msg/Clock")
+    points = bench.robot.create_publisher("/point", "geometry_msgs/PointStamped")
+    view.scene.node.parameters.set({"use_sim_time": True})
+    bench.wait(lambda: clock.subscription_count() and points.subscription_count())
+
+    def send(second: int) -> None:
+        stamp = {"sec": second, "nanosec": 0}
+        points.publish({"header": {"frame_id": "arm", "stamp": stamp}})
+
+    def set_time(seconds: float) -> None:
+        stamp = Time(round(seconds * 1e9))
+        clock.publish({"clock": {"sec": int(seconds), "nanosec": round(seconds % 1 * 1e9)}})
+        bench.wait(lambda: view.scene.now() == stamp.nanoseconds)
+
+    set_time(10.0)
+    transform = Transform((0, 0, 0), (0, 0, 0, 1), Time.from_parts(10, 0), "map", "arm")
+    TransformBroadcaster(bench.robot).send_transform(transform)
+    bench.wait(lambda: "arm" in view.scene.frames())
+    # The change of time has made it subscribe anew.
+    bench.wait(lambda: send(10) or len(parts(display, SPHERE)) == 1)
+    bench.wait.settled(bench.session)
+    before = display.received
+    set_time(11.5)
+    send(11)
+    bench.wait(lambda: display.received > before)
+    # Longer than data may wait for its transform.
+    bench.wait.nothing_happens(1.6)
+    assert (display.root.alpha, display.statusLevel) == (1.0, "ok"), display.statusText
+    set_time(12.5)
+    bench.wait(lambda: display.root.alpha < 1.0 and display.statusLevel == "error")

@@ -672,12 +672,16 @@ class TopicDisplay(OneTopicDisplay):
 
     def _is_late(self) -> bool:
         """Return whether the newest message has waited for its transform for long."""
-        waits = bool(self._waiting) and self._waiting[-1] is self._newest
-        return waits and time.monotonic() - self._placed_at > _LATE_S
+        newest, scene = self._newest, self.scene
+        if scene is None or newest is None or not self._waiting or self._waiting[-1] is not newest:
+            return False
+        # While a simulation or recording is paused, nothing is late.
+        age_s = (scene.now() - newest.stamp) * 1e-9 if newest.stamp else math.inf
+        return min(age_s, time.monotonic() - self._placed_at) > _LATE_S
 
     def check_frame(self) -> None:
-        """Try again to place what waits, so that the status says why it is not shown."""
-        if self._waiting and self.shown:
+        """Try again to place what is late, so that the status says why it is not shown."""
+        if self.shown and self._is_late():
             self._show_waiting()
         super().check_frame()
 
