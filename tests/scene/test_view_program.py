@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from conftest import SceneBench
@@ -92,7 +93,7 @@ def test_displays_are_added_renamed_moved_and_removed(bench: SceneBench, model: 
     assert bench.view.scene.displays[1].topic == "/plan"
     bench.wait(publisher.subscription_count)
     model.rename(row_of(model, "Path"), "Plan")
-    model.move(row_of(model, "Plan"), row_of(model, "Grid"))
+    assert model.drop(row_of(model, "Plan"), row_of(model, "Grid"), 0.2) == row_of(model, "Plan")
     assert [one.name for one in bench.view.scene.displays] == ["Plan", "Grid"]
     model.setEnabled(row_of(model, "Plan"), False)
     bench.wait(lambda: not publisher.subscription_count())
@@ -107,6 +108,118 @@ def test_rows_follow_the_status(bench: SceneBench, model: Any) -> None:
     assert model.rows[row].level == "error"
     assert "no transform from [tool]" in model.rows[row].description
     assert "Transform" in labels(model)
+
+
+def outline(scene: Any, group: Any = None) -> list[Any]:
+    """Return the names of displays, those of a group as a list behind its name."""
+    found: list[Any] = []
+    for one in scene.displays:
+        if one.group is group:
+            found.append(one.name)
+            if one.TYPE == "Group":
+                found.append(outline(scene, one))
+    return found
+
+
+@pytest.fixture
+def grouped(bench: SceneBench, model: Any) -> Any:
+    """The rows with the displays Grid, an empty group Robot, Axes and Plan."""
+    bench.view.scene.add("Group", "Robot")
+    bench.view.scene.add("Axes")
+    bench.view.scene.add("Path", "Plan", topic="/plan")
+    model.refresh()
+    return model
+
+
+def test_displays_are_dropped_between_others_and_into_groups(
+    bench: SceneBench, grouped: Any, tmp_path: Path
+) -> None:
+    model, scene = grouped, bench.view.scene
+
+    def drop(moved: str, target: str, part: float) -> list[Any]:
+        row = len(model.rows) if target == "" else row_of(model, target)
+        source = row_of(model, moved)
+        place = model.dropTarget(source, row, part)
+        new = model.drop(source, row, part)
+        assert model.rows[new].label == moved
+        assert not place or model.rows[new].depth == place["depth"] + place["into"]
+        return outline(scene)
+
+    assert outline(scene) == ["Grid", "Robot", [], "Axes", "Plan"]
+    assert drop("Axes", "Robot", 0.5) == ["Grid", "Robot", ["Axes"], "Plan"]
+    assert drop("Grid", "Axes", 0.2) == ["Robot", ["Grid", "Axes"], "Plan"]
+    assert drop("Plan", "Grid", 0.9) == ["Robot", ["Grid", "Plan", "Axes"]]
+    assert drop("Axes", "Robot", 0.9) == ["Robot", ["Axes", "Grid", "Plan"]]
+    assert drop("Grid", "", 0.0) == ["Robot", ["Axes", "Plan"], "Grid"]
+    assert drop("Plan", "Robot", 0.1) == ["Plan", "Robot", ["Axes"], "Grid"]
+    # Neither into itself, nor into what is in it; above the displays is in front of the first.
+    model.add("Group", "")
+    assert drop("Group", "Robot", 0.5)[1:3] == ["Robot", ["Axes", "Group", []]]
+    assert model.dropTarget(row_of(model, "Robot"), row_of(model, "Group"), 0.5) == {}
+    before = outline(scene)
+    assert drop("Robot", "Group", 0.5) == before
+    assert drop("Grid", "Global Status", 0.5)[0] == "Grid"
+    # Below the settings of a display is below it.
+    model.toggle(row_of(model, "Plan"))
+    assert drop("Grid", "Topic", 0.1)[:2] == ["Plan", "Grid"]
+    bench.view.save_config(tmp_path / "moved.rviz")
+    after = outline(scene)
+    assert bench.view.load_config(tmp_path / "moved.rviz") == []
+    assert outline(scene) == after
+
+
+def test_a_display_in_a_group_is_shown_and_hidden_with_it(bench: SceneBench, grouped: Any) -> None:
+    scene = bench.view.scene
+    publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
+    bench.wait(publisher.subscription_count)
+    _, group, _, plan = scene.displays
+    group.enabled = False
+    grouped.drop(row_of(grouped, "Plan"), row_of(grouped, "Robot"), 0.5)
+    assert not plan.shown
+    bench.wait(lambda: not publisher.subscription_count())
+    grouped.drop(row_of(grouped, "Plan"), row_of(grouped, "Robot"), 0.1)
+    assert plan.shown
+    bench.wait(publisher.subscription_count)
+
+
+def test_displays_are_moved_by_keys(bench: SceneBench, grouped: Any) -> None:
+    model, scene = grouped, bench.view.scene
+
+    def shift(moved: str, direction: str) -> list[Any]:
+        new = model.shift(row_of(model, moved), direction)
+        assert model.rows[new].label == moved
+        return outline(scene)
+
+    assert shift("Grid", "up") == ["Grid", "Robot", [], "Axes", "Plan"]
+    assert shift("Axes", "in") == ["Grid", "Robot", ["Axes"], "Plan"]
+    assert shift("Plan", "up") == ["Grid", "Plan", "Robot", ["Axes"]]
+    assert shift("Grid", "down") == ["Plan", "Grid", "Robot", ["Axes"]]
+    assert shift("Axes", "down") == ["Plan", "Grid", "Robot", ["Axes"]]
+    assert shift("Axes", "out") == ["Plan", "Grid", "Robot", [], "Axes"]
+    assert shift("Grid", "in") == ["Plan", "Grid", "Robot", [], "Axes"]
+
+
+def test_a_move_that_is_none_is_an_error(bench: SceneBench, grouped: Any) -> None:
+    from rosglass.errors import Error
+
+    scene = bench.view.scene
+    grid, group, axes, plan = scene.displays
+    for before, into, why in (
+        (None, grid, "display 'Grid' is no group"),
+        (None, group, "display 'Robot' cannot be moved into itself"),
+        (axes, None, ""),
+        (plan, group, "display 'Plan' is not in display 'Robot'"),
+    ):
+        moved = group if into is group and before is None else axes
+        if why:
+            with pytest.raises(Error, match=why):
+                scene.move(moved, before, into)
+        else:
+            scene.move(moved, before, into)
+        assert outline(scene) == ["Grid", "Robot", [], "Axes", "Plan"]
+    scene.remove(plan)
+    with pytest.raises(Error, match="'Plan' is not in this scene"):
+        scene.move(axes, plan)
 
 
 def view_command(*arguments: str, timeout: float = 100) -> subprocess.CompletedProcess[str]:
@@ -202,8 +315,9 @@ def test_what_would_be_lost_is_asked_for(bench: SceneBench, tmp_path: Path) -> N
     assert "there is no such file" in program.message
 
 
-def test_reset_in_the_tool_bar_drops_what_was_received(bench: SceneBench) -> None:
-    from PySide6.QtCore import QObject
+@pytest.fixture
+def window(bench: SceneBench) -> Iterator[Any]:
+    """The window of the program, connected to the robot of the bench."""
     from PySide6.QtQml import QQmlApplicationEngine
 
     from rosglass.qml import install
@@ -215,6 +329,91 @@ def test_reset_in_the_tool_bar_drops_what_was_received(bench: SceneBench) -> Non
     engine.rootContext().setContextProperty("program", program)
     engine.load(str(WINDOW))
     (window,) = engine.rootObjects()
+    bench.wait(window.isExposed)
+    yield window
+    # It would ask whether to save what has changed.
+    program.discard()
+    window.close()
+    engine.deleteLater()
+    send_deferred_deletes()
+
+
+class Rows:
+    """The rows of the Displays panel in the program's window, for the mouse and the keyboard."""
+
+    def __init__(self, window: Any) -> None:
+        from PySide6.QtCore import QObject, QPoint, QPointF, Qt
+        from PySide6.QtTest import QTest
+
+        self.window, self._test, self._left = window, QTest, Qt.MouseButton.LeftButton
+        self._list = window.findChild(QObject, "displayRows")
+        self._point, self._pointf = QPoint, QPointF
+        self.model = self._list.property("model")
+        self.scene = window.findChild(QObject, "scene").scene
+
+    def at(self, label: str, part: float = 0.5, x: float = 150) -> Any:
+        """Return where the row of a label is, or a part of its height further down."""
+        self.model.refresh()
+        top = self._list.property("originY") - self._list.property("contentY")
+        y = top + 24 * (row_of(self.model, label) + part)
+        return self._list.mapToScene(self._pointf(x, y)).toPoint()
+
+    def drag(self, moved: str, target: Any) -> None:
+        """Press on a row and move to a place, in steps."""
+        start = self.at(moved)
+        self._test.mousePress(self.window, self._left, pos=start)
+        for share in (0.3, 0.6, 1.0):
+            self._test.mouseMove(self.window, start + (target - start) * share)
+
+    def release(self, target: Any) -> None:
+        self._test.mouseRelease(self.window, self._left, pos=target)
+
+    def click(self, place: Any) -> None:
+        self._test.mouseClick(self.window, self._left, pos=place)
+
+    def key(self, name: str, *, alt: bool = False) -> None:
+        from PySide6.QtCore import Qt
+
+        held = Qt.KeyboardModifier.AltModifier if alt else Qt.KeyboardModifier.NoModifier
+        self._test.keyClick(self.window, getattr(Qt.Key, f"Key_{name}"), held)
+
+
+def test_a_display_is_dragged_by_the_mouse(bench: SceneBench, window: Any) -> None:
+    rows = Rows(window)
+    rows.scene.add("Group", "Robot")
+    rows.scene.add("Axes")
+    target = rows.at("Robot")
+    rows.drag("Grid", target)
+    assert rows.model.frozen
+    assert outline(rows.scene) == ["Grid", "TF", "Robot", [], "Axes"]
+    rows.release(target)
+    assert outline(rows.scene) == ["TF", "Robot", ["Grid"], "Axes"]
+    assert not rows.model.frozen
+    # Escape drops what is dragged, until the button is released.
+    target = rows.at("TF", 0.1)
+    rows.drag("Axes", target)
+    rows.key("Escape")
+    rows.release(target)
+    assert outline(rows.scene) == ["TF", "Robot", ["Grid"], "Axes"]
+    rows.drag("Axes", target)
+    rows.release(target)
+    assert outline(rows.scene) == ["Axes", "TF", "Robot", ["Grid"]]
+    # The display that was moved stays selected, for the keyboard.
+    rows.key("Down", alt=True)
+    assert outline(rows.scene) == ["TF", "Axes", "Robot", ["Grid"]]
+    rows.key("Space")
+    assert not rows.scene.find("Axes").enabled
+    rows.key("Down")
+    rows.key("Down")
+    rows.key("Left", alt=True)
+    assert outline(rows.scene) == ["TF", "Axes", "Robot", [], "Grid"]
+    rows.key("Delete")
+    assert outline(rows.scene) == ["TF", "Axes", "Robot", []]
+
+
+def test_reset_in_the_tool_bar_drops_what_was_received(bench: SceneBench, window: Any) -> None:
+    from PySide6.QtCore import QObject
+
     scene = window.findChild(QObject, "scene").scene
     path = scene.add("Path", topic="/plan")
     publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
@@ -223,12 +422,7 @@ def test_reset_in_the_tool_bar_drops_what_was_received(bench: SceneBench) -> Non
         publisher.publish({"header": {"frame_id": scene.fixed_frame}})
         return bool(len(path.root))
 
-    try:
-        bench.wait(is_shown)
-        window.findChild(QObject, "reset").clicked.emit()
-        assert not len(path.root)
-        bench.wait(is_shown)
-    finally:
-        window.close()
-        engine.deleteLater()
-        send_deferred_deletes()
+    bench.wait(is_shown)
+    window.findChild(QObject, "reset").clicked.emit()
+    assert not len(path.root)
+    bench.wait(is_shown)

@@ -745,8 +745,7 @@ class SceneDisplays(displays.Displays):
 
     @Slot()
     def _watch_scene(self) -> None:
-        self._scene.displayAdded.connect(self._on_change)
-        self._scene.displayRemoved.connect(self._on_change)
+        self._scene.displaysChanged.connect(self._on_change)
         self._on_change()
 
     @property

@@ -10,6 +10,7 @@ from PySide6.QtGui import QColor
 
 from rosglass.errors import Error
 from rosglass.interfaces.names import ros1_name
+from rosglass.qml.properties import Writable
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.scene.display import OneTopicDisplay
 from rosglass.scene.display_configs import GroupDisplay, UnknownDisplay
@@ -25,6 +26,8 @@ __all__ = ["DisplaysModel", "PanelRow"]
 
 #: Milliseconds between two looks at what has no signal of its own.
 _REFRESH_MS = 250
+#: Shares of a group's row at which a display is dropped above or below it, not into it.
+_EDGE = 0.25
 _FIXED_FRAME, _BACKGROUND = "Fixed Frame", "Background Color"
 
 
@@ -56,6 +59,24 @@ class PanelRow(NamedTuple):
     expandable: bool = False
     expanded: bool = False
     choices: tuple[str, ...] = ()
+
+
+class _Landing(NamedTuple):
+    """Where a display goes that is dropped.
+
+    Attributes:
+        group: Its group there.
+        before: The display that it goes in front of; None for the end.
+        row: The row that it goes in front of.
+        depth: Levels of indentation there.
+        into: Whether it goes into the group of that row, as the last one.
+    """
+
+    group: Display | None
+    before: Display | None
+    row: int
+    depth: int
+    into: bool = False
 
 
 _ROLES = {
@@ -133,6 +154,9 @@ class DisplaysModel(QAbstractListModel):
     #: The view that is shown.
     view = Property(QtCore.QObject, _get_view, _set_view, notify=viewChanged)
 
+    #: Whether rows stay as they are, while one of them is dragged.
+    frozen = Writable(bool, False, then="refresh")
+
     @property
     def rows(self) -> list[PanelRow]:
         """What is shown, from the top."""
@@ -160,7 +184,7 @@ class DisplaysModel(QAbstractListModel):
     @Slot()
     def refresh(self) -> None:
         """Show what has changed."""
-        if not is_alive(self):
+        if not is_alive(self) or self.frozen:
             return
         view = self._view
         new = list(self._walk(view)) if view is not None and is_alive(view) else []
@@ -333,15 +357,126 @@ class DisplaysModel(QAbstractListModel):
             return
         self._view.scene.remove(display)
 
-    @Slot(int, int)
-    def move(self, row: int, target: int) -> None:
-        """Move a display to the place of the one in another row."""
-        display, other = self._display_at(row), self._display_at(target)
-        if display is None or other is None or display is other or self._view is None:
-            return
-        scene = self._view.scene
-        scene.move(display, scene.displays.index(other))
+    # -- order -----------------------------------------------------------------------------------
+
+    def _find_landing(self, source: int, row: int, part: float) -> _Landing | None:
+        """Return where a display goes that is dropped on a row; None where it cannot go."""
+        moved, target = self._display_at(source), self._display_at(row)
+        if moved is None or self._view is None:
+            return None
+        rows = self._rows
+        if target is None:
+            if row >= len(rows):
+                return _Landing(None, None, len(rows), 0)
+            # The rows above the displays.
+            first = next(self._inside(None), None)
+            return _Landing(None, first, self._row_of(first), 0)
+        head = self._row_of(target)
+        depth, expanded = rows[head].depth, rows[head].expanded
+        end = head + 1
+        while end < len(rows) and rows[end].depth > depth:
+            end += 1
+        if isinstance(target, GroupDisplay) and row == head and part >= _EDGE:
+            if expanded and part > 1 - _EDGE:
+                found = _Landing(target, next(self._inside(target), None), head + 1, depth + 1)
+            elif expanded or part <= 1 - _EDGE:
+                found = _Landing(target, None, head, depth, into=True)
+            else:
+                found = _Landing(target.group, self._next_to(target), end, depth)
+        elif row == head and part < 0.5:
+            found = _Landing(target.group, target, head, depth)
+        else:
+            found = _Landing(target.group, self._next_to(target), end, depth)
+        above = found.group
+        while above is not None and above is not moved:
+            above = above.group
+        return found if above is None else None
+
+    def _row_of(self, display: Display | None) -> int:
+        key = ("display", id(display))
+        rows = enumerate(self._rows)
+        return next((number for number, row in rows if row.key == key), len(self._rows))
+
+    def _inside(self, group: Display | None) -> Iterator[Display]:
+        """Iterate over the displays in a group; in none for None."""
+        displays = self._view.scene.displays if self._view is not None else []
+        return (one for one in displays if one.group is group)
+
+    def _next_to(self, display: Display) -> Display | None:
+        """Return the display after one in its group; None for the last one."""
+        beside = list(self._inside(display.group))
+        return next(iter(beside[beside.index(display) + 1 :]), None)
+
+    @Slot(int, int, float, result="QVariantMap")
+    def dropTarget(self, source: int, row: int, part: float) -> dict[str, Any]:
+        """Return where a display goes that is dropped on a row, for what shows it.
+
+        Args:
+            source: Row of the display.
+            row: Row that it is dropped on; the number of rows for below the last one.
+            part: Where in this row, from 0 at its upper edge to 1 at its lower edge.
+
+        Returns:
+            `row` that it goes in front of, `depth`, and `into`, whether it goes into the group of
+            that row; empty where it cannot go.
+        """
+        found = self._find_landing(source, row, part)
+        return {} if found is None else {"row": found.row, "depth": found.depth, "into": found.into}
+
+    @Slot(int, int, float, result=int)
+    def drop(self, source: int, row: int, part: float) -> int:
+        """Move a display to where it is dropped; arguments as of :meth:`dropTarget`.
+
+        Returns:
+            The row of the display afterwards.
+        """
+        display, found = self._display_at(source), self._find_landing(source, row, part)
+        if display is None or found is None:
+            return source
+        before = found.before
+        if before is display:
+            before = self._next_to(display)
+        return self._move(display, before, found.group)
+
+    @Slot(int, str, result=int)
+    def shift(self, row: int, direction: str) -> int:
+        """Move a display by one, for the keyboard.
+
+        Args:
+            row: Its row.
+            direction: ``up`` or ``down`` among those in its group, ``in`` to the group above it,
+                ``out`` of its group.
+
+        Returns:
+            The row of the display afterwards.
+        """
+        display = self._display_at(row)
+        if display is None or self._rows[row].kind != "display":
+            return row
+        group = display.group
+        beside = list(self._inside(group))
+        at = beside.index(display)
+        if direction == "up" and at > 0:
+            return self._move(display, beside[at - 1], group)
+        if direction == "down" and at + 1 < len(beside):
+            return self._move(display, next(iter(beside[at + 2 :]), None), group)
+        if direction == "in" and at > 0 and isinstance(beside[at - 1], GroupDisplay):
+            return self._move(display, None, beside[at - 1])
+        if direction == "out" and group is not None:
+            return self._move(display, self._next_to(group), group.group)
+        return row
+
+    def _move(self, display: Display, before: Display | None, group: Display | None) -> int:
+        assert self._view is not None
+        try:
+            self._view.scene.move(display, before, group)
+        except Error as error:
+            self.refused.emit(str(error))
+        if group is not None:
+            self._expanded.add(("display", id(group)))
+        self.frozen = False
         self.refresh()
+        return self._row_of(display)
 
     @Slot(result="QVariantList")
     def types(self) -> list[str]:

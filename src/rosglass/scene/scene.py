@@ -190,10 +190,52 @@ class Scene(Element):
         self.displaysChanged.emit()
         display.deleteLater()
 
-    def move(self, display: Display, index: int) -> None:
-        """Move a display to another place of the list."""
+    def move(
+        self, display: Display, before: Display | None = None, group: Display | None = None
+    ) -> None:
+        """Move a display to another place of the list, or into another group.
+
+        Args:
+            display: The display; one that is a group takes along what is in it.
+            before: The display that it goes in front of, in the same group; None for the end.
+            group: The group that it goes into; None for none.
+
+        Raises:
+            Error: One of them is not in this scene, `before` is not in `group`, or a group would be
+                in itself.
+        """
+        for one in (display, before, group):
+            if one is not None and one not in self._displays:
+                raise Error(f"{one.label} is not in this scene")
+        if group is not None and group.TYPE != "Group":
+            raise Error(f"{group.label} is no group")
+        above = group
+        while above is not None:
+            if above is display:
+                raise Error(f"{display.label} cannot be moved into itself")
+            above = above.group
+        if before is display:
+            return
+        if before is not None and before.group is not group:
+            raise Error(f"{before.label} is not in {'the list' if group is None else group.label}")
+        was_shown = display.shown
         self._displays.remove(display)
-        self._displays.insert(index, display)
+        at = len(self._displays) if before is None else self._displays.index(before)
+        self._displays.insert(at, display)
+        display.group = group
+        self._displays[:] = list(self._in_order(None))
+        (self.root if group is None else group.root).add(display.root)
+        if display.shown != was_shown:
+            display.on_group_enabled()
+        self.displaysChanged.emit()
+
+    def _in_order(self, group: Display | None) -> Iterator[Display]:
+        """Iterate over the displays of a group, each before those in it, as panels list them."""
+        for display in self._displays:
+            if display.group is group:
+                yield display
+                if display.TYPE == "Group":
+                    yield from self._in_order(display)
 
     def find(self, name: str) -> Display | None:
         """Return the first display of a name."""

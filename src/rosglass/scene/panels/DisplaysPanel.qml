@@ -12,6 +12,7 @@ Pane {
     // The row that is selected; it follows rows that come and go above it.
     property alias current: list.currentIndex
     readonly property bool ofDisplay: current >= 0 && list.currentItem !== null && list.currentItem.ofDisplay
+    readonly property int rowHeight: 24
     // What the user has entered and does not fit.
     property string problem: ""
 
@@ -23,6 +24,93 @@ Pane {
         onAccepted: panel.problem = ""
     }
     Timer { id: forget; interval: 8000; onTriggered: panel.problem = "" }
+
+    // A display that is dragged to another place, by the mouse or by a finger that is held down.
+    QtObject {
+        id: dragging
+
+        property bool active: false
+        // Until the button is released.
+        property bool canceled: false
+        property int source: -1
+        property string label: ""
+        // Where it is held, in the list.
+        property point at
+        // Where it would go: see DisplaysModel.dropTarget().
+        property var target: ({})
+        readonly property real y: at.y + list.contentY - list.originY
+        readonly property int row: Math.max(0, Math.min(Math.floor(y / panel.rowHeight), list.count))
+        readonly property real part: y / panel.rowHeight - row
+
+        function begin(row, label) {
+            source = row
+            dragging.label = label
+            rows.frozen = true
+            active = true
+        }
+        function follow(point) {
+            at = point
+            target = rows.dropTarget(source, row, part)
+        }
+        function drop() {
+            if (!active)
+                return
+            const to = target.row === undefined ? source : rows.drop(source, row, part)
+            end()
+            panel.current = to
+        }
+        function end() {
+            active = false
+            rows.frozen = false
+            target = {}
+        }
+    }
+    Timer {
+        interval: 30
+        repeat: true
+        running: dragging.active && (dragging.at.y < panel.rowHeight || dragging.at.y > list.height - panel.rowHeight)
+        onTriggered: {
+            const last = list.originY + Math.max(0, list.contentHeight - list.height)
+            const step = dragging.at.y < panel.rowHeight ? -8 : 8
+            list.contentY = Math.max(list.originY, Math.min(list.contentY + step, last))
+            dragging.follow(dragging.at)
+        }
+    }
+    // Gets the keys once a row is clicked.
+    Item {
+        id: keys
+
+        readonly property var moves: ({ [Qt.Key_Up]: "up", [Qt.Key_Down]: "down", [Qt.Key_Right]: "in", [Qt.Key_Left]: "out" })
+
+        Keys.onPressed: event => {
+            const row = list.currentItem
+            const moves = event.modifiers & Qt.AltModifier
+            event.accepted = true
+            if (dragging.active && event.key === Qt.Key_Escape) {
+                dragging.end()
+                dragging.canceled = true
+            } else if (dragging.active || event.modifiers & (Qt.ControlModifier | Qt.MetaModifier))
+                event.accepted = false
+            else if (moves && panel.ofDisplay && event.key in keys.moves)
+                panel.current = rows.shift(panel.current, keys.moves[event.key])
+            else if (moves)
+                event.accepted = false
+            else if (event.key === Qt.Key_Up)
+                list.decrementCurrentIndex()
+            else if (event.key === Qt.Key_Down)
+                list.incrementCurrentIndex()
+            else if (row && row.expandable && event.key === (row.expanded ? Qt.Key_Left : Qt.Key_Right))
+                rows.toggle(panel.current)
+            else if (panel.ofDisplay && event.key === Qt.Key_Space)
+                rows.setEnabled(panel.current, !row.checked)
+            else if (panel.ofDisplay && event.key === Qt.Key_Delete)
+                rows.remove(panel.current)
+            else if (panel.ofDisplay && event.key === Qt.Key_F2)
+                renaming.open()
+            else
+                event.accepted = false
+        }
+    }
 
     ColumnLayout {
         anchors.fill: parent
@@ -38,6 +126,31 @@ Pane {
             currentIndex: -1
             boundsBehavior: Flickable.StopAtBounds
             ScrollBar.vertical: ScrollBar { }
+
+            // Where a display that is dragged would go.
+            Rectangle {
+                parent: list.contentItem
+                z: 2
+                visible: dragging.active && dragging.target.row !== undefined
+                x: visible ? 4 + 14 * dragging.target.depth : 0
+                y: visible ? list.originY + dragging.target.row * panel.rowHeight - (dragging.target.into ? 0 : 1) : 0
+                width: list.width - x
+                height: dragging.target.into ? panel.rowHeight : 2
+                color: dragging.target.into ? "transparent" : palette.highlight
+                border { width: dragging.target.into ? 2 : 0; color: palette.highlight }
+            }
+            Label {
+                objectName: "dragged"
+                parent: list
+                z: 3
+                visible: dragging.active
+                x: Math.min(dragging.at.x + 12, list.width - width)
+                y: dragging.at.y + 4
+                padding: 4
+                text: dragging.label
+                textFormat: Text.PlainText
+                background: Rectangle { color: palette.window; border.color: palette.mid; opacity: 0.9 }
+            }
 
             delegate: Rectangle {
                 id: row
@@ -56,13 +169,38 @@ Pane {
                 readonly property color tint: level === "error" ? "#c62818" : level === "warn" ? "#9a5b00" : palette.text
 
                 width: list.width
-                height: 24
+                height: panel.rowHeight
+                opacity: dragging.active && index === dragging.source ? 0.5 : 1
                 color: index === panel.current ? palette.highlight
                      : ofDisplay || kind === "options" ? palette.alternateBase : "transparent"
 
                 MouseArea {
+                    property point start
+                    // A finger scrolls the list.
+                    property bool byFinger: false
+
                     anchors.fill: parent
                     hoverEnabled: true
+                    preventStealing: row.ofDisplay && !byFinger || dragging.active
+                    cursorShape: dragging.active ? Qt.ClosedHandCursor : Qt.ArrowCursor
+                    onPressed: mouse => {
+                        start = Qt.point(mouse.x, mouse.y)
+                        dragging.canceled = false
+                        byFinger = mouse.source !== Qt.MouseEventNotSynthesized
+                        keys.forceActiveFocus()
+                        if (!byFinger)
+                            panel.current = row.index
+                    }
+                    onPressAndHold: if (byFinger && row.ofDisplay) { panel.current = row.index; dragging.begin(row.index, row.label) }
+                    onPositionChanged: mouse => {
+                        const far = Math.max(Math.abs(mouse.x - start.x), Math.abs(mouse.y - start.y))
+                        if (pressed && !byFinger && row.ofDisplay && !dragging.active && !dragging.canceled && far > Application.styleHints.startDragDistance)
+                            dragging.begin(row.index, row.label)
+                        if (dragging.active)
+                            dragging.follow(mapToItem(list, mouse.x, mouse.y))
+                    }
+                    onReleased: dragging.drop()
+                    onCanceled: dragging.end()
                     onClicked: panel.current = row.index
                     onDoubleClicked: if (row.expandable) rows.toggle(row.index)
                     PlainToolTip { visible: parent.containsMouse && row.description !== ""; plain: row.description }

@@ -100,6 +100,8 @@ ApplicationWindow {
             SplitView.minimumWidth: 100
             focus: true
 
+            // As in RViz, keys are the view's while the mouse is over it, except for those of a text.
+            HoverHandler { onHoveredChanged: if (hovered && !(window.activeFocusItem instanceof TextInput)) scene.forceActiveFocus() }
             ImagePanels { objectName: "imagePanels"; anchors.fill: parent; view: scene }
             Label {
                 anchors.centerIn: parent
