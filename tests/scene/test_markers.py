@@ -137,7 +137,38 @@ def test_a_namespace_is_hidden(bench: SceneBench, show: Callable[..., Any]) -> N
     assert display.namespaces == ["other", "shapes"]
     display.setNamespaceEnabled("shapes", False)
     assert len(drawables(display)) == 1
-    assert display.save_settings()["Namespaces"] == {"other": True, "shapes": False}
+    assert display.save_settings()["Namespaces"] == {"shapes": False}
+
+
+def test_namespaces_are_bounded_and_empty_ones_make_room(
+    show: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene.displays import marker as module
+
+    monkeypatch.setattr(module, "_MAX_NAMESPACES", 3)
+    for number in range(10):
+        one = f"n{number}"
+        display = show(marker(1, ns=one), marker(1, ns=one, action=DELETE))
+    assert display.namespaces == ["n7", "n8", "n9"]
+    assert display.statusLevel == "ok", display.statusText
+    display = show(*(marker(1, ns=f"m{number}") for number in range(4)))
+    assert display.namespaces == ["m0", "m1", "m2"]
+    assert len(drawables(display)) == 3
+    assert "m3/0: it cannot be drawn: there are more than 3 namespaces" in display.statusText
+    display = show(marker(1, ns="m1", action=DELETE), marker(1, ns="m3"))
+    assert display.namespaces == ["m0", "m2", "m3"]
+    assert display.statusLevel == "ok", display.statusText
+
+
+def test_hidden_namespaces_are_saved(show: Callable[..., Any]) -> None:
+    display = show(marker(1, ns="a"), marker(1, ns="b"))
+    assert display.save_settings()["Namespaces"] == {}
+    display.setNamespaceEnabled("a", False)
+    assert display.parts.load({"Namespaces": {"c": False, "d": True}}) == []
+    saved = display.save_settings({"Namespaces": {"b": True, "d": False}})
+    assert saved["Namespaces"] == {"b": True, "d": True, "a": False, "c": False}
+    show(marker(1, ns="c"))
+    assert len(drawables(display)) == 1
 
 
 def test_markers_wait_for_their_frame_and_locked_ones_follow_it(

@@ -254,13 +254,74 @@ def test_settings_are_written_for_either_rviz(bench: SceneBench) -> None:
     other = view.scene.add("RobotModel")
     links = {"arm": {"Value": False}, "Link Tree Style": ""}
     assert other.load_settings({**saved, "Links": links, "Description Source": "Topic"}) == []
-    assert (other.alpha, other.is_link_enabled("arm")) == (0.5, False)
+    assert (other.alpha, other.parts.is_enabled("arm")) == (0.5, False)
     assert other.save_settings(saved, 2)["Links"]["arm"] == {"Value": False}
     # A file of RViz 1 shows robots with ROS 2 as well, whose description is on a topic.
     old = {"Class": "rviz/RobotModel", "Robot Description": "arm_description"}
     assert other.load_settings(old) == []
     assert (other.descriptionSource, other.robotDescription) == ("Automatic", "arm_description")
     assert other.save_settings(old, 1)["Robot Description"] == "arm_description"
+
+
+def test_links_have_settings_of_their_own(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.scene.drawing import Lines
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    view = bench.load("RobotModelDisplay {}")
+    (robot,) = view.scene.displays
+    tip = '<joint name="k" type="fixed"><parent link="mast"/><child link="tip"/></joint>'
+    publish(bench, URDF.replace("</robot>", f'<link name="tip"/>{tip}</robot>'))
+    bench.wait(lambda: robot.links == ["base_link", "mast", "tip"])
+    broadcaster = TransformBroadcaster(bench.robot)
+
+    def move(x: int) -> None:
+        for link in robot.links:
+            now = Time(1 + x)
+            broadcaster.send_transform(Transform((x, 0, 0), (0, 0, 0, 1), now, "map", link))
+
+    def opacities() -> dict[Any, float]:
+        return {
+            one.shape: alpha for one, _, alpha in robot.root.drawables() if hasattr(one, "shape")
+        }
+
+    def trail() -> Any:
+        return next((one for one, _, _ in robot.root.drawables() if isinstance(one, Lines)), None)
+
+    move(0)
+    bench.wait(lambda: shapes(robot) == {BOX, CYLINDER})
+    assert [robot.parts.can_switch(name) for name in robot.links] == [True, True, False]
+    robot.parts.set("base_link", "Alpha", 0.25)
+    robot.alpha = 0.5
+    assert opacities() == {BOX: 0.125, CYLINDER: 0.5}
+    robot.allLinksEnabled = False
+    assert shapes(robot) == set()
+    robot.parts.set("tip", "Show Axes", True)
+    assert shapes(robot) == {CYLINDER}
+    robot.parts.set("tip", "Show Axes", False)
+    robot.parts.set_enabled("mast", True)
+    assert shapes(robot) == {CYLINDER}
+    robot.parts.set("mast", "Show Trail", True)
+    bench.wait(trail)
+    move(1)
+    bench.wait(lambda: trail().bounds()[1].tolist() == [1, 0, 0])
+    assert trail().bounds()[0].tolist() == [0, 0, 0]
+    saved = robot.save_settings({"Links": {"base_link": {"Alpha": 1, "Show Axes": False}}})
+    assert saved["Links"] == {
+        "All Links Enabled": False,
+        "base_link": {"Alpha": 0.25, "Show Axes": False},
+        "mast": {"Show Trail": True, "Value": True},
+        "tip": {"Show Axes": False},
+    }
+    other = view.scene.add("RobotModel")
+    assert other.load_settings(saved) == []
+    assert other.parts.get("base_link", "Alpha") == 0.25
+    assert [other.parts.is_enabled(name) for name in robot.links] == [False, True, False]
+    assert other.load_settings({"Links": {"mast": {"Alpha": "much"}}}) == [
+        "Links/mast/Alpha: expected a finite number, got 'much'"
+    ]
+    view.scene.fixed_frame = "base_link"
+    bench.wait(lambda: trail() is None or not trail().bounds()[1].any())
 
 
 def test_a_robot_whose_transforms_stop_fades(bench: SceneBench, monkeypatch: Any) -> None:

@@ -222,6 +222,67 @@ def test_a_move_that_is_none_is_an_error(bench: SceneBench, grouped: Any) -> Non
         scene.move(axes, plan)
 
 
+def test_namespaces_and_links_are_rows_with_check_boxes(
+    bench: SceneBench, model: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene import panel_models
+
+    monkeypatch.setattr(panel_models, "_MAX_PARTS", 3)
+    markers = bench.view.scene.add("MarkerArray", topic="/markers")
+    publisher = bench.robot.create_publisher("/markers", "visualization_msgs/MarkerArray")
+    bench.wait(publisher.subscription_count)
+    names = ["a/b", "c" * 10_000, "", "d", "e"]
+    made = {"header": {"frame_id": "map"}, "type": 1, "scale": {"x": 1.0, "y": 1.0, "z": 1.0}}
+    publisher.publish({"markers": [{**made, "ns": name} for name in names]})
+    bench.wait(lambda: len(markers.namespaces) == 5)
+    model.refresh()
+    model.toggle(row_of(model, "MarkerArray"))
+    assert "a/b" not in labels(model)
+    model.toggle(row_of(model, "Namespaces"))
+    at = row_of(model, "Namespaces")
+    shown = model.rows[at + 1 : at + 5]
+    assert [row.kind for row in shown] == ["part", "part", "part", "list"]
+    assert [row.label[:201] for row in shown] == ["", "a/b", "c" * 200 + "\u2026", "and 2 more"]
+    model.setEnabled(at + 2, False)
+    assert not markers.parts.is_enabled("a/b")
+    assert [row.checked for row in model.rows[at + 1 : at + 4]] == [True, False, True]
+    assert markers.save_settings()["Namespaces"] == {"a/b": False}
+
+
+def test_all_frames_are_shown_or_hidden(bench: SceneBench, model: Any) -> None:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    broadcaster = StaticTransformBroadcaster(bench.robot)
+    for name in ("base", "tool"):
+        broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), Time(1), "map", name))
+    tf = bench.view.scene.add("TF")
+    bench.wait(lambda: tf.frames == ["base", "map", "tool"])
+    model.refresh()
+    model.toggle(row_of(model, "TF"))
+    model.toggle(row_of(model, "Frames"))
+    at = row_of(model, "Frames")
+    assert labels(model)[at : at + 5] == ["Frames", "All Enabled", "base", "map", "tool"]
+    model.setEnabled(row_of(model, "tool"), False)
+    bench.wait(lambda: tf.frames == ["base", "map"])
+    model.edit(at + 1, False)
+    bench.wait(lambda: tf.frames == [])
+    assert [row.checked for row in model.rows[at + 2 : at + 5]] == [False] * 3
+    model.setEnabled(row_of(model, "base"), True)
+    bench.wait(lambda: tf.frames == ["base"])
+    saved = tf.save_settings({"Frames": {"All Enabled": True, "map": {"Value": True}}})
+    assert saved["Frames"] == {
+        "All Enabled": False,
+        "map": {"Value": False},
+        "base": {"Value": True},
+    }
+    other = bench.view.scene.add("TF")
+    assert other.load_settings(saved) == []
+    bench.wait(lambda: other.frames == ["base"])
+    model.edit(at + 1, True)
+    bench.wait(lambda: tf.frames == ["base", "map", "tool"])
+
+
 def view_command(*arguments: str, timeout: float = 100) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "rosglass", "view", *arguments],
@@ -409,6 +470,22 @@ def test_a_display_is_dragged_by_the_mouse(bench: SceneBench, window: Any) -> No
     assert outline(rows.scene) == ["TF", "Axes", "Robot", [], "Grid"]
     rows.key("Delete")
     assert outline(rows.scene) == ["TF", "Axes", "Robot", []]
+
+
+def test_a_frame_is_hidden_by_its_check_box(bench: SceneBench, window: Any) -> None:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    broadcaster = StaticTransformBroadcaster(bench.robot)
+    broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), Time(1), "map", "tool"))
+    rows = Rows(window)
+    tf = rows.scene.find("TF")
+    bench.wait(lambda: tf.frames == ["map", "tool"])
+    # An arrow left of a row shows what is below it.
+    rows.click(rows.at("TF", x=10))
+    rows.click(rows.at("Frames", x=24))
+    rows.click(rows.at("tool", x=62))
+    bench.wait(lambda: tf.frames == ["map"])
 
 
 def test_reset_in_the_tool_bar_drops_what_was_received(bench: SceneBench, window: Any) -> None:

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from rosglass.messages import Message
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
+    from rosglass.scene.parts import Parts
     from rosglass.scene.scene import Scene
 
 __all__ = [
@@ -160,6 +161,8 @@ class Display(Configurable, TopicElement):
         self._placed_at = -math.inf
         #: Whether the frame that it follows is not updated any more.
         self._frame_is_silent = False
+        #: What of it is shown and hidden one by one; None for nothing.
+        self.parts: Parts | None = None
         #: The group that it is in; None for none.
         self.group: Display | None = None
         super().__init__(parent, runtime)

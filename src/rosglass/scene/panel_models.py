@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from PySide6.QtCore import QAbstractListModel, QModelIndex, Qt
@@ -20,12 +21,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from rosglass.scene.display import Display
+    from rosglass.scene.parts import Parts
     from rosglass.scene.settings import Setting
 
 __all__ = ["DisplaysModel", "PanelRow"]
 
 #: Milliseconds between two looks at what has no signal of its own.
 _REFRESH_MS = 250
+#: Namespaces, frames or links of a display that are listed, and characters of their names.
+_MAX_PARTS, _MAX_NAME_LENGTH = 2000, 200
 #: Shares of a group's row at which a display is dropped above or below it, not into it.
 _EDGE = 0.25
 _FIXED_FRAME, _BACKGROUND = "Fixed Frame", "Background Color"
@@ -38,11 +42,12 @@ class PanelRow(NamedTuple):
         key: What stays the same while values change.
         depth: Levels of indentation.
         label: Its name.
-        kind: Of the setting, or ``options``, ``display``, ``status``.
+        kind: Of the setting, or ``options``, ``display``, ``status``, ``list`` of what is below it,
+            ``part`` of a display, e.g. a namespace.
         value: What is shown.
         description: For the tooltip.
         level: ``ok``, ``warn`` or ``error``.
-        checked: Of displays, whether it is enabled.
+        checked: Of displays and parts, whether it is enabled.
         expandable: Whether it has rows below it.
         expanded: Whether these are shown.
         choices: Of enumerations and names of frames.
@@ -82,6 +87,24 @@ class _Landing(NamedTuple):
 _ROLES = {
     Qt.ItemDataRole.UserRole + number: name for number, name in enumerate(PanelRow._fields[1:], 1)
 }
+
+
+@cache
+def _tree_of(paths: tuple[str, ...]) -> dict[str, list[str]]:
+    """Return the names of the settings below each path, in their order."""
+    found: dict[str, list[str]] = {}
+    for path in paths:
+        parts = path.split("/")
+        for level in range(len(parts)):
+            below = found.setdefault("/".join(parts[:level]), [])
+            if parts[level] not in below:
+                below.append(parts[level])
+    return found
+
+
+def _short(name: str) -> str:
+    """Return a name of the robot's as a row shows it: it may be of any length."""
+    return name if len(name) <= _MAX_NAME_LENGTH else f"{name[:_MAX_NAME_LENGTH]}\u2026"
 
 
 def _text(value: Any) -> Any:
@@ -258,16 +281,52 @@ class DisplaysModel(QAbstractListModel):
             yield PanelRow(
                 (*key, "status", name), depth, name, "status", line.text, line.text, line.level
             )
-        for path, setting in display.SETTINGS.items():
+        yield from self._walk_settings(display, key, depth, "")
+
+    def _walk_settings(
+        self, display: Display, key: Any, depth: int, above: str
+    ) -> Iterator[PanelRow]:
+        """Iterate over the settings below a path, and what is below those that are expanded."""
+        parts, tree = display.parts, _tree_of(tuple(display.SETTINGS))
+        names = list(tree.get(above, ()))
+        if parts is not None and not above and parts.title not in names:
+            names.append(parts.title)
+        for name in names:
+            path = f"{above}/{name}" if above else name
+            setting = display.SETTINGS.get(path)
+            is_list = parts is not None and path == parts.title
+            own = (*key, path)
+            expandable, expanded = is_list or path in tree, own in self._expanded
+            if setting is None:
+                yield PanelRow(own, depth, name, "list", expandable=True, expanded=expanded)
+            else:
+                yield PanelRow(
+                    own, depth, name, setting.kind.NAME, _text(getattr(display, setting.name)),
+                    setting.description, expandable=expandable, expanded=expanded,
+                    choices=self._choices(display, setting),
+                )  # fmt: skip
+            if expandable and expanded:
+                yield from self._walk_settings(display, key, depth + 1, path)
+                if parts is not None and is_list:
+                    yield from self._walk_parts(parts, own, depth + 1)
+
+    def _walk_parts(self, parts: Parts, key: Any, depth: int) -> Iterator[PanelRow]:
+        names = list(parts.names())
+        for name in names[:_MAX_PARTS]:
+            own = (*key, name)
+            expanded = bool(parts.details) and own in self._expanded
             yield PanelRow(
-                (*key, path),
-                depth + path.count("/"),
-                path.rpartition("/")[2],
-                setting.kind.NAME,
-                _text(getattr(display, setting.name)),
-                setting.description,
-                choices=self._choices(display, setting),
-            )
+                own, depth, _short(name), "part" if parts.can_switch(name) else "list",
+                checked=parts.is_enabled(name), expandable=bool(parts.details), expanded=expanded,
+            )  # fmt: skip
+            for detail, setting in parts.details.items() if expanded else ():
+                yield PanelRow(
+                    (*own, detail), depth + 1, detail, setting.kind.NAME,
+                    _text(parts.get(name, detail)), setting.description,
+                )  # fmt: skip
+        if len(names) > _MAX_PARTS:
+            rest = f"and {len(names) - _MAX_PARTS} more"
+            yield PanelRow((*key, "", ""), depth, rest, "list")
 
     def _choices(self, display: Display, setting: Setting) -> tuple[str, ...]:
         if setting.kind.NAME == "enum":
@@ -309,11 +368,15 @@ class DisplaysModel(QAbstractListModel):
 
     @Slot(int, bool)
     def setEnabled(self, row: int, enabled: bool) -> None:
-        """Show or hide a display."""
+        """Show or hide a display, or a part of it."""
         display = self._display_at(row)
-        if display is not None:
+        if display is None:
+            return
+        if self._rows[row].kind == "display":
             display.enabled = enabled
-            self.refresh()
+        elif self._rows[row].kind == "part" and display.parts is not None:
+            display.parts.set_enabled(self._rows[row].key[-1], enabled)
+        self.refresh()
 
     @Slot(int, "QVariant")
     def edit(self, row: int, text: Any) -> None:
@@ -321,10 +384,13 @@ class DisplaysModel(QAbstractListModel):
         view, display = self._view, self._display_at(row)
         if view is None or not 0 <= row < len(self._rows):
             return
-        path = self._rows[row].key[-1]
+        *_, part, path = self._rows[row].key
         try:
-            if display is not None:
+            if display is not None and path in display.SETTINGS and len(self._rows[row].key) == 3:
                 display.set(path, _value(display.SETTINGS[path], text))
+            elif display is not None and display.parts and path in display.parts.details:
+                detail = display.parts.details[path]
+                display.parts.set(part, path, _value(detail, text))
             elif path == _FIXED_FRAME:
                 view.scene.fixed_frame = text
             elif path == _BACKGROUND:

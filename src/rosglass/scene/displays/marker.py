@@ -35,6 +35,7 @@ from rosglass.scene.drawing import (
     Shape,
 )
 from rosglass.scene.meshes import load_mesh_cached
+from rosglass.scene.parts import Parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -86,6 +87,8 @@ _MAX_WAIT_S = 60.0
 _LATE_S = 1.0
 #: Lookups that fail until the other waiting markers have to wait for the next transforms.
 _MAX_MISSES = 50
+#: Namespaces of a topic, each drawn on its own, for each frame that markers are locked to.
+_MAX_NAMESPACES = 2000
 #: Meshes that are kept for further markers, and that are being read.
 _MAX_MESHES, _MAX_READING = 200, 1000
 #: Lines of the status, and markers whose problems are known.
@@ -271,6 +274,11 @@ class _Batch:
         """Return the marker of an instance."""
         return self._keys[index]
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether it has no instance."""
+        return not self._keys
+
     def flush(self) -> None:
         """Give the mesh what has changed."""
         if self.dirty:
@@ -340,6 +348,11 @@ class MarkerGroup:
             group.remove()
         for batch in self._batches.values():
             batch.discard(key)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether it has no marker."""
+        return not self._own and all(batch.is_empty for batch in self._batches.values())
 
     def flush(self) -> None:
         """Draw what has changed since the last call."""
@@ -616,14 +629,15 @@ class Markers(TopicDisplay):
         self._hidden: dict[str, dict[tuple[str, int], None]] = {}
         #: Frames of locked markers that are not known, and why.
         self._lost: dict[str, str] = {}
-        #: Whether namespaces are shown, of those that were switched.
-        self._switched: dict[str, bool] = {}
+        #: Those without markers, which make room for new ones.
+        self._empty: dict[tuple[str, str], None] = {}
         self._late: dict[tuple[str, int], _Late] = {}
         self._problems: dict[tuple[str, int], Status] = {}
         #: Names of the lines of the status that are about markers.
         self._lines: set[str] = set()
         self._meshes = MarkerMeshes(self._in_background, self._on_mesh)
         super().__init__(parent, runtime)
+        self.parts: Parts = Parts("Namespaces", lambda: self.namespaces, self._switch_groups)
         self._expiry = single_shot(self, self._expire)
         self._flush_timer = single_shot(self, self._flush)
 
@@ -634,31 +648,20 @@ class Markers(TopicDisplay):
     @Slot(str, bool)
     def setNamespaceEnabled(self, namespace: str, enabled: bool) -> None:  # noqa: N802 - QML's name
         """Show or hide the markers of a namespace."""
-        self._switched[namespace] = enabled
-        self._switch_groups()
+        self.parts.set_enabled(namespace, enabled)
 
     def _switch_groups(self) -> None:
         for (namespace, frame), group in self._groups.items():
-            group.root.visible = self.is_namespace_enabled(namespace) and frame not in self._lost
-
-    def is_namespace_enabled(self, namespace: str) -> bool:
-        """Return whether the markers of a namespace are shown."""
-        return self._switched.get(namespace, True)
+            group.root.visible = self.parts.is_enabled(namespace) and frame not in self._lost
 
     def load_settings(self, saved: Any) -> list[str]:
         """Take the settings of a file, and which namespaces it shows."""
-        spaces = saved.get("Namespaces")
-        if isinstance(spaces, dict):
-            for name, shown in spaces.items():
-                if isinstance(shown, bool):
-                    self.setNamespaceEnabled(str(name), shown)
-        return super().load_settings(saved)
+        return super().load_settings(saved) + self.parts.load(saved)
 
     def save_settings(self, older: Any = None, ros: int = 2) -> dict[str, Any]:
         """Return the settings for a file, with the namespaces that are shown."""
         kept = super().save_settings(older, ros)
-        names = sorted({*(name for name, _ in self._groups), *self._switched})
-        kept["Namespaces"] = {name: self.is_namespace_enabled(name) for name in names}
+        self.parts.save(kept)
         return kept
 
     # -- messages --------------------------------------------------------------------------------
@@ -786,6 +789,7 @@ class Markers(TopicDisplay):
                     group.root.pose = pose
                 pose = _IDENTITY
             group.put(marker, pose, self._meshes)
+            self._empty.pop(self._group_key(marker), None)
             problem = self._meshes.problem_of(marker)
             if problem:
                 self._note_problem(marker.key, "error", problem)
@@ -818,12 +822,22 @@ class Markers(TopicDisplay):
                 del self._hidden[marker.frame]
 
     def _group_of(self, marker: MarkerRecord) -> MarkerGroup | None:
-        return self._groups.get((marker.key[0], marker.frame if marker.locked else ""))
+        return self._groups.get(self._group_key(marker))
+
+    @staticmethod
+    def _group_key(marker: MarkerRecord) -> tuple[str, str]:
+        return marker.key[0], marker.frame if marker.locked else ""
 
     def _add_group(self, marker: MarkerRecord) -> MarkerGroup:
-        namespace, frame = marker.key[0], marker.frame if marker.locked else ""
-        group = self._groups[namespace, frame] = MarkerGroup(self)
-        group.root.visible = self.is_namespace_enabled(namespace)
+        key = namespace, _ = self._group_key(marker)
+        if len(self._groups) >= _MAX_NAMESPACES:
+            if not self._empty:
+                raise Error(f"there are more than {_MAX_NAMESPACES} namespaces")
+            unused = next(iter(self._empty))
+            del self._empty[unused]
+            self._groups.pop(unused).root.remove()
+        group = self._groups[key] = MarkerGroup(self)
+        group.root.visible = self.parts.is_enabled(namespace)
         self.root.add(group.root)
         return group
 
@@ -836,6 +850,8 @@ class Markers(TopicDisplay):
             group = self._group_of(marker)
             if group is not None:
                 group.remove(key)
+                if group.is_empty:
+                    self._empty[self._group_key(marker)] = None
 
     def _clear(self, namespace: str) -> None:
         """Remove the markers of a namespace; all of them for an empty one, as RViz does."""
@@ -849,6 +865,7 @@ class Markers(TopicDisplay):
         super().reset()
         for held in (self._shown, self._expires, self._groups, self._hidden, self._lost):
             held.clear()
+        self._empty.clear()
         self._late.clear()
         self._problems.clear()
         self._flush_later()

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
@@ -15,8 +16,10 @@ from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import QtGui, Signal, Slot, is_alive
 from rosglass.scene.display import Display, Status
-from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Group, Mesh, Shape
+from rosglass.scene.displays.shapes import AxesShapes
+from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Group, Lines, Mesh, Shape
 from rosglass.scene.meshes import ending_of, load_mesh_cached
+from rosglass.scene.parts import Parts
 from rosglass.scene.resources import check_texture, locate_resource
 from rosglass.scene.rviz_formats import (
     DescriptionSetting,
@@ -49,6 +52,16 @@ _RETRY_MS = 2000
 _NO_MATERIAL = (1.0, 0.0, 0.0, 1.0)
 #: That of parts of mesh files without one.
 _GREY = (0.6, 0.6, 0.6, 1.0)
+#: RViz's axes of a link: length and diameter, metres.
+_AXES_M, _AXES_WIDTH_M = 0.1, 0.01
+#: The trail of a link: colour, width and distance of its points in metres, and how many there are.
+_TRAIL_COLOUR, _TRAIL_WIDTH_M, _TRAIL_STEP_M, _TRAIL_POINTS = (0.0, 0.5, 0.5, 1.0), 0.01, 0.02, 2000
+#: Settings that each link has of its own.
+_LINK_DETAILS = (
+    Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0),
+    Setting("Show Trail", "bool", False, "Whether a line shows where the link was."),
+    Setting("Show Axes", "bool", False, "Whether the axes of its frame are shown."),
+)
 #: Status lines of links without a transform, before the rest is counted.
 _MAX_LINK_LINES = 10
 _DESCRIPTION_KEYS = (
@@ -254,10 +267,58 @@ class _Link:
 
     def __init__(self, visuals: list[Mesh], collisions: list[Mesh], owner: Any) -> None:
         self.visual, self.collision = Group(*visuals), Group(*collisions)
+        self.has_shape = bool(visuals or collisions)
         self.root = Group(self.visual, self.collision)
         self.root.visible = False
+        #: Made when they are shown for the first time; the trail is in the fixed frame.
+        self.axes: AxesShapes | None = None
+        self.trail: Lines | None = None
+        self._way: deque[NDArray[np.float64]] = deque(maxlen=_TRAIL_POINTS)
+        self._end = np.zeros(3)
+        self._owner = owner
         for mesh in (*visuals, *collisions):
             mesh.owner = owner
+
+    def set_alpha(self, alpha: float) -> None:
+        """Set the opacity of its shapes."""
+        self.visual.alpha = self.collision.alpha = alpha
+
+    def show_axes(self, shown: bool) -> None:
+        """Show the axes of its frame, or not."""
+        if shown and self.axes is None:
+            self.axes = AxesShapes(self._owner)
+            self.axes.set_axes(np.eye(4)[np.newaxis], _AXES_M, _AXES_WIDTH_M)
+            self.root.add(self.axes)
+        if self.axes is not None:
+            self.axes.visible = shown
+
+    def show_trail(self, shown: bool, group: Group) -> None:
+        """Begin a trail in a group of the fixed frame, or remove it."""
+        if shown == (self.trail is not None):
+            return
+        if self.trail is not None:
+            self.trail.remove()
+        self.clear_trail()
+        self.trail = Lines(_TRAIL_WIDTH_M, in_metres=True) if shown else None
+        if self.trail is not None:
+            group.add(self.trail)
+
+    def clear_trail(self) -> None:
+        """Forget where it was."""
+        self._way.clear()
+
+    def follow(self, pose: NDArray[np.float64]) -> None:
+        """Move to a pose in the fixed frame."""
+        self.root.pose = pose
+        if self.trail is None:
+            return
+        at = pose[:3, 3]
+        if not self._way or np.linalg.norm(at - self._way[-1]) >= _TRAIL_STEP_M:
+            self._way.append(at)
+        elif self.trail.count and (at == self._end).all():
+            return
+        self._end = at
+        self.trail.set_strip([*self._way, at], _TRAIL_COLOUR)
 
 
 class _Part:
@@ -305,7 +366,10 @@ class RobotModelDisplay(Display):
         then="_on_source",
     )  # fmt: skip
     tfPrefix = Setting("TF Prefix", "string", "", "In front of the names of links, with a slash.")
-    allLinksEnabled = Setting("Links/All Links Enabled", "bool", True, "Whether links are shown.")
+    allLinksEnabled = Setting(
+        "Links/All Links Enabled", "bool", True, "Shows or hides all links.",
+        then="_on_all_links_enabled",
+    )  # fmt: skip
 
     linksChanged = Signal()
     robotChanged = Signal()
@@ -317,14 +381,22 @@ class RobotModelDisplay(Display):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         self._bodies: dict[str, _Link] = {}
-        self._body = Group()
+        self._body, self._trails = Group(), Group()
         self._root_link = ""
-        self._switched: dict[str, bool] = {}
         self._text: str | None = None
         #: What the status says of the description that is shown.
         self._loaded_lines: dict[str, Status] = {}
         self._next = 0.0
         super().__init__(parent, runtime)
+        self.parts: Parts = Parts(
+            "Links",
+            lambda: self.links,
+            self._restyle,
+            default=lambda: self.allLinksEnabled,
+            can_switch=lambda name: name in self._bodies and self._bodies[name].has_shape,
+            details=_LINK_DETAILS,
+            as_mapping=True,
+        )
         self._again = single_shot(self, self._create_again)
 
     # -- the description -------------------------------------------------------------------------
@@ -411,13 +483,15 @@ class RobotModelDisplay(Display):
     def _clear(self) -> None:
         self._bodies.clear()
         self._body.clear()
+        self._trails.clear()
         self._loaded_lines = {}
-        self.root.add(self._body)
+        self.root.add(self._body, self._trails)
         self.clear_status()
         report(self, links=[], robotName="")
 
     def reset(self) -> None:
-        """Load the robot again if a mesh is missing: it may be there now."""
+        """Begin the trails anew; load the robot again if a mesh is missing: it may be there now."""
+        self._clear_trails()
         if any(line.startswith("Mesh ") for line in self._loaded_lines):
             self._text = None
 
@@ -431,18 +505,19 @@ class RobotModelDisplay(Display):
     @Slot(str, bool)
     def setLinkEnabled(self, link: str, enabled: bool) -> None:
         """Show or hide a link."""
-        self._switched[link] = enabled
-        self._follow()
+        self.parts.set_enabled(link, enabled)
 
-    def is_link_enabled(self, link: str) -> bool:
-        """Return whether a link is shown."""
-        return self._switched.get(link, bool(self.allLinksEnabled))
+    def _on_all_links_enabled(self) -> None:
+        self.parts.follow_default()
 
     def _restyle(self) -> None:
         self._body.alpha = self.alpha
-        for link in self._bodies.values():
+        for name, link in self._bodies.items():
             link.visual.visible = self.visualEnabled
             link.collision.visible = self.collisionEnabled
+            link.set_alpha(self.parts.get(name, "Alpha"))
+            link.show_axes(self.parts.get(name, "Show Axes"))
+            link.show_trail(self.parts.get(name, "Show Trail"), self._trails)
         self._follow()
 
     def on_transforms(self) -> None:
@@ -454,7 +529,12 @@ class RobotModelDisplay(Display):
 
     def on_fixed_frame(self) -> None:
         """Place the links in the new fixed frame."""
+        self._clear_trails()
         self._follow()
+
+    def _clear_trails(self) -> None:
+        for link in self._bodies.values():
+            link.clear_trail()
 
     def _follow(self) -> None:
         scene = self.scene
@@ -469,8 +549,8 @@ class RobotModelDisplay(Display):
                 missing.append((name, str(error)))
                 link.root.visible = False
                 continue
-            link.root.pose = pose
-            link.root.visible = self.is_link_enabled(name)
+            link.follow(pose)
+            link.root.visible = self.parts.is_enabled(name) or not link.has_shape
         self._report_missing(missing)
 
     def _report_missing(self, missing: list[tuple[str, str]]) -> None:
@@ -496,11 +576,7 @@ class RobotModelDisplay(Display):
             if key not in ("Description Topic", "Description Source", "Robot Description")
         }
         refused = super().load_settings(ours)
-        links = saved.get("Links")
-        for name, state in (links if isinstance(links, dict) else {}).items():
-            shown = state.get("Value") if isinstance(state, dict) else None
-            if isinstance(shown, bool):
-                self._switched[str(name)] = shown
+        refused += self.parts.load(saved)
         if not {"Description Source", "Description Topic", "Robot Description"} & set(saved):
             return refused
         try:
@@ -545,9 +621,5 @@ class RobotModelDisplay(Display):
             kept.setdefault(
                 "Robot Description" if ros == 1 else "Description File", description.name
             )
-        links = dict(kept.get("Links") or {})
-        for name, shown in self._switched.items():
-            inner = links.get(name)
-            links[name] = {**(inner if isinstance(inner, dict) else {}), "Value": shown}
-        kept["Links"] = links
+        self.parts.save(kept)
         return kept

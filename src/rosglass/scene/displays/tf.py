@@ -15,6 +15,7 @@ from rosglass.qt import Signal, Slot
 from rosglass.scene.display import OUTDATED_ALPHA, Display
 from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, stack_poses
 from rosglass.scene.drawing import Labels
+from rosglass.scene.parts import Parts
 from rosglass.scene.settings import Setting
 
 if TYPE_CHECKING:
@@ -73,7 +74,10 @@ class TFDisplay(Display):
     )  # fmt: skip
     whitelist = Setting("Filter (whitelist)", "string", "", "Regular expression of frames to show.")
     blacklist = Setting("Filter (blacklist)", "string", "", "Regular expression of frames to hide.")
-    allEnabled = Setting("Frames/All Enabled", "bool", True, "Whether frames are shown at first.")
+    allEnabled = Setting(
+        "Frames/All Enabled", "bool", True, "Shows or hides all frames, and those to come.",
+        then="_on_all_enabled",
+    )  # fmt: skip
 
     framesChanged = Signal()
     #: Names of the frames that are shown.
@@ -84,8 +88,6 @@ class TFDisplay(Display):
     ) -> None:
         self._axes, self._arrows = AxesShapes(self), ArrowShapes(self)
         self._names = Labels(align="below")
-        #: Whether frames are shown, of those that were switched.
-        self._switched: dict[str, bool] = {}
         self._next = 0.0
         #: Whether a frame is not static, and when they are looked at without a transform.
         self._moves = False
@@ -93,6 +95,13 @@ class TFDisplay(Display):
         #: What is drawn, to draw nothing anew while nothing changes.
         self._drawn: Any = None
         super().__init__(parent, runtime)
+        self.parts: Parts = Parts(
+            "Frames",
+            lambda: self.scene.frames() if self.scene is not None else (),
+            self._draw,
+            default=lambda: self.allEnabled,
+            as_mapping=True,
+        )
         self.root.add(self._axes, self._arrows, self._names)
 
     def leave(self) -> None:
@@ -103,30 +112,19 @@ class TFDisplay(Display):
     @Slot(str, bool)
     def setFrameEnabled(self, frame: str, enabled: bool) -> None:  # noqa: N802 - QML's name
         """Show or hide one frame."""
-        self._switched[frame] = enabled
-        self._draw()
+        self.parts.set_enabled(frame, enabled)
 
-    def is_frame_enabled(self, frame: str) -> bool:
-        """Return whether a frame is shown, as far as it is known."""
-        return self._switched.get(frame, bool(self.allEnabled))
+    def _on_all_enabled(self) -> None:
+        self.parts.follow_default()
 
     def load_settings(self, saved: Any) -> list[str]:
         """Take the settings of a file, and which frames it shows."""
-        frames = saved.get("Frames")
-        if isinstance(frames, dict):
-            for name, state in frames.items():
-                value = state.get("Value") if isinstance(state, dict) else state
-                if isinstance(value, bool) and name != "All Enabled":
-                    self._switched[str(name)] = value
-        return super().load_settings(saved)
+        return super().load_settings(saved) + self.parts.load(saved)
 
     def save_settings(self, older: Any = None, ros: int = 2) -> dict[str, Any]:
         """Return the settings for a file, with the frames that are shown."""
         kept = super().save_settings(older, ros)
-        frames = dict(kept.get("Frames") or {})
-        for name in [*self.frames, *self._switched]:
-            frames[name] = {"Value": self.is_frame_enabled(name)}
-        kept["Frames"] = frames
+        self.parts.save(kept)
         return kept
 
     def _restyle(self) -> None:
@@ -155,7 +153,7 @@ class TFDisplay(Display):
             self._draw()
 
     def _is_chosen(self, name: str) -> bool:
-        if self.is_frame_enabled(name):
+        if self.parts.is_enabled(name):
             try:
                 return bool(
                     (not self.whitelist or re.search(self.whitelist, name))

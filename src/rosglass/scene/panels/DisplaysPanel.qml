@@ -101,7 +101,7 @@ Pane {
                 list.incrementCurrentIndex()
             else if (row && row.expandable && event.key === (row.expanded ? Qt.Key_Left : Qt.Key_Right))
                 rows.toggle(panel.current)
-            else if (panel.ofDisplay && event.key === Qt.Key_Space)
+            else if (row && (row.ofDisplay || row.kind === "part") && event.key === Qt.Key_Space)
                 rows.setEnabled(panel.current, !row.checked)
             else if (panel.ofDisplay && event.key === Qt.Key_Delete)
                 rows.remove(panel.current)
@@ -217,7 +217,7 @@ Pane {
                         MouseArea { anchors.fill: parent; anchors.margins: -6; enabled: row.expandable; onClicked: rows.toggle(row.index) }
                     }
                     CheckBox {
-                        visible: row.ofDisplay
+                        visible: row.ofDisplay || row.kind === "part"
                         checked: row.checked
                         onToggled: rows.setEnabled(row.index, checked)
                     }
