@@ -283,6 +283,47 @@ def test_all_frames_are_shown_or_hidden(bench: SceneBench, model: Any) -> None:
     bench.wait(lambda: tf.frames == ["base", "map", "tool"])
 
 
+def test_settings_without_effect_are_hidden(bench: SceneBench, model: Any) -> None:
+    def rows_of(name: str) -> list[str]:
+        model.refresh()
+        at = row_of(model, name)
+        below = model.rows[at + 1 :]
+        end = next((n for n, row in enumerate(below) if row.depth == 0), len(below))
+        return [row.label for row in below[:end]]
+
+    model.toggle(row_of(model, "Grid"))
+    (grid,) = bench.view.scene.displays
+    assert not model.rows[row_of(model, "Line Style")].expandable
+    grid.lineStyle = "Billboards"
+    model.refresh()
+    model.toggle(row_of(model, "Line Style"))
+    assert "Line Width" in rows_of("Grid")
+    model.add("PointCloud2", "")
+    cloud = bench.view.scene.displays[1]
+    colours = {"Axis", "Color", "Channel Name", "Use rainbow", "Min Color", "Min Intensity"}
+    assert not colours & set(rows_of("PointCloud2"))
+    assert "Size (m)" in rows_of("PointCloud2")
+    cloud.style, cloud.colorTransformer = "Points", "Intensity"
+    assert colours & set(rows_of("PointCloud2")) == {"Channel Name", "Use rainbow"}
+    assert "Size (m)" not in rows_of("PointCloud2")
+    assert {"Size (Pixels)", "Invert Rainbow"} <= set(rows_of("PointCloud2"))
+    cloud.useRainbow = cloud.autocomputeIntensityBounds = False
+    assert {"Min Color", "Min Intensity"} <= set(rows_of("PointCloud2"))
+    cloud.colorTransformer = "AxisColor"
+    assert colours & set(rows_of("PointCloud2")) == {"Axis"}
+    # What is hidden is saved all the same.
+    assert cloud.save_settings()["Min Intensity"] == 0.0
+
+
+def test_each_condition_names_a_property(bench: SceneBench) -> None:
+    scene = bench.load().scene
+    for name in sorted(scene.TYPES):
+        if name != "Unknown":
+            display = scene.add(name)
+            for setting in display.SETTINGS.values():
+                assert setting.is_shown(display) in (True, False)
+
+
 def view_command(*arguments: str, timeout: float = 100) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "rosglass", "view", *arguments],

@@ -548,12 +548,14 @@ class _Property(NamedTuple):
         description: For the panel.
         read: Returns its value.
         write: Sets it.
+        is_shown: Returns whether it has an effect; panels hide it otherwise.
     """
 
     kind: Kind
     description: str
     read: Callable[[], Any]
     write: Callable[[Any], object]
+    is_shown: Callable[[], bool] = lambda: True
 
 
 #: Properties by their path.
@@ -576,6 +578,7 @@ def _properties_of(display: Display) -> _Tree:
             setting.description,
             lambda: getattr(display, setting.name),
             lambda value: display.setProperty(setting.name, value),
+            lambda: setting.is_shown(display),
         )
 
     return {path: of(setting) for path, setting in display.SETTINGS.items()}
@@ -659,7 +662,8 @@ def _describe(tree: _Tree, above: str = "") -> list[dict[str, Any]]:
         below = _describe(tree, path)
         if not one.kind.HOLDS_OTHERS:
             below = [_part(path, part, number) for part, number in value.items()]
-        found.append(_described(name, path, value, one.kind.NAME, one.description, below))
+        described = _described(name, path, value, one.kind.NAME, one.description, below)
+        found.append({**described, "hidden": not one.is_shown()})
     return found
 
 

@@ -294,9 +294,13 @@ class DisplaysModel(QAbstractListModel):
         for name in names:
             path = f"{above}/{name}" if above else name
             setting = display.SETTINGS.get(path)
+            if setting is not None and not setting.is_shown(display):
+                continue
             is_list = parts is not None and path == parts.title
             own = (*key, path)
-            expandable, expanded = is_list or path in tree, own in self._expanded
+            below = (display.SETTINGS.get(f"{path}/{one}") for one in tree.get(path, ()))
+            expandable = is_list or any(one is None or one.is_shown(display) for one in below)
+            expanded = expandable and own in self._expanded
             if setting is None:
                 yield PanelRow(own, depth, name, "list", expandable=True, expanded=expanded)
             else:

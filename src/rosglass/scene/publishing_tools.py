@@ -396,6 +396,10 @@ class SetGoalTool(PoseTool):
     MESSAGE = "geometry_msgs/PoseStamped"
     TOPICS = ("/move_base_simple/goal", "/goal_pose")
 
+    topic = Setting(
+        "Topic", "topic", "", "Topic to publish on; RViz's own if it is empty.", then="_schedule",
+        shown_if={"action": ""},
+    )  # fmt: skip
     action = Setting(
         "Action", "topic", "",
         "An action of Nav2, e.g. navigate_to_pose, that gets the goal instead of the topic.",

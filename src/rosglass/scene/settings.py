@@ -53,6 +53,8 @@ class Setting(Writable[Any]):
         default: RViz's default.
         description: What it does, with its unit.
         then: Method to call after a change.
+        shown_if: When it has an effect: values of other properties, or tuples of them, by their
+            names. Panels hide it otherwise, as RViz does. None for always.
         options: What narrows the values: `min`, `max`, `choices`.
     """
 
@@ -64,9 +66,14 @@ class Setting(Writable[Any]):
         description: str = "",
         *,
         then: str = "_restyle",
+        shown_if: Mapping[str, Any] | None = None,
         **options: Any,
     ) -> None:
         self.path, self.description = path, description
+        self._shown_if = {
+            name: values if isinstance(values, tuple) else (values,)
+            for name, values in (shown_if or {}).items()
+        }
         self.kind = KINDS[kind](**options)
         self.default = self.kind.read(default)
         #: The QML property.
@@ -78,6 +85,10 @@ class Setting(Writable[Any]):
             return self.kind.read(value)
         except Error as error:
             raise Error(f"{self.name}: {error}") from None
+
+    def is_shown(self, owner: Any) -> bool:
+        """Return whether it has an effect on what it is a setting of, by the other properties."""
+        return all(getattr(owner, name) in values for name, values in self._shown_if.items())
 
     def __set_name__(self, owner: type[Any], name: str) -> None:
         self.name = name

@@ -281,6 +281,7 @@ class Tool(Configurable, Element):
                 "placeholder": self._placeholder(path),
             }
             for path, value in self.values().items()
+            if self.SETTINGS[path].is_shown(self)
         ]
 
     def _placeholder(self, path: str) -> str:  # noqa: ARG002 - for subclasses

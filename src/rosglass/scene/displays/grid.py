@@ -66,8 +66,9 @@ class GridDisplay(_InFrame):
         "Line Style", "enum", "Lines", "How lines are drawn.", choices=["Lines", "Billboards"]
     )
     lineWidth = Setting(
-        "Line Style/Line Width", "float", 0.03, "Of billboards, in metres.", min=0.001
-    )
+        "Line Style/Line Width", "float", 0.03, "Of billboards, in metres.", min=0.001,
+        shown_if={"lineStyle": "Billboards"},
+    )  # fmt: skip
     color = Setting("Color", "color", "#a0a0a4", "The colour.")
     alpha = Setting("Alpha", "float", 0.5, "Opacity.", min=0.0, max=1.0)
     plane = Setting("Plane", "enum", "XY", "The plane.", choices=["XY", "XZ", "YZ"])

@@ -363,14 +363,16 @@ class ImageDisplay(PictureDisplay):
         then="_update_range",
     )  # fmt: skip
     minValue = Setting(
-        "Min Value", "float", 0.0, "What is black, in the picture's numbers.", then="_update_range"
-    )
+        "Min Value", "float", 0.0, "What is black, in the picture's numbers.",
+        then="_update_range", shown_if={"normalizeRange": False},
+    )  # fmt: skip
     maxValue = Setting(
-        "Max Value", "float", 1.0, "What is white, in the picture's numbers.", then="_update_range"
-    )
+        "Max Value", "float", 1.0, "What is white, in the picture's numbers.",
+        then="_update_range", shown_if={"normalizeRange": False},
+    )  # fmt: skip
     medianWindow = Setting(
         "Median window", "int", 5, "Pictures over which black and white are medians.",
-        min=1, max=1000, then="_update_range",
+        min=1, max=1000, then="_update_range", shown_if={"normalizeRange": True},
     )  # fmt: skip
 
     def _grey_range(self) -> GreyRange:
@@ -447,7 +449,7 @@ class CameraDisplay(PictureDisplay):
     )  # fmt: skip
     overlayAlpha = Setting(
         "Overlay Alpha", "float", 0.5, "Opacity of the picture over the scene.", min=0.0, max=1.0,
-        then="_emit_changed",
+        then="_emit_changed", shown_if={"imageRendering": ("overlay", "background and overlay")},
     )  # fmt: skip
     zoomFactor = Setting(
         "Zoom Factor", "float", 1.0, "Above 1 magnifies, below 1 shows more around the picture.",

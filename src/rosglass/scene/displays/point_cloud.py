@@ -80,6 +80,14 @@ _MAX_SCAN_S = 10.0
 _STILL = 1e-5
 
 
+#: Of settings: the color transformers and styles that they are of.
+_INTENSITY = {"wanted_transformer": "Intensity"}
+_AXIS_COLOR = {"wanted_transformer": "AxisColor"}
+_RAINBOW = {**_INTENSITY, "useRainbow": True}
+_TWO_COLORS = {**_INTENSITY, "useRainbow": False}
+_METRIC = {"style": ("Squares", "Flat Squares", "Spheres", "Boxes")}
+
+
 class _Prepared(NamedTuple):
     """A cloud that is ready to be drawn.
 
@@ -225,7 +233,8 @@ def _text_of(value: Any) -> str:
 
 
 def _channel(default: str) -> Setting:
-    return Setting("Channel Name", "string", default, "Of Intensity: the field.")
+    text = "Of Intensity: the field."
+    return Setting("Channel Name", "string", default, text, shown_if=_INTENSITY)
 
 
 def _autocompute(default: bool) -> Setting:
@@ -234,13 +243,29 @@ def _autocompute(default: bool) -> Setting:
         "bool",
         default,
         "Whether the bounds are those of the points.",
+        shown_if=_INTENSITY,
     )
 
 
 def _bound(path: str, default: float) -> Setting:
     name = "first" if "Min" in path else "last"
     text = f"Value of the {name} color; metres for AxisColor."
-    return Setting(path, "float", default, text, min=-_MAX_FLOAT, max=_MAX_FLOAT)
+    shown_if: dict[str, Any] = {**_INTENSITY, "autocomputeIntensityBounds": False}
+    if "Intensity" not in path:
+        shown_if = {**_AXIS_COLOR, "autocomputeValueBounds": False}
+    return Setting(path, "float", default, text, min=-_MAX_FLOAT, max=_MAX_FLOAT, shown_if=shown_if)
+
+
+def _invert(default: bool) -> Setting:
+    text = "Whether red is at the maximum."
+    return Setting("Invert Rainbow", "bool", default, text, shown_if=_RAINBOW)
+
+
+def _size(**conditions: Any) -> Setting:
+    return Setting(
+        "Size (m)", "float", 0.01, "Of all styles but Points, in metres.", min=0.0001,
+        max=_MAX_SIZE_M, shown_if={**_METRIC, **conditions},
+    )  # fmt: skip
 
 
 class CloudDisplay(TopicDisplay):
@@ -252,15 +277,13 @@ class CloudDisplay(TopicDisplay):
     selectable = Setting("Selectable", "bool", True, "Whether points can be selected.")
     style = Setting(
         "Style", "enum", "Flat Squares", "How points are drawn.",
-        choices=["Points", "Squares", "Flat Squares", "Spheres", "Boxes"],
+        choices=["Points", *_METRIC["style"]],
     )  # fmt: skip
-    size = Setting(
-        "Size (m)", "float", 0.01, "Of all styles but Points, in metres.", min=0.0001,
-        max=_MAX_SIZE_M,
-    )  # fmt: skip
+    size = _size()
     sizePixels = Setting(
-        "Size (Pixels)", "float", 3.0, "Of the style Points.", min=1.0, max=_MAX_SIZE_PX
-    )
+        "Size (Pixels)", "float", 3.0, "Of the style Points.", min=1.0, max=_MAX_SIZE_PX,
+        shown_if={"style": "Points"},
+    )  # fmt: skip
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
     decayTime = Setting(
         "Decay Time", "float", 0.0, "Seconds that points are shown; 0 until the next message.",
@@ -276,24 +299,29 @@ class CloudDisplay(TopicDisplay):
     )  # fmt: skip
     axis = Setting(
         "Axis", "enum", "Z", "Of AxisColor: the axis along which colors change.",
-        choices=["X", "Y", "Z"],
+        choices=["X", "Y", "Z"], shown_if=_AXIS_COLOR,
     )  # fmt: skip
     autocomputeValueBounds = Setting(
-        "Autocompute Value Bounds", "bool", True, "Whether the bounds are those of the points."
-    )
+        "Autocompute Value Bounds", "bool", True, "Whether the bounds are those of the points.",
+        shown_if=_AXIS_COLOR,
+    )  # fmt: skip
     minValue = _bound("Autocompute Value Bounds/Min Value", -10.0)
     maxValue = _bound("Autocompute Value Bounds/Max Value", 10.0)
     useFixedFrame = Setting(
-        "Use Fixed Frame", "bool", True, "Whether the axis is that of the fixed frame."
+        "Use Fixed Frame", "bool", True, "Whether the axis is that of the fixed frame.",
+        shown_if=_AXIS_COLOR,
+    )  # fmt: skip
+    color = Setting(
+        "Color", "color", "#ffffff", "Of FlatColor.", shown_if={"wanted_transformer": "FlatColor"}
     )
-    color = Setting("Color", "color", "#ffffff", "Of FlatColor.")
     channelName = _channel("intensity")
     useRainbow = Setting(
-        "Use rainbow", "bool", True, "Whether colors are a rainbow, or between two colors."
-    )
-    invertRainbow = Setting("Invert Rainbow", "bool", False, "Whether red is at the maximum.")
-    minColor = Setting("Min Color", "color", "#000000", "At the minimum, without a rainbow.")
-    maxColor = Setting("Max Color", "color", "#ffffff", "At the maximum, without a rainbow.")
+        "Use rainbow", "bool", True, "Whether colors are a rainbow, or between two colors.",
+        shown_if=_INTENSITY,
+    )  # fmt: skip
+    invertRainbow = _invert(False)
+    minColor = Setting("Min Color", "color", "#000000", "At the minimum.", shown_if=_TWO_COLORS)
+    maxColor = Setting("Max Color", "color", "#ffffff", "At the maximum.", shown_if=_TWO_COLORS)
     autocomputeIntensityBounds = _autocompute(True)
     minIntensity = _bound("Min Intensity", 0.0)
     maxIntensity = _bound("Max Intensity", 4096.0)
@@ -314,6 +342,11 @@ class CloudDisplay(TopicDisplay):
         self._shown: dict[CloudEntry, _ShownCloud] = {}
         self._colors: _ColorSettings | None = None
         super().__init__(parent, runtime)
+
+    @property
+    def wanted_transformer(self) -> str:
+        """The color transformer that is chosen, or else in use; empty while there is none."""
+        return str(self.colorTransformer or self.usedColorTransformer)
 
     # -- in the node's thread --------------------------------------------------------------------
 
@@ -709,10 +742,13 @@ class DepthCloudDisplay(CloudDisplay):
         "Color Image Topic", "topic", "", "Color images of the same camera; empty for none.",
         then="_on_topic",
     )  # fmt: skip
-    autoSize = Setting("Auto Size", "bool", True, "Whether points are as large as their pixels.")
+    size = _size(autoSize=False)
+    autoSize = Setting(
+        "Auto Size", "bool", True, "Whether points are as large as their pixels.", shown_if=_METRIC
+    )
     autoSizeFactor = Setting(
         "Auto Size/Auto Size Factor", "float", 1.0, "What that size is multiplied with.",
-        min=0.0001, max=_MAX_SIZE_M,
+        min=0.0001, max=_MAX_SIZE_M, shown_if={"autoSize": True},
     )  # fmt: skip
     occlusionCompensation = Setting(
         "Occlusion Compensation", "bool", False,
@@ -722,6 +758,7 @@ class DepthCloudDisplay(CloudDisplay):
     occlusionTimeOut = Setting(
         "Occlusion Compensation/Occlusion Time-Out", "float", 30.0,
         "Seconds for which hidden points stay.", min=0.0, max=1e9,
+        shown_if={"occlusionCompensation": True},
     )  # fmt: skip
 
     def __init__(
@@ -847,7 +884,7 @@ class TemperatureDisplay(CloudDisplay):
     READ = _read_value("temperature")
 
     channelName = _channel("temperature")
-    invertRainbow = Setting("Invert Rainbow", "bool", True, "Whether red is at the maximum.")
+    invertRainbow = _invert(True)
     autocomputeIntensityBounds = _autocompute(False)
     minIntensity = _bound("Min Intensity", 0.0)
     maxIntensity = _bound("Max Intensity", 100.0)

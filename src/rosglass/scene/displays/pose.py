@@ -43,18 +43,37 @@ _STANDING = np.array(
 )
 
 
+#: Of settings: the styles of a path that they are of.
+_BILLBOARDS = {"lineStyle": "Billboards"}
+_POSE_AXES, _POSE_ARROWS = {"poseStyle": "Axes"}, {"poseStyle": "Arrows"}
+#: Of settings: the shapes that they are of, and the covariances.
+_ARROW, _AXES = {"shape": "Arrow"}, {"shape": "Axes"}
+_FLAT_ARROW, _SOLID_ARROW = {"shape": "Arrow (Flat)"}, {"shape": "Arrow (3D)"}
+_ANY_ARROW = {"shape": ("Arrow (Flat)", "Arrow (3D)")}
+_COVARIANCE = {"covariance": True}
+_POSITION, _ORIENTATION = {"covariancePosition": True}, {"covarianceOrientation": True}
+
+
 class _Shaped(TopicDisplay):
     """A display of poses as arrows or axes."""
 
     shape = Setting("Shape", "enum", "Arrow", "How a pose is drawn.", choices=["Arrow", "Axes"])
-    color = Setting("Color", "color", "#ff1900", "Of arrows.")
+    color = Setting("Color", "color", "#ff1900", "Of arrows.", shown_if=_ARROW)
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
-    shaftLength = Setting("Shaft Length", "float", 1.0, "Of arrows, in metres.", min=0.0)
-    shaftRadius = Setting("Shaft Radius", "float", 0.05, "Of arrows, in metres.", min=0.0)
-    headLength = Setting("Head Length", "float", 0.3, "Of arrows, in metres.", min=0.0)
-    headRadius = Setting("Head Radius", "float", 0.1, "Of arrows, in metres.", min=0.0)
-    axesLength = Setting("Axes Length", "float", 1.0, "In metres.", min=0.0)
-    axesRadius = Setting("Axes Radius", "float", 0.1, "In metres.", min=0.0)
+    shaftLength = Setting(
+        "Shaft Length", "float", 1.0, "Of arrows, in metres.", min=0.0, shown_if=_ARROW
+    )
+    shaftRadius = Setting(
+        "Shaft Radius", "float", 0.05, "Of arrows, in metres.", min=0.0, shown_if=_ARROW
+    )
+    headLength = Setting(
+        "Head Length", "float", 0.3, "Of arrows, in metres.", min=0.0, shown_if=_ARROW
+    )
+    headRadius = Setting(
+        "Head Radius", "float", 0.1, "Of arrows, in metres.", min=0.0, shown_if=_ARROW
+    )
+    axesLength = Setting("Axes Length", "float", 1.0, "In metres.", min=0.0, shown_if=_AXES)
+    axesRadius = Setting("Axes Radius", "float", 0.1, "In metres.", min=0.0, shown_if=_AXES)
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -129,15 +148,25 @@ class PoseArrayDisplay(TopicDisplay):
         "Shape", "enum", "Arrow (Flat)", "How poses are drawn.",
         choices=["Arrow (Flat)", "Arrow (3D)", "Axes"],
     )  # fmt: skip
-    color = Setting("Color", "color", "#ff1900", "Of arrows.")
+    color = Setting("Color", "color", "#ff1900", "Of arrows.", shown_if=_ANY_ARROW)
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
-    arrowLength = Setting("Arrow Length", "float", 0.3, "Of flat arrows, in metres.", min=0.0)
-    headRadius = Setting("Head Radius", "float", 0.03, "Of arrows, in metres.", min=0.0)
-    headLength = Setting("Head Length", "float", 0.07, "Of arrows, in metres.", min=0.0)
-    shaftRadius = Setting("Shaft Radius", "float", 0.01, "Of arrows, in metres.", min=0.0)
-    shaftLength = Setting("Shaft Length", "float", 0.23, "Of arrows, in metres.", min=0.0)
-    axesLength = Setting("Axes Length", "float", 0.3, "In metres.", min=0.0)
-    axesRadius = Setting("Axes Radius", "float", 0.01, "In metres.", min=0.0)
+    arrowLength = Setting(
+        "Arrow Length", "float", 0.3, "Of flat arrows, in metres.", min=0.0, shown_if=_FLAT_ARROW
+    )
+    headRadius = Setting(
+        "Head Radius", "float", 0.03, "Of arrows, in metres.", min=0.0, shown_if=_SOLID_ARROW
+    )
+    headLength = Setting(
+        "Head Length", "float", 0.07, "Of arrows, in metres.", min=0.0, shown_if=_SOLID_ARROW
+    )
+    shaftRadius = Setting(
+        "Shaft Radius", "float", 0.01, "Of arrows, in metres.", min=0.0, shown_if=_SOLID_ARROW
+    )
+    shaftLength = Setting(
+        "Shaft Length", "float", 0.23, "Of arrows, in metres.", min=0.0, shown_if=_SOLID_ARROW
+    )
+    axesLength = Setting("Axes Length", "float", 0.3, "In metres.", min=0.0, shown_if=_AXES)
+    axesRadius = Setting("Axes Radius", "float", 0.01, "In metres.", min=0.0, shown_if=_AXES)
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -219,31 +248,46 @@ class _WithCovariance(_Shaped):
     """A display of poses with covariances."""
 
     covariance = Setting("Covariance", "bool", True, "Whether covariances are shown.")
-    covariancePosition = Setting("Covariance/Position", "bool", True, "Of positions.")
-    positionColor = Setting("Covariance/Position/Color", "color", "#cc33cc", "Of the ellipsoid.")
-    positionAlpha = Setting("Covariance/Position/Alpha", "float", 0.3, "Opacity.", min=0.0, max=1.0)
-    positionScale = Setting(
-        "Covariance/Position/Scale", "float", 1.0, "Standard deviations.", min=0.0
+    covariancePosition = Setting(
+        "Covariance/Position", "bool", True, "Of positions.", shown_if=_COVARIANCE
     )
-    covarianceOrientation = Setting("Covariance/Orientation", "bool", True, "Of orientations.")
+    positionColor = Setting(
+        "Covariance/Position/Color", "color", "#cc33cc", "Of the ellipsoid.", shown_if=_POSITION
+    )
+    positionAlpha = Setting(
+        "Covariance/Position/Alpha", "float", 0.3, "Opacity.", min=0.0, max=1.0, shown_if=_POSITION
+    )
+    positionScale = Setting(
+        "Covariance/Position/Scale", "float", 1.0, "Standard deviations.", min=0.0,
+        shown_if=_POSITION,
+    )  # fmt: skip
+    covarianceOrientation = Setting(
+        "Covariance/Orientation", "bool", True, "Of orientations.", shown_if=_COVARIANCE
+    )
     orientationFrame = Setting(
         "Covariance/Orientation/Frame", "enum", "Local", "Whose axes rotations are around.",
-        choices=["Local", "Fixed"],
+        choices=["Local", "Fixed"], shown_if=_ORIENTATION,
     )  # fmt: skip
     orientationColorStyle = Setting(
         "Covariance/Orientation/Color Style", "enum", "Unique", "One colour, or the axes' colours.",
-        choices=["Unique", "RGB"],
+        choices=["Unique", "RGB"], shown_if=_ORIENTATION,
     )  # fmt: skip
-    orientationColor = Setting("Covariance/Orientation/Color", "color", "#ffff7f", "Of the shapes.")
+    orientationColor = Setting(
+        "Covariance/Orientation/Color", "color", "#ffff7f", "Of the shapes.",
+        shown_if={**_ORIENTATION, "orientationColorStyle": "Unique"},
+    )  # fmt: skip
     orientationAlpha = Setting(
-        "Covariance/Orientation/Alpha", "float", 0.5, "Opacity.", min=0.0, max=1.0
-    )
+        "Covariance/Orientation/Alpha", "float", 0.5, "Opacity.", min=0.0, max=1.0,
+        shown_if=_ORIENTATION,
+    )  # fmt: skip
     orientationOffset = Setting(
-        "Covariance/Orientation/Offset", "float", 1.0, "From the pose, in metres.", min=0.0
-    )
+        "Covariance/Orientation/Offset", "float", 1.0, "From the pose, in metres.", min=0.0,
+        shown_if=_ORIENTATION,
+    )  # fmt: skip
     orientationScale = Setting(
-        "Covariance/Orientation/Scale", "float", 1.0, "Standard deviations.", min=0.0
-    )
+        "Covariance/Orientation/Scale", "float", 1.0, "Standard deviations.", min=0.0,
+        shown_if=_ORIENTATION,
+    )  # fmt: skip
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -429,7 +473,9 @@ class PathDisplay(TopicDisplay):
     lineStyle = Setting(
         "Line Style", "enum", "Lines", "How the line is drawn.", choices=["Lines", "Billboards"]
     )
-    lineWidth = Setting("Line Width", "float", 0.03, "Of billboards, in metres.", min=0.001)
+    lineWidth = Setting(
+        "Line Width", "float", 0.03, "Of billboards, in metres.", min=0.001, shown_if=_BILLBOARDS
+    )
     color = Setting("Color", "color", "#19ff00", "The colour of the line.")
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
     bufferLength = Setting(
@@ -439,13 +485,25 @@ class PathDisplay(TopicDisplay):
     poseStyle = Setting(
         "Pose Style", "enum", "None", "How poses are drawn.", choices=["None", "Axes", "Arrows"]
     )
-    axesLength = Setting("Length", "float", 0.3, "Of axes, in metres.", min=0.0)
-    axesRadius = Setting("Radius", "float", 0.03, "Of axes, in metres.", min=0.0)
-    poseColor = Setting("Pose Color", "color", "#ff55ff", "Of arrows.")
-    shaftLength = Setting("Shaft Length", "float", 0.1, "Of arrows, metres.", min=0.0)
-    headLength = Setting("Head Length", "float", 0.2, "Of arrows, metres.", min=0.0)
-    shaftDiameter = Setting("Shaft Diameter", "float", 0.1, "In metres.", min=0.0)
-    headDiameter = Setting("Head Diameter", "float", 0.3, "In metres.", min=0.0)
+    axesLength = Setting(
+        "Length", "float", 0.3, "Of axes, in metres.", min=0.0, shown_if=_POSE_AXES
+    )
+    axesRadius = Setting(
+        "Radius", "float", 0.03, "Of axes, in metres.", min=0.0, shown_if=_POSE_AXES
+    )
+    poseColor = Setting("Pose Color", "color", "#ff55ff", "Of arrows.", shown_if=_POSE_ARROWS)
+    shaftLength = Setting(
+        "Shaft Length", "float", 0.1, "Of arrows, metres.", min=0.0, shown_if=_POSE_ARROWS
+    )
+    headLength = Setting(
+        "Head Length", "float", 0.2, "Of arrows, metres.", min=0.0, shown_if=_POSE_ARROWS
+    )
+    shaftDiameter = Setting(
+        "Shaft Diameter", "float", 0.1, "In metres.", min=0.0, shown_if=_POSE_ARROWS
+    )
+    headDiameter = Setting(
+        "Head Diameter", "float", 0.3, "In metres.", min=0.0, shown_if=_POSE_ARROWS
+    )
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None

@@ -356,14 +356,15 @@ class RobotModelDisplay(Display):
     )  # fmt: skip
     descriptionTopic = Setting(
         "Description Topic", "topic", "/robot_description", "Of std_msgs/String.",
-        then="_on_source",
+        then="_on_source", shown_if={"used_source": _TOPIC},
     )  # fmt: skip
     descriptionFile = Setting(
-        "Description File", "path", "", "A URDF file; package:// as well.", then="_on_source"
-    )
+        "Description File", "path", "", "A URDF file; package:// as well.", then="_on_source",
+        shown_if={"used_source": _FILE},
+    )  # fmt: skip
     robotDescription = Setting(
         "Robot Description", "string", "robot_description", "The parameter's name in ROS 1.",
-        then="_on_source",
+        then="_on_source", shown_if={"used_source": _PARAMETER},
     )  # fmt: skip
     tfPrefix = Setting("TF Prefix", "string", "", "In front of the names of links, with a slash.")
     allLinksEnabled = Setting(
@@ -406,10 +407,15 @@ class RobotModelDisplay(Display):
         self._clear()
         self._schedule()
 
-    def _find_source(self, node: Node) -> tuple[str, str]:
-        kind = self.descriptionSource
-        if kind == _AUTOMATIC:
-            kind = _PARAMETER if hasattr(node, "parameter_server") else _TOPIC
+    @property
+    def used_source(self) -> str:
+        """Where the description is: ``Topic``, ``File`` or ``Parameter``."""
+        if self.descriptionSource != _AUTOMATIC:
+            return str(self.descriptionSource)
+        return _PARAMETER if hasattr(self.node, "parameter_server") else _TOPIC
+
+    def _find_source(self) -> tuple[str, str]:
+        kind = self.used_source
         name = {
             _TOPIC: self.descriptionTopic,
             _FILE: self.descriptionFile,
@@ -421,7 +427,7 @@ class RobotModelDisplay(Display):
         node = self.node
         if node is None or self.scene is None or not self.shown:
             return None
-        kind, name = self._find_source(node)
+        kind, name = self._find_source()
         return (node, kind, name) if name else None
 
     def _factory(self, *wanted: Any) -> Callable[[], Any]:
