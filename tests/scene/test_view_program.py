@@ -324,6 +324,19 @@ def test_each_condition_names_a_property(bench: SceneBench) -> None:
                 assert setting.is_shown(display) in (True, False)
 
 
+def test_a_colour_is_changed_while_rows_come_and_go(bench: SceneBench, model: Any) -> None:
+    from PySide6.QtGui import QColor
+
+    (grid,) = bench.view.scene.displays
+    model.toggle(row_of(model, "Grid"))
+    model.pick(row_of(model, "Color"))
+    model.toggle(row_of(model, "Global Options"))
+    model.setPicked(QColor("#123456"))
+    assert grid.color.name() == "#123456"
+    bench.view.scene.remove(grid)
+    model.setPicked(QColor("#000000"))
+
+
 def view_command(*arguments: str, timeout: float = 100) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "rosglass", "view", *arguments],

@@ -155,6 +155,7 @@ class DisplaysModel(QAbstractListModel):
         self._view: SceneView | None = None
         self._rows: list[PanelRow] = []
         self._expanded: set[tuple[Any, ...]] = {("options",)}
+        self._picked: tuple[Any, ...] = ()
         self._timer = QtCore.QTimer(self)
         self._timer.setInterval(_REFRESH_MS)
         self._timer.timeout.connect(self.refresh)
@@ -410,6 +411,20 @@ class DisplaysModel(QAbstractListModel):
         # An editor shows again what the setting has.
         index = self.index(row)
         self.dataChanged.emit(index, index)
+
+    @Slot(int)
+    def pick(self, row: int) -> None:
+        """Remember a row whose value a dialog changes; others may come and go until then."""
+        if 0 <= row < len(self._rows):
+            self._picked = self._rows[row].key
+
+    @Slot("QVariant")
+    def setPicked(self, value: Any) -> None:
+        """Change the setting of the row that was picked, if it is still there."""
+        for number, row in enumerate(self._rows):
+            if row.key == self._picked:
+                self.edit(number, value)
+                return
 
     @Slot(int, str)
     def rename(self, row: int, name: str) -> None:

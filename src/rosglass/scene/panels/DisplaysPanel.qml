@@ -1,5 +1,6 @@
 import QtQuick
 import QtQuick.Controls.Fusion
+import QtQuick.Dialogs
 import QtQuick.Layouts
 import RosScene 1.0
 
@@ -245,6 +246,10 @@ Pane {
                         Layout.preferredHeight: 16
                         color: row.kind === "color" ? row.value : "transparent"
                         border.color: palette.mid
+                        MouseArea {
+                            anchors { fill: parent; margins: -4 }
+                            onClicked: { panel.current = row.index; colors.ask(row.index, parent.color, row.label) }
+                        }
                     }
                     CheckBox {
                         visible: row.kind === "bool"
@@ -303,6 +308,24 @@ Pane {
         }
     }
 
+    ColorDialog {
+        id: colors
+
+        property color before
+        property bool asking: false
+
+        function ask(row, color, label) {
+            rows.pick(row)
+            title = label
+            before = selectedColor = color
+            asking = true
+            open()
+        }
+        // The view shows each color while one is looked for.
+        onSelectedColorChanged: if (asking) rows.setPicked(selectedColor)
+        onAccepted: { rows.setPicked(selectedColor); asking = false }
+        onRejected: { rows.setPicked(before); asking = false }
+    }
     Dialog {
         id: renaming
         title: "New name of the display"
