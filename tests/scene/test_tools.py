@@ -410,9 +410,14 @@ def test_a_goal_to_an_action_without_server_says_so(
     view = bench.load('Nav2GoalTool { name: "Go" }\ntool: "Go"')
     goal = view.tools.current
     bench.wait(lambda: goal.is_ready)
-    monkeypatch.setattr("rosglass.scene.publishing_tools._GOAL_TIMEOUT_S", 0.2)
+    said: list[str] = []
+    view.statusTextChanged.connect(lambda: said.append(view.statusText))
+    monkeypatch.setattr("rosglass.scene.publishing_tools._MATCH_TIMEOUT_S", 0.2)
     hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
-    bench.wait(lambda: "navigate_to_pose" in goal.problem, lambda: goal.problem)
+    bench.wait(lambda: "not sent" in goal.problem, lambda: goal.problem)
+    assert "/navigate_to_pose" in goal.problem
+    assert goal.goal is None
+    assert not [text for text in said if "sent to" in text]
 
 
 # -- points, distances, selections ---------------------------------------------------------------

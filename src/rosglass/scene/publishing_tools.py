@@ -447,8 +447,14 @@ class SetGoalTool(PoseTool):
         if not self.action or client is None or waiting is None or self._session is None:
             super()._send_waiting()
             return
+        fields, text, deadline = waiting
+        if not client.ready and time.monotonic() < deadline:
+            self.announce(f"{text}: looking for a server of {client.name}")
+            return
         self._waiting = None
-        fields, text, _ = waiting
+        if not client.ready:
+            self._complain(f"{text}: not sent: {client.problem}")
+            return
         try:
             self._goal = client.send_goal(
                 {"pose": fields},
@@ -460,7 +466,8 @@ class SetGoalTool(PoseTool):
         except Error as error:
             self._complain(f"{text}: not sent: {error}")
         else:
-            self.announce(f"{text}: sent to {self.action}")
+            self._set_problem("")
+            self.announce(f"{text}: sent to {client.name}")
 
     def _on_goal_status(self, status: GoalStatus) -> None:
         if is_alive(self):
