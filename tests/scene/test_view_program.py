@@ -407,6 +407,27 @@ def test_the_command_shows_overlays(app: Any, tmp_path: Path) -> None:
     assert "Nothing.qml" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("chosen", "meant"),
+    [
+        ("/work/a.rviz", ""),
+        ("/work//tmp/my robot/a.rviz", "/tmp/my robot/a.rviz"),
+        ("///tmp/a.rviz", "/tmp/a.rviz"),
+        ("/work/~/a.rviz", "~/a.rviz"),
+        ("/work/a~/b.rviz", ""),
+    ],
+)
+def test_typed_paths_are_taken_as_they_are(app: Any, chosen: str, meant: str) -> None:
+    from PySide6.QtCore import QUrl
+
+    from rosglass.scene.program import ViewProgram
+
+    url = QUrl("file:")
+    url.setPath(chosen)
+    found = ViewProgram().typedFile(url)
+    assert found.toLocalFile() == (os.path.expanduser(meant) if meant else "")  # noqa: PTH111
+
+
 def test_what_would_be_lost_is_asked_for(bench: SceneBench, tmp_path: Path) -> None:
     from rosglass.scene.program import ViewProgram
 

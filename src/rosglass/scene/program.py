@@ -236,6 +236,26 @@ class ViewProgram(QtCore.QObject):
         self._remember()
         self._refresh()
 
+    @Slot(QtCore.QUrl, result=QtCore.QUrl)
+    def typedFile(self, file: QtCore.QUrl) -> QtCore.QUrl:
+        """Return what the user means with a path that was typed into Qt's file dialog.
+
+        It joins absolute ones, and those with ``~``, to the folder that it shows.
+
+        Returns:
+            That file; an empty URL for one that is in the folder.
+        """
+        _, found, typed = file.path().partition("//")
+        if not found:
+            _, found, typed = file.path().partition("/~/")
+            return QtCore.QUrl.fromLocalFile(str(Path.home() / typed)) if found else QtCore.QUrl()
+        return QtCore.QUrl.fromLocalFile("/" + typed.lstrip("/"))
+
+    @Slot(QtCore.QUrl, result=bool)
+    def exists(self, file: QtCore.QUrl) -> bool:
+        """Return whether there is a file."""
+        return Path(_local(file)).exists()
+
     @Slot(QtCore.QUrl)
     @Slot(str)
     def save(self, place: Any) -> None:

@@ -164,7 +164,29 @@ ApplicationWindow {
         fileMode: FileDialog.SaveFile
         defaultSuffix: "rviz"
         nameFilters: ["RViz configs (*.rviz)"]
-        onAccepted: program.save(selectedFile)
+        onAccepted: {
+            const typed = program.typedFile(selectedFile)
+            if (typed.toString() === "") {
+                program.save(selectedFile)
+                return
+            }
+            // The dialog shows this folder the next time.
+            selectedFile = typed
+            if (program.exists(typed))
+                replacing.ask(typed)
+            else
+                program.save(typed)
+        }
+    }
+    MessageDialog {
+        id: replacing
+        property url file
+        function ask(file) { replacing.file = file; open() }
+        title: "rosglass view"
+        text: "There is such a file already. Replace it?"
+        informativeText: file.toString().replace(/^file:\/\//, "")
+        buttons: MessageDialog.Yes | MessageDialog.No
+        onButtonClicked: (button, role) => { if (button === MessageDialog.Yes) program.save(file) }
     }
     MessageDialog {
         id: unsaved
