@@ -83,9 +83,10 @@ def test_unknown_tools_and_settings_are_errors(bench: SceneBench) -> None:
 def test_a_panel_shows_and_changes_settings(bench: SceneBench) -> None:
     pose = bench.load().tools.find("SetInitialPose")
     shown = {one["name"]: one for one in pose.settings()}
-    assert shown["Topic"]["text"] == ""
+    assert shown["Topic"]["value"] == ""
     assert shown["Topic"]["placeholder"] == "/initialpose"
-    assert shown["X std deviation"]["text"] == "0.5"
+    assert shown["X std deviation"]["value"] == "0.5"
+    assert shown["X std deviation"]["kind"] == "float"
     assert pose.setSetting("X std deviation", "0.25") == ""
     assert pose.xDeviation == 0.25
     assert "expected a finite number" in pose.setSetting("X std deviation", "wide")
@@ -116,6 +117,10 @@ def test_panels_change_settings_and_list_the_selection(bench: SceneBench, hand: 
         QTest.keyClick(bench.window, letter)
     hand.key(hand.keys.Key_Return)
     assert view.tools.find("SetGoal").topic == "/dock"
+    box = next(one for one in items_of(view) if one.property("checked") and one.isVisible())
+    centre = box.mapToScene(box.boundingRect().center())
+    hand.click((round(centre.x()), round(centre.y())))
+    assert not view.tools.find("Interact").hideInactiveObjects
     # Letters in a field select no tools.
     assert view.tool == "Interact"
     add_box(view, owner=view.scene.add("Path", "Way"))
@@ -125,6 +130,32 @@ def test_panels_change_settings_and_list_the_selection(bench: SceneBench, hand: 
     assert "1 selected" in texts
     assert "Way: 0" in texts
     assert "Position: 0; 0; 0" in texts
+
+
+def test_a_text_of_the_view_stays_while_the_camera_moves(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load("ViewsPanel { width: 200; height: 300; view: parent }")
+    bench.picture()
+
+    def field(text: str) -> Any:
+        shown = (one for one in items_of(view) if one.isVisible())
+        return next((one for one in shown if one.property("text") == text), None)
+
+    distance = field("10")
+    centre = distance.mapToScene(distance.boundingRect().center())
+    hand.click((round(centre.x()), round(centre.y())))
+    hand.key(hand.keys.Key_End)
+    hand.key(hand.keys.Key_Backspace)
+    assert distance.property("text") == "1"
+    view.controller.set("Yaw", 1.25)
+    view.camera_moved()
+    bench.wait(lambda: field("1.25"))
+    assert distance.property("text") == "1"
+    hand.key(hand.keys.Key_Return)
+    assert view.controller.get("Distance") == 1.0
+    boxes = [one for one in items_of(view) if one.property("checked") and one.isVisible()]
+    centre = boxes[0].mapToScene(boxes[0].boundingRect().center())
+    hand.click((round(centre.x()), round(centre.y())))
+    assert not view.controller.get("Focal Shape Fixed Size")
 
 
 def test_tools_are_added_and_removed(bench: SceneBench) -> None:

@@ -547,6 +547,23 @@ def test_a_display_is_dragged_by_the_mouse(bench: SceneBench, window: Any) -> No
     assert outline(rows.scene) == ["TF", "Axes", "Robot", []]
 
 
+def test_the_view_shows_the_colour_that_a_dialog_has(bench: SceneBench, window: Any) -> None:
+    from PySide6.QtCore import QMetaObject, QObject
+    from PySide6.QtGui import QColor
+
+    rows = Rows(window)
+    view, colors = (window.findChild(QObject, name) for name in ("scene", "colors"))
+    for end, after in (("reject", "#303030"), ("accept", "#112233")):
+        rows.click(rows.at("Background Color", x=151))
+        bench.wait(lambda: colors.property("visible"))
+        assert colors.property("selectedColor").name() == "#303030"
+        colors.setProperty("selectedColor", QColor("#112233"))
+        assert view.property("background").name() == "#112233"
+        QMetaObject.invokeMethod(colors, end)
+        bench.wait(lambda: not colors.property("visible"))
+        assert view.property("background").name() == after
+
+
 def test_a_frame_is_hidden_by_its_check_box(bench: SceneBench, window: Any) -> None:
     from rosglass import Time
     from rosglass.tf import StaticTransformBroadcaster, Transform

@@ -29,7 +29,7 @@ from rosglass.scene.rviz_config import RvizConfig, ToolConfig, ViewConfig
 from rosglass.scene.scene import Scene
 from rosglass.scene.selection import Selection
 from rosglass.scene.tools import PointerEvent, Tool, Tools
-from rosglass.scene.views import VIEWS, create_view
+from rosglass.scene.views import FIXED_FRAME, VIEWS, create_view
 from rosglass.tf.topics import is_ros1
 
 if TYPE_CHECKING:
@@ -322,15 +322,22 @@ class SceneView(QQuickRhiItem):
 
     @Slot(result="QVariantList")
     def viewSettings(self) -> list[dict[str, Any]]:
-        """Return the settings of the view: name, text and description."""
+        """Return the settings of the view: name, kind, value and choices for SettingEditor."""
         return [
             {
                 "name": one["path"],
-                "text": _setting_text(one["value"]),
+                "kind": one["kind"],
+                "value": _setting_text(one["value"]),
+                "choices": self._choices_of(one),
                 "description": one["description"],
             }
             for one in self._view.describe()
         ]
+
+    def _choices_of(self, setting: dict[str, Any]) -> list[str]:
+        if setting["kind"] == "frame":
+            return [FIXED_FRAME, *self.scene.frames()]
+        return list(setting.get("choices", ()))
 
     @Slot(str, str, result=str)
     def setViewSetting(self, name: str, text: str) -> str:
@@ -700,7 +707,9 @@ _BUTTONS = int(Button.LEFT | Button.RIGHT | Button.MIDDLE)
 _MODIFIERS = int(Modifier.SHIFT | Modifier.CTRL | Modifier.ALT)
 
 
-def _setting_text(value: Any) -> str:
+def _setting_text(value: Any) -> Any:
+    if isinstance(value, bool):
+        return value
     if isinstance(value, dict):
         return "; ".join(f"{number:.5g}" for number in value.values())
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -271,12 +271,17 @@ class Tool(Configurable, Element):
         return {path: getattr(self, setting.name) for path, setting in self.SETTINGS.items()}
 
     @Slot(result=_LIST)
-    def settings(self) -> list[dict[str, str]]:
-        """Return the settings for a panel: name, text, description, and what empty text means."""
+    def settings(self) -> list[dict[str, Any]]:
+        """Return the settings for a panel: name, kind, value and choices for SettingEditor.
+
+        Also their description, and in `placeholder` what an empty text means.
+        """
         return [
             {
                 "name": path,
-                "text": _text_of(value),
+                "kind": self.SETTINGS[path].kind.NAME,
+                "value": value if isinstance(value, bool) else _text_of(value),
+                "choices": list(self.SETTINGS[path].kind.options.get("choices", ())),
                 "description": self.SETTINGS[path].description,
                 "placeholder": self._placeholder(path),
             }
@@ -842,8 +847,6 @@ class Tools(QtCore.QObject):
 
 
 def _text_of(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
     if isinstance(value, QtGui.QColor):
         return str(value.name())
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,6 +1,5 @@
 import QtQuick
 import QtQuick.Controls.Fusion
-import QtQuick.Dialogs
 import QtQuick.Layouts
 import RosScene 1.0
 
@@ -167,7 +166,8 @@ Pane {
                 required property bool expanded
                 required property var choices
                 readonly property bool ofDisplay: kind === "display"
-                readonly property color tint: level === "error" ? "#c62818" : level === "warn" ? "#9a5b00" : palette.text
+                readonly property color tint: level === "error" ? "#c62818" : level === "warn" ? "#9a5b00"
+                                               : index === panel.current ? palette.highlightedText : palette.text
 
                 width: list.width
                 height: panel.rowHeight
@@ -240,51 +240,15 @@ Pane {
                         elide: Text.ElideRight
                         color: row.tint
                     }
-                    Rectangle {
-                        visible: row.kind === "color"
-                        Layout.preferredWidth: 16
-                        Layout.preferredHeight: 16
-                        color: row.kind === "color" ? row.value : "transparent"
-                        border.color: palette.mid
-                        MouseArea {
-                            anchors { fill: parent; margins: -4 }
-                            onClicked: { panel.current = row.index; colors.ask(row.index, parent.color, row.label) }
-                        }
-                    }
-                    CheckBox {
-                        visible: row.kind === "bool"
-                        checked: row.kind === "bool" && row.value === true
-                        onToggled: rows.edit(row.index, checked)
-                    }
-                    ComboBox {
-                        visible: row.kind === "enum" || ((row.kind === "frame" || row.kind === "topic") && row.choices.length > 0)
-                        Layout.fillWidth: true
-                        Layout.preferredWidth: 150
-                        Layout.preferredHeight: 22
-                        model: row.choices
-                        editable: row.kind !== "enum"
-                        currentIndex: row.choices.indexOf(String(row.value))
-                        // What is set may be none of the choices, e.g. a frame that is not there yet.
-                        readonly property string given: String(row.value)
-                        onGivenChanged: if (editable) editText = given
-                        onModelChanged: if (editable) Qt.callLater(() => { editText = given })
-                        Component.onCompleted: if (editable) editText = given
-                        onActivated: rows.edit(row.index, currentText)
-                        onAccepted: rows.edit(row.index, editText)
-                    }
-                    TextField {
-                        visible: ["int", "float", "string", "path", "color", "vector", "quaternion"].indexOf(row.kind) >= 0
-                              || ((row.kind === "frame" || row.kind === "topic") && row.choices.length === 0)
-                        Layout.fillWidth: true
-                        Layout.preferredWidth: 150
-                        Layout.preferredHeight: 22
-                        text: row.kind === "bool" ? "" : String(row.value)
-                        selectByMouse: true
-                        onEditingFinished: {
-                            if (text === String(row.value)) return
-                            rows.edit(row.index, text)
-                            // What was refused is not left standing.
-                            text = Qt.binding(() => row.kind === "bool" ? "" : String(row.value))
+                    SettingEditor {
+                        kind: row.kind
+                        value: row.value
+                        choices: row.choices
+                        onEdited: value => rows.edit(row.index, value)
+                        onColorAsked: before => {
+                            panel.current = row.index
+                            rows.pick(row.index)
+                            chooser.ask(before, row.label)
                         }
                     }
                 }
@@ -308,24 +272,7 @@ Pane {
         }
     }
 
-    ColorDialog {
-        id: colors
-
-        property color before
-        property bool asking: false
-
-        function ask(row, color, label) {
-            rows.pick(row)
-            title = label
-            before = selectedColor = color
-            asking = true
-            open()
-        }
-        // The view shows each color while one is looked for.
-        onSelectedColorChanged: if (asking) rows.setPicked(selectedColor)
-        onAccepted: { rows.setPicked(selectedColor); asking = false }
-        onRejected: { rows.setPicked(before); asking = false }
-    }
+    ColorChooser { id: chooser; objectName: "colors"; onTried: color => rows.setPicked(color) }
     Dialog {
         id: renaming
         title: "New name of the display"

@@ -13,6 +13,12 @@ Pane {
 
     padding: 4
 
+    ColorChooser {
+        id: chooser
+        property var group: null
+        property string setting: ""
+        onTried: color => { if (group) group.set(setting, color) }
+    }
     ColumnLayout {
         anchors.fill: parent
         ListView {
@@ -26,6 +32,11 @@ Pane {
 
                 required property var modelData
                 property var settings: modelData.settings()
+
+                function set(name, value) {
+                    panel.problem = modelData.setSetting(name, String(value))
+                    settings = modelData.settings()
+                }
 
                 width: ListView.view.width
                 visible: settings.length > 0
@@ -47,17 +58,16 @@ Pane {
                             HoverHandler { id: hover }
                             PlainToolTip { visible: hover.hovered && modelData.description !== ""; plain: modelData.description }
                         }
-                        TextField {
-                            Layout.fillWidth: true
-                            Layout.preferredWidth: 120
-                            Layout.preferredHeight: 22
-                            text: modelData.text
-                            placeholderText: modelData.placeholder
-                            onEditingFinished: {
-                                if (text === modelData.text)
-                                    return
-                                panel.problem = group.modelData.setSetting(modelData.name, text)
-                                group.settings = group.modelData.settings()
+                        SettingEditor {
+                            kind: modelData.kind
+                            value: modelData.value
+                            choices: modelData.choices
+                            placeholder: modelData.placeholder
+                            onEdited: value => group.set(modelData.name, value)
+                            onColorAsked: before => {
+                                chooser.group = group
+                                chooser.setting = modelData.name
+                                chooser.ask(before, modelData.name)
                             }
                         }
                     }

@@ -22,6 +22,8 @@ Pane {
         function onCameraChanged() { later.start() }
     }
     Timer { id: later; interval: 200; onTriggered: panel.refresh() }
+    // Frames come and go.
+    Timer { interval: 1000; repeat: true; running: panel.visible; onTriggered: panel.refresh() }
 
     ColumnLayout {
         anchors.fill: parent
@@ -40,17 +42,22 @@ Pane {
             Layout.fillWidth: true
             Layout.fillHeight: true
             clip: true
-            model: panel.settings
+            // Rows stay while the camera moves: an editor that is open stays so.
+            model: panel.settings.length
             delegate: RowLayout {
+                id: row
+
+                required property int index
+                readonly property var setting: panel.settings[index] || ({ name: "", kind: "", value: "", choices: [] })
+
                 width: ListView.view.width
                 height: 24
-                Label { Layout.fillWidth: true; Layout.preferredWidth: 100; text: modelData.name; textFormat: Text.PlainText; elide: Text.ElideRight }
-                TextField {
-                    Layout.fillWidth: true
-                    Layout.preferredWidth: 120
-                    Layout.preferredHeight: 22
-                    text: modelData.text
-                    onEditingFinished: if (text !== modelData.text) panel.problem = panel.view.setViewSetting(modelData.name, text)
+                Label { Layout.fillWidth: true; Layout.preferredWidth: 100; text: row.setting.name; textFormat: Text.PlainText; elide: Text.ElideRight }
+                SettingEditor {
+                    kind: row.setting.kind
+                    value: row.setting.value
+                    choices: row.setting.choices
+                    onEdited: value => panel.problem = panel.view.setViewSetting(row.setting.name, String(value))
                 }
             }
         }
