@@ -255,7 +255,7 @@ def test_all_frames_are_shown_or_hidden(bench: SceneBench, model: Any) -> None:
 
     broadcaster = StaticTransformBroadcaster(bench.robot)
     for name in ("base", "tool"):
-        broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), Time(1), "map", name))
+        broadcaster.send_transform(Transform((1, 0, 0.5), (0, 0, 0, 1), Time(1), "map", name))
     tf = bench.view.scene.add("TF")
     bench.wait(lambda: tf.frames == ["base", "map", "tool"])
     model.refresh()
@@ -263,6 +263,13 @@ def test_all_frames_are_shown_or_hidden(bench: SceneBench, model: Any) -> None:
     model.toggle(row_of(model, "Frames"))
     at = row_of(model, "Frames")
     assert labels(model)[at : at + 5] == ["Frames", "All Enabled", "base", "map", "tool"]
+    model.toggle(at + 4)
+    below = [(row.label, row.kind, row.value) for row in model.rows[at + 5 : at + 8]]
+    assert below == [
+        ("Parent", "text", "map"),
+        ("Position", "text", "1; 0; 0.5"),
+        ("Orientation", "text", "0; 0; 0; 1"),
+    ]
     model.setEnabled(row_of(model, "tool"), False)
     bench.wait(lambda: tf.frames == ["base", "map"])
     model.edit(at + 1, False)

@@ -29,7 +29,7 @@ from rosglass.scene.rviz_formats import TopicSetting, read_topic, write_topic
 from rosglass.scene.settings import Configurable, Setting
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -315,6 +315,19 @@ class Display(Configurable, TopicElement):
         report(self, statusLevel=_LEVELS[worst], statusText=text)
 
     # -- frames ----------------------------------------------------------------------------------
+
+    def describe_frame(self, frame: str) -> Iterator[tuple[str, str]]:
+        """Iterate over what a panel says of a frame: names and values, in the fixed frame."""
+        scene = self.scene
+        if scene is None or scene.transforms is None:
+            return
+        try:
+            found = scene.transforms.lookup_transform(scene.fixed_frame, frame)
+        except TransformException as error:
+            yield "Position", str(error)
+            return
+        yield "Position", "; ".join(f"{number:.5g}" for number in found.translation)
+        yield "Orientation", "; ".join(f"{number:.5g}" for number in found.rotation)
 
     def place_of(
         self, frame: str, stamp: int = 0, status: str = "Transform"

@@ -43,7 +43,7 @@ class PanelRow(NamedTuple):
         depth: Levels of indentation.
         label: Its name.
         kind: Of the setting, or ``options``, ``display``, ``status``, ``list`` of what is below it,
-            ``part`` of a display, e.g. a namespace.
+            ``part`` of a display, e.g. a namespace, ``text`` that is shown only.
         value: What is shown.
         description: For the tooltip.
         level: ``ok``, ``warn`` or ``error``.
@@ -317,18 +317,22 @@ class DisplaysModel(QAbstractListModel):
 
     def _walk_parts(self, parts: Parts, key: Any, depth: int) -> Iterator[PanelRow]:
         names = list(parts.names())
+        expandable = bool(parts.details) or parts.describe is not None
         for name in names[:_MAX_PARTS]:
             own = (*key, name)
-            expanded = bool(parts.details) and own in self._expanded
+            expanded = expandable and own in self._expanded
             yield PanelRow(
                 own, depth, _short(name), "part" if parts.can_switch(name) else "list",
-                checked=parts.is_enabled(name), expandable=bool(parts.details), expanded=expanded,
+                checked=parts.is_enabled(name), expandable=expandable, expanded=expanded,
             )  # fmt: skip
             for detail, setting in parts.details.items() if expanded else ():
                 yield PanelRow(
                     (*own, detail), depth + 1, detail, setting.kind.NAME,
                     _text(parts.get(name, detail)), setting.description,
                 )  # fmt: skip
+            if expanded and parts.describe is not None:
+                for line, text in parts.describe(name):
+                    yield PanelRow((*own, line), depth + 1, line, "text", _short(text))
         if len(names) > _MAX_PARTS:
             rest = f"and {len(names) - _MAX_PARTS} more"
             yield PanelRow((*key, "", ""), depth, rest, "list")

@@ -24,6 +24,7 @@ class Parts:
         default: Returns whether a part is shown that the user has not switched.
         can_switch: Returns whether a part can be hidden: some have nothing to show.
         details: Settings that each part has of its own.
+        describe: Returns what there is to say about a part, for the panel: names and values.
         as_mapping: Whether a file has a mapping for each part, not only whether it is shown.
     """
 
@@ -36,9 +37,11 @@ class Parts:
         default: Callable[[], bool] = lambda: True,
         can_switch: Callable[[str], bool] = lambda _: True,
         details: Iterable[Setting] = (),
+        describe: Callable[[str], Iterable[tuple[str, str]]] | None = None,
         as_mapping: bool = False,
     ) -> None:
         self.title, self.names, self.can_switch = title, names, can_switch
+        self.describe = describe
         self.details: dict[str, Setting] = {detail.path: detail for detail in details}
         self._on_change, self._default, self._as_mapping = on_change, default, as_mapping
         #: What differs from the default, by the names of parts; also of those to come.

@@ -396,6 +396,7 @@ class RobotModelDisplay(Display):
             default=lambda: self.allLinksEnabled,
             can_switch=lambda name: name in self._bodies and self._bodies[name].has_shape,
             details=_LINK_DETAILS,
+            describe=lambda name: self.describe_frame(self._frame_of(name)),
             as_mapping=True,
         )
         self._again = single_shot(self, self._create_again)
@@ -503,8 +504,11 @@ class RobotModelDisplay(Display):
 
     def followed_frame(self) -> str:
         """Return the frame of the robot's root link."""
+        return self._frame_of(self._root_link) if self._root_link else ""
+
+    def _frame_of(self, link: str) -> str:
         prefix = self.tfPrefix.strip("/")
-        return f"{prefix}/{self._root_link}" if prefix and self._root_link else self._root_link
+        return f"{prefix}/{link}" if prefix else link
 
     # -- the links -------------------------------------------------------------------------------
 
@@ -546,11 +550,10 @@ class RobotModelDisplay(Display):
         scene = self.scene
         if scene is None or not self._bodies or not self.shown:
             return
-        prefix = self.tfPrefix.strip("/")
         missing: list[tuple[str, str]] = []
         for name, link in self._bodies.items():
             try:
-                pose = scene.look_up(f"{prefix}/{name}" if prefix else name)
+                pose = scene.look_up(self._frame_of(name))
             except TransformException as error:
                 missing.append((name, str(error)))
                 link.root.visible = False

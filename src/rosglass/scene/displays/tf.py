@@ -19,6 +19,8 @@ from rosglass.scene.parts import Parts
 from rosglass.scene.settings import Setting
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from rosglass.qml.runtime import Runtime
@@ -100,6 +102,7 @@ class TFDisplay(Display):
             lambda: self.scene.frames() if self.scene is not None else (),
             self._draw,
             default=lambda: self.allEnabled,
+            describe=self._describe,
             as_mapping=True,
         )
         self.root.add(self._axes, self._arrows, self._names)
@@ -113,6 +116,13 @@ class TFDisplay(Display):
     def setFrameEnabled(self, frame: str, enabled: bool) -> None:  # noqa: N802 - QML's name
         """Show or hide one frame."""
         self.parts.set_enabled(frame, enabled)
+
+    def _describe(self, frame: str) -> Iterator[tuple[str, str]]:
+        buffer = self.scene.transforms if self.scene is not None else None
+        info = buffer.frame(frame) if buffer is not None else None
+        if info is not None:
+            yield "Parent", info.parent or "none"
+        yield from self.describe_frame(frame)
 
     def _on_all_enabled(self) -> None:
         self.parts.follow_default()

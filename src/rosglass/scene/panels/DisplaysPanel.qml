@@ -232,7 +232,7 @@ Pane {
                         color: row.tint
                     }
                     Text {
-                        visible: row.kind === "status"
+                        visible: row.kind === "status" || row.kind === "text"
                         Layout.fillWidth: true
                         Layout.preferredWidth: 160
                         text: String(row.value)
