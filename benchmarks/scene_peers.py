@@ -344,17 +344,24 @@ def first_frame(what: str) -> None:
         window.show()
         app.exec()
         return
-    from rosglass import cli
-    from rosglass.scene.program import ViewProgram
+    # In the order of the installed command.
+    from rosglass.cli import main, view
 
-    begin = ViewProgram.begin
+    show = view.show
 
-    def watch(self: Any, view: Any, *others: Any) -> None:
-        begin(self, view, *others)
-        view.window().frameSwapped.connect(lambda: view.pictures_drawn() and shown())
+    def watched(file: str, **options: Any) -> int:
+        program = type(options["context"]["program"])
+        begin = program.begin
 
-    ViewProgram.begin = watch  # type: ignore[method-assign, assignment]
-    sys.exit(cli.main(["view", "--url", "local://benchmark"]))
+        def watch(self: Any, view: Any, *others: Any) -> None:
+            begin(self, view, *others)
+            view.window().frameSwapped.connect(lambda: view.pictures_drawn() and shown())
+
+        program.begin = watch
+        return show(file, **options)
+
+    view.show = watched
+    sys.exit(main(["view", "--url", "local://benchmark"]))
 
 
 def main() -> None:

@@ -36,7 +36,7 @@ Module {
 
 def files() -> dict[Path, str]:
     """Return what the files must hold."""
-    found = {FOLDER6 / "RosScene" / "plugins.qmltypes": _module("RosScene", scene.TYPES)}
+    found = {FOLDER6 / "RosScene" / "plugins.qmltypes": _module("RosScene", scene.load_types())}
     for uri, module in (("Ros", ros1), ("Ros2", ros2)):
         found[FOLDER / uri / "plugins.qmltypes"] = _module(uri, module.TYPES)
         found[FOLDER / uri / "Native" / "plugins.qmltypes"] = _module(

@@ -19,6 +19,7 @@ GRID = """
 Visualization Manager:
   Displays:
     - {Class: rviz_default_plugins/Grid, Name: Floor, Enabled: true, Color: 255; 0; 255, Alpha: 1}
+    - {Class: rviz_default_plugins/Image, Name: Camera, Enabled: true}
     - {Class: other_plugins/Radar, Name: Radar, Enabled: true}
   Global Options: {Fixed Frame: odom, Background Color: 0; 0; 40}
 """
@@ -365,6 +366,7 @@ def test_the_command_shows_a_config(app: Any, tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert "display 'Radar': rosglass has no other_plugins/Radar" in done.stderr
+    assert "WARNING rosglass.qml" not in done.stderr, "types of panels are there"
     image = QImage(str(picture))
     assert (image.width(), image.height()) == (1280, 800)
     colours = [image.pixelColor(x, y).name() for x in range(360, 1000, 3) for y in range(60, 700)]
@@ -396,8 +398,10 @@ def test_the_command_shows_overlays(app: Any, tmp_path: Path) -> None:
 
     overlay, picture = tmp_path / "Panel.qml", tmp_path / "view.png"
     overlay.write_text(
-        "import QtQuick 2.15\nimport Ros 1.0\nRectangle { color: rviz.fixedFrame === 'odom' ? "
-        '"#ff0000" : "#0000ff"\nComponent.onCompleted: { Ros.init("panel"); rviz.isBare = true } }'
+        "import QtQuick 2.15\nimport Ros 1.0\nimport RosScene 1.0\n"
+        'Rectangle { color: rviz.fixedFrame === \'odom\' ? "#ff0000" : "#0000ff"\n'
+        'Component.onCompleted: { Ros.init("panel"); rviz.isBare = true }\n'
+        "property Component further: SceneView { MarkerDisplay { } } }"
     )
     arguments = ("--fixed-frame", "odom", "--url", "local://overlays", "--overlay", str(overlay))
     done = view_command(*arguments, "--screenshot", str(picture), "--after", "1")

@@ -117,6 +117,15 @@ def test_import_is_light() -> None:
     assert run(f"import rosglass, sys; print(sorted({heavy} & set(sys.modules)))") == "[]"
 
 
+def test_the_3d_view_loads_only_what_its_window_shows() -> None:
+    late = (
+        "{'rosglass.scene.displays.marker', 'rosglass.images', 'rosglass.qml.ros2', "
+        "'rosglass.connection', 'rosglass.interfaces.library', 'rosglass.tf.buffer', 'yaml'}"
+    )
+    code = f"import rosglass.scene.program, sys; print(sorted({late} & set(sys.modules)))"
+    assert run(code) == "[]"
+
+
 def test_public_names_are_all_there() -> None:
     assert [name for name in rosglass.__all__ if getattr(rosglass, name, None) is None] == []
     assert dir(rosglass) == sorted(rosglass.__all__)
@@ -124,7 +133,7 @@ def test_public_names_are_all_there() -> None:
         rosglass.conect  # noqa: B018
 
 
-@pytest.mark.parametrize("package", ["comm", "ros2"])
+@pytest.mark.parametrize("package", ["comm", "interfaces", "ros2", "tf"])
 def test_public_names_of_a_package_are_all_there(package: str) -> None:
     found = importlib.import_module(f"rosglass.{package}")
     assert [name for name in found.__all__ if getattr(found, name, None) is None] == []

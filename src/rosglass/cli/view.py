@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from pathlib import Path
@@ -24,6 +25,17 @@ def run(args: argparse.Namespace) -> int:
         UnsupportedError: There is no Qt 6, or it would draw without a graphics interface.
     """
     quiet_media()
+    # Threads for products of large matrices, which a view does not have, would delay its window.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Nothing that is loaded becomes garbage.
+    gc.disable()
+    try:
+        return _run(args)
+    finally:
+        gc.enable()
+
+
+def _run(args: argparse.Namespace) -> int:
     if args.renderer == "software" or os.environ.get("QT_QUICK_BACKEND") == "software":
         raise UnsupportedError(
             "Qt's software renderer draws no 3D: use --renderer opengl, unset QT_QUICK_BACKEND; "

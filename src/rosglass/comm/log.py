@@ -16,7 +16,6 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.core import NodeMember
-from rosglass.comm.publisher import Publisher
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.timers import Worker
 from rosglass.errors import Error, escape_controls
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from rosglass.comm.core import NodeCore
+    from rosglass.comm.publisher import Publisher
     from rosglass.comm.qos import QoS
 
 __all__ = [
@@ -197,6 +197,9 @@ class RosoutHandler(logging.Handler, NodeMember):
                 core = self._core
                 core.check_open()
                 message_type = core.types.message(topic.type)
+                # Slow to import; interfaces need only `warn_on_terminal` before their first frame.
+                from rosglass.comm.publisher import Publisher  # noqa: PLC0415
+
                 self._publisher = Publisher(core, core.resolve(_TOPIC), message_type, topic.qos)
                 # Members close in reverse order: this one before its publisher.
                 self._core.add(self)

@@ -2,47 +2,57 @@
 
 from __future__ import annotations
 
-from rosglass.interfaces.counterparts import Counterparts, Pair, PairedField
-from rosglass.interfaces.definition import (
-    ActionDefinition,
-    ArrayKind,
-    Constant,
-    Definition,
-    Field,
-    FieldType,
-    InterfaceDefinition,
-    ServiceDefinition,
-    Source,
-    Value,
-)
-from rosglass.interfaces.derived import service_event
-from rosglass.interfaces.hashes import announced_hashes, full_text, md5, rihs01, type_description
-from rosglass.interfaces.idl import parse_idl
-from rosglass.interfaces.library import Library
-from rosglass.interfaces.names import adding_definitions, join_name, ros1_name, split_name
-from rosglass.interfaces.parser import (
-    INTEGER_RANGES,
-    PRIMITIVES,
-    parse,
-    parse_action,
-    parse_message,
-    parse_service,
-)
-from rosglass.interfaces.provider import (
-    DISTRIBUTIONS,
-    Distributions,
-    Folders,
-    MemoryProvider,
-    Provider,
-    workspace,
-)
-from rosglass.interfaces.type_descriptions import (
-    TypeCache,
-    add_type_sources,
-    cache_folder,
-    parse_type_description,
-    type_sources,
-)
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rosglass.interfaces.counterparts import Counterparts, Pair, PairedField
+    from rosglass.interfaces.definition import (
+        ActionDefinition,
+        ArrayKind,
+        Constant,
+        Definition,
+        Field,
+        FieldType,
+        InterfaceDefinition,
+        ServiceDefinition,
+        Source,
+        Value,
+    )
+    from rosglass.interfaces.derived import service_event
+    from rosglass.interfaces.hashes import (
+        announced_hashes,
+        full_text,
+        md5,
+        rihs01,
+        type_description,
+    )
+    from rosglass.interfaces.idl import parse_idl
+    from rosglass.interfaces.library import Library
+    from rosglass.interfaces.names import adding_definitions, join_name, ros1_name, split_name
+    from rosglass.interfaces.parser import (
+        INTEGER_RANGES,
+        PRIMITIVES,
+        parse,
+        parse_action,
+        parse_message,
+        parse_service,
+    )
+    from rosglass.interfaces.provider import (
+        DISTRIBUTIONS,
+        Distributions,
+        Folders,
+        MemoryProvider,
+        Provider,
+        workspace,
+    )
+    from rosglass.interfaces.type_descriptions import (
+        TypeCache,
+        add_type_sources,
+        cache_folder,
+        parse_type_description,
+        type_sources,
+    )
 
 __all__ = [
     "DISTRIBUTIONS",
@@ -88,3 +98,76 @@ __all__ = [
     "type_sources",
     "workspace",
 ]
+
+_HOMES = {
+    "counterparts": (
+        "Counterparts",
+        "Pair",
+        "PairedField",
+    ),
+    "definition": (
+        "ActionDefinition",
+        "ArrayKind",
+        "Constant",
+        "Definition",
+        "Field",
+        "FieldType",
+        "InterfaceDefinition",
+        "ServiceDefinition",
+        "Source",
+        "Value",
+    ),
+    "derived": ("service_event",),
+    "hashes": (
+        "announced_hashes",
+        "full_text",
+        "md5",
+        "rihs01",
+        "type_description",
+    ),
+    "idl": ("parse_idl",),
+    "library": ("Library",),
+    "names": (
+        "adding_definitions",
+        "join_name",
+        "ros1_name",
+        "split_name",
+    ),
+    "parser": (
+        "INTEGER_RANGES",
+        "PRIMITIVES",
+        "parse",
+        "parse_action",
+        "parse_message",
+        "parse_service",
+    ),
+    "provider": (
+        "DISTRIBUTIONS",
+        "Distributions",
+        "Folders",
+        "MemoryProvider",
+        "Provider",
+        "workspace",
+    ),
+    "type_descriptions": (
+        "TypeCache",
+        "add_type_sources",
+        "cache_folder",
+        "parse_type_description",
+        "type_sources",
+    ),
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> object:
+    # Imported on first use: before its first frame, a user interface needs names only.
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'rosglass.interfaces' has no attribute {name!r}")
+    value: object = getattr(import_module(f"rosglass.interfaces.{_HOME_OF[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

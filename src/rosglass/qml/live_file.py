@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.errors import QmlError
 from rosglass.qml.log import forget_repeats, log_engine_warnings, plain_path
-from rosglass.qml.modules import import_folder, install, interface_file
+from rosglass.qml.modules import import_folder, install, interface_file, is_own_window
 from rosglass.qml.renderer_choice import imports_module
 from rosglass.qml.runtime import runtime_of
 from rosglass.qml.watchdog import Watchdog
@@ -355,7 +355,8 @@ class LiveFile(QtCore.QObject):
         # The engine searches the last path first: our own modules are added last.
         for path in [*_environment_paths(), *map(str, reversed(self._folders))]:
             self.engine.addImportPath(path)
-        install(self.engine, session)
+        self._is_own = is_own_window(self.path)
+        install(self.engine, session, own_window=self._is_own)
         Watchdog.of(session).watch(self.engine, self.script_ended.emit)
         session.call_ended.connect(self._go_on)
         self._watcher: Watcher | None = None
@@ -399,7 +400,8 @@ class LiveFile(QtCore.QObject):
         runtime = runtime_of(self.engine)
         if runtime is not None:
             runtime.forget_warnings()
-        if QT6 and imports_module("RosScene", self.path, self.engine.importPathList()):
+        paths = self.engine.importPathList()
+        if QT6 and not self._is_own and imports_module("RosScene", self.path, paths):
             # A package above this one, which makes the types of this module.
             import_module("rosglass.scene.modules").register()
         component = QtQml.QQmlComponent(self.engine, QtCore.QUrl.fromLocalFile(str(self.path)))

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error, QmlError
-from rosglass.interfaces.provider import workspace
-from rosglass.qml import ros1, ros2
 from rosglass.qml.runtime import Runtime, runtime_of
 from rosglass.qt import QT6, QtQml
 
@@ -25,6 +23,7 @@ __all__ = [
     "import_folder",
     "install",
     "interface_file",
+    "is_own_window",
     "locate",
     "near",
     "register",
@@ -32,6 +31,8 @@ __all__ = [
 
 _PACKAGE = "package://"
 _REMOTE = ("http://", "https://", "ftp://")
+#: Where the windows of rosglass itself are, whose program registers the types that they use.
+_OWN = Path(__file__).parents[1] / "scene/panels"
 
 
 def locate(place: str | os.PathLike[str]) -> Path:
@@ -50,6 +51,9 @@ def locate(place: str | os.PathLike[str]) -> Path:
     package, _, rest = text.removeprefix(_PACKAGE).partition("/")
     if not package:
         raise QmlError(f"{text}: expected package://name/path")
+    # Slow to import; most files are not named so.
+    from rosglass.interfaces.provider import workspace  # noqa: PLC0415
+
     folder = workspace(os.environ).package(package)
     if not folder:
         raise QmlError(
@@ -114,12 +118,20 @@ IMPORT_PATHS = tuple(
 )
 
 
+def is_own_window(file: Path) -> bool:
+    """Return whether a file is the window of ``rosglass view``.
+
+    It uses neither ``Ros`` nor ``Ros2``, nor most types of ``RosScene``, whose import takes long.
+    """
+    return file.parent == _OWN
+
+
 @cache
 def register() -> None:
     """Register the types with Qt; only the first call has an effect."""
-    # Qt waits 5 ms before drawing, to collect further changes: a third of the time that a picture
-    # takes from the robot to the screen.
-    os.environ.setdefault("QT_QPA_UPDATE_IDLE_TIME", "0")
+    # Half of all that an interface loads, and rosglass view needs none of it.
+    from rosglass.qml import ros1, ros2  # noqa: PLC0415
+
     register_type: Any = QtQml.qmlRegisterType
     for uri, module in (("Ros", ros1), ("Ros2", ros2)):
         for name, native in module.NATIVE.items():
@@ -128,12 +140,15 @@ def register() -> None:
             register_type(kind, uri, 1, 0, name)
 
 
-def install(engine: QtQml.QQmlEngine, session: Session | None = None) -> Session:
+def install(
+    engine: QtQml.QQmlEngine, session: Session | None = None, *, own_window: bool = False
+) -> Session:
     """Make ``import Ros 1.0`` and ``import Ros2 1.0`` work in an engine.
 
     Args:
         engine: The engine; it must not yet have loaded a file that imports the modules.
         session: The session to use; None for the application's own, which all such engines share.
+        own_window: Whether it is for a window of rosglass, which does without these modules.
 
     Returns:
         The session.
@@ -141,7 +156,11 @@ def install(engine: QtQml.QQmlEngine, session: Session | None = None) -> Session
     Raises:
         Error: The engine already has a session.
     """
-    register()
+    # Qt waits 5 ms before drawing, to collect further changes: a third of the time that a picture
+    # takes from the robot to the screen.
+    os.environ.setdefault("QT_QPA_UPDATE_IDLE_TIME", "0")
+    if not own_window:
+        register()
     for path in IMPORT_PATHS:
         engine.addImportPath(str(path))
     if session is None:

@@ -15,7 +15,6 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, overload
 
-from rosglass import connection
 from rosglass.comm.executor import Dispatcher
 from rosglass.comm.graph import ConnectionState, Status
 from rosglass.comm.handle import Executor
@@ -173,8 +172,16 @@ _MAX_DEFER_MS = 1000
 _CLOSE_TIMEOUT_S = 1.2
 
 
+def _connection() -> Any:
+    """Return the module that makes nodes, which is not needed before the first frame."""
+    from rosglass import connection  # noqa: PLC0415
+
+    return connection
+
+
 def _connect(url: str | None, name: str, namespace: str, arguments: Sequence[str] = ()) -> Node:
-    return connection.connect(url, name, namespace, arguments=arguments)
+    node: Node = _connection().connect(url, name, namespace, arguments=arguments)
+    return node
 
 
 def _parse(arguments: Sequence[str], url: str) -> Arguments | None:
@@ -554,7 +561,7 @@ class Session(QtCore.QObject):
             try:
                 return connect(url, name, namespace)
             except ModuleNotFoundError as error:
-                missing = connection.explain_missing(error)
+                missing = _connection().explain_missing(error)
                 if not missing:
                     raise
                 raise Error(missing) from None
@@ -700,7 +707,7 @@ def _call_all(handlers: dict[int, tuple[QtCore.QObject, Callable[[], None]]]) ->
 def _with_domain(url: str, domain: int) -> str:
     """Return `url` with a ``domain`` option; an empty `url` becomes the default URL."""
     if not url:
-        url = connection.default_url({**os.environ, "ROS_DOMAIN_ID": str(domain)})
+        url = _connection().default_url({**os.environ, "ROS_DOMAIN_ID": str(domain)})
     base, _, query = url.partition("?")
     if base.partition(":")[0].lower() not in ("dds", "zenoh"):
         _log.warning("setDomainId(%d) is ignored: %s has no domains", domain, url)

@@ -8,21 +8,24 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rosglass.scene.drawing import Labels, Lines, MapImage, Mesh, Points
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
+    from typing import TypeAlias
+
+    from numpy.typing import NDArray
 
     from rosglass.scene.camera import Camera
     from rosglass.scene.drawing import Drawable
+
+    _Placed: TypeAlias = tuple[Drawable, NDArray[np.float64], float]
 
 __all__ = ["Hit", "Selected", "pick", "select"]
 
 #: How far beside a triangle counts as on it, as a share of its sides.
 _EDGE = 1e-6
-_Placed = tuple["Drawable", NDArray[np.float64], float]
 _Place = tuple[float, float]
 
 

@@ -14,7 +14,7 @@ from rosglass.qml.modules import interface_file, locate
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qml.runtime import runtime_of
 from rosglass.qt import QtCore, Slot, is_alive
-from rosglass.scene.displays.qml_overlay import QmlOverlayDisplay
+from rosglass.scene.modules import register_window
 from rosglass.scene.rviz_config import RvizConfig
 
 if TYPE_CHECKING:
@@ -108,6 +108,7 @@ class ViewProgram(QtCore.QObject):
         recorder: WindowRecorder | None = None,
     ) -> None:
         super().__init__()
+        register_window()
         self._session: Session | None = None
         self._path = config_file(config) if config else None
         # Read before the window is shown: a mistake in its name is an error of the command.
@@ -161,6 +162,7 @@ class ViewProgram(QtCore.QObject):
             return
         # Slow to load; most views have none.
         from rosglass.scene.access import access_of  # noqa: PLC0415
+        from rosglass.scene.displays.qml_overlay import QmlOverlayDisplay  # noqa: PLC0415
         from rosglass.scene.overlay import add_overlay  # noqa: PLC0415
 
         shown = {

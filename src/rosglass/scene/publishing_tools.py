@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from rosglass.comm.action_client import GoalStatus
 from rosglass.comm.names import similar
 from rosglass.comm.qos import QoS
 from rosglass.errors import Error
@@ -31,7 +30,7 @@ from rosglass.scene.tools import PointerEvent, Tool, point_text
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from rosglass.comm.action_client import ClientGoal
+    from rosglass.comm.action_client import ClientGoal, GoalStatus
     from rosglass.qml.runtime import Runtime
     from rosglass.rviz.orbit import Point
 
@@ -480,7 +479,7 @@ class SetGoalTool(PoseTool):
         failure = goal.done.exception()
         if failure is not None:
             self._complain(f"goal of {self.action}: {failure}")
-        elif goal.status in (GoalStatus.REJECTED, GoalStatus.ABORTED, GoalStatus.LOST):
+        elif goal.status.name in ("REJECTED", "ABORTED", "LOST"):
             self._complain(f"goal of {self.action}: {goal.status.value}")
 
 

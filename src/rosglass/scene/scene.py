@@ -19,10 +19,9 @@ from rosglass.qml.tf_buffer import TfLink
 from rosglass.qt import Property, Signal, Slot, is_alive
 from rosglass.rviz.property_values import shown
 from rosglass.scene.drawing import Group, instance_matrix
-from rosglass.scene.resource_retriever import ResourceRetriever
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     import numpy as np
     from numpy.typing import NDArray
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.display import Display
+    from rosglass.scene.resource_retriever import ResourceRetriever
     from rosglass.tf import FrameTree, TransformBuffer
 
 __all__ = ["Scene"]
@@ -64,14 +64,15 @@ class Scene(Element):
     placed = Signal()
 
     #: Types of displays by their name in RViz, e.g. ``Grid``.
-    TYPES: ClassVar[dict[str, type[Display]]] = {}
+    TYPES: ClassVar[Mapping[str, type[Display]]] = {}
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         self.root = Group()
         self.draws_in_software = False
-        self._resources = ResourceRetriever()
+        #: What finds meshes and textures, once something has been loaded.
+        self._resources: list[ResourceRetriever] = []
         self._fixed_frame = "map"
         self._displays: list[Display] = []
         self._link: TfLink | None = None
@@ -368,7 +369,7 @@ class Scene(Element):
         if self._loader is None:
             self._loader = Dispatcher("rosglass-scene")
             self._cleanup["loader"] = self._loader.close
-        executor, resources = self._executor, self._resources
+        executor, resources = self._executor, self._retriever()
 
         def run() -> None:
             try:
@@ -381,6 +382,15 @@ class Scene(Element):
             executor.post(lambda: done(result))
 
         self._loader.post(run)
+
+    def _retriever(self) -> ResourceRetriever:
+        if not self._resources:
+            # Slow to import, and needed after the first frame.
+            from rosglass.scene.resource_retriever import ResourceRetriever  # noqa: PLC0415
+
+            node = None if self._link is None else self.node
+            self._resources.append(ResourceRetriever(node))
+        return self._resources[0]
 
     def now(self) -> int:
         """Return the robot's time in nanoseconds; 0 while there is no node."""
@@ -400,10 +410,12 @@ class Scene(Element):
             weak_callback(self._on_transforms), session.executor
         )
         jumps = wanted[0].clock.on_jump(weak_callback(self._on_jump), executor=session.executor)
-        resources = self._resources = ResourceRetriever(wanted[0])
+        # One without a node reaches less.
+        resources = self._resources = []
 
         def leave() -> None:
-            session.background(resources.close)
+            for one in resources:
+                session.background(one.close)
             jumps.close()
             watch.close()
             link.leave(self)
@@ -416,7 +428,7 @@ class Scene(Element):
         if leave is not None:
             leave()
         self._link = self._watch = self._tree = None
-        self._resources = ResourceRetriever()
+        self._resources = []
 
     def _on_transforms(self) -> None:
         if is_alive(self) and not self._timer.isActive():
@@ -458,7 +470,8 @@ class Scene(Element):
             display._schedule()
 
         self._reset_at = time.monotonic()
-        self._resources.retry()
+        for one in self._resources:
+            one.retry()
         self._each(restart)
 
     def _each(self, job: Callable[[Display], None]) -> None:

@@ -30,7 +30,6 @@ from rosglass.scene.scene import Scene
 from rosglass.scene.selection import Selection
 from rosglass.scene.tools import PointerEvent, Tool, Tools
 from rosglass.scene.views import FIXED_FRAME, VIEWS, create_view
-from rosglass.tf.topics import is_ros1
 
 if TYPE_CHECKING:
     import os
@@ -395,7 +394,8 @@ class SceneView(QQuickRhiItem):
             ros: The RViz that a new config is for, 1 or 2; by default that of the robot.
         """
         if ros is None:
-            ros = 1 if self.scene.node is not None and is_ros1(self.scene.node) else 2
+            node = self.scene.node
+            ros = 1 if node is not None and node.wire == "ros1" else 2
         config = self.config or RvizConfig(ros)
         config.fixed_frame = self.scene.fixed_frame
         config.background_color = cast("tuple[float, ...]", self._background.getRgbF())

@@ -102,7 +102,14 @@ ApplicationWindow {
 
             // As in RViz, keys are the view's while the mouse is over it, except for those of a text.
             HoverHandler { onHoveredChanged: if (hovered && !(window.activeFocusItem instanceof TextInput)) scene.forceActiveFocus() }
-            ImagePanels { objectName: "imagePanels"; anchors.fill: parent; view: scene }
+            // Its types are loaded with the first display of pictures.
+            Loader {
+                objectName: "imagePanels"
+                anchors.fill: parent
+                active: scene.scene.displayList.some(one => one.isPicture === true)
+                source: "ImagePanels.qml"
+                onLoaded: item.view = scene
+            }
             Label {
                 anchors.centerIn: parent
                 width: Math.min(implicitWidth, parent.width - 40)
