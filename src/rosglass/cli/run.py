@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rosglass.qml.application import Application
     from rosglass.scene.window_recorder import WindowRecorder
 
-__all__ = ["QUIET_MEDIA", "Picture", "format_log", "quiet_media", "run", "show"]
+__all__ = ["QUIET_MEDIA", "Picture", "format_log", "quiet_media", "run", "show", "show_interface"]
 
 #: Rules for messages of Qt that are of no use to users of an interface.
 QUIET_MEDIA = "qt.multimedia.symbolsresolver=false;qt.multimedia.ffmpeg*=false;qt.qpa.theme*=false"
@@ -27,24 +27,35 @@ QUIET_MEDIA = "qt.multimedia.symbolsresolver=false;qt.multimedia.ffmpeg*=false;q
 
 def run(args: argparse.Namespace) -> int:
     """Show the interface until it is closed; returns the exit code."""
+    return show_interface(
+        args, args.file, name=args.name, import_paths=args.import_paths, watch=args.watch
+    )
+
+
+def show_interface(args: argparse.Namespace, file: str, **options: Any) -> int:
+    """Show a QML file as the command line says; returns the exit code.
+
+    Args:
+        args: Of a command with the options of interfaces.
+        file: The file.
+        options: Further options of :func:`show`.
+    """
     try:
         return show(
-            args.file,
+            file,
             screenshot=None if args.screenshot is None else Path(args.screenshot),
             after=args.after,
             verbose=args.verbose > 1,
             end_process=True,
             longest_script=args.longest_script,
             url=args.url,
-            name=args.name,
-            import_paths=args.import_paths,
-            watch=args.watch,
             fullscreen=args.fullscreen,
             kiosk=args.kiosk,
             renderer=args.renderer,
             allow_network=args.allow_network,
             arguments=args.arguments,
             ros_arguments=args.ros_arguments,
+            **options,
         )
     except QmlError as error:
         print(error, file=sys.stderr)

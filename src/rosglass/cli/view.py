@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import gc
 import os
-import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rosglass.cli.run import quiet_media, show
-from rosglass.errors import QmlError, UnsupportedError
+from rosglass.cli.run import quiet_media, show_interface
+from rosglass.errors import UnsupportedError
 
 if TYPE_CHECKING:
     import argparse
@@ -66,25 +64,10 @@ def _run(args: argparse.Namespace) -> int:
         import_paths=args.import_paths,
         recorder=recorder,
     )
-    try:
-        return show(
-            str(WINDOW),
-            screenshot=None if args.screenshot is None else Path(args.screenshot),
-            after=args.after,
-            verbose=args.verbose > 1,
-            end_process=True,
-            longest_script=args.longest_script,
-            recorder=recorder,
-            url=args.url,
-            name=args.name or "rosglass_view",
-            context={"program": program},
-            fullscreen=args.fullscreen,
-            kiosk=args.kiosk,
-            renderer=args.renderer,
-            allow_network=args.allow_network,
-            arguments=args.arguments,
-            ros_arguments=args.ros_arguments,
-        )
-    except QmlError as error:
-        print(error, file=sys.stderr)
-        return 1
+    return show_interface(
+        args,
+        str(WINDOW),
+        name=args.name or "rosglass_view",
+        context={"program": program},
+        recorder=recorder,
+    )

@@ -755,6 +755,9 @@ class TopicDisplay(OneTopicDisplay):
                     self._show(item, pose)
                     return
             return
+        self._show_all_waiting()
+
+    def _show_all_waiting(self) -> None:
         for _ in range(len(self._waiting)):
             item = self._waiting.popleft()
             pose = self._place(item)

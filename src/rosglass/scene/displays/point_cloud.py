@@ -467,17 +467,10 @@ class CloudDisplay(TopicDisplay):
         report(self, points=count)
 
     def _show_waiting(self) -> None:
-        if not self.decayTime:
+        if self.decayTime:
+            self._show_all_waiting()
+        else:
             super()._show_waiting()
-            return
-        # Each counts, as far as its transform is known.
-        for _ in range(len(self._waiting)):
-            item = self._waiting.popleft()
-            pose = self._place(item)
-            if pose is None:
-                self._waiting.append(item)
-            else:
-                self._show(item, pose)
 
     def _renew_preparer(self) -> None:
         self._colors = None
