@@ -78,6 +78,6 @@ class Hand:
         self._test.keyClick(self.window, key, keys or self.NONE)
 
 
-def has_colour(picture: Any, red: int, green: int, blue: int, tolerance: int = 60) -> int:
+def has_color(picture: Any, red: int, green: int, blue: int, tolerance: int = 60) -> int:
     off = np.abs(picture.astype(int) - (red, green, blue)).max(axis=2)
     return int((off <= tolerance).sum())

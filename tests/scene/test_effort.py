@@ -84,14 +84,14 @@ class Arc(NamedTuple):
     """What is drawn of a joint, in the fixed frame.
 
     Attributes:
-        colour: RGBA bytes.
+        color: RGBA bytes.
         centre: Of the circle.
         first, second: The first points of the arc.
         head, tip: From where to where its head is.
         lines: What draws it, with others.
     """
 
-    colour: list[int]
+    color: list[int]
     centre: Any
     first: Any
     second: Any
@@ -152,7 +152,7 @@ def test_an_effort_is_an_arc_as_large_as_its_share_of_the_limit(
     assert elbow.centre == pytest.approx([1, 0, 0])
     assert (shoulder.lines.width, shoulder.lines.in_metres) == (pytest.approx(0.02), True)
     assert elbow.radius == pytest.approx(0.05 + 1.05 / 2), "no more than 100 %"
-    assert elbow.colour == [255, 0, 0, 255], "red at the limit"
+    assert elbow.color == [255, 0, 0, 255], "red at the limit"
     assert by_joint["drive"].radius == pytest.approx(0.05 + 0.05 / 2)
     at = shoulder.lines.owner.names.index("shoulder")
     assert shoulder.lines.owner.describe(29 * at + 28) == [

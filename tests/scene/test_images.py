@@ -25,8 +25,8 @@ CAMERA = 'CameraDisplay { id: front; topic: "/front/image" }'
 PANEL = 'ImagePanel { objectName: "panel"; display: front; width: 400; height: 300 }'
 
 
-def picture_of(colour: tuple[int, int, int], seconds: int = 7, **fields: Any) -> dict[str, Any]:
-    pixels = np.full((HEIGHT, WIDTH, 3), colour, np.uint8)
+def picture_of(color: tuple[int, int, int], seconds: int = 7, **fields: Any) -> dict[str, Any]:
+    pixels = np.full((HEIGHT, WIDTH, 3), color, np.uint8)
     return {
         "header": {"frame_id": "camera", "stamp": {"sec": seconds, "nanosec": next(NUMBERS)}},
         "width": WIDTH,
@@ -49,9 +49,9 @@ class Robot:
         self.infos = bench.robot.create_publisher("/front/camera_info", "sensor_msgs/CameraInfo")
         self.broadcaster = TransformBroadcaster(bench.robot)
 
-    def show(self, display: Any, *colour: int, **fields: Any) -> None:
+    def show(self, display: Any, *color: int, **fields: Any) -> None:
         """Publish a picture until the display shows it."""
-        message = picture_of((colour or (0, 255, 255)), **fields)  # type: ignore[arg-type]
+        message = picture_of((color or (0, 255, 255)), **fields)  # type: ignore[arg-type]
         stamp = message["header"]["stamp"]
         nanoseconds = stamp["sec"] * 1_000_000_000 + stamp["nanosec"]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from rosmaster import RosMaster
-from scene_mouse import Hand, has_colour
+from scene_mouse import Hand, has_color
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -448,17 +448,17 @@ def test_what_is_under_the_mouse_is_lighter_and_the_status_bar_says_what_it_does
 ) -> None:
     show(marker(control(BUTTON, boxes=True), menu_entries=MENU_ENTRIES))
     hand.move((5, 5))
-    assert has_colour(bench.picture(), 0, 0, 255, 10) > 500
+    assert has_color(bench.picture(), 0, 0, 255, 10) > 500
     hand.move(hand.at((0, 0, 0)))
-    assert has_colour(bench.picture(), 77, 77, 255, 10) > 500
+    assert has_color(bench.picture(), 77, 77, 255, 10) > 500
     assert bench.view.statusText == (
         "<b>Left-Click:</b> Activate. <b>Right-Click:</b> Show context menu."
     )
     hand.press(hand.at((0, 0, 0)))
-    assert has_colour(bench.picture(), 128, 128, 255, 10) > 500
+    assert has_color(bench.picture(), 128, 128, 255, 10) > 500
     hand.release(hand.at((0, 0, 0)))
     hand.move((5, 5))
-    assert has_colour(bench.picture(), 0, 0, 255, 10) > 500
+    assert has_color(bench.picture(), 0, 0, 255, 10) > 500
     assert "Activate" not in bench.view.statusText
 
 

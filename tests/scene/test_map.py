@@ -53,7 +53,7 @@ def middle(bench: SceneBench) -> tuple[int, ...]:
     return tuple(int(part) for part in bench.picture()[155, 205])
 
 
-def test_a_map_is_drawn_in_rviz_colours(bench: SceneBench, show: Callable[..., Any]) -> None:
+def test_a_map_is_drawn_in_rviz_colors(bench: SceneBench, show: Callable[..., Any]) -> None:
     display = show(grid(20, 10, 100))
     assert display.statusLevel == "ok", display.statusText
     assert (display.columns, display.rows, display.resolution) == (20, 10, 1.0)
@@ -97,16 +97,16 @@ def test_a_bad_map_is_an_error_in_words(
     assert middle(bench) == (0, 0, 0), "the last good map stays"
 
 
-def test_palettes_have_the_colours_of_rviz() -> None:
-    colours = palette("map")
-    assert colours[(0, 50, 100), :].tolist() == [[255] * 4, [128, 128, 128, 255], [0, 0, 0, 255]]
-    assert colours[(110, 128, 254), :].tolist() == [
+def test_palettes_have_the_colors_of_rviz() -> None:
+    colors = palette("map")
+    assert colors[(0, 50, 100), :].tolist() == [[255] * 4, [128, 128, 128, 255], [0, 0, 0, 255]]
+    assert colors[(110, 128, 254), :].tolist() == [
         [0, 255, 0, 255],
         [255, 0, 0, 255],
         [255, 255, 0, 255],
     ]
-    colours = palette("costmap")
-    assert colours[(0, 50, 99), :].tolist() == [
+    colors = palette("costmap")
+    assert colors[(0, 50, 99), :].tolist() == [
         [0, 0, 0, 0],
         [127, 0, 128, 255],
         [0, 255, 255, 255],

@@ -114,7 +114,7 @@ def test_a_marker_replaces_the_one_of_its_id(show: Callable[..., Any]) -> None:
     assert [one.texts for one in drawables(display)] == [("a",), ("b",)]
 
 
-def test_colours_of_points_count(show: Callable[..., Any]) -> None:
+def test_colors_of_points_count(show: Callable[..., Any]) -> None:
     line = points((0, 0, 0), (1, 0, 0))
     two = [RED, {"r": 0.0, "g": 1.0, "b": 0.0, "a": 1.0}]
     display = show(marker(4, points=line, colors=two), marker(8, 1, points=line, colors=two))
@@ -440,7 +440,7 @@ def test_meshes_have_their_textures_and_are_made_in_another_thread(
     bench.wait(lambda: len(drawables(display)) == 2)
     painted, plain = drawables(display)
     assert painted.texture[0, 0].tolist() == [0, 255, 0, 255]
-    assert (plain.texture, plain.colour) == (None, (1.0, 0.0, 0.0, 1.0))
+    assert (plain.texture, plain.color) == (None, (1.0, 0.0, 0.0, 1.0))
     assert len(threads) == 1
     assert threading.main_thread() not in threads
     bench.wait(lambda: "shapes/2" in display.status_lines)

@@ -137,7 +137,7 @@ def test_meshes_come_from_files_and_missing_ones_are_named(
     (robot,) = view.scene.displays
     bench.wait(lambda: len(list(robot.root.drawables())) == 1)
     ((mesh, _, _),) = robot.root.drawables()
-    assert mesh.colour == (0, 1, 0, 1)
+    assert mesh.color == (0, 1, 0, 1)
     assert mesh.shape.rows["position"].tolist() == [list(map(float, c)) for c in corners]
     assert robot.statusLevel == "error"
     assert "package://nowhere/gone.stl" in robot.statusText

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 STAMP = {"sec": 0, "nanosec": 0}
 
 
-def has_colour(picture: Any, red: int, green: int, blue: int, tolerance: int = 40) -> int:
+def has_color(picture: Any, red: int, green: int, blue: int, tolerance: int = 40) -> int:
     """Return how many pixels have a colour."""
     off = np.abs(picture.astype(int) - (red, green, blue)).max(axis=2)
     return int((off <= tolerance).sum())
@@ -138,12 +138,12 @@ def test_a_path_is_shown_and_fades_when_its_publisher_is_gone(bench: SceneBench)
     bench.wait(send)
     assert path.statusLevel == "ok"
     assert "messages received" in path.statusText
-    bright = has_colour(bench.picture(), 25, 255, 0)
+    bright = has_color(bench.picture(), 25, 255, 0)
     assert bright > 100
     publisher.close()
     bench.wait(lambda: path.statusLevel == "warn")
     assert "its publisher is gone; the last message is of" in path.statusText
-    assert has_colour(bench.picture(), 25, 255, 0) == 0
+    assert has_color(bench.picture(), 25, 255, 0) == 0
 
 
 def test_a_topic_of_another_type_is_an_error_in_words(bench: SceneBench) -> None:
@@ -185,9 +185,9 @@ def test_displays_are_added_and_removed_from_python(bench: SceneBench) -> None:
     view = bench.load()
     grid = view.scene.add("rviz_default_plugins/Grid", "Floor", planeCellCount=4)
     assert view.scene.find("Floor") is grid
-    assert has_colour(bench.picture(), 104, 104, 106, 20) > 50
+    assert has_color(bench.picture(), 104, 104, 106, 20) > 50
     view.scene.remove(grid)
-    assert has_colour(bench.picture(), 104, 104, 106, 20) == 0
+    assert has_color(bench.picture(), 104, 104, 106, 20) == 0
     with pytest.raises(Error, match="is not in this scene"):
         view.scene.remove(grid)
     with pytest.raises(Error, match="there is no type of displays 'Gird'"):

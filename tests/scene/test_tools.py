@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from scene_mouse import Hand, has_colour
+from scene_mouse import Hand, has_color
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -215,7 +215,7 @@ def test_the_mouse_moves_the_camera(bench: SceneBench, hand: Hand) -> None:
     hand.press((200, 150))
     hand.move((240, 150))
     assert list(view.overlay.drawables()), "the ball at the focal point"
-    assert has_colour(bench.picture(), 255, 255, 0, 130) > 0
+    assert has_color(bench.picture(), 255, 255, 0, 130) > 0
     hand.release((240, 150))
     assert not list(view.overlay.drawables())
     assert view.controller.yaw == pytest.approx(yaw - 0.2)
@@ -274,7 +274,7 @@ def test_a_goal_is_published(bench: SceneBench, hand: Hand) -> None:
     before = bench.robot.now().nanoseconds
     hand.press(start)
     hand.move(end)
-    assert has_colour(bench.picture(), 0, 200, 0, 80) > 50
+    assert has_color(bench.picture(), 0, 200, 0, 80) > 50
     assert "degrees" in view.statusText
     hand.release(end)
     assert view.tool == "Interact"
@@ -288,7 +288,7 @@ def test_a_goal_is_published(bench: SceneBench, hand: Hand) -> None:
     assert 2 * math.atan2(turn.z, turn.w) == pytest.approx(math.pi / 2, abs=0.05)
     assert set_poses[0] == pytest.approx((position.x, position.y, 2 * math.atan2(turn.z, turn.w)))
     bench.wait(lambda: "sent on /goal_pose" in view.statusText)
-    assert has_colour(bench.picture(), 0, 200, 0, 80) == 0
+    assert has_color(bench.picture(), 0, 200, 0, 80) == 0
 
 
 def test_an_initial_pose_has_the_covariance(bench: SceneBench, hand: Hand) -> None:
@@ -487,10 +487,10 @@ def test_a_distance_is_measured(bench: SceneBench, hand: Hand) -> None:
     hand.click(hand.at((2, 0, 0)))
     assert measured == [pytest.approx(4, abs=0.1)]
     assert measure.length == measured[0]
-    assert has_colour(bench.picture(), 255, 213, 0) > 100
+    assert has_color(bench.picture(), 255, 213, 0) > 100
     hand.click((200, 150), hand.RIGHT)
     assert measure.length == -1
-    assert has_colour(bench.picture(), 255, 213, 0) == 0
+    assert has_color(bench.picture(), 255, 213, 0) == 0
 
 
 def test_a_rectangle_selects(bench: SceneBench, hand: Hand) -> None:
@@ -515,9 +515,9 @@ def test_a_rectangle_selects(bench: SceneBench, hand: Hand) -> None:
     hand.press((x - 40, y - 40))
     hand.move((x + 60, y + 40))
     bench.picture()
-    assert has_colour(bench.picture(), 0x60, 0xA0, 0xFF) > 100
+    assert has_color(bench.picture(), 0x60, 0xA0, 0xFF) > 100
     hand.release((x + 60, y + 40))
-    assert has_colour(bench.picture(), 0x60, 0xA0, 0xFF, 20) == 0
+    assert has_color(bench.picture(), 0x60, 0xA0, 0xFF, 20) == 0
     assert selection.count == 2
     assert view.property("count") == 2
     first = selection.items()[0]
@@ -529,7 +529,7 @@ def test_a_rectangle_selects(bench: SceneBench, hand: Hand) -> None:
     assert (part.display, part.part, part.lines[-1]) == ("Robot", "arm_link", ("Mass", "3 kg"))
     assert "3 selected" in view.statusText
     assert selection.parts[-1]["lines"][-1]["value"] == "3 kg"
-    assert has_colour(bench.picture(), 153, 204, 255, 30) > 20
+    assert has_color(bench.picture(), 153, 204, 255, 30) > 20
     hand.drag((x - 40, y - 40), (x + 60, y + 40), keys=hand.CTRL)
     assert selection.count == 1
     # The box is followed, and forgotten with the drawable.

@@ -369,9 +369,9 @@ def test_the_command_shows_a_config(app: Any, tmp_path: Path) -> None:
     assert "WARNING rosglass.qml" not in done.stderr, "types of panels are there"
     image = QImage(str(picture))
     assert (image.width(), image.height()) == (1280, 800)
-    colours = [image.pixelColor(x, y).name() for x in range(360, 1000, 3) for y in range(60, 700)]
-    assert colours.count("#000028") > 1000, "the background of the config"
-    assert colours.count("#ff00ff") > 100, "its grid"
+    colors = [image.pixelColor(x, y).name() for x in range(360, 1000, 3) for y in range(60, 700)]
+    assert colors.count("#000028") > 1000, "the background of the config"
+    assert colors.count("#ff00ff") > 100, "its grid"
 
 
 @pytest.mark.parametrize(

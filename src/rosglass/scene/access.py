@@ -634,7 +634,7 @@ def _write(tree: _Tree, path: str, value: Any, whose: str) -> None:
         if part:
             given = kind.with_part(found.read(), part, value)
         else:
-            given = kind.read(_colour(value) if kind.NAME == "color" else value)
+            given = kind.read(_color(value) if kind.NAME == "color" else value)
     except Error as error:
         raise Error(f"{name}: {error}") from None
     if kind.NAME == "color" and given.alpha() != 255:
@@ -642,7 +642,7 @@ def _write(tree: _Tree, path: str, value: Any, whose: str) -> None:
     found.write(given)
 
 
-def _colour(value: Any) -> Any:
+def _color(value: Any) -> Any:
     """Return a colour that RViz writes as ``255; 0; 0`` as Qt's."""
     if isinstance(value, str) and value.count(";") == 2:
         try:
@@ -801,7 +801,7 @@ class SceneDisplays(displays.Displays):
                 KINDS["color"](),
                 "What is behind everything.",
                 lambda: view.property("background"),
-                lambda colour: view.setProperty("background", colour),
+                lambda color: view.setProperty("background", color),
             ),
         }
 

@@ -16,7 +16,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from rosglass.scene.triangles import (
-    Colour,
+    Color,
     MeshError,
     MeshPart,
     assemble,
@@ -81,7 +81,7 @@ class _Collada:
                 self._ids.setdefault(element.get("id", ""), element)
         self._sources: dict[tuple[str, int], Floats] = {}
         self._geometries: dict[str, list[tuple[str, MeshPart]]] = {}
-        self._materials: dict[str, tuple[Colour | None, str | None]] = {}
+        self._materials: dict[str, tuple[Color | None, str | None]] = {}
         self._triangles = 0
 
     def parts(self) -> list[MeshPart]:
@@ -169,8 +169,8 @@ class _Collada:
         for symbol, part in self._geometry(target):
             self._triangles += part.triangles
             check_count(self._name, self._triangles)
-            colour, texture = self._material(bindings.get(symbol, default))
-            yield replace(part, colour=colour, texture=None if part.uv is None else texture)
+            color, texture = self._material(bindings.get(symbol, default))
+            yield replace(part, color=color, texture=None if part.uv is None else texture)
 
     def _geometry(self, geometry: Element) -> list[tuple[str, MeshPart]]:
         key = geometry.get("id", "")
@@ -310,18 +310,18 @@ class _Collada:
 
     # -- materials -----------------------------------------------------------------------------
 
-    def _material(self, key: str) -> tuple[Colour | None, str | None]:
+    def _material(self, key: str) -> tuple[Color | None, str | None]:
         """Return the colour and texture of a material by its id."""
         if key not in self._materials:
             material = self._ids.get(key)
             instance = None if material is None else material.find("instance_effect")
-            found: tuple[Colour | None, str | None] = (None, None)
+            found: tuple[Color | None, str | None] = (None, None)
             if instance is not None:
                 found = self._effect(self._target(instance, "url"))
             self._materials[key] = found
         return self._materials[key]
 
-    def _effect(self, effect: Element) -> tuple[Colour | None, str | None]:
+    def _effect(self, effect: Element) -> tuple[Color | None, str | None]:
         shading = next(
             (
                 found
@@ -339,13 +339,13 @@ class _Collada:
                 texture = self._picture(effect, sampler.get("texture", ""))
                 if texture is not None:
                     return (1.0, 1.0, 1.0, alpha), texture
-            colour = shading.find(f"{channel}/color")
-            if colour is not None:
-                r, g, b, _ = self._colour(colour)
+            color = shading.find(f"{channel}/color")
+            if color is not None:
+                r, g, b, _ = self._color(color)
                 return (r, g, b, alpha), None
         return (0.6, 0.6, 0.6, alpha), None  # assimp's default
 
-    def _colour(self, element: Element) -> Colour:
+    def _color(self, element: Element) -> Color:
         values = self._array(element, np.float64)
         if len(values) not in {3, 4} or not np.isfinite(values).all():
             self._refuse(element, "expected a colour of 3 or 4 finite numbers")
@@ -356,8 +356,8 @@ class _Collada:
         """Return the opacity by the rules of COLLADA 1.5."""
         transparent = shading.find("transparent")
         mode = "A_ONE" if transparent is None else transparent.get("opaque", "A_ONE")
-        colour = None if transparent is None else transparent.find("color")
-        r, g, b, a = (0.0, 0.0, 0.0, 1.0) if colour is None else self._colour(colour)
+        color = None if transparent is None else transparent.find("color")
+        r, g, b, a = (0.0, 0.0, 0.0, 1.0) if color is None else self._color(color)
         factor = 1.0
         number = shading.find("transparency/float")
         if number is not None:
@@ -365,7 +365,7 @@ class _Collada:
             factor = float(found[0]) if len(found) == 1 and 0 <= found[0] <= 1 else 1.0
         if mode.startswith("RGB"):
             a = 0.212671 * r + 0.715160 * g + 0.072169 * b
-        return 1.0 - a * factor if mode.endswith("ZERO") and colour is not None else a * factor
+        return 1.0 - a * factor if mode.endswith("ZERO") and color is not None else a * factor
 
     def _picture(self, effect: Element, sampler: str) -> str | None:
         """Return the path of the picture of a sampler, or of an image by its id."""

@@ -217,17 +217,17 @@ def _box_of(points: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float
     return finite.min(axis=0).astype(np.float64), finite.max(axis=0).astype(np.float64)
 
 
-def rgba_bytes(colours: ArrayLike, count: int) -> NDArray[np.uint8]:
+def rgba_bytes(colors: ArrayLike, count: int) -> NDArray[np.uint8]:
     """Return colours as (count, 4) bytes, one for each or the same for all.
 
     Args:
-        colours: RGB or RGBA, floats from 0 to 1 or bytes; shape (3), (4), (count, 3), (count, 4).
+        colors: RGB or RGBA, floats from 0 to 1 or bytes; shape (3), (4), (count, 3), (count, 4).
         count: How many are wanted.
 
     Raises:
         Error: They have another shape.
     """
-    given = np.asarray(colours)
+    given = np.asarray(colors)
     if given.dtype != np.uint8:
         with np.errstate(invalid="ignore"):
             scaled = np.nan_to_num(np.asarray(given, np.float32), nan=0.0, posinf=1.0, neginf=0.0)
@@ -362,13 +362,13 @@ class Points(Drawable):
         self.position, self.channel, self.channel_is_bytes = position, channel, channel_is_bytes
         self.changed(geometry=True)
 
-    def set_points(self, points: ArrayLike, colours: ArrayLike | None = None) -> None:
+    def set_points(self, points: ArrayLike, colors: ArrayLike | None = None) -> None:
         """Take positions of shape (n, 3) in metres, and RGBA for each or all."""
         xyz = _checked("points", points, (3,))
         rows = np.zeros((len(xyz), 4), np.float32)
         rows[:, :3] = xyz
-        if colours is not None:
-            rgba = rgba_bytes(colours, len(xyz))
+        if colors is not None:
+            rgba = rgba_bytes(colors, len(xyz))
             rows.view(np.uint8).reshape(-1, 16)[:, 12:] = rgba[:, (2, 1, 0, 3)]
             clear = bool((rgba[:, 3] < 255).any())
             self.coloring = replace(self.coloring, mode="bgra", per_point_alpha=clear)
@@ -376,7 +376,7 @@ class Points(Drawable):
             rows.reshape(-1).view(np.uint8),
             len(xyz),
             16,
-            channel=12 if colours is not None else -1,
+            channel=12 if colors is not None else -1,
             channel_is_bytes=True,
         )
 
@@ -451,15 +451,15 @@ class Lines(Drawable):
         self.width, self.in_metres, self.alpha = width, in_metres, 1.0
         self._opaque = True
 
-    def set_segments(self, segments: ArrayLike, colours: ArrayLike = (1.0, 1.0, 1.0, 1.0)) -> None:
+    def set_segments(self, segments: ArrayLike, colors: ArrayLike = (1.0, 1.0, 1.0, 1.0)) -> None:
         """Take lines.
 
         Args:
             segments: Shape (n, 2, 3), metres.
-            colours: For all, for each, or of both ends of each: shape (n, 2, 4).
+            colors: For all, for each, or of both ends of each: shape (n, 2, 4).
         """
         points = _checked("segments", segments, (2, 3))
-        given = np.asarray(colours)
+        given = np.asarray(colors)
         if given.ndim == 3:
             ends = rgba_bytes(given.reshape(-1, given.shape[2]), 2 * len(points)).reshape(-1, 2, 4)
         else:
@@ -473,10 +473,10 @@ class Lines(Drawable):
         self.rows, self.count = rows, len(rows)
         self.changed(geometry=True)
 
-    def set_strip(self, points: ArrayLike, colours: ArrayLike = (1.0, 1.0, 1.0, 1.0)) -> None:
+    def set_strip(self, points: ArrayLike, colors: ArrayLike = (1.0, 1.0, 1.0, 1.0)) -> None:
         """Take a line through points of shape (n, 3), with a colour for all or for each point."""
         line = _checked("points", points, (3,))
-        given = np.asarray(colours)
+        given = np.asarray(colors)
         if given.ndim == 2 and len(given) == len(line):
             given = np.stack([given[:-1], given[1:]], axis=1)
         self.set_segments(
@@ -508,7 +508,7 @@ class Shape:
         positions: (n, 3), metres.
         normals: (n, 3); made from the triangles if None.
         indices: (m, 3) or (m * 3) numbers of vertices; if None, each three vertices are a triangle.
-        colours: RGBA for each vertex; white if None.
+        colors: RGBA for each vertex; white if None.
         uv: (n, 2) places in the texture, from its upper left corner; 0 if None.
         one_sided: Whether triangles are seen only from the side where their corners are in
             counter-clockwise order.
@@ -529,7 +529,7 @@ class Shape:
         normals: ArrayLike | None = None,
         indices: ArrayLike | None = None,
         *,
-        colours: ArrayLike | None = None,
+        colors: ArrayLike | None = None,
         uv: ArrayLike | None = None,
         one_sided: bool = False,
         closed: bool = False,
@@ -552,7 +552,7 @@ class Shape:
         rows["normal"] = (
             _normals(at, faces) if normals is None else _fitting("normals", normals, at, 3)
         )
-        rows["rgba"] = 255 if colours is None else rgba_bytes(colours, len(at))
+        rows["rgba"] = 255 if colors is None else rgba_bytes(colors, len(at))
         if uv is not None:
             rows["uv"] = _fitting("uv", uv, at, 2)
         #: A row for each vertex.
@@ -632,17 +632,17 @@ class Mesh(Drawable):
         instances: A row for each time: matrix (float32, 16, column by column), RGBA (float32, 4).
         lit: Whether the headlight shades it.
         texture: Pixels (h, w, 4) of uint8, or None.
-        colour: RGBA, multiplied with that of vertices, instances and texture.
+        color: RGBA, multiplied with that of vertices, instances and texture.
     """
 
     ROW = np.dtype([("matrix", "<f4", 16), ("rgba", "<f4", 4)])
 
     def __init__(
-        self, shape: Shape, colour: Sequence[float] = (1.0, 1.0, 1.0, 1.0), *, lit: bool = True
+        self, shape: Shape, color: Sequence[float] = (1.0, 1.0, 1.0, 1.0), *, lit: bool = True
     ) -> None:
         super().__init__()
         self.shape, self.lit = shape, lit
-        self.colour = tuple(colour)
+        self.color = tuple(color)
         self.texture: NDArray[np.uint8] | None = None
         self.texture_opaque = True
         #: Counts textures, which are uploaded apart.
@@ -651,15 +651,15 @@ class Mesh(Drawable):
         self._opaque = True
         self.set_instances(np.eye(4)[np.newaxis])
 
-    def set_instances(self, matrices: ArrayLike, colours: ArrayLike = (1.0, 1.0, 1.0, 1.0)) -> None:
+    def set_instances(self, matrices: ArrayLike, colors: ArrayLike = (1.0, 1.0, 1.0, 1.0)) -> None:
         """Draw it once for each matrix.
 
         Args:
             matrices: Shape (n, 4, 4); those that are not finite are left out.
-            colours: RGBA from 0 to 1, for each or all.
+            colors: RGBA from 0 to 1, for each or all.
         """
         given = _checked("matrices", matrices, (4, 4))
-        rgba = np.broadcast_to(np.asarray(colours, np.float32), (len(given), 4))
+        rgba = np.broadcast_to(np.asarray(colors, np.float32), (len(given), 4))
         good = np.isfinite(given).all(axis=(1, 2))
         rows = np.zeros(int(good.sum()), self.ROW)
         rows["matrix"] = given[good].transpose(0, 2, 1).reshape(-1, 16)
@@ -690,19 +690,19 @@ class Mesh(Drawable):
         self.textures += 1
         self.changed()
 
-    def set_look(self, *, colour: Sequence[float] | None = None, lit: bool | None = None) -> None:
+    def set_look(self, *, color: Sequence[float] | None = None, lit: bool | None = None) -> None:
         """Change the colour, RGBA from 0 to 1, or whether it is lit."""
-        before = self.colour, self.lit
-        self.colour = self.colour if colour is None else tuple(colour)
+        before = self.color, self.lit
+        self.color = self.color if color is None else tuple(color)
         self.lit = self.lit if lit is None else lit
-        if before != (self.colour, self.lit):
+        if before != (self.color, self.lit):
             self.changed()
 
     @property
     def opaque(self) -> bool:
         """Whether nothing behind it shines through."""
         return (
-            self._opaque and self.shape.opaque and self.texture_opaque and self.colour[3] >= OPAQUE
+            self._opaque and self.shape.opaque and self.texture_opaque and self.color[3] >= OPAQUE
         )
 
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
@@ -787,7 +787,7 @@ class Labels(Drawable):
         texts: One for each; several lines are allowed.
         positions: (n, 3), metres; where the middle of each is, or of its left or upper edge.
         heights: Of a line, in metres, or in pixels of the screen.
-        colours: (n, 4) RGBA bytes.
+        colors: (n, 4) RGBA bytes.
         in_pixels: Whether `heights` are pixels.
         align: ``centre``, ``left`` or ``below``.
     """
@@ -800,7 +800,7 @@ class Labels(Drawable):
         self.texts: tuple[str, ...] = ()
         self.positions: NDArray[np.float32] = np.zeros((0, 3), np.float32)
         self.heights: NDArray[np.float32] = np.zeros(0, np.float32)
-        self.colours: NDArray[np.uint8] = np.zeros((0, 4), np.uint8)
+        self.colors: NDArray[np.uint8] = np.zeros((0, 4), np.uint8)
         self.in_pixels, self.align, self.alpha = in_pixels, align, 1.0
         #: Counts changes of the texts, which are painted anew.
         self.texts_changed = 0
@@ -810,7 +810,7 @@ class Labels(Drawable):
         texts: Sequence[str],
         positions: ArrayLike,
         heights: ArrayLike = 0.1,
-        colours: ArrayLike = (1.0, 1.0, 1.0, 1.0),
+        colors: ArrayLike = (1.0, 1.0, 1.0, 1.0),
     ) -> None:
         """Take texts, positions (n, 3), heights and colours for each or all.
 
@@ -829,7 +829,7 @@ class Labels(Drawable):
             self.texts_changed += 1
         self.positions = at
         self.heights = np.broadcast_to(np.asarray(heights, np.float32), len(at)).copy()
-        self.colours = rgba_bytes(colours, len(at))
+        self.colors = rgba_bytes(colors, len(at))
         self.count = len(at)
         self.changed(geometry=True)
 

@@ -35,7 +35,7 @@ from rosglass.scene.collada import read_collada
 from rosglass.scene.resources import check_texture, locate_resource, make_room
 from rosglass.scene.triangles import (
     MAX_TRIANGLES,
-    Colour,
+    Color,
     MeshError,
     MeshPart,
     assemble,
@@ -281,7 +281,7 @@ class _Cache:
             if isinstance(part.texture, bytes):
                 arrays[f"texture{number}"] = np.frombuffer(part.texture, np.uint8)
             path = part.texture if isinstance(part.texture, str) else None
-            about.append({"number": number, "colour": part.colour, "texture": path})
+            about.append({"number": number, "colour": part.color, "texture": path})
         arrays["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
         size = sum(array.nbytes for array in arrays.values())
         if size > _MAX_CACHE_BYTES // 2:
@@ -302,7 +302,7 @@ class _Cache:
 
 def _part_of(file: Any, about: dict[str, Any]) -> MeshPart:
     """Return a part of a cached file, checked as far as drawing needs it."""
-    number, colour = about["number"], about["colour"]
+    number, color = about["number"], about["colour"]
 
     def array(field: str, dtype: Any, *shape: int) -> Any:
         found = file[f"{field}{number}"]
@@ -321,8 +321,8 @@ def _part_of(file: Any, about: dict[str, Any]) -> MeshPart:
     texture = about["texture"]
     if f"texture{number}" in names:
         texture = array("texture", np.uint8).tobytes()
-    colour = None if colour is None else tuple(map(float, colour))
-    return MeshPart(positions, normals, uv, indices, colour, texture)
+    color = None if color is None else tuple(map(float, color))
+    return MeshPart(positions, normals, uv, indices, color, texture)
 
 
 # -- STL -----------------------------------------------------------------------------------------
@@ -376,7 +376,7 @@ class _Obj:
     def __init__(self, name: str, base: str, read: Callable[[str], bytes]) -> None:
         self._name, self._base, self._read = name, base, read
         self._libraries: dict[str, None] = {}
-        self._materials: dict[str | None, tuple[Colour, str | None]] = {}
+        self._materials: dict[str | None, tuple[Color, str | None]] = {}
         #: The lines of vertices, texture coordinates and normals.
         self._rows: dict[str, list[str]] = {"v": [], "vt": [], "vn": []}
         #: Faces of the same material and layout, which numpy reads at once: the layout is the
@@ -409,7 +409,7 @@ class _Obj:
                 sizes = np.full(len(lines), count, np.int64)
                 corners = corners[triangulate(sizes, positions[corners[:, 0]])]
             with_uv = width > 1 and not has_gap
-            colour, texture = self._materials.get(material, (None, None))
+            color, texture = self._materials.get(material, (None, None))
             part = assemble(
                 positions,
                 normals if width > 2 else None,
@@ -420,7 +420,7 @@ class _Obj:
                     corners[:, 1] if with_uv else None,
                 ),
             )
-            parts.append(replace(part, colour=colour, texture=texture if with_uv else None))
+            parts.append(replace(part, color=color, texture=texture if with_uv else None))
         return parts
 
     def _scan(self, text: str) -> None:
@@ -504,10 +504,10 @@ class _Obj:
                     _log.warning("%s: %s of material %r is no number", self._name, key, material)
                 self._materials[material] = ((r, g, b, a), texture)
             elif material is not None and key == "map_Kd":
-                colour, _ = self._materials[material]
+                color, _ = self._materials[material]
                 # Options such as -s 1 1 1 stand before the name, which may have spaces.
                 path = re.sub(r"^(?:-[a-z]+(?:\s+(?:on|off|[-+.\d]\S*))*\s+)*", "", rest)
-                self._materials[material] = (colour, relative(self._base, path))
+                self._materials[material] = (color, relative(self._base, path))
 
 
 # -- glTF, PLY and OFF, through trimesh ----------------------------------------------------------
@@ -566,21 +566,21 @@ def _from_trimesh(mesh: Any, name: str, has_normals: bool) -> MeshPart:
         uv = from_top(np.asarray(uv, np.float32))
     else:
         uv = None
-    colour, texture = _trimesh_material(getattr(visual, "material", None), name)
+    color, texture = _trimesh_material(getattr(visual, "material", None), name)
     normals = np.asarray(mesh.vertex_normals, np.float32) if has_normals else None
     part = assemble(positions, normals, uv, (at, at, None if uv is None else at))
-    return replace(part, colour=colour, texture=None if uv is None else texture)
+    return replace(part, color=color, texture=None if uv is None else texture)
 
 
-def _trimesh_material(material: Any, name: str) -> tuple[Colour | None, bytes | None]:
+def _trimesh_material(material: Any, name: str) -> tuple[Color | None, bytes | None]:
     if material is None:
         return None, None
     factor = getattr(material, "baseColorFactor", None)
     values = (255, 255, 255, 255) if factor is None else tuple(int(v) for v in factor)
-    colour = tuple(value / 255 for value in (*values, 255)[:4])
+    color = tuple(value / 255 for value in (*values, 255)[:4])
     image = getattr(material, "baseColorTexture", None)
     if image is None:
-        return colour, None  # type: ignore[return-value]
+        return color, None  # type: ignore[return-value]
     file = BytesIO()
     try:
         width, height = image.size
@@ -590,8 +590,8 @@ def _trimesh_material(material: Any, name: str) -> tuple[Colour | None, bytes | 
         raise
     except Exception as error:  # of pillow, for a corrupt picture
         _log.warning("%s: a texture can't be read: %s", name, error)
-        return colour, None  # type: ignore[return-value]
-    return colour, file.getvalue()  # type: ignore[return-value]
+        return color, None  # type: ignore[return-value]
+    return color, file.getvalue()  # type: ignore[return-value]
 
 
 class _Resolver:

@@ -403,10 +403,10 @@ class DisplaysModel(QAbstractListModel):
             elif path == _FIXED_FRAME:
                 view.scene.fixed_frame = text
             elif path == _BACKGROUND:
-                colour = QColor(text)
-                if not colour.isValid():
+                color = QColor(text)
+                if not color.isValid():
                     raise Error(f"expected a colour, e.g. '#303030', got {text!r}")
-                view.setProperty("background", colour)
+                view.setProperty("background", color)
         except Error as error:
             self.refused.emit(f"{path}: {error}")
         else:

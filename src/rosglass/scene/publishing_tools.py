@@ -243,7 +243,7 @@ class PoseTool(PublishingTool):
 
     _HELP = "Click and drag mouse to set position/orientation."
     #: Of the arrow.
-    _COLOUR: ClassVar[tuple[float, ...]] = (0.0, 1.0, 0.0, 1.0)
+    _COLOR: ClassVar[tuple[float, ...]] = (0.0, 1.0, 0.0, 1.0)
 
     #: A pose was set: x and y in metres, yaw in radians, in the fixed frame.
     poseSet = Signal(float, float, float)
@@ -255,7 +255,7 @@ class PoseTool(PublishingTool):
         self._position: Point | None = None
         self._yaw = 0.0
         super().__init__(parent, runtime)
-        self._arrow.set_arrows(np.eye(4)[np.newaxis], _SHAFT, _HEAD, self._COLOUR)
+        self._arrow.set_arrows(np.eye(4)[np.newaxis], _SHAFT, _HEAD, self._COLOR)
         self._arrow.visible = False
         self.root.add(self._arrow)
 

@@ -557,7 +557,7 @@ class _MeshOnDevice(_OnDevice):
         self._shape = None
 
     def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
-        red, green, blue, own = self.drawable.colour
+        red, green, blue, own = self.drawable.color
         block[0] = (red, green, blue, own * alpha)
         block[1, :2] = self.drawable.lit, self.drawable.shape.closed
 
@@ -659,7 +659,7 @@ class _LabelsOnDevice(_OnDevice):
         # One that has no place is not shown.
         shown = np.isfinite(labels.positions).all(axis=1)
         rows["size"] = self._shapes * labels.heights[:, np.newaxis] * shown[:, np.newaxis]
-        rows["place"], rows["rgba"] = self._places, labels.colours
+        rows["place"], rows["rgba"] = self._places, labels.colors
         self._buffer = self.device.fill(batch, self._buffer, rows)
 
     def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:

@@ -211,10 +211,10 @@ class SceneView(QQuickRhiItem):
     def _get_background(self) -> QColor:
         return self._background
 
-    def _set_background(self, colour: QColor) -> None:
-        if colour != self._background:
-            self._background = QColor(colour)
-            self.setAlphaBlending(colour.alpha() < 255)
+    def _set_background(self, color: QColor) -> None:
+        if color != self._background:
+            self._background = QColor(color)
+            self.setAlphaBlending(color.alpha() < 255)
             self.backgroundChanged.emit()
             self.update()
 
@@ -693,7 +693,7 @@ class SceneView(QQuickRhiItem):
         if shape is not None:
             self._focal.pose = shape.pose
             size = instance_matrix(scale=shape.size)[np.newaxis]
-            self._focal.set_instances(size, shape.colour)
+            self._focal.set_instances(size, shape.color)
         self._focal.visible = shape is not None
 
 

@@ -36,7 +36,7 @@ _MAX_BOXES = 2000
 #: Milliseconds until the boxes follow what has moved.
 _FOLLOW_MS = 100
 #: RViz's colour of selections.
-_COLOUR = (0.6, 0.8, 1.0)
+_COLOR = (0.6, 0.8, 1.0)
 #: Least size of a box, metres.
 _LEAST_M = 0.02
 _CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float64)
@@ -225,7 +225,7 @@ class Selection(QtCore.QObject):
         )
         if not same:
             self._root.pose = instance_matrix(middle.tolist())
-            self._lines.set_segments(segments, _COLOUR)
+            self._lines.set_segments(segments, _COLOR)
 
     @Slot()
     def on_scene(self) -> None:

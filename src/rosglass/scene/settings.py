@@ -38,9 +38,9 @@ _QT_TYPES: dict[str, type] = {
 _TEXTS = {"enum", "frame", "path", "string", "topic"}
 
 
-def rgb_of(colour: QtGui.QColor) -> tuple[float, float, float]:
+def rgb_of(color: QtGui.QColor) -> tuple[float, float, float]:
     """Return red, green and blue from 0 to 1."""
-    return colour.redF(), colour.greenF(), colour.blueF()
+    return color.redF(), color.greenF(), color.blueF()
 
 
 class Setting(Writable[Any]):

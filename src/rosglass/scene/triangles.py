@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MAX_TRIANGLES",
-    "Colour",
+    "Color",
     "MeshError",
     "MeshPart",
     "assemble",
@@ -38,7 +38,7 @@ __all__ = [
     "unit_vectors",
 ]
 
-Colour: TypeAlias = tuple[float, float, float, float]
+Color: TypeAlias = tuple[float, float, float, float]
 
 #: Meshes with more triangles are refused.
 MAX_TRIANGLES = 10_000_000
@@ -59,7 +59,7 @@ class MeshPart:
         normals: Unit normals of the vertices, (n, 3) float32.
         uv: Coordinates in the texture, (n, 2) float32, from its top left corner; None for none.
         indices: Three vertices for each triangle, (m,) uint32; None if they are in order.
-        colour: Red, green, blue and opacity, 0 to 1; None if the file has none. RViz draws an STL
+        color: Red, green, blue and opacity, 0 to 1; None if the file has none. RViz draws an STL
             file in the colour of the robot description or marker, and other files without a
             material in grey (0.6).
         texture: Path or URI of a picture, or its bytes if it is in the file; None for none.
@@ -69,7 +69,7 @@ class MeshPart:
     normals: Floats
     uv: Floats | None = None
     indices: NDArray[np.uint32] | None = None
-    colour: Colour | None = None
+    color: Color | None = None
     texture: str | bytes | None = None
 
     @property
@@ -293,7 +293,7 @@ def merged(parts: Sequence[MeshPart]) -> list[MeshPart]:
     """Join the parts that are drawn alike: exporters write hundreds."""
     groups: dict[Any, list[MeshPart]] = {}
     for part in parts:
-        groups.setdefault((part.colour, part.texture, part.uv is None), []).append(part)
+        groups.setdefault((part.color, part.texture, part.uv is None), []).append(part)
     return [group[0] if len(group) == 1 else _joined(group) for group in groups.values()]
 
 
@@ -314,7 +314,7 @@ def _joined(parts: Sequence[MeshPart]) -> MeshPart:
         np.concatenate([part.normals for part in parts]),
         np.concatenate(uvs) if uvs else None,
         indices,
-        parts[0].colour,
+        parts[0].color,
         parts[0].texture,
     )
 

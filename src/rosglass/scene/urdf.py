@@ -113,12 +113,12 @@ class Material:
 
     Attributes:
         name: Its name; empty for one without a name.
-        colour: Red, green, blue and opacity, 0 to 1.
+        color: Red, green, blue and opacity, 0 to 1.
         texture: URI of a picture; empty for none.
     """
 
     name: str
-    colour: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     texture: str = ""
 
 
@@ -440,7 +440,7 @@ class _Parser:
             if min(r, g, b, a) < 0 or max(r, g, b, a) > 1:
                 self._warn(color, f"rgba is not from 0 to 1 and is cut off: {color.get('rgba')}")
                 r, g, b, a = (min(max(value, 0.0), 1.0) for value in (r, g, b, a))
-            material = replace(material, colour=(r, g, b, a))
+            material = replace(material, color=(r, g, b, a))
         if texture is not None:
             material = replace(material, texture=texture.get("filename", "").strip())
         return material

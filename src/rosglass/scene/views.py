@@ -85,12 +85,12 @@ class FocalShape(NamedTuple):
     Attributes:
         pose: Its pose in the fixed frame, 4 x 4.
         size: Metres across in x, y and z.
-        colour: RGBA, 0 to 1.
+        color: RGBA, 0 to 1.
     """
 
     pose: Matrix
     size: tuple[float, float, float]
-    colour: tuple[float, float, float, float]
+    color: tuple[float, float, float, float]
 
 
 class ViewController:
@@ -457,7 +457,7 @@ class OrbitView(ViewController):
         "<b>Left-Click:</b> Move X/Y.  <b>Right-Click/Mouse Wheel:</b> Move Z.",
     )
     #: Of the focal shape, RGBA.
-    _COLOUR = (1.0, 1.0, 0.0, 0.5)
+    _COLOR = (1.0, 1.0, 0.0, 0.5)
 
     distance = NumberSetting("Distance", 10.0, "Distance from the focal point.", 0.001)
     focal_shape_size = NumberSetting("Focal Shape Size", 0.05, "Focal shape size.", 0.001, 10_000.0)
@@ -484,7 +484,7 @@ class OrbitView(ViewController):
         pose = self._target.copy()
         pose[:3, 3] = (self._target @ np.append(self.focal_point, 1.0))[:3]
         across = self.focal_shape_size * (1.0 if self.focal_shape_fixed_size else self.distance)
-        return FocalShape(pose, (across, across, across / 5), self._COLOUR)
+        return FocalShape(pose, (across, across, across / 5), self._COLOR)
 
     def on_wheel(self, wheel: Wheel) -> None:
         """Zoom, or with Shift move along the line of sight."""
@@ -575,7 +575,7 @@ class XYOrbitView(OrbitView):
     )
     _RIGHT = (Action.ZOOM, Action.ZOOM)
     _HELP = (OrbitView._HELP[0], "<b>Left-Click:</b> Move X/Y.  <b>Right-Click:</b> Zoom.")
-    _COLOUR = (0.0, 1.0, 1.0, 0.5)
+    _COLOR = (0.0, 1.0, 1.0, 0.5)
 
     def _eye_pose(self) -> Matrix:
         pose = super()._eye_pose()

@@ -120,7 +120,7 @@ def test_binary_stl(header: bytes) -> None:
     part = one(stl(TRIANGLE, header=header), "a.stl")
     assert corners(part) == TRIANGLE
     assert part.normals.tolist() == [[0, 0, 1]] * 3  # of the triangle: the file has none
-    assert (part.indices, part.uv, part.colour, part.texture) == (None, None, None, None)
+    assert (part.indices, part.uv, part.color, part.texture) == (None, None, None, None)
     assert (part.positions.dtype, part.normals.dtype) == (np.float32, np.float32)
     assert part.positions.flags.c_contiguous
     assert part.triangles == 1
@@ -275,7 +275,7 @@ WHITE = channel("diffuse", "1 1 1 1")
 
 
 @pytest.mark.parametrize(
-    ("channels", "colour"),
+    ("channels", "color"),
     [
         (channel("diffuse", "1 0.5 0 1"), (1, 0.5, 0, 1)),
         (channel("diffuse", "1 0.5 0"), (1, 0.5, 0, 1)),
@@ -288,17 +288,17 @@ WHITE = channel("diffuse", "1 1 1 1")
         (WHITE + channel("transparent", "0 0 0 0.25"), (1, 1, 1, 0.25)),
     ],
 )
-def test_materials(channels: str, colour: tuple[float, ...]) -> None:
+def test_materials(channels: str, color: tuple[float, ...]) -> None:
     part = one(collada(node(material="effect-m"), materials=effect(channels)), "a.dae")
-    assert part.colour == pytest.approx(colour)
+    assert part.color == pytest.approx(color)
 
 
 def test_parts_have_the_materials_that_the_node_binds() -> None:
     materials = effect("<diffuse><color>1 0 0 1</color></diffuse>", key="red")
     nodes = node(material="red-m") + node() + node("<translate>9 9 9</translate>", material="red-m")
     red, plain = load_mesh(collada(nodes, materials=materials), "a.dae")
-    assert (red.colour, red.triangles) == ((1, 0, 0, 1), 4)
-    assert (plain.colour, plain.triangles) == (None, 2)
+    assert (red.color, red.triangles) == ((1, 0, 0, 1), 4)
+    assert (plain.color, plain.triangles) == (None, 2)
 
 
 @pytest.mark.parametrize("is_direct", [False, True])
@@ -316,7 +316,7 @@ def test_textures(is_direct: bool, tmp_path: Path) -> None:
     file.write_bytes(data)
     (part,) = load_mesh(file)
     assert part.texture == f"{tmp_path}/../my wood.png"
-    assert part.colour == (1, 1, 1, 1)
+    assert part.color == (1, 1, 1, 1)
     absolute = data.replace(b"../my%20wood.png", b"file:///a/b.png")
     assert one(absolute, "a.dae").texture == "file:///a/b.png"
     missing = one(data.replace(b'id="image"', b'id="other"'), "a.dae")
@@ -446,13 +446,13 @@ def test_obj(tmp_path: Path) -> None:
     (tmp_path / "box.mtl").write_text(MTL)
     (tmp_path / "box.obj").write_text(OBJ)
     wood, red, plain = load_mesh(tmp_path / "box.obj")
-    assert wood.colour == pytest.approx((0.1, 0.2, 0.3, 0.75))
+    assert wood.color == pytest.approx((0.1, 0.2, 0.3, 0.75))
     assert wood.texture == f"{tmp_path}/my wood.png"
     assert corners(wood) == [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
     assert corners(wood, "uv") == [[0, 1], [1, 1], [1, 0]]
-    assert (red.colour, red.texture, red.triangles) == ((1, 0, 0, 0.5), None, 2)
+    assert (red.color, red.texture, red.triangles) == ((1, 0, 0, 0.5), None, 2)
     assert corners(red) == [[0, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0], [1, 1, 0]]
-    assert (plain.colour, plain.triangles) == (None, 2)
+    assert (plain.color, plain.triangles) == (None, 2)
     assert all(
         part.normals[:, 2].tolist() == [1] * len(part.normals) for part in (wood, red, plain)
     )
@@ -540,7 +540,7 @@ def test_glb_is_turned_to_z_up() -> None:
     part = one(glb(gltf_document(), GLTF_BINARY), "a.glb")
     assert corners(part) == [[0, -10, 0], [1, -10, 0], [0, -10, 2]]
     assert part.normals.tolist() == [[0, -1, 0]] * 3
-    assert part.colour == (1, 0, 0, 1)
+    assert part.color == (1, 0, 0, 1)
 
 
 @pytest.mark.parametrize(
@@ -636,7 +636,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def same(one: Sequence[MeshPart], other: Sequence[MeshPart]) -> bool:
     return len(one) == len(other) and all(
-        (a.colour, a.texture) == (b.colour, b.texture)
+        (a.color, a.texture) == (b.color, b.texture)
         and all(
             np.array_equal(getattr(a, name), getattr(b, name))
             if getattr(a, name) is not None
@@ -671,9 +671,9 @@ def test_the_cache_follows_the_materials_of_obj_files(cache: Path, tmp_path: Pat
     file = tmp_path / "box.obj"
     file.write_text(OBJ)
     (tmp_path / "box.mtl").write_text(MTL)
-    assert (load_mesh_cached(file)[1].colour or ())[:3] == (1, 0, 0)
+    assert (load_mesh_cached(file)[1].color or ())[:3] == (1, 0, 0)
     (tmp_path / "box.mtl").write_text(MTL.replace("Kd 1 0 0", "Kd 0 1 0"))
-    assert (load_mesh_cached(file)[1].colour or ())[:3] == (0, 1, 0)
+    assert (load_mesh_cached(file)[1].color or ())[:3] == (0, 1, 0)
     assert len(list(cache.iterdir())) == 2
 
 

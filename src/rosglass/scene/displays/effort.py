@@ -455,8 +455,8 @@ class EffortDisplay(HistoryDisplay):
         values = np.array(list(efforts.values()))
         parts = np.minimum(np.abs(values) / list(limits.values()), 1.0) + _LEAST_PART
         radii = _INNER_M + parts * self.scale / 2
-        colours = np.full((len(values), 4), self.alpha)
-        colours[:, :3] = rainbow(np.minimum(parts, 1.0))
+        colors = np.full((len(values), 4), self.alpha)
+        colors[:, :3] = rainbow(np.minimum(parts, 1.0))
         poses = np.array([data.poses[name] for name in efforts])
         # Near the first joint, numbers are small enough for the GPU.
         base = poses[0]
@@ -467,7 +467,7 @@ class EffortDisplay(HistoryDisplay):
         points = points @ poses[:, :3, :3].transpose(0, 2, 1) + poses[:, np.newaxis, :3, 3]
         lines = np.stack([points[:, :-1], points[:, 1:]], axis=2)
         arcs = Lines(self.width, in_metres=True)
-        arcs.set_segments(lines.reshape(-1, 2, 3), np.repeat(colours, lines.shape[1], axis=0))
+        arcs.set_segments(lines.reshape(-1, 2, 3), np.repeat(colors, lines.shape[1], axis=0))
         arcs.owner = _Owner(self, efforts, lines.shape[1])
 
         # From where the arc begins, along x.
@@ -477,7 +477,7 @@ class EffortDisplay(HistoryDisplay):
         local *= self.width
         local[:, 1, 3], local[:, 3, 3] = radii, 1.0
         heads = Mesh(CONE)
-        heads.set_instances(poses @ local, colours)
+        heads.set_instances(poses @ local, colors)
         heads.owner = _Owner(self, efforts, 1)
         for item in (arcs, heads):
             item.pose = base

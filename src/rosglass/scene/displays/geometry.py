@@ -255,12 +255,12 @@ class _Screw(HistoryDisplay):
 
     def draw(self, data: Any, group: Group) -> None:
         """Draw two arrows, and a circle around the second."""
-        for number, ((colour, scale), vector) in enumerate(zip(self.look(), data, strict=True)):
+        for number, ((color, scale), vector) in enumerate(zip(self.look(), data, strict=True)):
             length = float(np.linalg.norm(vector)) * scale
             wide = self.arrowWidth
             if length <= 0 or (self.hideSmallValues and length < wide):
                 continue
-            rgba = (*rgb_of(colour), self.alpha)
+            rgba = (*rgb_of(color), self.alpha)
             pose = _along(vector / np.linalg.norm(vector))
             arrow = ArrowShapes(self)
             # Proportions of RViz's arrow.

@@ -162,26 +162,26 @@ class Control:
         return known
 
     def _painted(self, marker: MarkerRecord) -> MarkerRecord:
-        colour, colours = marker.colour, marker.colours
+        color, colors = marker.color, marker.colors
         if self.record.automatic and not self.display.enableTransparency:
-            colour = (*colour[:3], 1.0)
-            colours = colours.copy()
-            colours[:, 3:] = 1.0
+            color = (*color[:3], 1.0)
+            colors = colors.copy()
+            colors[:, 3:] = 1.0
         light = self._highlight
         if light and len(marker.points) <= _MAX_HIGHLIGHTED:
-            red, green, blue, alpha = colour
+            red, green, blue, alpha = color
             if marker.kind == MESH and marker.embedded:
                 # Multiplied with the mesh's own colours.
                 if not (red or green or blue):
                     red = green = blue = 1.0
                 bright = 1 + light
-                colour = (bright * red, bright * green, bright * blue, alpha or 1.0)
+                color = (bright * red, bright * green, bright * blue, alpha or 1.0)
             else:
                 red, green, blue = (min(part + light, 1.0) for part in (red, green, blue))
-                colour = (red, green, blue, alpha)
-            colours = colours.copy()
-            colours[:, :3] = np.minimum(colours[:, :3] + light, 1.0)
-        return marker._replace(colour=colour, colours=colours)
+                color = (red, green, blue, alpha)
+            colors = colors.copy()
+            colors[:, :3] = np.minimum(colors[:, :3] + light, 1.0)
+        return marker._replace(color=color, colors=colors)
 
     def _set_highlight(self, light: float) -> None:
         if light != self._highlight:

@@ -245,23 +245,21 @@ def _complete(control: ControlRecord, scale: float) -> ControlRecord:
         for number, side in enumerate((scale, -scale)):
             ends = np.array([[0.5 * side, 0, 0], [0.9 * side, 0, 0]], np.float32)
             made.append(
-                MarkerRecord(
-                    ("", number), ARROW, 0, pose=pose, scale=size, colour=tint, points=ends
-                )
+                MarkerRecord(("", number), ARROW, 0, pose=pose, scale=size, color=tint, points=ends)
             )
     elif control.mode in (MOVE_PLANE, ROTATE_AXIS, MOVE_ROTATE):
         points, shades = _ring(control.mode)
-        colours = np.empty((len(shades), 4), np.float32)
-        colours[:, :3] = np.outer(shades, (red, green, blue))
-        colours[:, 3] = AUTOMATIC_ALPHA
+        colors = np.empty((len(shades), 4), np.float32)
+        colors[:, :3] = np.outer(shades, (red, green, blue))
+        colors[:, 3] = AUTOMATIC_ALPHA
         if control.mode == MOVE_ROTATE:
-            colours[shades == 1.0, 3] /= 2  # as in RViz
+            colors[shades == 1.0, 3] /= 2  # as in RViz
         size = (scale, scale, scale)
         ring = MarkerRecord(
-            ("", 0), TRIANGLE_LIST, 0, pose=pose, scale=size, colour=tint, points=points
+            ("", 0), TRIANGLE_LIST, 0, pose=pose, scale=size, color=tint, points=points
         )
         # Without colours of its own, it is lit.
-        made.append(ring if control.mode == MOVE_PLANE else ring._replace(colours=colours))
+        made.append(ring if control.mode == MOVE_PLANE else ring._replace(colors=colors))
     elif control.mode == MENU:
         height = 0.25 * scale
         pose = instance_matrix((-0.1 * height, 0, 1.2 * scale - 0.1 * height))

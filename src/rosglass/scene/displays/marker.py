@@ -106,11 +106,11 @@ class MarkerRecord(NamedTuple):
         stamp: Its time in nanoseconds; 0 for the newest.
         pose: In its frame, 4 x 4.
         scale: x, y, z in metres.
-        colour: RGBA.
+        color: RGBA.
         lifetime: Seconds; 0 for ever.
         locked: Whether it moves with its frame.
         points: (n, 3), metres.
-        colours: (n, 4) or (0, 4).
+        colors: (n, 4) or (0, 4).
         text: Of texts.
         resource: URI of a mesh.
         embedded: Whether a mesh has its own colours.
@@ -125,11 +125,11 @@ class MarkerRecord(NamedTuple):
     stamp: int = 0
     pose: NDArray[np.float64] = np.eye(4)
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    colour: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     lifetime: float = 0.0
     locked: bool = False
     points: NDArray[np.float32] = np.zeros((0, 3), np.float32)
-    colours: NDArray[np.float32] = np.zeros((0, 4), np.float32)
+    colors: NDArray[np.float32] = np.zeros((0, 4), np.float32)
     text: str = ""
     resource: str = ""
     embedded: bool = False
@@ -169,13 +169,13 @@ def read_marker(message: Any, part: tuple[str, int] | None = None) -> MarkerReco
     size = (scale.x, scale.y, scale.z)
     if part is not None:
         size = (size[0] or 1.0, size[1] or 1.0, size[2] or 1.0)
-    colour = (tint.r, tint.g, tint.b, tint.a)
+    color = (tint.r, tint.g, tint.b, tint.a)
     problem = ""
     if action != _ADD:
         problem = f"action {action}: expected 0 (add), 2 (delete) or 3 (delete all)"
     elif not 0 <= kind <= ARROW_STRIP:
         problem = f"type {kind}: expected 0 to {ARROW_STRIP}"
-    elif not np.isfinite([*numbers, *size, *colour]).all():
+    elif not np.isfinite([*numbers, *size, *color]).all():
         problem = "pose, scale or color has a number that is not finite"
     count = len(message.points)
     if count > _MAX_POINTS:
@@ -186,7 +186,7 @@ def read_marker(message: Any, part: tuple[str, int] | None = None) -> MarkerReco
         return MarkerRecord(key, kind, action, header.frame_id.lstrip("/"), at, problem=problem)
     size, warning = _without_zeros(kind, size, count)
     points = np.array([(o.x, o.y, o.z) for o in message.points], np.float32).reshape(-1, 3)
-    colours = np.array([(c.r, c.g, c.b, c.a) for c in message.colors], np.float32).reshape(-1, 4)
+    colors = np.array([(c.r, c.g, c.b, c.a) for c in message.colors], np.float32).reshape(-1, 4)
     return MarkerRecord(
         key,
         kind,
@@ -195,11 +195,11 @@ def read_marker(message: Any, part: tuple[str, int] | None = None) -> MarkerReco
         at,
         poses_matrices(numbers[:3], numbers[3:])[0],
         size,
-        colour,
+        color,
         max(_seconds(message.lifetime), 0.0),
         message.frame_locked,
         points,
-        colours,
+        colors,
         message.text,
         message.mesh_resource,
         message.mesh_use_embedded_materials,
@@ -240,11 +240,11 @@ class _Batch:
         self._slots: dict[tuple[str, int], int] = {}
         self._keys: list[tuple[str, int]] = []
         self._matrices = np.zeros((16, 4, 4), np.float32)
-        self._colours = np.zeros((16, 4), np.float32)
+        self._colors = np.zeros((16, 4), np.float32)
         self.dirty = True
 
     def put(
-        self, key: tuple[str, int], matrix: NDArray[np.float64], colour: tuple[float, ...]
+        self, key: tuple[str, int], matrix: NDArray[np.float64], color: tuple[float, ...]
     ) -> None:
         """Draw a marker, in place of the one of the same key."""
         slot = self._slots.get(key)
@@ -253,8 +253,8 @@ class _Batch:
             self._keys.append(key)
             if slot == len(self._matrices):
                 self._matrices = np.concatenate([self._matrices, np.zeros_like(self._matrices)])
-                self._colours = np.concatenate([self._colours, np.zeros_like(self._colours)])
-        self._matrices[slot], self._colours[slot] = matrix, colour
+                self._colors = np.concatenate([self._colors, np.zeros_like(self._colors)])
+        self._matrices[slot], self._colors[slot] = matrix, color
         self.dirty = True
 
     def discard(self, key: tuple[str, int]) -> None:
@@ -267,7 +267,7 @@ class _Batch:
                 self._keys[slot] = last
                 self._slots[last] = slot
                 end = len(self._keys)
-                self._matrices[slot], self._colours[slot] = self._matrices[end], self._colours[end]
+                self._matrices[slot], self._colors[slot] = self._matrices[end], self._colors[end]
             self.dirty = True
 
     def key_of(self, index: int) -> tuple[str, int]:
@@ -285,7 +285,7 @@ class _Batch:
             self.dirty = False
             count = len(self._keys)
             self.mesh.set_instances(
-                self._matrices[:count].copy(), self._colours[:count].copy() if count else (1,) * 4
+                self._matrices[:count].copy(), self._colors[:count].copy() if count else (1,) * 4
             )
 
 
@@ -318,7 +318,7 @@ class MarkerGroup:
         # Textures and texts are uploaded again only if they changed; a mesh that is read is empty.
         look: tuple[Any, ...] = ()
         if marker.kind in (TEXT, MESH):
-            look = (marker.kind, marker.scale, marker.colour, marker.text)
+            look = (marker.kind, marker.scale, marker.color, marker.text)
             look += (marker.resource, marker.embedded)
         own = self._own.get(marker.key)
         if own and look and self._looks.get(marker.key) == look:
@@ -327,8 +327,8 @@ class MarkerGroup:
         self.remove(marker.key)
         shapes = list(_instances(marker))
         if shapes:
-            for shape, local, colour in shapes:
-                self._batch(shape).put(marker.key, place @ local, colour)
+            for shape, local, color in shapes:
+                self._batch(shape).put(marker.key, place @ local, color)
             return
         group = Group(*_drawables(marker, meshes))
         for item in group:
@@ -372,17 +372,17 @@ def _instances(
     """Iterate over the shapes that a marker consists of, where these are always the same ones."""
     x, y, z = marker.scale
     if marker.kind == CUBE:
-        yield BOX, _scaled(x, y, z), marker.colour
+        yield BOX, _scaled(x, y, z), marker.color
     elif marker.kind == SPHERE_TYPE:
-        yield SPHERE, _scaled(x, y, z), marker.colour
+        yield SPHERE, _scaled(x, y, z), marker.color
     elif marker.kind == CYLINDER_TYPE:
-        yield CYLINDER, _scaled(x, y, z), marker.colour
+        yield CYLINDER, _scaled(x, y, z), marker.color
     elif marker.kind == ARROW and not len(marker.points):
         # Proportions of RViz: 77 % shaft, and a head of twice its width.
         shaft = _TO_X @ _scaled(y, z, 0.77 * x, 0.385 * x)
         head = _TO_X @ _scaled(2 * y, 2 * z, 0.23 * x, 0.77 * x)
-        yield CYLINDER, shaft, marker.colour
-        yield CONE, head, marker.colour
+        yield CYLINDER, shaft, marker.color
+        yield CONE, head, marker.color
     elif marker.kind == ARROW:
         start, end = marker.points[0].astype(np.float64), marker.points[1].astype(np.float64)
         way = end - start
@@ -391,8 +391,8 @@ def _instances(
             return
         tip = min(z, length) if z else _HEAD_SHARE * length
         place = _standing(start, way / length)
-        yield CYLINDER, place @ _scaled(x, x, length - tip, (length - tip) / 2), marker.colour
-        yield CONE, place @ _scaled(y, y, tip, length - tip), marker.colour
+        yield CYLINDER, place @ _scaled(x, x, length - tip, (length - tip) / 2), marker.color
+        yield CONE, place @ _scaled(y, y, tip, length - tip), marker.color
 
 
 def _standing(origin: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -408,14 +408,14 @@ def _standing(origin: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np
 def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]:
     """Iterate over what a marker draws beside instances, in its own frame."""
     kind, points, (x, y, z) = marker.kind, marker.points, marker.scale
-    each = marker.colours if len(marker.colours) == len(points) else marker.colour
+    each = marker.colors if len(marker.colors) == len(points) else marker.color
     if kind in (LINE_STRIP, LINE_LIST):
         lines = Lines(abs(x), in_metres=True)
         if kind == LINE_STRIP:
             lines.set_strip(points, each)
         else:
-            colours = each if isinstance(each, tuple) else each.reshape(-1, 2, 4)
-            lines.set_segments(points.reshape(-1, 2, 3), colours)
+            colors = each if isinstance(each, tuple) else each.reshape(-1, 2, 4)
+            lines.set_segments(points.reshape(-1, 2, 3), colors)
         yield lines
     elif kind in _POINT_STYLES:
         cloud = Points()
@@ -427,7 +427,7 @@ def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]
         yield cloud
     elif kind == TEXT:
         labels = Labels()
-        labels.set_texts([marker.text], [[0, 0, 0]], abs(z), marker.colour)
+        labels.set_texts([marker.text], [[0, 0, 0]], abs(z), marker.color)
         yield labels
     elif kind == TRIANGLE_LIST:
         yield _triangles(marker)
@@ -439,15 +439,15 @@ def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]
 
 def _triangles(marker: MarkerRecord) -> Mesh:
     points = marker.points * np.array(marker.scale, np.float32)
-    colours: NDArray[np.float32] | None = None
-    if len(marker.colours) == len(points):
-        colours = marker.colours
-    elif len(marker.colours) == len(points) // 3:
-        colours = np.repeat(marker.colours, 3, axis=0)
-    if colours is None:
-        return Mesh(Shape(points), marker.colour)
+    colors: NDArray[np.float32] | None = None
+    if len(marker.colors) == len(points):
+        colors = marker.colors
+    elif len(marker.colors) == len(points) // 3:
+        colors = np.repeat(marker.colors, 3, axis=0)
+    if colors is None:
+        return Mesh(Shape(points), marker.color)
     # RViz does not light what has colours of its own.
-    return Mesh(Shape(points, colours=colours), lit=False)
+    return Mesh(Shape(points, colors=colors), lit=False)
 
 
 def _arrow_strip(marker: MarkerRecord) -> Iterable[Mesh]:
@@ -456,7 +456,7 @@ def _arrow_strip(marker: MarkerRecord) -> Iterable[Mesh]:
         for at in range(len(marker.points) - 1)
     ]
     for part, shape in ((0, CYLINDER), (1, CONE)):
-        mesh = Mesh(shape, marker.colour)
+        mesh = Mesh(shape, marker.color)
         mesh.set_instances(np.array([one[part][1] for one in arrows if one]).reshape(-1, 4, 4))
         yield mesh
 
@@ -484,7 +484,7 @@ def _read_mesh(uri: str, resources: ResourceRetriever) -> _MeshFile:
                 mesh.set_texture(read_texture(part.texture, uri, resources))
             except (Error, OSError) as error:
                 problem = str(error)
-        made.append((mesh, part.colour))
+        made.append((mesh, part.color))
     return _MeshFile(made, problem)
 
 
@@ -525,13 +525,13 @@ class MarkerMeshes:
             )
         file = self._files[uri] = self._files.pop(uri)
         for part, own in file.parts if file is not None else ():
-            colour: tuple[float, ...] = marker.colour
-            if marker.embedded and colour[:3] == (0.0, 0.0, 0.0):
-                colour = (1.0, 1.0, 1.0, colour[3] or 1.0)
+            color: tuple[float, ...] = marker.color
+            if marker.embedded and color[:3] == (0.0, 0.0, 0.0):
+                color = (1.0, 1.0, 1.0, color[3] or 1.0)
             if marker.embedded and own is not None:
-                colour = tuple(a * b for a, b in zip(own, colour, strict=True))
+                color = tuple(a * b for a, b in zip(own, color, strict=True))
             mesh = copy(part) if marker.embedded else Mesh(part.shape)
-            mesh.set_look(colour=colour)
+            mesh.set_look(color=color)
             mesh.set_instances(_scaled(*marker.scale)[np.newaxis])
             yield mesh
 

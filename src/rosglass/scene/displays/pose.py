@@ -346,8 +346,8 @@ class _WithCovariance(_Shaped):
         unique = (*rgb_of(self.orientationColor), alpha)
         axes = [(1, 0, 0, alpha), (0, 1, 0, alpha), (0, 0, 1, alpha)]
         rgb = self.orientationColorStyle == "RGB"
-        colours = [axes[axis] if rgb else unique for axis, _ in discs] or [unique]
-        self._discs.set_instances(np.array([m for _, m in discs]).reshape(-1, 4, 4), colours)
+        colors = [axes[axis] if rgb else unique for axis, _ in discs] or [unique]
+        self._discs.set_instances(np.array([m for _, m in discs]).reshape(-1, 4, 4), colors)
         self._cones.set_instances(np.array(cones).reshape(-1, 4, 4), axes[2] if rgb else unique)
 
     def _cone(self, pose: NDArray[np.float64], variance: float) -> NDArray[np.float64]:

@@ -178,7 +178,7 @@ def link_drawables(
     """
     geometry = visual.geometry
     material = visual.material
-    own = material.colour if material is not None else _NO_MATERIAL
+    own = material.color if material is not None else _NO_MATERIAL
     simple: list[tuple[Shape, NDArray[np.float64]]] = []
     if isinstance(geometry, Box):
         simple.append((BOX, _matrix(*geometry.size)))
@@ -205,7 +205,7 @@ def link_drawables(
             for mesh in made:
                 mesh.set_texture(pixels)
                 # RViz uses one or the other.
-                mesh.set_look(colour=(1.0, 1.0, 1.0, 1.0))
+                mesh.set_look(color=(1.0, 1.0, 1.0, 1.0))
         except (Error, OSError) as error:
             problems[material.texture] = str(error)
     return made
@@ -243,7 +243,7 @@ def _mesh_drawables(
 
 def material_of(part: MeshPart) -> tuple[float, float, float, float]:
     """Return the colour of a part of a mesh file that has materials: opaque, as in RViz."""
-    r, g, b, _ = part.colour or _GREY
+    r, g, b, _ = part.color or _GREY
     return (r, g, b, 1.0)
 
 

@@ -18,7 +18,7 @@ _ALONG = np.zeros((3, 4, 4))
 _ALONG[0] = [[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
 _ALONG[1] = [[0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]
 _ALONG[2] = np.eye(4)
-_COLOURS = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1]], np.float32)
+_COLORS = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1]], np.float32)
 
 
 def stack_poses(poses: Any) -> NDArray[np.float64]:
@@ -95,9 +95,9 @@ class AxesShapes(Group):
         length = np.broadcast_to(np.asarray(length, np.float64), len(at))
         local = _along(length, radius, length / 2, len(at))
         matrices = at[:, np.newaxis] @ (_ALONG @ local[:, np.newaxis])
-        colours = np.tile(_COLOURS, (len(at), 1))
-        colours[:, 3] = np.repeat(np.broadcast_to(np.asarray(alpha), len(at)), 3)
-        self._mesh.set_instances(matrices.reshape(-1, 4, 4), colours if len(at) else (1, 1, 1, 1))
+        colors = np.tile(_COLORS, (len(at), 1))
+        colors[:, 3] = np.repeat(np.broadcast_to(np.asarray(alpha), len(at)), 3)
+        self._mesh.set_instances(matrices.reshape(-1, 4, 4), colors if len(at) else (1, 1, 1, 1))
 
 
 class ArrowShapes(Group):
@@ -120,8 +120,8 @@ class ArrowShapes(Group):
         poses: Any,
         shaft: tuple[ArrayLike, ArrayLike],
         head: tuple[ArrayLike, ArrayLike],
-        colours: ArrayLike,
-        head_colours: ArrayLike | None = None,
+        colors: ArrayLike,
+        head_colors: ArrayLike | None = None,
     ) -> None:
         """Draw arrows.
 
@@ -129,13 +129,13 @@ class ArrowShapes(Group):
             poses: (n, 4, 4).
             shaft: Length and diameter in metres, for each or all.
             head: Length and diameter in metres, for each or all.
-            colours: RGBA from 0 to 1, for each or all.
-            head_colours: Those of the heads, if they are others.
+            colors: RGBA from 0 to 1, for each or all.
+            head_colors: Those of the heads, if they are others.
         """
         at = stack_poses(poses) @ _ALONG[0]
         count = len(at)
         length = np.broadcast_to(np.asarray(shaft[0], np.float64), count)
         middle = _along(length, shaft[1], length / 2, count)
         tip = _along(head[0], head[1], length, count)
-        self._shafts.set_instances(at @ middle, colours)
-        self._heads.set_instances(at @ tip, colours if head_colours is None else head_colours)
+        self._shafts.set_instances(at @ middle, colors)
+        self._heads.set_instances(at @ tip, colors if head_colors is None else head_colors)

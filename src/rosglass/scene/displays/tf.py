@@ -33,7 +33,7 @@ _MAX_FRAMES = 2000
 #: Sizes in RViz at a marker scale of 1, metres.
 _AXIS_M, _AXIS_RADIUS_M, _NAME_M = 0.2, 0.02, 0.1
 _SHAFT_M, _HEAD_M, _HEAD_WIDTH_M = 0.01, 0.1, 0.04
-_SHAFT_COLOUR, _HEAD_COLOUR = (0.8, 0.8, 0.3, 1.0), (1.0, 0.1, 0.6, 1.0)
+_SHAFT_COLOR, _HEAD_COLOR = (0.8, 0.8, 0.3, 1.0), (1.0, 0.1, 0.6, 1.0)
 #: Seconds between two looks at frames that are not updated any more.
 _LOOK_S = 0.5
 #: The share of its timeout after which a frame begins to fade.
@@ -248,14 +248,14 @@ class TFDisplay(Display):
             np.array(arrows).reshape(-1, 4, 4),
             (far - head, _SHAFT_M * scale),
             (head, _HEAD_WIDTH_M * scale),
-            _with_alpha(_SHAFT_COLOUR, opacities),
-            _with_alpha(_HEAD_COLOUR, opacities),
+            _with_alpha(_SHAFT_COLOR, opacities),
+            _with_alpha(_HEAD_COLOR, opacities),
         )
 
 
-def _with_alpha(colour: tuple[float, ...], opacities: list[float]) -> NDArray[np.float64]:
+def _with_alpha(color: tuple[float, ...], opacities: list[float]) -> NDArray[np.float64]:
     """Return a colour with each opacity, (n, 4)."""
-    out = np.tile(np.array(colour), (max(len(opacities), 1), 1))
+    out = np.tile(np.array(color), (max(len(opacities), 1), 1))
     out[: len(opacities), 3] = opacities
     return out
 
