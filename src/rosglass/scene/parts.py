@@ -1,4 +1,4 @@
-"""The parts of a display that are shown and hidden one by one: namespaces, frames or links."""
+"""The parts of a display that are shown and hidden one by one, such as frames, links and joints."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Parts:
     """Which parts of a display are shown, in its panel and in ``.rviz`` files.
 
     Args:
-        title: RViz's name of the list: ``Namespaces``, ``Frames`` or ``Links``.
+        title: RViz's name of the list: ``Namespaces``, ``Frames``, ``Links`` or ``Joints``.
         names: Returns the names of the parts that there are.
         on_change: Called after the user has changed something.
         default: Returns whether a part is shown that the user has not switched.

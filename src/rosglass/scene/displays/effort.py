@@ -20,6 +20,7 @@ from rosglass.scene.displays.geometry import HistoryDisplay
 from rosglass.scene.displays.robot_model import DescriptionSource
 from rosglass.scene.displays.shapes import rotation_of_z_to
 from rosglass.scene.drawing import CONE, Lines, Mesh
+from rosglass.scene.parts import Parts
 from rosglass.scene.point_colors import rainbow
 from rosglass.scene.settings import Setting
 from rosglass.scene.urdf import parse_urdf
@@ -206,13 +207,22 @@ class EffortDisplay(HistoryDisplay):
         #: All joints that turn; None until the description is read.
         self._turning: dict[str, Joint] | None = None
         self._robot_name = ""
-        self._switched: dict[str, bool] = {}
         self._text: str | None = None
         self._urdf = Status("warn", "")
         #: What :meth:`_place` has found for the message that :meth:`show` gets next.
         self._poses: dict[str, NDArray[np.float64]] = {}
         self._next_at = 0.0
         super().__init__(parent, runtime)
+        self.parts: Parts = Parts(
+            "Joints",
+            lambda: self.joints,
+            self._restyle,
+            describe=lambda joint: (
+                ("Effort", f"{self.effort(joint):g} Nm"),
+                ("Max Effort", f"{self.maxEffort(joint):g} Nm"),
+            ),
+            as_mapping=True,
+        )
         self._again = single_shot(self, self._create_again)
         self._throttle = single_shot(self, self._on_throttle)
 
@@ -311,13 +321,12 @@ class EffortDisplay(HistoryDisplay):
     @Slot(str, bool)
     def setJointEnabled(self, joint: str, enabled: bool) -> None:
         """Show or hide the effort of a joint."""
-        self._switched[joint] = enabled
-        self._restyle()
+        self.parts.set_enabled(joint, enabled)
 
     @Slot(str, result=bool)
     def isJointEnabled(self, joint: str) -> bool:
         """Return whether the effort of a joint is shown."""
-        return self._switched.get(joint, True)
+        return self.parts.is_enabled(joint)
 
     @Slot(str, result=float)
     def maxEffort(self, joint: str) -> float:
@@ -487,20 +496,10 @@ class EffortDisplay(HistoryDisplay):
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
         """Take the settings of a file of either RViz, and which joints it shows."""
-        joints = saved.get("Joints")
-        for name, state in (joints if isinstance(joints, dict) else {}).items():
-            shown = state.get("Value") if isinstance(state, dict) else state
-            if isinstance(shown, bool):
-                self._switched[str(name)] = shown
-        return super().load_settings(saved)
+        return super().load_settings(saved) + self.parts.load(saved)
 
     def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
         """Return the settings for a file of one RViz, with the joints that are shown."""
         kept = super().save_settings(older, ros)
-        joints = dict(kept["Joints"]) if isinstance(kept.get("Joints"), dict) else {}
-        for name, shown in self._switched.items():
-            inner = joints.get(name)
-            joints[name] = {**(inner if isinstance(inner, dict) else {}), "Value": shown}
-        if joints:
-            kept["Joints"] = joints
+        self.parts.save(kept)
         return kept
