@@ -308,17 +308,17 @@ def test_settings_without_effect_are_hidden(bench: SceneBench, model: Any) -> No
     assert "Line Width" in rows_of("Grid")
     model.add("PointCloud2", "")
     cloud = bench.view.scene.displays[1]
-    colours = {"Axis", "Color", "Channel Name", "Use rainbow", "Min Color", "Min Intensity"}
-    assert not colours & set(rows_of("PointCloud2"))
+    colors = {"Axis", "Color", "Channel Name", "Use rainbow", "Min Color", "Min Intensity"}
+    assert not colors & set(rows_of("PointCloud2"))
     assert "Size (m)" in rows_of("PointCloud2")
     cloud.style, cloud.colorTransformer = "Points", "Intensity"
-    assert colours & set(rows_of("PointCloud2")) == {"Channel Name", "Use rainbow"}
+    assert colors & set(rows_of("PointCloud2")) == {"Channel Name", "Use rainbow"}
     assert "Size (m)" not in rows_of("PointCloud2")
     assert {"Size (Pixels)", "Invert Rainbow"} <= set(rows_of("PointCloud2"))
     cloud.useRainbow = cloud.autocomputeIntensityBounds = False
     assert {"Min Color", "Min Intensity"} <= set(rows_of("PointCloud2"))
     cloud.colorTransformer = "AxisColor"
-    assert colours & set(rows_of("PointCloud2")) == {"Axis"}
+    assert colors & set(rows_of("PointCloud2")) == {"Axis"}
     # What is hidden is saved all the same.
     assert cloud.save_settings()["Min Intensity"] == 0.0
 
@@ -332,7 +332,7 @@ def test_each_condition_names_a_property(bench: SceneBench) -> None:
                 assert setting.is_shown(display) in (True, False)
 
 
-def test_a_colour_is_changed_while_rows_come_and_go(bench: SceneBench, model: Any) -> None:
+def test_a_color_is_changed_while_rows_come_and_go(bench: SceneBench, model: Any) -> None:
     from PySide6.QtGui import QColor
 
     (grid,) = bench.view.scene.displays
@@ -558,7 +558,7 @@ def test_a_display_is_dragged_by_the_mouse(bench: SceneBench, window: Any) -> No
     assert outline(rows.scene) == ["TF", "Axes", "Robot", []]
 
 
-def test_the_view_shows_the_colour_that_a_dialog_has(bench: SceneBench, window: Any) -> None:
+def test_the_view_shows_the_color_that_a_dialog_has(bench: SceneBench, window: Any) -> None:
     from PySide6.QtCore import QMetaObject, QObject
     from PySide6.QtGui import QColor
 

@@ -55,7 +55,7 @@ _GREY = (0.6, 0.6, 0.6, 1.0)
 #: RViz's axes of a link: length and diameter, metres.
 _AXES_M, _AXES_WIDTH_M = 0.1, 0.01
 #: The trail of a link: colour, width and distance of its points in metres, and how many there are.
-_TRAIL_COLOUR, _TRAIL_WIDTH_M, _TRAIL_STEP_M, _TRAIL_POINTS = (0.0, 0.5, 0.5, 1.0), 0.01, 0.02, 2000
+_TRAIL_COLOR, _TRAIL_WIDTH_M, _TRAIL_STEP_M, _TRAIL_POINTS = (0.0, 0.5, 0.5, 1.0), 0.01, 0.02, 2000
 #: Settings that each link has of its own.
 _LINK_DETAILS = (
     Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0),
@@ -318,7 +318,7 @@ class _Link:
         elif self.trail.count and (at == self._end).all():
             return
         self._end = at
-        self.trail.set_strip([*self._way, at], _TRAIL_COLOUR)
+        self.trail.set_strip([*self._way, at], _TRAIL_COLOR)
 
 
 class _Part:
