@@ -16,8 +16,8 @@ from PySide6.QtCore import QSize, Qt  # noqa: E402
 from PySide6.QtGui import QColor, QImage  # noqa: E402
 
 from rosglass.demo import framecode  # noqa: E402
+from rosglass.demo.app import CameraFigures, Latency, table  # noqa: E402
 from rosglass.demo.camera import CODE_POSITION, HEIGHT, WIDTH  # noqa: E402
-from rosglass.demo.figures import CameraFigures, Latency, table  # noqa: E402
 from rosglass.demo.pictures import paint_map, paint_scan, register  # noqa: E402
 from rosglass.errors import Error  # noqa: E402
 

@@ -13,9 +13,9 @@ import numpy as np
 from rosglass.comm import QoS, Time
 from rosglass.demo import telemetry, textures
 from rosglass.demo.operation import Operation
-from rosglass.demo.scan import LaserScanner
 from rosglass.demo.scene import MOUNT, faces_of, ramp_faces
 from rosglass.demo.telemetry import AXLES
+from rosglass.demo.world import LaserScanner
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

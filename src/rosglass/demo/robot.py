@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import ParameterDescriptor, QoS, Range, Time
 from rosglass.demo import telemetry
-from rosglass.demo.scan import LaserScanner, occupancy
 from rosglass.demo.simulation import CommandRejectedError, Simulation
+from rosglass.demo.world import LaserScanner, occupancy
 from rosglass.errors import Error, NodeClosedError, TypeNotFoundError, UnsupportedError
 from rosglass.images.encodings import opencv
 

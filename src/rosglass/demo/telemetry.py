@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rosglass.demo.scan import LaserScanner
 from rosglass.demo.scene import FOCAL, HEIGHT, MOUNT, WIDTH
 from rosglass.demo.simulation import FLIPPERS, Limits, RobotState
+from rosglass.demo.world import LaserScanner
 
 if TYPE_CHECKING:
     import numpy.typing as npt

@@ -13,9 +13,8 @@ pytest.importorskip("cv2", reason="the simulated cloud needs the extra `camera`"
 import rosglass
 from rosglass.comm import Time
 from rosglass.demo.equipment import Cloud
-from rosglass.demo.scan import LaserScanner
 from rosglass.demo.simulation import RobotState
-from rosglass.demo.world import World
+from rosglass.demo.world import LaserScanner, World
 
 if TYPE_CHECKING:
     import numpy.typing as npt

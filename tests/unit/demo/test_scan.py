@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rosglass.demo.scan import LaserScanner, cast, occupancy
-from rosglass.demo.world import World
+from rosglass.demo.world import LaserScanner, World, cast, occupancy
 
 
 def test_a_ray_ends_at_the_nearest_edge() -> None:
