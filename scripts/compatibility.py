@@ -22,7 +22,7 @@ from rosglass.qml.goal_handle import GoalHandle, RosGoalHandle
 from rosglass.qml.logger import Console, Logger
 from rosglass.qml.publisher import Publisher, RosPublisher
 from rosglass.qml.ros1 import Package
-from rosglass.qml.service_client import ServiceClient
+from rosglass.qml.services import ServiceClient
 from rosglass.qml.yaml_io import Io
 from rosglass.qt import QtCore
 

@@ -28,8 +28,7 @@ from rosglass.qml.parameter import Parameter
 from rosglass.qml.publisher import RosPublisher
 from rosglass.qml.replay import Replay
 from rosglass.qml.runtime import Runtime, own_runtime
-from rosglass.qml.service_client import Service
-from rosglass.qml.service_server import RosServiceServer, server_function
+from rosglass.qml.services import RosServiceServer, Service, server_function
 from rosglass.qml.singleton import ValueFunctions, check_type, is_list, strings
 from rosglass.qml.subscription import DEFAULT_QOS, Subscriber, next_message
 from rosglass.qml.synchronized_subscription import RosSynchronizedSubscription

@@ -24,8 +24,7 @@ from rosglass.qml.parameter import Parameter
 from rosglass.qml.publisher import Publisher
 from rosglass.qml.replay import Replay
 from rosglass.qml.runtime import own_runtime
-from rosglass.qml.service_client import ServiceClient
-from rosglass.qml.service_server import ServiceServer, server_function
+from rosglass.qml.services import ServiceClient, ServiceServer, server_function
 from rosglass.qml.singleton import (
     ValueFunctions,
     check_type,
