@@ -23,12 +23,17 @@ from rosglass.rviz.access import RvizAccess
 from rosglass.rviz.entries import Entries, OverlayMenu
 from rosglass.rviz.host import cpp_function, require_rviz
 from rosglass.rviz.lost_screen import LostScreen
-from rosglass.rviz.master import MasterWatch, wait_for_master
 from rosglass.rviz.overlay import log_uncaught_errors
 from rosglass.rviz.qml_overlay import QmlOverlay
 from rosglass.rviz.qt5 import QtGui, QtWidgets
 from rosglass.rviz.rendering import choice
-from rosglass.rviz.roscpp import connect_beside_rviz, name_node, shared_arguments
+from rosglass.rviz.roscpp import (
+    MasterWatch,
+    connect_beside_rviz,
+    name_node,
+    shared_arguments,
+    wait_for_master,
+)
 from rosglass.rviz.rviz_object import ACCESS
 from rosglass.rviz.stack import Stack
 from rosglass.rviz.view_controller import ViewKeys, ViewServices
