@@ -385,6 +385,8 @@ def test_a_second_node_of_the_name_leaves_the_screen(
     """)
     killed: list[int] = []
     live.session.killed.connect(lambda: killed.append(1))
+    # The last that the node registers by itself: as it does, it would take its name back.
+    wait(lambda: "/ui/set_logger_level" in live.robot.services())
     with rosglass.connect(url, name="ui"):
         wait(lambda: live.session.state == "failed")
         wait(lambda: root.property("n") == 1)

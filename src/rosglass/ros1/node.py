@@ -148,8 +148,8 @@ class Ros1Node(Node):
                 self._core,
                 RoscppServices(self, self._core, self._parameter_server, self._topic_names),
             )
-            self._core.start(self._parameter_server.changed)
             self._builtin_services.open(own_services)
+            self._core.start(self._parameter_server.changed)
         except BaseException:
             self._core.close()
             raise

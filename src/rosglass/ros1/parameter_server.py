@@ -628,6 +628,8 @@ class ParameterWatches:
 class ParameterWatch(Member):
     """The node's subscription to one parameter or namespace."""
 
+    lists_node = True
+
     def __init__(self, core: TcprosCore, watches: ParameterWatches, name: str) -> None:
         self.name = name
         self._core, self._watches = core, watches

@@ -443,6 +443,8 @@ class GoalProbe(Member):
         name: Full name of their type.
     """
 
+    lists_node = True
+
     def __init__(self, core: TcprosCore, topics: Topics, topic: str, name: str) -> None:
         self._core, self._topics, self._topic, self._name = core, topics, topic, name
         #: Replaced, never changed, and in the loop's thread only.

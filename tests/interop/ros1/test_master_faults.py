@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import threading
@@ -210,6 +211,19 @@ def test_the_older_of_two_nodes_of_a_name_ends(own_master, connect, request, pee
         eventually(lambda: registered(own_master, "/new")[0] == ["/twin"])
         assert newer.status().state is ConnectionState.CONNECTED
     eventually(lambda: registered(own_master, "/old")[0] == [])
+
+
+def test_a_node_on_the_port_of_one_that_was_killed_does_not_end_in_its_place(
+    own_master, connect, caplog
+):
+    caplog.set_level(logging.INFO, "rosglass.ros1")
+    node = connect("panel", url=own_master.url)
+    publish = ("registerPublisher", "/old", "std_msgs/Empty")
+    own_master.call(*publish, own_master.call("lookupNode", "/panel"), caller="/killed")
+    own_master.call(*publish, "http://127.0.0.1:1/", caller="/killed")  # it is started again
+    eventually(lambda: "/panel: ignored, as it has its name: closed by /master" in caplog.text)
+    assert "[/killed] Reason: new node registered with same name" in caplog.text
+    assert node.status().state is ConnectionState.CONNECTED
 
 
 def test_a_node_ends_although_the_master_cannot_tell_it_that_its_name_is_taken(own_master, connect):

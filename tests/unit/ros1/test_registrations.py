@@ -18,6 +18,7 @@ from waiting import eventually
 import rosglass
 from rosglass.comm import ConnectionState, EndpointKind, NodeName
 from rosglass.comm.builtin_services import BuiltinServices
+from rosglass.ros1.parameter_server import ParameterWatches
 from rosglass.wires.tcpros import address, registrations
 from rosglass.wires.tcpros.publication import Publication
 from rosglass.wires.tcpros.topic_subscription import TopicSubscription
@@ -221,6 +222,73 @@ def test_a_new_network_address_is_announced_and_the_node_lives_on(
         eventually(lambda: node.status().state is ConnectionState.CLOSED)
 
 
+#: The API of a node that was killed: the master lists it, but it does not answer.
+GONE = "http://127.0.0.1:1/"
+
+
+def test_a_node_that_was_killed_has_its_name_only_until_the_next_one_registers(
+    master: FakeMaster,
+) -> None:
+    master.publishers["/old"] = {"/panel": GONE}
+    # The program's start parameters are set, but nothing lists the node yet.
+    master.answers["subscribeParam"] = lambda *_: [0, "not now", 0]
+    node = connected(master)
+    for _ in range(2):
+        master.calls.clear()
+        eventually(lambda: "getSystemState" in master.calls, node.status)
+    assert node.status().state is ConnectionState.CONNECTED
+    assert core_of(node).name.full in master.publishers["/old"]
+    node.close()
+
+
+def test_a_connected_node_has_its_name(master: FakeMaster, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked, join = threading.Event(), ParameterWatches._join
+    listed: list[bool] = []
+
+    def answer(node: str) -> Any:
+        listed.append(master.lookupNode("", node)[0] == 1)
+        asked.set()
+        return master.getSystemState(node)
+
+    def join_late(*arguments: Any) -> None:
+        asked.wait(0.3)  # the master must not be asked before
+        join(*arguments)
+
+    master.answers["getSystemState"] = answer
+    monkeypatch.setattr(ParameterWatches, "_join", join_late)
+    with connected(master):
+        assert listed[0]
+
+
+def test_a_later_node_of_the_name_ends_a_node(master: FakeMaster, node: Any) -> None:
+    eventually(lambda: master.lookupNode("", "/panel")[2] == node_uri(node))
+    master.answers["lookupNode"] = lambda *_: [1, "", GONE]  # and its call gets lost
+    eventually(lambda: node.status().state is ConnectionState.CLOSED)
+    taken = f"new node registered with same name; {GONE} has the name /panel now"
+    assert node.status().detail == f"closed by {node.master_uri}: {taken}"
+    assert not node.status().killed
+
+
+@pytest.mark.parametrize(
+    "reason",
+    [
+        "[/before] Reason: new node registered with same name",  # a node that had our port
+        "[/panel] Reason: new node registered with same name",  # but we have it again
+    ],
+)
+def test_a_call_of_the_master_that_is_out_of_date_ends_no_node(
+    master: FakeMaster, node: Any, reason: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO, "rosglass.ros1")
+    shut_down(node, "/master", reason)
+    eventually(
+        lambda: f"/panel: ignored, as it has its name: closed by /master: {reason}" in caplog.text
+    )
+    assert node.status().state is ConnectionState.CONNECTED
+    shut_down(node, "/rosnode", "user request")
+    eventually(lambda: node.status().state is ConnectionState.CLOSED)
+
+
 def test_own_messages_are_ignored_also_after_the_address_has_changed(
     master: FakeMaster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -255,7 +323,7 @@ def test_a_node_that_somebody_else_closes_looks_nothing_up_any_more(
     master.offer("/add", 1)
     eventually(lambda: "/add" in node.services())
     core = core_of(node)
-    shut_down(node, "/master", "[/panel] Reason: new node registered with same name")
+    shut_down(node, "/rosnode", "user request")
     eventually(lambda: node.status().state is ConnectionState.CLOSED)
     eventually(lambda: "shutdown" not in [thread.name for thread in threading.enumerate()])
     ran = threading.Event()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 import threading
 from collections import deque
 from contextlib import suppress
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 from rosglass.comm import ConnectionState, Status
 from rosglass.comm.core import NodeCore
 from rosglass.comm.types import Types
-from rosglass.errors import DefinitionConflictError, Error, MasterError, TypeNotFoundError
+from rosglass.errors import DefinitionConflictError, Error, TypeNotFoundError
 from rosglass.interfaces import adding_definitions, full_text, join_name, split_name
 from rosglass.messages import MessageType, ServiceType, load
 from rosglass.wires.tcpros.address import bracketed, own_address
@@ -29,9 +30,13 @@ if TYPE_CHECKING:
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType
 
-__all__ = ["AnnouncedTypes", "BlockingPool", "TcprosCore", "TcprosOptions"]
+__all__ = ["NAME_TAKEN", "AnnouncedTypes", "BlockingPool", "TcprosCore", "TcprosOptions"]
 
 _log = logging.getLogger("rosglass.ros1")
+#: The master's reason when it ends a node because another one has registered under its name;
+#: rosmaster puts the name before it: ``[/panel] Reason: new node registered with same name``.
+NAME_TAKEN = "new node registered with same name"
+_NAMED_REASON = re.compile(r"\[(/[^\]]*)\] Reason: ")
 #: Seconds that the master may take to look up the node's name.
 _OWNER_TIMEOUT_S = 1.0
 #: Jobs in progress at once: calls of nodes that are gone, but still registered, time out, and
@@ -147,27 +152,33 @@ class TcprosCore(NodeCore):
 
     def _shut_down(self, caller: str, reason: str) -> None:
         detail = f"closed by {caller}: {reason or 'no reason given'}"
-        owner = ""
+        taken, owner = NAME_TAKEN in reason, ""
         with suppress(Error):
-            owner = self._name_owner()
-        if not owner and len(self.uris) > 1 and "same name" in reason:
-            return  # the new owner of the name is this node, under its new address
-        if owner and owner not in detail:
+            owner = str(self.master.call("lookupNode", self.name.full, timeout=_OWNER_TIMEOUT_S))
+        if taken and self._is_out_of_date(reason, owner):
+            _log.info("%s: ignored, as it has its name: %s", self.name, detail)
+            return
+        is_lost = bool(owner) and owner not in self.uris
+        if is_lost:
             detail += f"; {owner} has the name {self.name} now"
         _log.warning("%s: %s", self.name, detail)
-        self.close(detail, killed=not owner and "same name" not in reason)
+        self.close(detail, killed=not taken and not is_lost)
 
-    def _name_owner(self) -> str:
-        """Return the URI of another node that has this node's name; empty if there is none.
+    def _is_out_of_date(self, reason: str, owner: str) -> bool:
+        """Return whether a node's name was taken, but not this node's, or not any more.
 
-        Raises:
-            ConnectionLostError: The master does not answer.
+        The master calls the URI under which a node was registered. By then, that may be the URI of
+        another node that got its port, or this node may have registered again.
+
+        Args:
+            reason: The master's.
+            owner: URI of the node that the master lists under this node's name; empty for none.
         """
-        try:
-            uri = self.master.call("lookupNode", self.name.full, timeout=_OWNER_TIMEOUT_S)
-        except MasterError:
-            return ""
-        return "" if uri in self.uris else str(uri)
+        named = _NAMED_REASON.match(reason)
+        if named and named[1] != self.name.full:
+            return True
+        # With several URIs, the new node is this one under its new address.
+        return owner in self.uris or (not owner and len(self.uris) > 1)
 
     def _notify_closed(self, status: Status) -> None:
         self.set_status(status)

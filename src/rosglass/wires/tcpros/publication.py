@@ -63,6 +63,8 @@ class Publication(Member):
         numbers: The sequence numbers of messages that begin with a header.
     """
 
+    lists_node = True
+
     def __init__(
         self,
         core: TcprosCore,

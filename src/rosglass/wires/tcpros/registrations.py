@@ -19,6 +19,7 @@ from rosglass.comm.core import NodeMember
 from rosglass.comm.log_limits import LogOnce
 from rosglass.errors import ConnectionLostError, Error, MasterError
 from rosglass.wires.tcpros.address import explain_unreachable, own_address, parse_uri
+from rosglass.wires.tcpros.core import NAME_TAKEN
 from rosglass.wires.tcpros.master import Master
 
 if TYPE_CHECKING:
@@ -44,9 +45,12 @@ class Member(NodeMember):
     Attributes:
         endpoint: Its kind and name in the master's graph: it is registered again if it is missing
             there. None for members that the graph does not show.
+        lists_node: Whether the master lists the node under its name once this is registered: only
+            calls with the node's URI take the name from another node.
     """
 
     endpoint: tuple[EndpointKind, str] | None = None
+    lists_node = False
 
     def register(self, master: Master) -> None:
         """Register it; called on a thread that may wait, again after the master's restart.
@@ -102,8 +106,11 @@ class Registrations:
         return self._thread is threading.current_thread()
 
     def start(self) -> None:
-        """Start polling the master."""
+        """Start polling the master, first for the members that the loop's jobs are adding."""
+        self._wanted.clear()
         self._thread.start()
+        # A node that is connected has its name: a later one of that name ends it, not the reverse.
+        self._core.loop.call(self._wanted.set)
 
     def wake(self) -> None:
         """Register new members soon; from any thread."""
@@ -135,6 +142,7 @@ class Registrations:
     # -- the thread ------------------------------------------------------------------------------
 
     def _work(self) -> None:
+        self._wanted.wait()
         while True:
             self._wanted.clear()
             if self._closing:
@@ -150,9 +158,8 @@ class Registrations:
         core = self._core
         changed = False
         try:
-            successor = self._check_master()
-            if successor:
-                core.shut_down(core.master.uri, f"{successor} has the name {core.name} now")
+            if self._check_master():
+                core.shut_down(core.master.uri, NAME_TAKEN)
                 return
             if not core.options.address and core.set_host(own_address(core.master.reached_from)):
                 # The machine has changed network: the registrations carry the new address.
@@ -171,10 +178,12 @@ class Registrations:
         if changed:
             core.wake()
 
-    def _check_master(self) -> str:
-        """Detect a restart of the master; return the URI of a node that took this one's name."""
+    def _check_master(self) -> bool:
+        """Detect a restart of the master; return whether another node took this one's name."""
         core = self._core
         process, uri = core.master.call("getPid"), ""
+        # Until then, the master may list a node that was killed under this name.
+        listed = any(member.lists_node for member in self._registered)
         if self._registered:
             with suppress(
                 MasterError
@@ -186,7 +195,7 @@ class Registrations:
                 self._tried.clear()
                 self._leaving.clear()
         self._process = process
-        return "" if not uri or uri in core.uris else str(uri)
+        return listed and bool(uri) and uri not in core.uris
 
     def _unregister(self) -> None:
         while self._leaving:

@@ -59,6 +59,7 @@ class TcprosReplier(Replier, Member):
         type: The service type.
     """
 
+    lists_node = True
     tells_failures = has_refusals = True
     max_reply = MAX_FRAME
 

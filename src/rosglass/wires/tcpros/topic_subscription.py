@@ -82,6 +82,8 @@ class TopicSubscription(Member):
         eager: Whether messages are handed on as they are received.
     """
 
+    lists_node = True
+
     def __init__(
         self,
         core: TcprosCore,
