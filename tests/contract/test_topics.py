@@ -201,7 +201,8 @@ def test_a_latched_message_comes_to_whoever_is_late(robot, console, topic):
 
 
 def test_big_messages_come_whole(link):
-    publisher, subscription = link(IMAGE)
+    # Zenoh drops a big message for a receiver under load that does not keep all.
+    publisher, subscription = link(IMAGE, qos=KEEP_ALL)
     data = bytes(range(256)) * 12000
     publisher.publish(width=1000, height=1024, step=3000, encoding="rgb8", data=data)
     message = subscription.wait(30).message()

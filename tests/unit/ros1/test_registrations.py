@@ -479,7 +479,12 @@ def test_a_publisher_out_of_reach_is_told_once_for_all_its_topics_and_when_it_is
     robot = connected(master, "robot")
     for topic in topics:
         robot.create_publisher(topic, "std_msgs/String")
-    eventually(lambda: all(one.publisher_count() for one in heard))
+    # Connected, which is more than being listed: from then on the publisher's name is known.
+    eventually(
+        lambda: all(
+            any(link.connected for link in publisher_links(node, topic)) for topic in topics
+        )
+    )
 
     def told(what: str) -> list[str]:
         return [r.getMessage() for r in caplog.records if what in r.getMessage()]

@@ -456,7 +456,7 @@ def test_a_restarted_server_does_not_know_the_goal(client, peer, eventually):
     assert goal.status is LOST
 
 
-def test_a_restarted_server_that_does_not_answer(client, peer, impatient, eventually):
+def test_a_restarted_server_that_does_not_answer(client, peer, monkeypatch, eventually):
     lost, known = client.send_goal(), client.send_goal()
     peer.answer(1)
     peer.answer(2)
@@ -465,6 +465,8 @@ def test_a_restarted_server_that_does_not_answer(client, peer, impatient, eventu
     peer.appear(gid=b"t" * 16)
     eventually(lambda: len(peer.asked) == 4)
     peer.tell(known, 2)  # somebody has it: the server only looks new
+    eventually(lambda: known.status is EXECUTING)
+    monkeypatch.setattr("rosglass.ros2.action_client.GRACE_S", 0.05)
     with pytest.raises(rosglass.ConnectionLostError, match="went away before"):
         lost.result(30)
     peer.feed(known, 1)
