@@ -85,17 +85,20 @@ def test_a_request_does_not_outlast_its_server(live: Bench, wait: Any, monkeypat
     root: Any = live.load("""
         QtObject {
             property var client: Ros2.createServiceClient("/dock", "std_srvs/Trigger")
+            property var lost: Ros2.createServiceClient("/nowhere", "std_srvs/Trigger")
             property string rejected
+            property string waited
             function ready() { return client.ready }
             function send() {
-                client.connectionTimeout = 100
+                client.connectionTimeout = lost.connectionTimeout = 100
                 client.call().catch(function (e) { rejected = e.message })
+                lost.call().catch(function (e) { waited = e.message })
             }
         }
     """)
     wait(root.ready)
     root.send()
-    wait.nothing_happens(0.5)
+    wait(lambda: "no server" in root.property("waited"))
     # A server that is there may take as long as it likes.
     assert root.property("rejected") == ""
     root.property("client")._on_ready(False)

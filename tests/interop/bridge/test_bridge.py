@@ -151,7 +151,7 @@ def test_another_bridge_takes_over(bridge, connect):
     one.create_publisher("/later", STRING)
     two.create_subscription("/later", STRING)
     # What appears later is relayed later: by then it would have begun.
-    eventually(lambda: begun(second) == {("/later", "->")}, lambda: second.status())
+    eventually(lambda: begun(second) == {("/later", "->")}, second.status)
     first.close()
     eventually(lambda: ("/shared", "->") in begun(second))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-import time
 from concurrent.futures import Future
 
 import pytest
@@ -308,7 +307,7 @@ def test_a_master_that_is_killed_and_started_again(start_master, start_rospy, co
     client = console.create_service_client("/ours", BOOL)
     assert client.call().message == "ours"
     master.kill()
-    time.sleep(1.5)
+    eventually(lambda: console.status().state.value == "lost")
     assert client.call(timeout=30).message == "ours", "it is called where it was"
     master.start()
     eventually(lambda: ["/ours", ["/robot"]] in master.call("getSystemState")[2])

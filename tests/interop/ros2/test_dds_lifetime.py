@@ -22,6 +22,16 @@ KEEP_ALL = QoS(history=History.KEEP_ALL)
 pytestmark = pytest.mark.peers
 
 
+#: A program that subscribes and says so, for both sides to know of each other.
+READER = f"""
+subscription = node.create_subscription('/big', '{IMAGE}')
+while not subscription.publisher_count():
+    time.sleep(0.01)
+print('matched', flush=True)
+time.sleep(60)
+"""
+
+
 def program(text: str, domain: int) -> subprocess.Popen[str]:
     """Start a program that connects to `domain` as `node`."""
     head = f"import os, sys, time, rosglass\nnode = rosglass.connect('dds://?domain={domain}')\n"
@@ -138,10 +148,11 @@ for _ in range(4):
 @pytest.fixture
 def stuck(dds_connect, dds_domain):
     """A publisher whose only reader does not answer any more, but has not left either."""
-    reader = program(f"node.create_subscription('/big', '{IMAGE}')\ntime.sleep(60)", dds_domain)
+    reader = program(READER, dds_domain)
     publisher = dds_connect("talker").create_publisher("/big", IMAGE, KEEP_ALL)
     eventually(publisher.subscription_count)
-    time.sleep(0.2)
+    assert reader.stdout is not None
+    assert reader.stdout.readline() == "matched\n"
     reader.send_signal(signal.SIGSTOP)
     yield publisher
     reader.kill()
@@ -194,12 +205,13 @@ print('publishing', flush=True)
 while True:
     publisher.publish_serialized(data)
 """
-    reader = program(f"node.create_subscription('/big', '{IMAGE}')\ntime.sleep(60)", dds_domain)
+    reader = program(READER, dds_domain)
     process = program(text, dds_domain)
     assert process.stdout is not None
     assert process.stdin is not None
+    assert reader.stdout is not None
     assert process.stdout.readline() == "ready\n"
-    time.sleep(1.0)
+    assert reader.stdout.readline() == "matched\n"
     reader.send_signal(signal.SIGSTOP)
     print(file=process.stdin, flush=True)
     assert process.stdout.readline() == "publishing\n"
