@@ -751,6 +751,42 @@ CASES: dict[str, Case] = {
         ],
         parameters={"/rover": ROBOT},
     ),
+    "frames that are all hidden but one": Case(
+        [
+            display("TF", Show_Names=False, Marker_Scale=3.0,
+                    Frames={"All Enabled": False, "base": {"Value": True}}),
+        ],
+    ),
+    "settings of links": Case(
+        [
+            display("RobotModel", Robot_Description="rover",
+                    Links={"All Links Enabled": True, "chassis": {"Value": True, "Alpha": 0.4},
+                           "plain": {"Value": False}}),
+            display("RobotModel", Robot_Description="rover", TF_Prefix="second",
+                    Links={"All Links Enabled": False, "plain": {"Value": True}}),
+        ],
+        parameters={"/rover": ROBOT},
+    ),
+    "axes of links": Case(
+        [
+            display("RobotModel", Robot_Description="rover", TF_Prefix="second",
+                    Links={"All Links Enabled": False,
+                           "plain": {"Value": True, "Alpha": 0.0, "Show Axes": True}}),
+        ],
+        # From above they are too small to be compared.
+        parameters={"/rover": ROBOT}, views=("Orbit",),
+    ),
+    "namespaces": Case(
+        [
+            display("MarkerArray", "/namespaces", Namespaces={"away": False, "here": True}),
+        ],
+        [
+            Message("/namespaces", "visualization_msgs/MarkerArray", {"markers": [
+                marker(0, 1, "red", pose(-1.5, -1, 0, 0.4), (1, 0.7, 0.5), ns="away"),
+                marker(0, 3, "green", pose(1, -1, 0.5), (0.4, 0.4, 1), ns="here"),
+                marker(0, 1, "yellow", pose(1.5, 1), (0.3, 1, 0.3), ns="new")]}),
+        ],
+    ),
     "covariances of all kinds": Case(
         [
             display("PoseWithCovariance", "/covariance", Color=RED, Shape="Axes", Axes_Length=0.7,

@@ -163,10 +163,10 @@ def test_namespaces_are_bounded_and_empty_ones_make_room(
 def test_hidden_namespaces_are_saved(show: Callable[..., Any]) -> None:
     display = show(marker(1, ns="a"), marker(1, ns="b"))
     assert display.save_settings()["Namespaces"] == {}
-    display.setNamespaceEnabled("a", False)
     assert display.parts.load({"Namespaces": {"c": False, "d": True}}) == []
+    display.setNamespaceEnabled("a", False)
     saved = display.save_settings({"Namespaces": {"b": True, "d": False}})
-    assert saved["Namespaces"] == {"b": True, "d": True, "a": False, "c": False}
+    assert saved["Namespaces"] == {"b": True, "d": True, "c": False, "a": False}
     show(marker(1, ns="c"))
     assert len(drawables(display)) == 1
 

@@ -57,8 +57,13 @@ class Parts:
         self._switched[name] = enabled
         self._on_change()
 
+    def set_all(self, enabled: bool) -> None:
+        """Show or hide all parts that there are."""
+        self._switched.update(dict.fromkeys([*self.names(), *self._switched], enabled))
+        self._on_change()
+
     def follow_default(self) -> None:
-        """Show or hide all parts, by the default."""
+        """Show or hide all parts, also those to come, by the default."""
         self._switched.clear()
         self._on_change()
 
@@ -77,12 +82,14 @@ class Parts:
         self._on_change()
 
     def load(self, saved: Mapping[str, Any]) -> list[str]:
-        """Take what a display's settings in a file say of its parts.
+        """Take what a display's settings in a file say of its parts, and nothing else.
 
         Returns:
             What was left out, in words: values that do not fit.
         """
         refused = []
+        self._switched.clear()
+        self._values.clear()
         parts = saved.get(self.title)
         for name, state in (parts if isinstance(parts, dict) else {}).items():
             if isinstance(state, dict) != self._as_mapping:
@@ -96,7 +103,6 @@ class Parts:
                         self._values.setdefault(name, {})[path] = detail.restore(state[path])
                     except Error as error:
                         refused.append(f"{self.title}/{name}/{path}: {error}")
-        self._on_change()
         return refused
 
     def save(self, kept: dict[str, Any]) -> None:

@@ -77,7 +77,7 @@ class TFDisplay(Display):
     whitelist = Setting("Filter (whitelist)", "string", "", "Regular expression of frames to show.")
     blacklist = Setting("Filter (blacklist)", "string", "", "Regular expression of frames to hide.")
     allEnabled = Setting(
-        "Frames/All Enabled", "bool", True, "Shows or hides all frames, and those to come.",
+        "Frames/All Enabled", "bool", True, "Shows or hides all frames that there are.",
         then="_on_all_enabled",
     )  # fmt: skip
 
@@ -100,8 +100,7 @@ class TFDisplay(Display):
         self.parts: Parts = Parts(
             "Frames",
             lambda: self.scene.frames() if self.scene is not None else (),
-            self._draw,
-            default=lambda: self.allEnabled,
+            self._on_frames_switched,
             describe=self._describe,
             as_mapping=True,
         )
@@ -125,11 +124,21 @@ class TFDisplay(Display):
         yield from self.describe_frame(frame)
 
     def _on_all_enabled(self) -> None:
-        self.parts.follow_default()
+        # As in RViz, frames that come later are shown.
+        self.parts.set_all(self.allEnabled)
+
+    def _on_frames_switched(self) -> None:
+        if self.allEnabled and not all(map(self.parts.is_enabled, self.parts.names())):
+            # Only says so: it switches no frame.
+            self._allEnabled = False
+            self.allEnabledChanged.emit()  # type: ignore[attr-defined]
+        self._draw()
 
     def load_settings(self, saved: Any) -> list[str]:
         """Take the settings of a file, and which frames it shows."""
-        return super().load_settings(saved) + self.parts.load(saved)
+        refused = super().load_settings(saved) + self.parts.load(saved)
+        self._draw()
+        return refused
 
     def save_settings(self, older: Any = None, ros: int = 2) -> dict[str, Any]:
         """Return the settings for a file, with the frames that are shown."""
