@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     Colour = tuple[int, int, int]
     Locator = Callable[[float, float], tuple[int, int]]
 
-__all__ = ["PIXELS_PER_METRE", "SUN", "TILED", "ground", "panorama", "shadow_length", "sides"]
+__all__ = ["PIXELS_PER_METRE", "SUN", "TILED", "ground", "panorama", "sides"]
 
 #: Resolution of side textures that repeat along a wall.
 PIXELS_PER_METRE = 220
@@ -29,11 +29,6 @@ TILED = frozenset({"panel", "brick", "hazard", "container"})
 SUN = (-0.62, -0.55, 0.56)
 _GROUND_SCALE = 96
 _CRATE: Colour = (176, 128, 74)
-
-
-def shadow_length() -> float:
-    """Return the length of the shadow of an object one metre high, metres."""
-    return math.hypot(SUN[0], SUN[1]) / SUN[2]
 
 
 def _noise(

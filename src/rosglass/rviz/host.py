@@ -30,7 +30,6 @@ __all__ = [
     "AfterEvent",
     "Hook",
     "address",
-    "as_pyqt",
     "as_pyside",
     "class_of",
     "cpp_function",
@@ -127,12 +126,6 @@ def as_pyside(item: Any, kind: type[_T]) -> _T:
     shiboken = importlib.import_module("shiboken2")
     wrapped: _T = shiboken.wrapInstance(int(pyqt("sip").unwrapinstance(item)), kind)
     return wrapped
-
-
-def as_pyqt(item: QtCore.QObject, kind: Any) -> Any:
-    """Return the PyQt5 wrapper of a PySide2 object, e.g. for RViz's bindings."""
-    shiboken = importlib.import_module("shiboken2")
-    return pyqt("sip").wrapinstance(int(shiboken.getCppPointer(item)[0]), kind)
 
 
 @cache

@@ -669,12 +669,6 @@ class Mesh(Drawable):
         self.count = len(rows) if len(self.shape.faces) else 0
         self.changed(geometry=True)
 
-    def set_shape(self, shape: Shape) -> None:
-        """Draw another shape in the same places."""
-        self.shape = shape
-        self.count = len(self.instances) if len(shape.faces) else 0
-        self.changed(geometry=True)
-
     def set_texture(self, pixels: NDArray[np.uint8] | None) -> None:
         """Put an image of shape (h, w, 4) on it; None for none.
 

@@ -777,13 +777,6 @@ class CloudHistory:
         """Number of points of all clouds."""
         return self._points
 
-    @property
-    def next_expiry_s(self) -> float | None:
-        """Time at which :meth:`expire` has something to remove; None if it never has."""
-        if not self._entries or not self._decay_time_s:
-            return None
-        return self._entries[0].received_s + self._decay_time_s
-
     def add(
         self, cloud: Cloud, transform: Any, received_s: float, stamp: Time | None = None
     ) -> tuple[CloudEntry, list[CloudEntry]]:

@@ -420,21 +420,6 @@ class RvizConfig:
         found = self.root.get("Panels")
         return found if isinstance(found, list) else []
 
-    @property
-    def window_geometry(self) -> dict[str, Any]:
-        """The mapping ``Window Geometry``: RViz's window and docked panels."""
-        return _child(self.root, "Window Geometry", create=False)
-
-    @property
-    def preferences(self) -> dict[str, Any]:
-        """The mapping ``Preferences``."""
-        return _child(self.root, "Preferences", create=False)
-
-    @property
-    def transformation(self) -> dict[str, Any]:
-        """The mapping ``Transformation`` of RViz 2: the plugin that transforms."""
-        return _child(self.manager, "Transformation", create=False)
-
     def walk(self) -> Iterator[DisplayConfig]:
         """Iterate over all displays, each group before its displays."""
         stack = [iter(self.displays)]

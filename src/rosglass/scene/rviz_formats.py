@@ -48,7 +48,6 @@ __all__ = [
     "write_deviations",
     "write_marker_namespace",
     "write_topic",
-    "write_vector",
 ]
 
 # -- classes of plugins ----------------------------------------------------------------------------
@@ -281,18 +280,6 @@ def read_vector(value: Any, name: str = "value", parts: str = "XYZ") -> tuple[fl
     if not isinstance(value, dict) or any(part not in value for part in parts):
         raise Error(f"{name}: expected a mapping of {', '.join(parts)}, got {shown(value)}")
     return tuple(float(read_number(value[part], f"{name}/{part}")) for part in parts)
-
-
-def write_vector(vector: Sequence[float], name: str = "value") -> dict[str, float]:
-    """Return a vector of three numbers, or a quaternion (x, y, z, w), as RViz writes it.
-
-    Raises:
-        Error: It has another length, or a number that is not finite.
-    """
-    if len(vector) not in {3, 4}:
-        raise Error(f"{name}: expected 3 or 4 numbers, got {len(vector)}")
-    numbers = [float(read_number(float(part), name)) for part in vector]
-    return dict(zip("XYZW", numbers, strict=False))
 
 
 # -- topics ----------------------------------------------------------------------------------------

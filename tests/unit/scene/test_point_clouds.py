@@ -449,7 +449,7 @@ def test_a_point_is_described_as_in_rviz() -> None:
 def test_without_decay_time_the_last_cloud_stays() -> None:
     history = CloudHistory()
     first, removed = history.add(cloud(), IDENTITY, 10.0)
-    assert (history.entries, removed, history.next_expiry_s) == ((first,), [], None)
+    assert (history.entries, removed) == ((first,), [])
     assert history.expire(1e9) == []
     second, removed = history.add(cloud(random_points(9)), IDENTITY, 11.0)
     assert (history.entries, removed, history.point_count) == ((second,), [first], 9)
@@ -458,14 +458,13 @@ def test_without_decay_time_the_last_cloud_stays() -> None:
 def test_clouds_stay_for_the_decay_time() -> None:
     history = CloudHistory(decay_time_s=2.0)
     entries = [history.add(cloud(), IDENTITY * 1.0, float(at))[0] for at in (0, 1)]
-    assert history.next_expiry_s == 2.0
     assert history.expire(1.99) == []
     assert history.expire(2.0) == entries[:1]
     third, removed = history.add(cloud(), IDENTITY, 3.5)
     assert (removed, history.entries) == (entries[1:], (third,))
     # As in RViz, the last one disappears, too.
     assert history.expire(5.5) == [third]
-    assert (history.point_count, history.next_expiry_s) == (0, None)
+    assert history.point_count == 0
     history.decay_time_s = 0
     history.add(cloud(), IDENTITY, 6.0)
     assert len(history.clear()) == 1

@@ -34,7 +34,6 @@ from rosglass.scene.rviz_formats import (
     write_deviations,
     write_marker_namespace,
     write_topic,
-    write_vector,
 )
 
 FOLDER = Path(__file__).parent / "rviz_configs"
@@ -142,8 +141,6 @@ def test_the_nav2_config() -> None:
     assert (view.type, view.settings["Scale"]) == ("TopDownOrtho", 54)
     assert nav2.saved_views == []
     assert nav2.panels[-1] == {"Class": "nav2_rviz_plugins/Docking", "Name": "Docking"}
-    assert nav2.window_geometry["Width"] == 1610
-    assert nav2.transformation == {"Current": {"Class": "rviz_default_plugins/TF"}}
 
 
 def test_a_config_of_ros_1_with_groups_in_groups() -> None:
@@ -180,7 +177,6 @@ def test_every_display_and_view_of_ros_1() -> None:
         "TwistStamped",
     }
     assert [view.type for view in found.saved_views] == [view.name for view in found.saved_views]
-    assert found.preferences == {"PromptSaveOnExit": True}
     assert read_topic(find(found, "Camera").settings) == TopicSetting(
         "some/topic/camera", 2, "Reliable"
     )
@@ -578,15 +574,11 @@ def test_colors_that_cannot_be_written() -> None:
 
 def test_vectors() -> None:
     assert read_vector({"X": 1, "Y": "2.50", "Z": 3e-5}) == (1, 2.5, 3e-5)
-    assert read_vector(write_vector((0, 0, 0, 1)), "Rotation", "XYZW") == (0, 0, 0, 1)
+    assert read_vector({"X": 0, "Y": 0, "Z": 0, "W": 1}, "Rotation", "XYZW") == (0, 0, 0, 1)
     with pytest.raises(Error, match=r"Offset: expected a mapping of X, Y, Z, got {.X.: 1}"):
         read_vector({"X": 1}, "Offset")
     with pytest.raises(Error, match="Offset/Y: expected a finite number, got 'nan'"):
         read_vector({"X": 1, "Y": "nan", "Z": 0}, "Offset")
-    with pytest.raises(Error, match="Offset: expected a finite number, got inf"):
-        write_vector((0, math.inf, 0), "Offset")
-    with pytest.raises(Error, match="expected 3 or 4 numbers, got 2"):
-        write_vector((0, 0))
 
 
 def test_numbers() -> None:

@@ -64,9 +64,6 @@ _LINK_DETAILS = (
 )
 #: Status lines of links without a transform, before the rest is counted.
 _MAX_LINK_LINES = 10
-_DESCRIPTION_KEYS = (
-    *("Description Source", "Description Topic", "Description File", "Robot Description"),
-)
 _AUTOMATIC, _TOPIC, _FILE, _PARAMETER = "Automatic", "Topic", "File", "Parameter"
 
 

@@ -93,7 +93,7 @@ VERSION, _SERIES = "11.0.1", "11."
 #: A time span without limit, in nanoseconds.
 INFINITY = 2**63 - 1
 
-_entity, _entity_p = c_int32, POINTER(c_int32)
+_entity = c_int32
 _int_p, _long_p, _size_p = POINTER(c_int32), POINTER(c_int64), POINTER(c_size_t)
 #: Result and argument types of every function that is called.
 _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
