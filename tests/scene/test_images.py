@@ -397,6 +397,22 @@ def test_settings_of_rviz_files(bench: SceneBench, load: Callable[..., Any]) -> 
     assert (kept["Image Topic"], kept["Queue Size"]) == ("/rear/image", 7)
     assert kept["Visibility"] == {"Value": True, "Grid": False}
     assert kept["Panel Geometry"] == place
+    # Displays in groups stand in them, as RViz looks for them there.
+    scene = display.scene
+    group = scene.add("Group", "Robot")
+    scene.move(scene.add("TF"), group=group)
+    kept = display.save_settings(saved, 1)
+    assert kept["Visibility"] == saved["Visibility"]
+    display.parts.set_enabled("TF", True)
+    display.parts.set_enabled("Robot", False)
+    assert display.hiddenDisplays == ["Grid", "Robot"]
+    inner = {"Value": False, "TF": True}
+    assert display.save_settings(saved, 1)["Visibility"] == {
+        "Grid": False,
+        "Robot": inner,
+        "Value": True,
+    }
+    assert display.parts.names() == ["Grid", "Robot", "TF"]
     (refused,) = display.load_settings({"Panel Geometry": {**place, "Width": "wide"}})
     assert "Panel Geometry/Width: expected a" in refused
 

@@ -27,6 +27,7 @@ from rosglass.qml.properties import ReadOnly, Writable, report
 from rosglass.qt import Property, QtCore, QtGui, Signal, Slot, is_alive
 from rosglass.scene.camera import PinholeCamera
 from rosglass.scene.display import Intake, OneTopicDisplay, Subscriptions
+from rosglass.scene.parts import Parts
 from rosglass.scene.rviz_formats import read_number
 from rosglass.scene.scene_view import SceneView
 from rosglass.scene.settings import Setting
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
     from rosglass.qml.session import Session
     from rosglass.scene.camera import Camera
+    from rosglass.scene.display import Display
     from rosglass.scene.drawing import Item
     from rosglass.scene.renderer import Frame
     from rosglass.scene.scene import Scene
@@ -471,6 +473,7 @@ class CameraDisplay(PictureDisplay):
         self._pose: NDArray[np.float64] | None = None
         self._placed_at = 0.0
         super().__init__(parent, runtime)
+        self.parts: Parts = _Visibility(self)
 
     # -- files -----------------------------------------------------------------------------------
 
@@ -483,14 +486,22 @@ class CameraDisplay(PictureDisplay):
     def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
         """Return the settings for a file of one RViz."""
         kept = super().save_settings(older, ros)
-        before = kept.get("Visibility")
-        names = [] if self.scene is None else [one.name for one in self.scene.displays]
-        hidden = set(self.hiddenDisplays)
-        kept["Visibility"] = {
-            **(before if isinstance(before, dict) else {"Value": True}),
-            **{name: name not in hidden for name in names if name != self.name},
-        }
+        kept["Visibility"] = {"Value": True, **self._visibility(kept.get("Visibility"), None)}
         return kept
+
+    def _visibility(self, before: Any, group: Display | None) -> dict[str, Any]:
+        """Return which displays of a group are shown, beside those that a file had."""
+        found = dict(before) if isinstance(before, dict) else {}
+        for one in self.scene.displays if self.scene is not None else ():
+            if one.group is not group or one is self:
+                continue
+            shown = self.parts.is_enabled(one.name)
+            if one.TYPE == "Group":
+                inner = self._visibility(found.get(one.name), one)
+                found[one.name] = {**inner, "Value": shown}
+            else:
+                found[one.name] = shown
+        return found
 
     # -- CameraInfo ------------------------------------------------------------------------------
 
@@ -656,6 +667,28 @@ class CameraDisplay(PictureDisplay):
             # Coordinates of pixels are those of their middles.
             centre=(place.x() + (lens.cx + 0.5) * across, place.y() + (lens.cy + 0.5) * down),
         )
+
+
+class _Visibility(Parts):
+    """The displays of a scene, each of which a camera shows or not, in RViz's list."""
+
+    def __init__(self, camera: CameraDisplay) -> None:
+        super().__init__("Visibility", self._others, lambda: None)
+        self._camera = camera
+
+    def _others(self) -> list[str]:
+        scene = self._camera.scene
+        names = [] if scene is None else [one.name for one in scene.displays]
+        return [name for name in dict.fromkeys(names) if name != self._camera.name]
+
+    def is_enabled(self, name: str) -> bool:
+        """Return whether displays of a name are shown."""
+        return name not in self._camera.hiddenDisplays
+
+    def set_enabled(self, name: str, enabled: bool) -> None:
+        """Show or hide the displays of a name."""
+        others = [one for one in self._camera.hiddenDisplays if one != name]
+        self._camera.hiddenDisplays = others if enabled else [*others, name]
 
 
 def _hidden_names(saved: Any) -> list[str]:
