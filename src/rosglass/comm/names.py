@@ -241,9 +241,18 @@ def anonymous_name(name: str) -> str:
     return re.sub("__+", "_", text)
 
 
+#: Names that are compared with one that is wrong, and letters of a name.
+_MAX_COMPARED_NAMES, _MAX_COMPARED_LETTERS = 500, 100
+
+
 def similar(name: str, known: Iterable[str]) -> str:
-    """Return a hint at known names that are similar to `name`; empty if there are none."""
-    names = [other for other in known if other != name]
+    """Return a hint at known names that are similar to `name`; empty if there are none.
+
+    Also where comparing takes long: for a name of more than 100 letters, or more than 500 names.
+    """
+    names = [other for other in known if other != name and len(other) <= _MAX_COMPARED_LETTERS]
+    if len(name) > _MAX_COMPARED_LETTERS or len(names) > _MAX_COMPARED_NAMES:
+        return ""
     base = name.rpartition("/")[2]
     near = [other for other in names if other.rpartition("/")[2] == base]
     plain = _plain(name)

@@ -422,7 +422,7 @@ class _Parser:
             self._warn(element, f"{where}: {broken.reason}; the default colour is used")
             return None
         if material is None:
-            hint = "" if len(self._warnings) > _MAX_WARNINGS else _hint(name, self._materials)
+            hint = "" if len(self._warnings) > _MAX_WARNINGS else similar(name, self._materials)
             self._warn(
                 element,
                 f"{where}: material {name!r} is not defined{hint}; the default colour is used",
@@ -466,7 +466,7 @@ class _Parser:
             link = found.get("link", "")
             if link not in links:
                 raise _Broken(
-                    found, f"{where}: there is no {end} link {link!r}{_hint(link, links)}"
+                    found, f"{where}: there is no {end} link {link!r}{similar(link, links)}"
                 )
             ends[end] = link
         try:
@@ -531,7 +531,7 @@ class _Parser:
         for joint in list(joints.values()):
             if joint.mimic is not None and joint.mimic.joint not in joints:
                 unknown = joint.mimic.joint
-                hint = "" if len(self._warnings) > _MAX_WARNINGS else _hint(unknown, joints)
+                hint = "" if len(self._warnings) > _MAX_WARNINGS else similar(unknown, joints)
                 joints[joint.name] = replace(joint, mimic=None)
                 self._warnings.append(
                     f"{self._source}: joint {joint.name!r} mimics {unknown!r}, which does not "
@@ -748,12 +748,6 @@ def _finite(name: str, value: Any) -> float:
     if not math.isfinite(number):
         raise ArgumentError(name, value, "a finite number")
     return number
-
-
-def _hint(name: str, known: Iterable[str]) -> str:
-    """Return a hint at a similar name; none where comparing would take long."""
-    names = [other for other in known if len(other) <= 100]
-    return similar(name, names) if len(name) <= 100 and len(names) <= 1000 else ""
 
 
 def _listed(names: Iterable[str]) -> str:

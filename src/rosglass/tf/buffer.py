@@ -271,6 +271,8 @@ def check_may_wait_for(promise: Promise[Transform], what: str) -> None:
 
 
 _log = logging.getLogger("rosglass.tf")
+#: Names that do not exist, whose hints are kept.
+_MAX_HINTS = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,6 +325,8 @@ class TransformBuffer(Handle):
         self._lock = threading.Lock()
         self._store = FrameStore(kept.nanoseconds)
         self._log_once = LogOnce(1000)
+        #: Hints at similar frames by names that do not exist, and the version of the frames.
+        self._hints: tuple[int, dict[str, str]] = (0, {})
         self._changes = ChangeListeners(self._lock, self._links)
         self._pending = PendingLookups(self._lock)
 
@@ -699,9 +703,21 @@ class TransformBuffer(Handle):
         if isinstance(name, str) and name in self._store.names:
             return
         check_name(name, what)
-        raise LookupException(
-            f'"{name}" passed as {what} does not exist{similar(name, self._store.names)}'
-        )
+        raise LookupException(f'"{name}" passed as {what} does not exist{self._hint(name)}')
+
+    def _hint(self, name: str) -> str:
+        """Return a hint at similar frames, which is found once.
+
+        It takes milliseconds, and 3D views look up the frames of a robot 30 times per second, also
+        those that do not exist.
+        """
+        version, hints = self._hints
+        if version != self._store.version or len(hints) >= _MAX_HINTS:
+            hints = {}
+            self._hints = (self._store.version, hints)
+        if name not in hints:
+            hints[name] = similar(name, self._store.names)
+        return hints[name]
 
     def _infos(self, names: list[str] | None) -> list[FrameInfo]:
         store = self._store

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import threading
+from typing import Any
 
 import pytest
 
@@ -356,3 +357,23 @@ def test_what_was_late_before_does_not_count_after_clearing(clock: list[float]) 
     put(buffer, "map", "base", 700.0)
     clock[0] += 5.0
     assert not put(buffer, "map", "base", 600.0)
+
+
+def test_a_hint_at_similar_frames_is_found_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    found: list[str] = []
+
+    def similar(name: str, known: Any) -> str:
+        found.append(name)
+        return f"; there are {len(known)}"
+
+    monkeypatch.setattr("rosglass.tf.buffer.similar", similar)
+    buffer = TransformBuffer()
+    buffer.set_transform(Transform((0, 0, 0), (0, 0, 0, 1), Time(1), "map", "arm"))
+    for _ in range(3):
+        with pytest.raises(LookupException, match="; there are 2"):
+            buffer.lookup_transform("map", "arms")
+    assert found == ["arms"]
+    buffer.set_transform(Transform((0, 0, 0), (0, 0, 0, 1), Time(1), "map", "legs"))
+    with pytest.raises(LookupException, match="; there are 3"):
+        buffer.lookup_transform("map", "arms")
+    assert found == ["arms"] * 2, "another frame may be similar"
