@@ -657,8 +657,9 @@ def is_ordered(cloud: Cloud) -> bool:
         return True
     step = max(1, (cloud.point_count - 1) // _SAMPLED_POINTS)
     with np.errstate(over="ignore", invalid="ignore"):
-        first = np.stack([cloud.values(name)[:-1:step] for name in "xyz"]).astype(np.float32)
-        second = np.stack([cloud.values(name)[1::step] for name in "xyz"]).astype(np.float32)
+        columns = [cloud.values(name).reshape(cloud.point_count, -1)[:, 0] for name in "xyz"]
+        first = np.stack([column[:-1:step] for column in columns]).astype(np.float32)
+        second = np.stack([column[1::step] for column in columns]).astype(np.float32)
         valid = np.isfinite(first + second).all(axis=0)
         if np.count_nonzero(valid) < 3:
             return True
