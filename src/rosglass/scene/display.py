@@ -83,6 +83,8 @@ _LATE_S = 1.0
 _CONTINUOUS_S = 3.0
 #: Seconds without a transform after which a frame that is followed may be somewhere else.
 _SILENT_S = 5.0
+#: Letters of a line of the status: what robots name may be of any length.
+_MAX_NAME, _MAX_TEXT = 200, 1000
 #: Opacity of data whose publisher or connection is gone.
 OUTDATED_ALPHA = 0.35
 
@@ -290,6 +292,9 @@ class Display(Configurable, TopicElement):
             text: In words: what is wrong, and what to do.
         """
         assert level in _LEVELS
+        name = name[:_MAX_NAME]
+        if len(text) > _MAX_TEXT:
+            text = f"{text[:_MAX_TEXT]}... ({len(text)} characters)"
         new = Status(level, text)
         if self.status_lines.get(name) != new:
             self.status_lines[name] = new
@@ -297,7 +302,7 @@ class Display(Configurable, TopicElement):
 
     def delete_status(self, name: str) -> None:
         """Remove a line of the status, if there is one."""
-        if self.status_lines.pop(name, None) is not None:
+        if self.status_lines.pop(name[:_MAX_NAME], None) is not None:
             self._report_status()
 
     def clear_status(self) -> None:
