@@ -727,8 +727,10 @@ class TopicDisplay(OneTopicDisplay):
             self._intake.prepare = self.preparer()
 
     def _on_items(self) -> None:
+        if not is_alive(self):  # it has no attributes then
+            return
         intake = self._intake
-        if not is_alive(self) or intake is None or self.scene is None:
+        if intake is None or self.scene is None:
             return
         items, error = intake.take()
         report(self, received=intake.received)
