@@ -24,7 +24,7 @@ from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import TopicElement
 from rosglass.qml.properties import ReadOnly, Writable, report
 from rosglass.qt import Signal, Slot, is_alive
-from rosglass.scene.drawing import Group, instance_matrix
+from rosglass.scene.drawing import Group, check_numbers, instance_matrix
 from rosglass.scene.rviz_formats import TopicSetting, read_topic, write_topic
 from rosglass.scene.settings import Configurable, Setting
 
@@ -105,12 +105,12 @@ def matrix_of(pose: Any) -> NDArray[np.float64]:
     """Return the matrix of a ``geometry_msgs/Pose``.
 
     Raises:
-        Error: It has numbers that are not finite, or a quaternion that is none.
+        Error: It has numbers that cannot be drawn, or a quaternion that is none.
     """
     at, turn = pose.position, pose.orientation
     position, rotation = (at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w)
-    if not np.isfinite([*position, *rotation]).all():
-        raise Error(f"pose: position {position} or orientation {rotation} is not finite")
+    check_numbers("pose.position", position)
+    check_numbers("pose.orientation", rotation)
     length = sum(number * number for number in rotation)
     if length and abs(length - 1.0) > 0.1:
         raise Error(f"pose: the quaternion {rotation} is not normalised")

@@ -36,6 +36,7 @@ __all__ = [
     "Mesh",
     "Points",
     "Shape",
+    "check_numbers",
     "instance_matrix",
     "rgba_bytes",
 ]
@@ -44,6 +45,8 @@ __all__ = [
 OPAQUE = 0.9998
 #: Vertices, instances and points of one drawable: bytes of a GPU buffer stay below 2 GiB.
 _MAX_COUNT = 20_000_000
+#: Largest number of a message that is drawn: shaders square it as a float32.
+_MAX_NUMBER = 1e18
 _IDENTITY = np.eye(4)
 _IDENTITY.setflags(write=False)
 
@@ -241,13 +244,35 @@ def rgba_bytes(colors: ArrayLike, count: int) -> NDArray[np.uint8]:
     return out
 
 
+def check_numbers(name: str, numbers: ArrayLike) -> None:
+    """Check that numbers of a message can be drawn.
+
+    Args:
+        name: Of the field; where there are several rows, the error has the number of the first bad
+            one, as in ``cells[7]``.
+        numbers: Shape (k) or (n, k).
+
+    Raises:
+        Error: One is not finite, or beyond 1e18.
+    """
+    array = np.asarray(numbers)
+    good = np.abs(array) <= _MAX_NUMBER  # NaN is not
+    if good.all():
+        return
+    bad = float(array[~good][0])
+    where = f"{name}[{np.argwhere(~good)[0][0]}]" if array.ndim > 1 else name
+    reason = f"beyond the {_MAX_NUMBER:g} that is drawn" if math.isfinite(bad) else "not finite"
+    raise Error(f"{where}: {bad:g} is {reason}")
+
+
 def _checked(name: str, given: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """Return an array of floats of the shape (n, *shape).
 
     Raises:
         Error: It has another shape, or too many rows.
     """
-    array = np.ascontiguousarray(given, np.float32)
+    with np.errstate(over="ignore"):
+        array = np.ascontiguousarray(given, np.float32)
     if array.size == 0:
         array = array.reshape(0, *shape)
     if array.shape[1:] != shape:

@@ -12,7 +12,15 @@ import numpy as np
 from rosglass.errors import Error
 from rosglass.scene.display import TopicDisplay
 from rosglass.scene.displays.shapes import ArrowShapes, rotation_of_z_to
-from rosglass.scene.drawing import CONE, SPHERE, Group, Lines, Mesh, instance_matrix
+from rosglass.scene.drawing import (
+    CONE,
+    SPHERE,
+    Group,
+    Lines,
+    Mesh,
+    check_numbers,
+    instance_matrix,
+)
 from rosglass.scene.settings import Setting, rgb_of
 
 if TYPE_CHECKING:
@@ -97,10 +105,10 @@ class HistoryDisplay(TopicDisplay):
         self._kept.clear()
 
 
-def _finite(name: str, *numbers: float) -> tuple[float, ...]:
-    if not all(map(math.isfinite, numbers)):
-        raise Error(f"{name}: {numbers} has a number that is not finite")
-    return numbers
+def _vector(name: str, vector: Any) -> tuple[float, float, float]:
+    found = (vector.x, vector.y, vector.z)
+    check_numbers(name, found)
+    return found
 
 
 class PointStampedDisplay(HistoryDisplay):
@@ -122,7 +130,7 @@ class PointStampedDisplay(HistoryDisplay):
 
     def preparer(self) -> Callable[[Any], Any]:
         """Return the function that reads the point."""
-        return lambda message: _finite("point", *(getattr(message.point, axis) for axis in "xyz"))
+        return lambda message: _vector("point", message.point)
 
     def draw(self, data: Any, group: Group) -> None:
         """Draw a sphere."""
@@ -160,8 +168,7 @@ def _read_corners(message: Any) -> NDArray[np.float32]:
             f"polygon: {len(points)} points are more than the {_MAX_CORNERS} that are drawn"
         )
     corners = np.array([(p.x, p.y, p.z) for p in points], np.float32).reshape(-1, 3)
-    if not np.isfinite(corners).all():
-        raise Error("polygon: a point is not finite")
+    check_numbers("polygon.points", corners)
     return np.concatenate([corners, corners[:1]])
 
 
@@ -202,17 +209,17 @@ class RangeDisplay(HistoryDisplay):
 
 
 def _read_range(message: Any) -> tuple[float, float]:
-    low, high, angle = _finite(
-        "min_range, max_range, field_of_view",
-        message.min_range,
-        message.max_range,
-        message.field_of_view,
-    )
+    names = ("min_range", "max_range", "field_of_view")
+    low, high, angle = (float(message[name]) for name in names)
+    for name, number in zip(names, (low, high, angle), strict=True):
+        if not math.isfinite(number):
+            raise Error(f"{name}: {number} is not finite")
     value = float(message.range)
     if low == high:
         # A sensor of one fixed distance: infinity says whether something is there (REP 117).
         value = low if value == -math.inf else 0.0
     inside = math.isfinite(value) and low <= value <= high
+    check_numbers("range", value if inside else 0.0)
     return (value if inside else 0.0), abs(angle)
 
 
@@ -242,10 +249,7 @@ class _Screw(HistoryDisplay):
 
         def read(message: Any) -> Any:
             both = getattr(message, holder)
-            return [
-                np.array(_finite(name, *(getattr(getattr(both, name), axis) for axis in "xyz")))
-                for name in fields
-            ]
+            return [np.array(_vector(f"{holder}.{name}", getattr(both, name))) for name in fields]
 
         return read
 

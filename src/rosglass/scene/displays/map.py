@@ -11,7 +11,7 @@ import numpy as np
 from rosglass.errors import Error
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.scene.display import TopicDisplay, matrix_of
-from rosglass.scene.drawing import MapImage, Points
+from rosglass.scene.drawing import MapImage, Points, check_numbers
 from rosglass.scene.settings import Setting, rgb_of
 
 if TYPE_CHECKING:
@@ -267,5 +267,6 @@ def _read_cells(message: Any) -> tuple[NDArray[np.float32], float, float]:
     if len(message.cells) > _MAX_CELLS:
         raise Error(f"cells: {len(message.cells)} are more than the {_MAX_CELLS} that are drawn")
     points = np.array([(p.x, p.y, p.z) for p in message.cells], np.float32).reshape(-1, 3)
+    check_numbers("cells", points)
     points[:, 1] *= width / height
     return points, width, height

@@ -33,6 +33,7 @@ from rosglass.scene.drawing import (
     Mesh,
     Points,
     Shape,
+    check_numbers,
 )
 from rosglass.scene.meshes import load_mesh_cached
 from rosglass.scene.parts import Parts
@@ -68,6 +69,8 @@ _NAMES = [
     *("sphere_list", "points", "text_view_facing", "mesh_resource", "triangle_list", "arrow_strip"),
 ]
 _MAX_POINTS, _MAX_MARKERS = 2_000_000, 100_000
+#: Types whose points may have a color each.
+_COLORED = (LINE_STRIP, LINE_LIST, CUBE_LIST, SPHERE_LIST, POINTS, TRIANGLE_LIST)
 #: What lists of points are drawn as.
 _POINT_STYLES = {CUBE_LIST: "boxes", SPHERE_LIST: "spheres", POINTS: "squares"}
 #: Share of an arrow between two points that is its head, where no length is given, as in RViz.
@@ -187,6 +190,12 @@ def read_marker(message: Any, part: tuple[str, int] | None = None) -> MarkerReco
     size, warning = _without_zeros(kind, size, count)
     points = np.array([(o.x, o.y, o.z) for o in message.points], np.float32).reshape(-1, 3)
     colors = np.array([(c.r, c.g, c.b, c.a) for c in message.colors], np.float32).reshape(-1, 4)
+    warning = warning or _colors_warning(kind, count, colors)
+    try:
+        check_numbers("points", points)
+    except Error as error:
+        frame = header.frame_id.lstrip("/")
+        return MarkerRecord(key, kind, action, frame, at, problem=str(error))
     return MarkerRecord(
         key,
         kind,
@@ -217,6 +226,15 @@ def _without_zeros(
     if (x, y, z) == size or (kind == ARROW and size[0] and size[1]):
         return (x, y, z), ""
     return (x, y, z), f"scale {size} of a {_NAMES[kind]} is 0 in a direction: drawn as {_THIN_M} m"
+
+
+def _colors_warning(kind: int, points: int, colors: NDArray[np.float32]) -> str:
+    """Return what is wrong with the colors of points; empty if nothing is."""
+    if kind not in _COLORED:
+        return ""
+    if len(colors) not in ((0, points, points // 3) if kind == TRIANGLE_LIST else (0, points)):
+        return f"colors: {len(colors)} for {points} points: they have the marker's color"
+    return "" if np.isfinite(colors).all() else "colors: a number is not finite: drawn as 0 or 1"
 
 
 def _points_problem(kind: int, count: int) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from rosglass.errors import Error
 from rosglass.scene.display import TopicDisplay, matrix_of
 from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, poses_matrices
-from rosglass.scene.drawing import CONE, CYLINDER, SPHERE, Group, Lines, Mesh
+from rosglass.scene.drawing import CONE, CYLINDER, SPHERE, Group, Lines, Mesh, check_numbers
 from rosglass.scene.settings import Setting, rgb_of
 
 if TYPE_CHECKING:
@@ -198,9 +198,6 @@ class PoseArrayDisplay(TopicDisplay):
 
 def _read_poses(message: Any) -> NDArray[np.float64]:
     rows = _rows(message.poses, len(message.poses), _MAX_POSES)
-    bad = ~np.isfinite(rows).all(axis=1)
-    if bad.any():
-        raise Error(f"poses[{int(np.argmax(bad))}] has a number that is not finite")
     return poses_matrices(rows[:, :3], rows[:, 3:])
 
 
@@ -212,6 +209,7 @@ def _rows(poses: Iterable[Any], count: int, most: int) -> NDArray[np.float64]:
     for at, pose in enumerate(poses):
         p, q = pose.position, pose.orientation
         rows[at] = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+    check_numbers("poses", rows)
     return rows
 
 
@@ -230,18 +228,23 @@ class _Covariance(NamedTuple):
     Attributes:
         pose: In its frame, 4 x 4.
         covariance: Of x, y, z (m2) and rotations around x, y, z (rad2), 6 x 6.
+        problem: Why it is not drawn, and is 0 here; empty otherwise.
     """
 
     pose: NDArray[np.float64]
     covariance: NDArray[np.float64]
+    problem: str
 
 
 def _read_covariance(message: Any) -> _Covariance:
     part = message.pose
     covariance = np.array(part.covariance, np.float64).reshape(6, 6)
-    if not np.isfinite(covariance).all():
-        covariance = np.zeros((6, 6))
-    return _Covariance(matrix_of(part.pose), covariance)
+    problem = ""
+    try:
+        check_numbers("pose.covariance", covariance.reshape(-1))
+    except Error as error:
+        covariance, problem = np.zeros((6, 6)), f"{error}; the pose is shown without"
+    return _Covariance(matrix_of(part.pose), covariance, problem)
 
 
 class _WithCovariance(_Shaped):
@@ -304,8 +307,15 @@ class _WithCovariance(_Shaped):
 
     def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:  # noqa: ARG002
         """Show a pose with its covariance."""
+        self._report_covariance(data)
         self._poses, self._covariances = [pose @ data.pose], [(data.covariance, pose[:3, :3])]
         self._draw()
+
+    def _report_covariance(self, data: _Covariance) -> None:
+        if data.problem:
+            self.set_status("Covariance", "warn", data.problem)
+        else:
+            self.delete_status("Covariance")
 
     def _draw(self) -> None:
         self.root.add(self._uncertain)
@@ -431,6 +441,7 @@ class OdometryDisplay(_WithCovariance):
 
     def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:  # noqa: ARG002
         """Show a pose beside earlier ones, if the robot has moved."""
+        self._report_covariance(data)
         new = pose @ data.pose
         if self._poses and self._is_near(self._poses[-1], new):
             return

@@ -1,0 +1,380 @@
+"""What a broken robot or an attacker sends to displays: fields of messages that lie, one by one."""
+
+from __future__ import annotations
+
+import logging
+import math
+import sys
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from rosglass.qt import QtCore, is_alive
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from conftest import SceneBench
+
+# -- messages that are right -----------------------------------------------------------------------
+
+HEADER = {"frame_id": "odom", "stamp": {"sec": 0, "nanosec": 0}}
+POINT = {"x": 1.0, "y": 2.0, "z": 0.5}
+TURN = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+POSE = {"position": POINT, "orientation": TURN}
+COLOR = {"r": 1.0, "g": 0.5, "b": 0.0, "a": 1.0}
+COVARIANCE = [0.1 if at % 7 == 0 else 0.0 for at in range(36)]
+CLOUD = {
+    "width": 10,
+    "height": 1,
+    "point_step": 16,
+    "row_step": 160,
+    "fields": [
+        {"name": name, "offset": 4 * at, "datatype": 7, "count": 1}
+        for at, name in enumerate(("x", "y", "z", "intensity"))
+    ],
+    "data": np.arange(40, dtype=np.float32).tobytes(),
+}
+DEPTH = {
+    "height": 4,
+    "width": 4,
+    "encoding": "32FC1",
+    "step": 16,
+    "data": np.ones(16, np.float32).tobytes(),
+}
+GRID = {"info": {"resolution": 0.1, "width": 3, "height": 2, "origin": POSE}, "data": [0] * 6}
+SCAN = {
+    "angle_min": -1.0,
+    "angle_increment": 0.5,
+    "time_increment": 0.0,
+    "range_min": 0.1,
+    "range_max": 10.0,
+    "ranges": [1.0] * 5,
+    "intensities": [1.0] * 5,
+}
+CAMERA = {
+    "header": HEADER,
+    "width": 4,
+    "height": 4,
+    "p": [10.0, 0.0, 2.0, 0.0, 0.0, 10.0, 2.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+    "binning_x": 1,
+    "binning_y": 1,
+    "roi": {"x_offset": 0, "y_offset": 0},
+}
+
+
+def marker(kind: int, **fields: Any) -> dict[str, Any]:
+    count = 6 if kind in (4, 5, 6, 7, 8, 11, 12) else 2 if kind == 0 else 0
+    made = {
+        "header": HEADER,
+        "ns": "shapes",
+        "id": 1,
+        "type": kind,
+        "action": 0,
+        "pose": POSE,
+        "scale": {"x": 1.0, "y": 1.0, "z": 1.0},
+        "color": COLOR,
+        "lifetime": {"sec": 0, "nanosec": 0},
+        "frame_locked": False,
+        "points": [{"x": float(at), "y": 0.0, "z": 0.0} for at in range(count)],
+        "colors": [COLOR] * (0 if kind in (0, 12) else count),
+        "text": "robot",
+    }
+    return {**made, **fields}
+
+
+def control(mode: int, **fields: Any) -> dict[str, Any]:
+    made = {"name": "turn", "orientation": TURN, "interaction_mode": mode, "always_visible": True}
+    return {**made, **fields}
+
+
+INTERACTIVE = {
+    "header": HEADER,
+    "name": "handle",
+    "description": "Drag me",
+    "scale": 1.0,
+    "pose": POSE,
+    "menu_entries": [{"id": 1, "parent_id": 0, "title": "Go", "command": "", "command_type": 0}],
+    "controls": [control(3, orientation_mode=0), control(7, markers=[marker(1)])],
+}
+
+
+class Case(NamedTuple):
+    """A display, and a message that it shows.
+
+    Attributes:
+        display: Its type.
+        type: The message's.
+        message: Its fields, beside the header.
+        settings: Of the display.
+    """
+
+    display: str
+    type: str
+    message: dict[str, Any]
+    settings: dict[str, Any] = {}  # noqa: RUF012 - never written
+
+
+STAMPED_POSES = [{"header": HEADER, "pose": POSE}] * 3
+WITH_COVARIANCE = {"pose": {"pose": POSE, "covariance": COVARIANCE}}
+CASES = [
+    Case("Pose", "geometry_msgs/PoseStamped", {"pose": POSE}),
+    Case("PoseArray", "geometry_msgs/PoseArray", {"poses": [POSE, POSE]}),
+    Case("PoseWithCovariance", "geometry_msgs/PoseWithCovarianceStamped", WITH_COVARIANCE),
+    Case("Odometry", "nav_msgs/Odometry", WITH_COVARIANCE),
+    Case("Path", "nav_msgs/Path", {"poses": STAMPED_POSES}, {"poseStyle": "Axes"}),
+    Case("Map", "nav_msgs/OccupancyGrid", GRID),
+    Case("GridCells", "nav_msgs/GridCells", {"cell_width": 0.1, "cell_height": 0.1,
+         "cells": [POINT, POINT]}),
+    Case("PointStamped", "geometry_msgs/PointStamped", {"point": POINT}),
+    Case("Polygon", "geometry_msgs/PolygonStamped", {"polygon": {"points": [POINT] * 3}}),
+    Case("Range", "sensor_msgs/Range", {"field_of_view": 0.5, "min_range": 0.1, "max_range": 5.0,
+         "range": 2.0}),
+    Case("WrenchStamped", "geometry_msgs/WrenchStamped", {"wrench": {"force": POINT,
+         "torque": POINT}}),
+    Case("TwistStamped", "geometry_msgs/TwistStamped", {"twist": {"linear": POINT,
+         "angular": POINT}}),
+    Case("AccelStamped", "geometry_msgs/AccelStamped", {"accel": {"linear": POINT,
+         "angular": POINT}}),
+    Case("PointCloud2", "sensor_msgs/PointCloud2", CLOUD),
+    Case("PointCloud", "sensor_msgs/PointCloud", {"points": [POINT, POINT],
+         "channels": [{"name": "intensity", "values": [1.0, 2.0]}]}),
+    Case("LaserScan", "sensor_msgs/LaserScan", SCAN),
+    Case("Temperature", "sensor_msgs/Temperature", {"temperature": 20.0}),
+    Case("DepthCloud", "sensor_msgs/Image", DEPTH),
+    Case("Effort", "sensor_msgs/JointState", {"name": ["arm", "tool"], "effort": [1.0, 2.0]}),
+    *(Case("Marker", "visualization_msgs/Marker", marker(kind)) for kind in range(10)),
+    *(Case("Marker", "visualization_msgs/Marker", marker(kind)) for kind in (11, 12)),
+    Case("InteractiveMarkers", "visualization_msgs/InteractiveMarkerUpdate", {"type": 1,
+         "seq_num": 1, "markers": [INTERACTIVE],
+         "poses": [{"header": HEADER, "pose": POSE, "name": "handle"}], "erases": []}),
+]  # fmt: skip
+
+# -- and what is wrong with them -------------------------------------------------------------------
+
+FLOATS = [math.nan, math.inf, -1.0, 0.0, 1e308, 3e38, 1e-160, 1e-45]
+INTEGERS = [0, -1, 7, 255, 65536, -(2**31), 2**31 - 1, 2**32 - 1]
+TEXTS = ["", "/", "long" * 100_000, "ü\u202e\n\0<b>", "nowhere"]
+VECTORS = [math.nan, 1e308, 3e38, 1e-160, 0.0]
+
+
+def mutations(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any, ...], Any]]:
+    """Iterate over the paths of fields, and over values of the same type that are wrong there."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from mutations(inner, (*path, key))
+        if len(value) > 2 and all(isinstance(part, float) for part in value.values()):
+            yield from ((path, dict.fromkeys(value, number)) for number in VECTORS)
+    elif isinstance(value, float) and path[-1] not in ("y", "z", "g", "b"):
+        yield from ((path, number) for number in FLOATS)
+    elif isinstance(value, int) and not isinstance(value, bool):
+        yield from ((path, number) for number in INTEGERS)
+    elif isinstance(value, str):
+        yield from ((path, text) for text in TEXTS)
+    elif isinstance(value, bytes):
+        yield from ((path, data) for data in (b"", value[:-1], value * 2, b"\xff" * len(value)))
+    elif isinstance(value, list):
+        yield from ((path, some) for some in ([], value[:-1], value * 200))
+        if value:
+            yield from mutations(value[0], (*path, 0))
+        if value and isinstance(value[0], float):
+            yield from ((path, [number] * len(value)) for number in (math.nan, 1e308, -1.0))
+
+
+def changed(value: Any, path: tuple[Any, ...], new: Any) -> Any:
+    """Return a message in which a field has another value."""
+    if not path:
+        return new
+    copy = list(value) if isinstance(value, list) else dict(value)
+    copy[path[0]] = changed(value[path[0]], path[1:], new)
+    return copy
+
+
+class Watch(logging.Handler):
+    """Keeps what must not happen: tracebacks, exceptions in Qt's loop, warnings of Qt."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.ERROR)
+        self.seen: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.seen.append(self.format(record))
+
+
+@pytest.fixture
+def watch(monkeypatch: pytest.MonkeyPatch) -> Iterator[Watch]:
+    made = Watch()
+    logger = logging.getLogger("rosglass")
+    logger.addHandler(made)
+    monkeypatch.setattr(sys, "excepthook", lambda *error: made.seen.append(repr(error)))
+    before = QtCore.qInstallMessageHandler(lambda _kind, _about, text: made.seen.append(text))
+    yield made
+    QtCore.qInstallMessageHandler(before)
+    logger.removeHandler(made)
+    assert not made.seen, "\n".join(made.seen)
+
+
+ROBOT = """<robot name="r"><link name="odom"/><link name="body"/>
+<joint name="arm" type="revolute"><parent link="body"/><child link="odom"/>
+<limit effort="5" velocity="1"/></joint></robot>"""
+
+
+class Robot:
+    """A robot whose messages are wrong, beside a display whose messages are right."""
+
+    def __init__(self, bench: SceneBench, watch: Watch) -> None:
+        from rosglass import Time
+        from rosglass.tf import StaticTransformBroadcaster, Transform
+
+        self.bench, self._watch, self._node = bench, watch, bench.robot
+        self.view = bench.load()
+        tf = StaticTransformBroadcaster(self._node)
+        tf.send_transform(Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "odom"))
+        self.good = self.view.scene.add("Pose", topic="/good")
+        self._good = self._node.create_publisher("/good", "geometry_msgs/PoseStamped")
+        bench.wait(lambda: self._good.subscription_count() and self.view.scene.frames())
+
+    def show(self, case: Case) -> None:
+        """Show a case, prepared as far as it needs other messages."""
+        from rosglass.comm.qos import Durability, QoS
+
+        node, kind = self._node, case.display
+        self.topic = "/hostile/update" if kind == "InteractiveMarkers" else "/hostile/topic"
+        if kind == "InteractiveMarkers":
+            node.create_service_server(
+                "/hostile/get_interactive_markers",
+                "visualization_msgs/GetInteractiveMarkers",
+                lambda _: {"sequence_number": 0},
+            )
+        elif kind == "Effort":
+            latched = QoS(1, durability=Durability.TRANSIENT_LOCAL)
+            description = node.create_publisher(
+                "/robot_description", "std_msgs/String", qos=latched
+            )
+            description.publish({"data": ROBOT})
+        elif kind == "DepthCloud":
+            latched = QoS(1, durability=Durability.TRANSIENT_LOCAL)
+            info = node.create_publisher(
+                "/hostile/camera_info", "sensor_msgs/CameraInfo", qos=latched
+            )
+            info.publish(CAMERA)
+        self.display = self.view.scene.add(kind, topic=self.topic, **case.settings)
+        self.publisher = node.create_publisher(self.topic, case.type)
+        self.message = {**case.message, "header": HEADER}
+        if kind == "InteractiveMarkers":
+            del self.message["header"]
+        self.bench.wait(self.publisher.subscription_count)
+        self.send(self.message)
+        self.bench.wait(lambda: self.display.statusLevel == "ok", lambda: self.display.statusText)
+
+    def send(self, message: dict[str, Any]) -> None:
+        """Send a message and wait until it is shown, or its status says why not."""
+        from rosglass import Error
+
+        display = self.display
+        before = display.received
+        if display.TYPE == "InteractiveMarkers":
+            # A number that does not follow the last one makes the display request all markers.
+            servers = display._servers
+            self.bench.wait(lambda: not servers or servers[""].number is not None)
+            message = {**message, "seq_num": servers[""].number + 1 if servers else 1}
+        try:
+            self.publisher.publish(message)
+        except Error:
+            return  # no such message exists, e.g. with a negative width
+        self.bench.wait(lambda: display.received > before)
+
+    def check(self) -> None:
+        """Check that nothing is broken, and that the other display still shows what it receives."""
+        before, drawn = self.good.received, self.bench.drawn()
+        self._good.publish({"header": HEADER, "pose": changed(POSE, ("position", "x"), drawn)})
+        self.bench.wait(lambda: self.good.received > before and self.bench.drawn() > drawn)
+        assert self.good.statusLevel == "ok", self.good.statusText
+        assert not self.view.problem
+        assert not self._watch.seen, "\n".join(self._watch.seen)
+
+
+@pytest.fixture
+def robot(bench: SceneBench, watch: Watch) -> Robot:
+    return Robot(bench, watch)
+
+
+#: Fields in which numbers that are not finite have a meaning, or change nothing.
+MAY_BE_ANYTHING = {
+    *("range", "range_min", "range_max", "ranges", "intensities", "temperature", "values"),
+}
+
+
+def is_not_finite(value: Any) -> bool:
+    return isinstance(value, float) and not math.isfinite(value)
+
+
+@pytest.mark.parametrize(
+    "case", CASES, ids=lambda case: f"{case.display}{case.message.get('type', '')}"
+)
+def test_every_field_may_be_wrong(robot: Robot, watch: Watch, case: Case) -> None:
+    robot.show(case)
+    display = robot.display
+    for path, value in mutations(robot.message):
+        where = f"{'.'.join(map(str, path))} = {value!r:.60}"
+        robot.send(changed(robot.message, path, value))
+        assert not watch.seen, f"{where}: {watch.seen}"
+        assert len(display.statusText) < 5000, where
+        numbers = value.values() if isinstance(value, dict) else [value]
+        if MAY_BE_ANYTHING & set(path) or not any(map(is_not_finite, numbers)):
+            continue
+        names = [str(part) for part in path] + ["finite"]
+        robot.bench.wait(
+            lambda names=names: any(name in display.statusText for name in names),
+            lambda where=where: (where, display.statusText),
+            timeout=5.0,
+        )
+    robot.send(robot.message)
+    robot.bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
+    robot.check()
+
+
+@pytest.mark.parametrize("kind", ["PoseWithCovariance", "Odometry"])
+@pytest.mark.parametrize("number", [math.nan, sys.float_info.max])
+def test_a_pose_is_shown_without_a_covariance_that_is_none(
+    robot: Robot, kind: str, number: float
+) -> None:
+    robot.show(next(case for case in CASES if case.display == kind))
+    display = robot.display
+    display.reset()
+    shown = {"pose": {"pose": POSE, "covariance": [number, *COVARIANCE[1:]]}}
+    robot.send({"header": HEADER, **shown})
+    assert display.statusLevel == "warn"
+    assert "Covariance: pose.covariance: " in display.statusText
+    assert len(display._poses) == 1
+
+
+def test_colors_that_do_not_fit_are_named(robot: Robot) -> None:
+    robot.show(Case("Marker", "visualization_msgs/Marker", marker(4)))
+    robot.send(marker(4, colors=[COLOR] * 4))
+    robot.bench.wait(lambda: robot.display.statusLevel == "warn")
+    assert "shapes/1: colors: 4 for 6 points: they have the marker's color" in (
+        robot.display.statusText
+    )
+
+
+def test_lines_of_the_status_have_an_end(robot: Robot) -> None:
+    robot.show(CASES[0])
+    display, name = robot.display, "x" * 100_000
+    for number in range(3):
+        display.set_status(name, "error", f"{number}{name}")
+    assert len(display.statusText) < 2000
+    assert "... (100001 characters)" in display.statusText
+    display.delete_status(name)
+    assert display.statusLevel == "ok"
+
+
+def test_messages_on_their_way_to_a_destroyed_display_are_dropped(robot: Robot) -> None:
+    robot.show(CASES[0])
+    display = robot.display
+    on_items = display._on_items
+    robot.view.scene.remove(display)
+    robot.bench.wait(lambda: not is_alive(display))
+    on_items()
+    robot.check()
