@@ -18,10 +18,11 @@ from rosglass.qml.runtime import runtime_of
 from rosglass.qml.tf_buffer import TfLink
 from rosglass.qt import Property, Signal, Slot, is_alive
 from rosglass.rviz.property_values import shown
+from rosglass.scene.displays.shapes import poses_matrices
 from rosglass.scene.drawing import Group, instance_matrix
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
@@ -38,6 +39,7 @@ __all__ = ["Scene"]
 _log = logging.getLogger("rosglass.scene")
 #: Milliseconds between two looks at transforms that have changed.
 _TRANSFORMS_MS = 33
+_ORIGIN, _UPRIGHT = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 #: Seconds between two resets as the time jumps back again and again.
 _RESETS_S = 1.0
 
@@ -298,6 +300,27 @@ class Scene(Element):
             raise LookupException("not connected yet")
         found = buffer.lookup_transform(target, frame, Time(stamp) if stamp else None)
         return instance_matrix(found.translation, found.rotation)
+
+    def look_up_all(
+        self, frames: Sequence[str]
+    ) -> tuple[NDArray[np.float64], dict[str, TransformException]]:
+        """Return the newest poses of many frames in the fixed frame.
+
+        Returns:
+            Their matrices, (n, 4, 4), and for each frame whose pose is not known, why.
+        """
+        buffer, fixed = self.transforms, self._fixed_frame
+        others = [frame for frame in frames if frame != fixed]
+        found: dict[str, Any] = (
+            dict.fromkeys(others, LookupException("not connected yet"))
+            if buffer is None
+            else buffer.lookup_newest(fixed, others)
+        )
+        unknown = {one: why for one, why in found.items() if isinstance(why, TransformException)}
+        poses = {**found, **dict.fromkeys([fixed, *unknown], (_ORIGIN, _UPRIGHT))}
+        positions = [poses[frame][0] for frame in frames]
+        rotations = [poses[frame][1] for frame in frames]
+        return poses_matrices(positions, rotations), unknown
 
     def latest_time(self, frame: str) -> int:
         """Return the time of the newest transform between a frame and the fixed one.

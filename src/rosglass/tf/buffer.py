@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import monotonic
 from typing import TYPE_CHECKING
 
@@ -28,7 +28,15 @@ from rosglass.errors import (
     TimeoutException,
     TransformException,
 )
-from rosglass.tf.frames import FrameInfo, FrameStore, FrameTree, common_time, links_between, look_up
+from rosglass.tf.frames import (
+    FrameInfo,
+    FrameStore,
+    FrameTree,
+    common_time,
+    links_between,
+    look_up,
+    look_up_newest,
+)
 from rosglass.tf.transform import Transform
 
 if TYPE_CHECKING:
@@ -36,6 +44,7 @@ if TYPE_CHECKING:
     from collections.abc import Set as AbstractSet
 
     from rosglass.tf.frames import Entry
+    from rosglass.tf.transform import Quaternion, Vector
 
 __all__ = ["TransformBuffer", "Transformable"]
 
@@ -463,6 +472,32 @@ class TransformBuffer(Handle):
             lambda: self._look_up(target, source, nanoseconds_of(time, "time")),
         )
 
+    def lookup_newest(
+        self, target: str, sources: Iterable[str]
+    ) -> dict[str, tuple[Vector, Quaternion] | TransformException]:
+        """Return the newest poses of many frames in the frame `target`.
+
+        The same as :meth:`lookup_transform` for each, but links that they share are passed once.
+
+        Args:
+            target: Parent frame of the results.
+            sources: The frames.
+
+        Returns:
+            For each source its position and rotation, or the error of :meth:`lookup_transform`.
+        """
+        found: dict[str, tuple[Vector, Quaternion] | TransformException] = {}
+        known: list[str] = []
+        with self._lock:
+            for source in sources:
+                try:
+                    self._check_name(target, "target")
+                    self._check_name(source, "source")
+                    known.append(source)
+                except TransformException as error:  # noqa: PERF203 - the others are looked up
+                    found[source] = error
+            return found | look_up_newest(self._store.caches, target, known)
+
     def lookup_transform_full(
         self,
         target: str,
@@ -723,9 +758,11 @@ class TransformBuffer(Handle):
         store = self._store
         with self._lock:
             wanted = [name for name in names or store.names if name in store.names]
-            found = [(store.info(name), store.authorities.get(name, "")) for name in wanted]
+            authorities = [store.authorities.get(name, "") for name in wanted]
         # Without the lock: names of publishers are looked up in the graph.
-        return [replace(info, authority=str(authority)) for info, authority in found]
+        texts = [str(authority) for authority in authorities]
+        with self._lock:
+            return [store.info(name, text) for name, text in zip(wanted, texts, strict=True)]
 
     def _links(self, target: str, source: str) -> frozenset[str] | None:
         with self._lock:

@@ -17,14 +17,18 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from rosglass.comm.statistics import fading_rate
 from rosglass.comm.time import Time
-from rosglass.errors import ConnectivityException, ExtrapolationException, LookupException
+from rosglass.errors import (
+    ConnectivityException,
+    ExtrapolationException,
+    LookupException,
+    TransformException,
+)
 from rosglass.tf.transform import conjugate, multiply, rotate, slerp
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
     from rosglass.comm.time import Duration
-    from rosglass.errors import TransformException
     from rosglass.tf.transform import Quaternion, Vector
 
 __all__ = [
@@ -38,6 +42,7 @@ __all__ = [
     "common_time",
     "links_between",
     "look_up",
+    "look_up_newest",
     "root_of",
 ]
 
@@ -461,15 +466,17 @@ class FrameStore:
             self.names[cache.parent] = self.names[name] = None
         return gone
 
-    def info(self, name: str) -> FrameInfo:
-        """Return the state of a frame, without its authority."""
+    def info(self, name: str, authority: str) -> FrameInfo:
+        """Return the state of a frame, whose last transform is from `authority`."""
         cache = self.caches.get(name)
         if cache is None:
             return FrameInfo(name)
         latest = Time(cache.stamp)
         oldest = latest if cache.static else Time(cache.oldest)
         silence = monotonic() - self.arrivals.get(name, -math.inf)
-        return FrameInfo(name, cache.parent, "", cache.static, latest, oldest, cache.count, silence)
+        return FrameInfo(
+            name, cache.parent, authority, cache.static, latest, oldest, cache.count, silence
+        )
 
     def _place(self, child: str, stamp: int, entry: Entry, static: bool, authority: object) -> str:
         """Insert a transform of a new frame or parent; return why it is refused."""
@@ -652,6 +659,80 @@ def look_up(
     back = conjugate(tilt)
     between = (moved[0] - offset[0], moved[1] - offset[1], moved[2] - offset[2])
     return rotate(back, between), multiply(back, turned)
+
+
+def look_up_newest(
+    caches: Mapping[str, DynamicCache | StaticCache], target: str, sources: Iterable[str]
+) -> dict[str, tuple[Vector, Quaternion] | TransformException]:
+    """Return the newest poses of many frames in one; links that they share are passed once.
+
+    Returns:
+        For each source what :func:`look_up` returns at the :func:`common_time` of both frames, or
+        what these raise.
+    """
+    found: dict[str, tuple[Vector, Quaternion] | TransformException] = {}
+    below = _FramesBelow(caches, target)
+    for source in sources:
+        pose = below.newest(source)
+        try:
+            found[source] = pose or look_up(
+                caches, target, source, common_time(caches, target, source)
+            )
+        except TransformException as error:
+            found[source] = error
+    return found
+
+
+class _FramesBelow:
+    """The newest poses of frames that are somewhere below a target, in it."""
+
+    def __init__(self, caches: Mapping[str, DynamicCache | StaticCache], target: str) -> None:
+        self._caches, self._target = caches, target
+        #: By frame, the newest time at which all links to the target are known; 0 for any time.
+        self._times = {target: 0}
+        #: By frame and time.
+        self._poses: dict[tuple[str, int], tuple[Vector, Quaternion]] = {}
+
+    def newest(self, source: str) -> tuple[Vector, Quaternion] | None:
+        """Return the newest pose of a frame; None if it takes another way than straight up."""
+        time = self._newest_time(source)
+        if time is None:
+            return None
+        pose: tuple[Vector, Quaternion] | None = (_ORIGIN, _UPRIGHT)
+        links: list[tuple[str, Entry]] = []
+        frame = source
+        while frame != self._target:
+            pose = self._poses.get((frame, time))
+            if pose is not None:
+                break
+            cache = self._caches[frame]
+            entry = cache.at(time)
+            if entry is None or entry[0] != cache.parent:
+                return None
+            links.append((frame, entry))
+            frame = entry[0]
+        moved, turned = pose or (_ORIGIN, _UPRIGHT)
+        for frame, entry in reversed(links):
+            x, y, z = rotate(turned, entry[1:4])
+            moved = (moved[0] + x, moved[1] + y, moved[2] + z)
+            turned = multiply(turned, entry[4:])
+            self._poses[frame, time] = moved, turned
+        return moved, turned
+
+    def _newest_time(self, source: str) -> int | None:
+        """Return the newest time of a frame; None if it is not below the target."""
+        path: list[str] = []
+        frame, times = source, self._times
+        while frame not in times:
+            cache = self._caches.get(frame)
+            if cache is None or len(path) > len(self._caches):
+                return None
+            path.append(frame)
+            frame = cache.parent
+        for frame in reversed(path):
+            latest, above = self._caches[frame].latest, times[self._caches[frame].parent]
+            times[frame] = min(latest, above) if latest and above else latest or above
+        return times[source]
 
 
 def _gap(frame: str, gap: str, target: str, source: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import random
 import threading
 from typing import Any
 
@@ -146,6 +147,42 @@ def test_the_newest_is_the_newest_common() -> None:
     assert buffer.lookup_transform("map", "hand").stamp == at(7)
     assert buffer.latest_common_time("map", "hand") == at(7)
     assert buffer.latest_common_time("arm", "hand") == Time()
+
+
+def test_many_frames_at_once_are_where_each_of_them_is() -> None:
+    buffer = TransformBuffer()
+    turns = random.Random(3)
+    for number in range(1, 40):
+        parent = f"frame{turns.randrange(number)}"
+        static = turns.random() < 0.3
+        # Their newest times differ, and lie between those of others.
+        for second in range(1, 2 if static else 2 + turns.randrange(5)):
+            angle = turns.uniform(-3, 3)
+            rotation = (0.0, math.sin(angle), 0.0, math.cos(angle))
+            moment = second + turns.random()
+            put(
+                buffer, parent, f"frame{number}", moment, turns.uniform(-1, 1), rotation, "", static
+            )
+    put(buffer, "island", "beach")
+    put(buffer, "frame0", "once", 90.0)
+    put(buffer, "once", "long ago", 1.0)
+    put(buffer, "frame3", "moved", 1.0)
+    put(buffer, "frame4", "moved", 3.0)
+    put(buffer, "moved", "on it", 2.0)
+    frames = [*(f"frame{number}" for number in range(40)), "beach", "moved", "on it"]
+    frames += ["once", "long ago", "", "nowhere"]
+    for target in frames:
+        found = buffer.lookup_newest(target, frames)
+        assert found.keys() == set(frames)
+        for source in frames:
+            error = buffer.can_transform(target, source).error
+            if error is not None:
+                assert repr(found[source]) == repr(error)
+                continue
+            alone = buffer.lookup_transform(target, source)
+            position, rotation = found[source]  # type: ignore[misc]
+            assert position == pytest.approx(alone.translation)
+            assert rotation == pytest.approx(alone.rotation)
 
 
 def test_a_leading_slash_is_left_out() -> None:

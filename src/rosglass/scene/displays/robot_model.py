@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 
 from rosglass.comm.qos import Durability, QoS, Reliability
-from rosglass.errors import Error, TransformException, UnsupportedError
+from rosglass.errors import Error, UnsupportedError
 from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
@@ -379,6 +379,8 @@ class RobotModelDisplay(Display):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         self._bodies: dict[str, _Link] = {}
+        #: Where the links were last, (n, 4, 4).
+        self._poses = np.zeros((0, 4, 4))
         self._body, self._trails = Group(), Group()
         self._root_link = ""
         self._text: str | None = None
@@ -486,6 +488,7 @@ class RobotModelDisplay(Display):
 
     def _clear(self) -> None:
         self._bodies.clear()
+        self._poses = np.zeros((0, 4, 4))
         self._body.clear()
         self._trails.clear()
         self._loaded_lines = {}
@@ -547,15 +550,21 @@ class RobotModelDisplay(Display):
         scene = self.scene
         if scene is None or not self._bodies or not self.shown:
             return
+        poses, unknown = scene.look_up_all([self._frame_of(name) for name in self._bodies])
+        before, self._poses = self._poses, poses
+        # Links are moved one by one, which takes longer than finding out which have moved.
+        is_same = poses.shape == before.shape
+        moved = (poses != before).any(axis=(1, 2)) if is_same else np.ones(len(poses), bool)
         missing: list[tuple[str, str]] = []
-        for name, link in self._bodies.items():
-            try:
-                pose = scene.look_up(self._frame_of(name))
-            except TransformException as error:
+        for number, (name, link) in enumerate(self._bodies.items()):
+            error = unknown.get(self._frame_of(name))
+            if error is not None:
                 missing.append((name, str(error)))
                 link.root.visible = False
+                poses[number] = np.nan  # wherever it is found again, it has moved
                 continue
-            link.follow(pose)
+            if moved[number] or link.trail is not None:
+                link.follow(poses[number])
             link.root.visible = self.parts.is_enabled(name) or not link.has_shape
         self._report_missing(missing)
 

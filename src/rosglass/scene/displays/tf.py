@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
-from rosglass.errors import TransformException
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot
 from rosglass.scene.display import OUTDATED_ALPHA, Display
@@ -188,21 +187,20 @@ class TFDisplay(Display):
         if scene is None or buffer is None or not self.shown:
             return
         tree = buffer.tree()
+        chosen = [name for name in sorted(tree) if self._is_chosen(name)]
+        if len(chosen) > _MAX_FRAMES:
+            self.set_status("Frames", "warn", f"only the first {_MAX_FRAMES} frames are shown")
+            del chosen[_MAX_FRAMES:]
+        poses, unknown = scene.look_up_all(chosen)
+        is_lost = self._session is not None and self._session.state != "connected"
         shown: list[_Frame] = []
-        for name in sorted(tree):
-            info = tree[name]
-            if len(shown) >= _MAX_FRAMES:
-                self.set_status("Frames", "warn", f"only the first {_MAX_FRAMES} frames are shown")
-                break
-            if not self._is_chosen(name):
-                continue
-            try:
-                pose = scene.look_up(name)
-            except TransformException as error:
-                self.set_status(name, "warn", f"no transform: {error}")
+        for name, pose in zip(chosen, poses, strict=True):
+            if name in unknown:
+                self.set_status(name, "warn", f"no transform: {unknown[name]}")
                 continue
             self.delete_status(name)
-            shown.append(_Frame(name, pose, self._share(info), info.parent))
+            share = OUTDATED_ALPHA if is_lost else self._share(tree[name])
+            shown.append(_Frame(name, pose, share, tree[name].parent))
         self._moves = any(not tree[frame.name].static for frame in shown)
         shown = [frame for frame in shown if frame.share > 0]
         for line in list(self.status_lines):
@@ -215,12 +213,10 @@ class TFDisplay(Display):
 
     def _share(self, info: FrameInfo) -> float:
         """Return the opacity of a frame by its age: 1 while it is updated, 0 after the timeout."""
-        if self._session is not None and self._session.state != "connected":
-            return OUTDATED_ALPHA
         if info.static or not info.parent:
             return 1.0
         left = (self.frameTimeout - info.silence) / (self.frameTimeout * (1 - _FADE_AFTER))
-        return float(np.clip(left, 0.0, 1.0))
+        return float(min(max(left, 0.0), 1.0))
 
     def _fill(self, frames: list[_Frame]) -> None:
         names = [frame.name for frame in frames]
