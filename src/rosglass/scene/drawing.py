@@ -587,7 +587,9 @@ class Shape:
         #: Whether no vertex is translucent.
         self.opaque = bool((rows["rgba"][:, 3] == 255).all())
         #: Corners of the box around it.
-        self.box = _box_of(at[np.unique(faces)] if len(faces) else at[:0])
+        used = np.zeros(len(at), bool)
+        used[faces] = True
+        self.box = _box_of(at[used])
 
     def mirrored(self) -> Shape:
         """Return the same shape with its triangles turned, to be seen from the other side."""
