@@ -19,13 +19,16 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import math
 import os
+import signal
 import statistics
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,17 +39,21 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import rosglass
 from rosglass.comm.qos import QoS
-from rosglass.demo.processes import VirtualScreen
+from rosglass.demo.processes import VirtualScreen, start_robot
 from rviz_overlay import Verdicts, ros_master
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 ROOT = Path(__file__).parents[1]
+DASHBOARD = ROOT / "examples/rviz"
 PEERS = str(Path(__file__).with_name("scene_peers.py"))
 RVIZ_PYTHON = ROOT / ".venv-system/bin/python"
 HEADER = {"frame_id": "map"}
 TRIANGLES_AROUND = 160
+#: Of a robot.
+LINKS = 60
+_TF = "tf2_msgs/TFMessage"
 #: Seconds in which a config and its data are shown.
 _SETTLE_S = 4.0
 
@@ -58,6 +65,7 @@ class Peer:
         self.what, self._screen = what, VirtualScreen(1400, 1000)
         port = master.rpartition(":")[2]
         env = {k: v for k, v in os.environ.items() if k not in ("QT_QPA_PLATFORM", "PYTHONPATH")}
+        env.pop("XDG_CACHE_HOME", None)
         env |= {"HOME": home, "XDG_RUNTIME_DIR": home, "DISPLAY": self._screen.display}
         env |= {"ROS_MASTER_URI": master, "ROS_IP": "127.0.0.1", "QT_QPA_PLATFORM": "xcb"}
         python = sys.executable
@@ -88,6 +96,15 @@ class Peer:
         self._process.stdin.write(json.dumps({"do": do, **order}) + "\n")
         self._process.stdin.flush()
         return self._answer()
+
+    @contextlib.contextmanager
+    def paused(self) -> Iterator[None]:
+        """Let it use no CPU."""
+        self._process.send_signal(signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            self._process.send_signal(signal.SIGCONT)
 
     def close(self) -> None:
         """End it."""
@@ -168,6 +185,88 @@ def things(mesh: Path) -> list[dict[str, Any]]:
     return [*boxes, line, *texts, ball]
 
 
+def save_collada(file: Path, radius: float) -> None:
+    """Save a sphere of 18,432 triangles as COLLADA: a megabyte of text, as exporters write it."""
+    n = 96
+    turn, tilt = np.meshgrid(np.linspace(0, 2 * np.pi, n + 1), np.linspace(-1.57, 1.57, n + 1))
+    unit = [np.cos(tilt) * np.cos(turn), np.cos(tilt) * np.sin(turn), np.sin(tilt)]
+    normals = np.stack(unit, -1).reshape(-1, 3)
+    first = (np.arange(n)[:, np.newaxis] * (n + 1) + np.arange(n)).reshape(-1, 1)
+    faces = first + np.array([0, 1, n + 2, 0, n + 2, n + 1])
+    texts = [
+        " ".join(f"{number:.6f}" for number in (values * size).reshape(-1).tolist())
+        for values, size in ((normals, radius), (normals, 1.0))
+    ]
+    sources = "".join(
+        f'<source id="{name}"><float_array id="{name}-array" count="{normals.size}">{text}'
+        f'</float_array><technique_common><accessor source="#{name}-array" count="{len(normals)}" '
+        'stride="3"><param name="X" type="float"/><param name="Y" type="float"/>'
+        '<param name="Z" type="float"/></accessor></technique_common></source>'
+        for name, text in zip(("positions", "normals"), texts, strict=True)
+    )
+    corners = " ".join(f"{at} {at}" for at in faces.reshape(-1).tolist())
+    file.write_text(
+        '<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" '
+        'version="1.4.1"><asset><unit meter="1"/><up_axis>Z_UP</up_axis></asset>'
+        f'<library_geometries><geometry id="ball"><mesh>{sources}<vertices id="vertices">'
+        '<input semantic="POSITION" source="#positions"/></vertices>'
+        f'<triangles count="{len(faces) * 2}"><input semantic="VERTEX" source="#vertices" '
+        'offset="0"/><input semantic="NORMAL" source="#normals" offset="1"/>'
+        f"<p>{corners}</p></triangles></mesh></geometry></library_geometries>"
+        '<library_visual_scenes><visual_scene id="scene"><node id="node">'
+        '<instance_geometry url="#ball"/></node></visual_scene></library_visual_scenes>'
+        '<scene><instance_visual_scene url="#scene"/></scene></COLLADA>'
+    )
+
+
+def parent_of(link: int) -> int:
+    """Return the link that one of six limbs of ten links hangs on."""
+    return max(link - 6, 0)
+
+
+def describe_robot(meshes: list[Path]) -> str:
+    """Return the URDF of a robot of 60 links, the first of which have meshes."""
+    parts = []
+    for link in range(LINKS):
+        shape = (
+            f'<mesh filename="{meshes[link].as_uri()}"/>'
+            if link < len(meshes)
+            else '<cylinder radius="0.05" length="0.2"/>'
+        )
+        parts.append(
+            f'<link name="link{link}"><visual><geometry>{shape}</geometry><material name="m">'
+            '<color rgba="0.5 0.6 0.8 1"/></material></visual></link>'
+        )
+        if link:
+            parts.append(
+                f'<joint name="joint{link}" type="continuous"><axis xyz="0 0 1"/>'
+                f'<parent link="link{parent_of(link)}"/><child link="link{link}"/></joint>'
+            )
+    return f'<robot name="benchmark">{"".join(parts)}</robot>'
+
+
+def joint_transforms(angle: float) -> dict[str, Any]:
+    """Return what robot_state_publisher sends for one message of joint states, in radians."""
+    now = time.time()
+    stamp = {"secs": int(now), "nsecs": int(now % 1 * 1e9)}
+    transforms = []
+    for link in range(1, LINKS):
+        limb = link * math.pi / 3
+        turn, out = (angle + limb, 0.5) if link <= 6 else (angle, 0.25)
+        x, y = (out * math.cos(limb), out * math.sin(limb)) if link <= 6 else (out, 0.0)
+        transforms.append(
+            {
+                "header": {"frame_id": f"link{parent_of(link)}", "stamp": stamp},
+                "child_frame_id": f"link{link}",
+                "transform": {
+                    "translation": {"x": x, "y": y, "z": 0.05},
+                    "rotation": {"z": math.sin(turn / 2), "w": math.cos(turn / 2)},
+                },
+            }
+        )
+    return {"transforms": transforms}
+
+
 class Robot:
     """Publishes the data, in this process: its CPU is nobody's figure."""
 
@@ -180,6 +279,7 @@ class Robot:
         origin = {"position": {"x": -5.0, "y": -5.0}, "orientation": {"w": 1.0}}
         info = {"resolution": 0.01, "width": 1000, "height": 1000, "origin": origin}
         self._latched = []
+        base = {"header": HEADER, "child_frame_id": "link0", "transform": {"rotation": {"w": 1.0}}}
         boxes = [
             marker(n, 1, n % 100 * 0.1 - 5, n // 100 * 0.1 - 5, n % 9 * 0.1,
                    scale={"x": 0.08, "y": 0.08, "z": 0.08})
@@ -191,20 +291,22 @@ class Robot:
             ("/map", "nav_msgs/OccupancyGrid", {"header": HEADER, "info": info, "data": grid}),
             ("/things", "visualization_msgs/MarkerArray", {"markers": things(mesh)}),
             ("/boxes", "visualization_msgs/MarkerArray", {"markers": boxes}),
+            ("/tf_static", _TF, {"transforms": [base]}),
         ):
             self._latched.append(self.node.create_publisher(topic, kind, QoS.latched()))
             self._latched[-1].publish(message)
 
     @contextlib.contextmanager
     def sending(self, topic: str, kind: str, messages: list[Any], rate: float) -> Iterator[None]:
-        """Publish messages by turns, at a rate in Hz."""
+        """Publish messages by turns, at a rate in Hz; functions return them."""
         publisher = self.node.create_publisher(topic, kind, 2)
         ended = threading.Event()
 
         def send() -> None:
             number, due = 0, time.monotonic()
             while not ended.wait(max(0.0, due - time.monotonic())):
-                publisher.publish(messages[number % len(messages)])
+                message = messages[number % len(messages)]
+                publisher.publish(message() if callable(message) else message)
                 number, due = number + 1, due + 1 / rate
 
         thread = threading.Thread(target=send)
@@ -215,6 +317,16 @@ class Robot:
             ended.set()
             thread.join()
             publisher.close()
+
+    def joints(self, *angles: float) -> contextlib.AbstractContextManager[None]:
+        """Publish the transforms of 60 links 30 times a second."""
+        messages = [partial(joint_transforms, angle) for angle in angles]
+        return self.sending("/tf", _TF, messages, 30)
+
+    def describe(self, meshes: list[Path]) -> None:
+        """Set the robot's description."""
+        server: Any = self.node.parameter_server
+        server.set("robot_description", describe_robot(meshes))
 
 
 class Bench:
@@ -278,9 +390,17 @@ def still(bench: Bench) -> None:
     ours = bench.view("animate", seconds=bench.args.seconds)
     figure = f"{ours['fps']:.0f} frames/s, {ours['redrawn']:.0f} of the scene"
     bench.line("QML animates above it: ms a frame", figure, ours["ms"], 14)
-    ours = bench.view("pick", times=20)
+    picks(bench.view, "200,000 points", bench.verdicts)
+
+
+def picks(view: Peer, among: str, verdicts: Verdicts) -> None:
+    """Pick in what is shown."""
+    ours = view("pick", times=20)
     figure = f"{ours['hits']} hits of 20, longest {ours['longest']:.1f}"
-    bench.line("pick among 200,000 points: ms", figure, ours["ms"], 10)
+    verdicts.line(f"pick among {among}: ms", figure, ours["ms"], 10, False)
+    ours = view("click", times=20)
+    figure = f"{ours['clicks']} clicks, the camera moves"
+    verdicts.line("the same: pictures until the answer", figure, ours["pictures"], 2, False)
 
 
 def moving(bench: Bench) -> None:
@@ -344,6 +464,112 @@ def boxes(bench: Bench) -> None:
     bench.line("the same: CPU at 5 Hz", figure, ours["percent"] / theirs["percent"], 1)
 
 
+ROBOT = {"Class": "rviz/RobotModel", "Name": "Robot", "Enabled": True, "Value": True}
+FRAMES = {"Class": "rviz/TF", "Name": "TF", "Enabled": True, "Value": True}
+
+
+def robot(bench: Bench) -> None:
+    """A robot of 60 links that moves, and that stands still beside its frames."""
+    bench.robot.describe([])
+    with bench.robot.joints(*np.linspace(-0.5, 0.5, 30).tolist()):
+        bench.load(ROBOT, distance=6)
+        ours = bench.view("wait", seconds=bench.args.seconds)
+        theirs = bench.rviz("wait", seconds=bench.args.seconds)
+    # Without what stands for a graphics card.
+    used = ours["percent"] - ours["filling_percent"]
+    figure = f"{ours['fps']:.0f}/s; {ours['percent']:.0f} with pixels, RViz {theirs['percent']:.0f}"
+    bench.line("60 links at 30 Hz: percent of a core", figure, used, 15)
+    with bench.robot.joints(0.3):
+        bench.load(ROBOT, FRAMES, distance=6)
+        ours = bench.view("wait", seconds=bench.args.seconds)
+        theirs = bench.rviz("wait", seconds=bench.args.seconds)
+    figure = f"{ours['frames']:.0f} frames; RViz {theirs['percent']:.0f} %"
+    bench.line("the same, which do not move, and TF", figure, ours["percent"], 5)
+
+
+def meshes(args: argparse.Namespace, home: str, verdicts: Verdicts) -> None:
+    """A robot with 20 MB of meshes, in processes that start anew."""
+    folder = Path(home)
+    files = [folder / f"link{number}.dae" for number in range(20)]
+    for number, file in enumerate(files):
+        save_collada(file, 0.1 + 0.002 * number)
+    megabytes = sum(file.stat().st_size for file in files) / 1e6
+    bare = save_config(folder / "bare.rviz")
+    config = save_config(folder / "robot.rviz", ROBOT, distance=6)
+    found: dict[str, list[dict[str, float]]] = {"view": [], "rviz": []}
+    with ros_master(home) as master:
+        robot = Robot(master, folder)
+        robot.describe(files)
+        with robot.joints(0.3):
+            for number in range(args.turns + 1):
+                for what, figures in found.items():
+                    peer = Peer(what, master, home)
+                    peer("load", config=bare)
+                    peer("wait", seconds=2)
+                    figures.append(peer("open_robot", config=config))
+                    if what == "view" and number == args.turns:
+                        picks(peer, f"{megabytes:.0f} MB of meshes", verdicts)
+                    peer.close()
+        robot.node.close()
+    (first, *again), (_, *theirs) = found.values()
+
+    def median(name: str, figures: list[dict[str, float]]) -> float:
+        return statistics.median(one[name] for one in figures)
+
+    for name, title, target in (
+        ("seconds", f"robot of {megabytes:.0f} MB, second start: s", 0.3),
+        ("blocked", "the same: longest block of the GUI thread, s", 0.1),
+    ):
+        cpu = {"seconds": "cpu", "blocked": "blocked_cpu"}[name]
+        figure = f"CPU {median(cpu, again):.2f}, first {first[name]:.2f}, RViz "
+        figure += f"{median(name, theirs):.2f}"
+        verdicts.line(title, figure, median(name, again), target, False)
+
+
+def dashboard(args: argparse.Namespace, home: str, verdicts: Verdicts) -> None:
+    """Figure 1's dashboard over both, on the live robot of benchmarks/rviz_dashboard.py."""
+    found: dict[str, list[dict[str, float]]] = {"view": [], "busy": [], "rviz": []}
+    with ros_master(home) as master:
+        url = master.replace("http:", "ros1:")
+        live = start_robot(url, ("--equipped", "--fps", "30", "--mode", "autonomous"))
+        peers = {what: Peer(what, master, home) for what in ("view", "rviz")}
+        view, rviz = peers.values()
+        try:
+            for peer in peers.values():
+                peer("load", config=str(DASHBOARD / "figure1.rviz"))
+                peer("overlay", file=str(DASHBOARD / "Dashboard.qml"))
+            for number in range(args.turns + 1):
+                turn = {}
+                with rviz.paused():
+                    view("wait", seconds=_SETTLE_S)
+                    turn["view"] = view("wait", seconds=args.seconds)
+                    turn["busy"] = view("move", seconds=args.seconds)
+                with view.paused():
+                    rviz("wait", seconds=_SETTLE_S)
+                    turn["rviz"] = rviz("wait", seconds=args.seconds)
+                # The first turn warms up.
+                for what, figures in turn.items():
+                    found[what] += [figures] * (number > 0)
+        finally:
+            for peer in peers.values():
+                peer.close()
+            live.close()
+
+    def median(name: str, what: str = "view") -> float:
+        return statistics.median(one[name] for one in found[what])
+
+    rates = median("window_fps"), median("fps"), median("fps", "rviz")
+    pairs = zip(found["view"], found["rviz"], strict=True)
+    ratio = statistics.median(ours["window_fps"] / theirs["fps"] for ours, theirs in pairs)
+    figure = f"{rates[0]:.1f} (3D {rates[1]:.1f}) of {rates[2]:.1f}/s"
+    verdicts.line("Figure 1: frames per second, to RViz's", figure, ratio, 2, True)
+    figure = f"frame {median('both_ms'):.0f} ms, without 3D {median('plain_ms'):.0f}"
+    verdicts.line("the same: percent of the time for QML", figure, median("qml_percent"), 50, True)
+    figure = f"{median('fps', 'busy'):.1f}/s of 3D"
+    share = median("qml_percent", "busy")
+    verdicts.line("the same while the camera moves", figure, share, 50, True)
+
+
 def first(args: argparse.Namespace, home: str) -> tuple[str, float]:
     """Return times from start to first frame, as text, and their ratio."""
     took: dict[str, list[float]] = {"program": [], "bare": []}
@@ -385,7 +611,8 @@ def main() -> int:
     args = parser.parse_args()
     if args.quick:
         args.seconds, args.turns = 3, 2
-    parts = {one.__name__: one for one in (still, moving, squares, million, clouds, boxes)}
+    measured = (still, moving, squares, million, clouds, boxes, robot)
+    parts = {one.__name__: one for one in measured}
     print(f"load {os.getloadavg()[0]:.1f} before the start; ratio of RViz's where it has one")
     verdicts = Verdicts()
     chosen = [one for name, one in parts.items() if args.only in ("", name)]
@@ -395,10 +622,13 @@ def main() -> int:
                 bench = Bench(master, Path(home), args)
                 bench.verdicts = verdicts
                 try:
-                    for part in chosen:
-                        part(bench)
+                    for measure in chosen:
+                        measure(bench)
                 finally:
                     bench.close()
+        for part in (meshes, dashboard):
+            if args.only in ("", part.__name__):
+                part(args, home, verdicts)
         if args.only in ("", "first"):
             figure, ratio = first(args, home)
             verdicts.line("first frame of rosglass view, to a bare item", figure, ratio, 1.5, False)

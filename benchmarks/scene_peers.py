@@ -6,6 +6,7 @@ Each takes JSON objects, a line each, and answers each with a line of JSON. ``rv
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import json
 import os
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 VIEW = (1280, 800)
+_ROBOT_TIMEOUT_S = 60
 #: Degrees that the camera turns with each frame.
 _STEP_RAD = 0.02
 #: What is above the 3D view.
@@ -71,18 +73,72 @@ def run_for(seconds: float) -> None:
     run_event_loop(loop)
 
 
+def rasterizing() -> float:
+    """Return the seconds of CPU that Mesa's own threads have taken, which fill in pixels."""
+    seconds = 0.0
+    for task in Path("/proc/self/task").iterdir():
+        with contextlib.suppress(OSError):
+            if (task / "comm").read_text().startswith("llvmpipe"):
+                seconds += int((task / "schedstat").read_text().split()[0]) / 1e9
+    return seconds
+
+
 def measured(frames: Callable[[], int], run: Callable[[], None]) -> dict[str, float]:
     """Return the frames, and CPU milliseconds of all threads, while something runs."""
+    filling = rasterizing()
     count, cpu, started = frames(), time.process_time(), time.perf_counter()
     run()
     count, cpu = frames() - count, time.process_time() - cpu
     took = time.perf_counter() - started
+    filling = rasterizing() - filling
     return {
         "frames": count,
         "ms": 1000 * cpu / max(count, 1),
         "fps": count / took,
         "percent": 100 * cpu / took,
+        "filling_percent": 100 * filling / took,
     }
+
+
+class Blocks:
+    """The times for which the event loop handles nothing, while a ``with`` block runs."""
+
+    def __init__(self) -> None:
+        from rosglass.qt import QtCore
+
+        self._timer = QtCore.QTimer()
+        self._timer.setTimerType(QtCore.Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self._end)
+        self._last = self._last_cpu = 0.0
+        #: The longest one, in seconds, and the longest by the CPU that it took.
+        self.longest = self.longest_cpu = 0.0
+
+    def _end(self) -> None:
+        now, cpu = time.perf_counter(), time.thread_time()
+        self.longest = max(self.longest, now - self._last)
+        self.longest_cpu = max(self.longest_cpu, cpu - self._last_cpu)
+        self._last, self._last_cpu = now, cpu
+
+    def __enter__(self) -> Blocks:
+        self._last, self._last_cpu = time.perf_counter(), time.thread_time()
+        self._started, self._cpu = self._last, time.process_time()
+        self._timer.start(1)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._end()
+        self._timer.stop()
+        self.seconds = time.perf_counter() - self._started
+        self.cpu = time.process_time() - self._cpu
+
+    def figures(self) -> dict[str, float]:
+        """Return what was measured, in seconds."""
+        return {
+            "seconds": self.seconds,
+            "cpu": self.cpu,
+            "blocked": self.longest,
+            "blocked_cpu": self.longest_cpu,
+        }
 
 
 class Rviz:
@@ -110,6 +166,20 @@ class Rviz:
                 widget.height() + VIEW[1] - panel.height(),
             )
             self._app.qt.processEvents()
+
+    def overlay(self, file: str) -> None:
+        """Show a QML file over it."""
+        self._app.add_qml(Path(file))
+
+    def open_robot(self, config: str) -> dict[str, float]:
+        """Open a config with a robot, and return how long it takes until that is shown."""
+        with Blocks() as blocks:
+            self.load(config)
+            before = self._count
+            # The first frame may begin before the robot is there.
+            while self._count < before + 2:
+                run_for(0.001)
+        return blocks.figures()
 
     def wait(self, seconds: float) -> dict[str, float]:
         """Let it draw as it does by itself."""
@@ -161,6 +231,45 @@ class Costs:
         setattr(owner, name, timed)
 
 
+class Frames:
+    """The frames of a window, and how much of the time the 3D view takes of them.
+
+    Args:
+        window: The window.
+        drawn: Returns how many pictures of the 3D view were drawn.
+    """
+
+    def __init__(self, window: Any, drawn: Callable[[], int]) -> None:
+        self._drawn, self._before, self._since = drawn, 0, 0.0
+        #: Seconds of each frame, with and without a new picture of the 3D view.
+        self.seconds: dict[bool, list[float]] = {True: [], False: []}
+        window.afterAnimating.connect(self._begin)
+        window.frameSwapped.connect(self._end)
+
+    def _begin(self) -> None:
+        self._before, self._since = self._drawn(), time.perf_counter()
+
+    def _end(self) -> None:
+        self.seconds[self._drawn() > self._before].append(time.perf_counter() - self._since)
+
+    def clear(self) -> None:
+        """Forget all."""
+        for frames in self.seconds.values():
+            frames.clear()
+
+    def shares(self, seconds: float) -> dict[str, float]:
+        """Return the window's frames per second, and the percentage of the time left to QML."""
+        both, alone = self.seconds[True], self.seconds[False]
+        plain = statistics.median(alone) if alone else 0.0
+        taken = sum(max(one - plain, 0.0) for one in both)
+        return {
+            "window_fps": (len(both) + len(alone)) / seconds,
+            "qml_percent": 100 * (1 - taken / seconds),
+            "plain_ms": 1000 * plain,
+            "both_ms": 1000 * statistics.median(both) if both else 0.0,
+        }
+
+
 class View:
     """A SceneView below some QML, in a window."""
 
@@ -184,7 +293,7 @@ class View:
         self._window = QQuickView()
         self._session = Session(url)
         install(self._window.engine(), self._session)
-        self._session.init("scene_view")
+        self._session.init(f"scene_view_{os.getpid()}")
         file = Path(os.environ["HOME"], "View.qml")
         file.write_text(_QML)
         self._window.setResizeMode(QQuickView.ResizeMode.SizeRootObjectToView)
@@ -192,11 +301,35 @@ class View:
         self._window.setSource(file.as_uri())
         self._root = self._window.rootObject()
         self._view = self._root.findChild(rosglass.scene.SceneView, "scene")
+        self._frames = Frames(self._window, self._view.pictures_drawn)
         self._window.show()
 
     def load(self, config: str) -> None:
         """Open a config."""
         self._view.load_config(config)
+
+    def overlay(self, file: str) -> None:
+        """Show a QML file over it."""
+        from rosglass.scene import add_overlay
+
+        add_overlay(self._view, file)
+
+    def open_robot(self, config: str) -> dict[str, float]:
+        """Open a config with a robot, and return how long it takes until that is shown."""
+        with Blocks() as blocks:
+            self.load(config)
+            (robot,) = (one for one in self._view.scene.displays if one.TYPE == "RobotModel")
+            drawn = self._view.pictures_drawn
+            loaded: list[int] = []
+            count = lambda: loaded.append(drawn())  # noqa: E731 - methods change metaobjects
+            robot.robotChanged.connect(count)
+            until = time.perf_counter() + _ROBOT_TIMEOUT_S
+            while not (loaded and drawn() > loaded[0]) and time.perf_counter() < until:
+                run_for(0.001)
+            robot.robotChanged.disconnect(count)
+        if not loaded:
+            raise SystemExit(robot.statusText)
+        return blocks.figures()
 
     def received(self) -> int:
         """Return how many displays have got a message."""
@@ -207,7 +340,9 @@ class View:
         costs = self.costs
         costs.seconds, costs.longest = {"node": 0.0, "gui": 0.0}, 0.0
         before = self._messages()
+        self._frames.clear()
         found = measured(self._view.pictures_drawn, lambda: run_for(seconds))
+        found |= self._frames.shares(seconds)
         found["messages"] = count = self._messages() - before
         found |= {f"{k}_ms": 1000 * v / max(count, 1) for k, v in costs.seconds.items()}
         return found | {"longest_ms": 1000 * costs.longest}
@@ -226,8 +361,10 @@ class View:
             view.camera_moved()
 
         self._window.frameSwapped.connect(turn)
+        self._frames.clear()
         turn()
         found = measured(view.pictures_drawn, lambda: run_for(seconds))
+        found |= self._frames.shares(seconds)
         self._window.frameSwapped.disconnect(turn)
         return found
 
@@ -252,6 +389,42 @@ class View:
             hits += self._view.pick(x, y) is not None
             took.append(1000 * (time.thread_time() - started))
         return {"ms": statistics.median(took), "longest": max(took), "hits": hits}
+
+    def click(self, times: int) -> dict[str, float]:
+        """Click while the camera moves; return pictures until a tool has what was clicked."""
+        from PySide6.QtCore import QEvent, QPointF, Qt
+        from PySide6.QtGui import QMouseEvent
+
+        from rosglass.qt import QtCore
+        from rosglass.scene import Tool
+
+        tool = Tool()
+        self._view.tools.add(tool)
+        tool.select()
+        answers: list[int] = []
+        tool.pressed.connect(lambda _: answers.append(self._view.pictures_drawn()))
+        asked: list[int] = []
+        button, none = Qt.MouseButton.LeftButton, Qt.MouseButton.NoButton
+
+        def click() -> None:
+            asked.append(self._view.pictures_drawn())
+            at = QPointF(300 + 37 * len(asked) % 700, 200 + 53 * len(asked) % 400)
+            for kind, held in (
+                (QEvent.Type.MouseButtonPress, button),
+                (QEvent.Type.MouseButtonRelease, none),
+            ):
+                event = QMouseEvent(kind, at, at, button, held, Qt.KeyboardModifier.NoModifier)
+                QtCore.QCoreApplication.postEvent(self._window, event)
+
+        timer = QtCore.QTimer()
+        timer.timeout.connect(click)
+        timer.start(100)
+        self.move(times / 10)
+        timer.stop()
+        run_for(0.2)
+        waited = [after - before for before, after in zip(asked, answers, strict=True)]
+        self._view.tools.select("MoveCamera")
+        return {"pictures": max(waited), "clicks": len(waited)}
 
     def profile(self, seconds: float) -> dict[str, float]:
         """Return Python's functions by their own time while data arrives, for a look by hand."""
