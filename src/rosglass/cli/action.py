@@ -9,6 +9,7 @@ from rosglass.cli.connecting import (
     End,
     await_graph,
     connect,
+    create_typed,
     explained_wait,
     find,
     is_ros1,
@@ -101,7 +102,9 @@ def send(args: argparse.Namespace) -> int:
 
     with connect(args) as node:
         name = node.resolve(args.action)
-        with node.create_action_client(name, type_name) as client:
+        with create_typed(
+            node, lambda: node.create_action_client(name, type_name), type_name, args.timeout
+        ) as client:
             with explained_wait(lambda: client.problem):
                 wait(node, lambda: client.type is not None, args.timeout)
             if client.type is None:

@@ -16,7 +16,7 @@ from rosglass.cli.parser import TIMEOUT_S
 from rosglass.comm import ConnectionState, anonymous_name
 from rosglass.comm.names import hidden
 from rosglass.connection import default_url
-from rosglass.errors import ConnectionLostError, Error
+from rosglass.errors import ConnectionLostError, Error, TypeNotFoundError
 from rosglass.interfaces.names import spelled_ros1
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ __all__ = [
     "await_graph",
     "await_types",
     "connect",
+    "create_typed",
     "explained_wait",
     "find",
     "invalid_names",
@@ -90,6 +91,28 @@ def connect(args: argparse.Namespace, *, wait_for_start: bool = False) -> Node:
         node.close()
         raise
     return node
+
+
+def create_typed(
+    node: Node, create: Callable[[], _T], type_name: str | None, timeout: float | None
+) -> _T:
+    """Return what `create` makes of a type that only the robot may have.
+
+    A command's node is new: it may not know yet who uses the type, and would not ask them.
+
+    Raises:
+        TypeNotFoundError: No definition is known, nor sent by the robot within the timeout.
+    """
+    try:
+        return create()
+    except TypeNotFoundError as missing:
+        if type_name is None:
+            raise
+        try:
+            node.fetch_type(type_name, timeout=TIMEOUT_S if timeout is None else timeout)
+        except TypeNotFoundError:
+            raise missing from None
+        return create()
 
 
 def join(url: str, name: str, timeout: float) -> Node:

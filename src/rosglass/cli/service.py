@@ -10,6 +10,7 @@ from rosglass.cli.connecting import (
     await_graph,
     await_types,
     connect,
+    create_typed,
     explained_wait,
     find,
     is_hidden,
@@ -92,7 +93,9 @@ def call(args: argparse.Namespace) -> int:
         logging.getLogger("rosglass.ros1").setLevel(logging.ERROR)
     with connect(args) as node:
         name = node.resolve(args.service)
-        with node.create_service_client(name, type_name) as client:
+        with create_typed(
+            node, lambda: node.create_service_client(name, type_name), type_name, args.timeout
+        ) as client:
 
             def settled() -> bool:
                 # ROS 1's master reports at once that there is no such service.

@@ -16,6 +16,7 @@ from rosglass.cli.connecting import (
     as_ros1,
     await_graph,
     connect,
+    create_typed,
     explained_wait,
     find,
     is_hidden,
@@ -143,7 +144,12 @@ def echo(args: argparse.Namespace) -> int:
     limit = args.truncate or (None if args.csv else SHOWN_JSON if args.json else SHOWN)
     received = 0
     with connect(args, wait_for_start=True) as node:
-        subscription = node.create_subscription(args.topic, args.type, qos=profile(args))
+        subscription = create_typed(
+            node,
+            lambda: node.create_subscription(args.topic, args.type, qos=profile(args)),
+            args.type,
+            args.timeout,
+        )
         get = _getter(args.field)
         end = End()
         due = time.monotonic() + (math.inf if args.timeout is None else args.timeout)
@@ -230,8 +236,13 @@ def measure(args: argparse.Namespace) -> int:
             seen.append(_Seen(sample.received_ns, len(sample.data), delay))
 
     with connect(args, wait_for_start=True) as node:
-        subscription = node.create_subscription(
-            args.topic, args.type, qos=profile(args), raw_callback=receive, executor=IMMEDIATE
+        subscription = create_typed(
+            node,
+            lambda: node.create_subscription(
+                args.topic, args.type, qos=profile(args), raw_callback=receive, executor=IMMEDIATE
+            ),
+            args.type,
+            None,
         )
         end = End()
         until = None if args.duration is None else time.monotonic() + args.duration
@@ -335,7 +346,12 @@ def publish(args: argparse.Namespace) -> int:
         topic = node.resolve(args.topic)
         if type_name is None:
             type_name = _type_in_use(node, topic, args.timeout)
-        publisher = node.create_publisher(topic, type_name, profile(args))
+        publisher = create_typed(
+            node,
+            lambda: node.create_publisher(topic, type_name, profile(args)),
+            type_name,
+            args.timeout,
+        )
         values = parse_fields(text, publisher.type.name, template(publisher.type))
         message = publisher.type.create(values)
         wanted = args.wait if args.wait is not None else int(args.count == 1)

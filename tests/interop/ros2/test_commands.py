@@ -17,6 +17,7 @@ from ports import free_port
 
 import rosglass
 from rosglass.comm import QoS
+from rosglass.interfaces import Library
 
 if TYPE_CHECKING:
     from rosglass.comm import Node, ServerGoal
@@ -213,6 +214,28 @@ def test_sending_goals(run: Any, start_command: Any) -> None:
     out, _ = process.communicate(timeout=60)
     assert "canceled" in out
     assert process.returncode == 1
+
+
+def test_a_type_that_only_the_robot_has_is_fetched(router: Any, start_command_at: Any) -> None:
+    """However new the command's node is in the graph: often it did not know the server yet."""
+    library = Library()
+    library.add_text("moon_msgs/action/Dig", "int32 depth\n---\nint32 found\n---\n")
+    library.add_text("moon_msgs/srv/Weigh", "string what\n---\nfloat64 mass\n")
+    library.add_text("moon_msgs/msg/Dust", "int32 grains\n")
+    with rosglass.connect(router.url, "digger", library=library) as node:
+        node.create_action_server("dig", "moon_msgs/action/Dig", lambda goal: {"found": 7})
+        node.create_service_server("weigh", "moon_msgs/srv/Weigh", lambda request: {"mass": 2.5})
+        node.create_publisher("dust", "moon_msgs/msg/Dust", QoS.latched()).publish(grains=9)
+        commands = (
+            ("action", "send", "/dig", "moon_msgs/action/Dig", "{depth: 2}"),
+            ("service", "call", "/weigh", "moon_msgs/srv/Weigh", "{what: stone}"),
+            ("topic", "echo", "/dust", "moon_msgs/msg/Dust", "--once"),
+        )
+        for command, answer in zip(commands, ("found: 7", "mass: 2.5", "grains: 9"), strict=True):
+            for _ in range(3):
+                process = start_command_at(router.url, *command)
+                out, err = process.communicate(timeout=60)
+                assert (process.returncode, answer in out) == (0, True), err
 
 
 @BOTH
