@@ -22,7 +22,7 @@ Column {
             var end = handle.terminalState, result = handle.getResult()
             outcome = end.state === ActionTerminalStates.SUCCEEDED ? "done, " + result.outcome
                 : end.state === ActionTerminalStates.PREEMPTED ? "cancelled"
-                : "failed: " + (end.text || "no answer")
+                : "failed: " + (end.text || result && result.outcome || "no answer")
         }, function () {})
         if (goal === null)
             outcome = "NOT SENT: no server is connected"
@@ -47,7 +47,7 @@ Column {
         textFormat: Text.PlainText
         text: !behaviours.live ? "ROBOT SILENT" + (behaviours.active ? ": " + behaviours.name + " may still be running" : "")
             : !behaviours.client.connected ? "NO BEHAVIOUR SERVER" : behaviours.active
-            ? behaviours.name + ": " + (behaviours.goal.feedback ? behaviours.goal.feedback.current_state : "on its way")
+            ? behaviours.name + ": " + (behaviours.goal.feedback ? behaviours.goal.feedback.current_state || "executing" : "on its way")
             : behaviours.name ? behaviours.name + ": " + behaviours.outcome : ""
         color: behaviours.ready ? Theme.text : Theme.bad
         font.pixelSize: 11

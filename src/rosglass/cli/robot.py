@@ -13,8 +13,10 @@ import rosglass
 from rosglass.cli.network import refused
 from rosglass.cli.output import note
 from rosglass.comm import ConnectionState
+from rosglass.demo.operation import BEHAVIOR_EXECUTION
 from rosglass.demo.processes import DUPLICATE_EXIT
 from rosglass.demo.robot import Robot, RobotOptions
+from rosglass.interfaces import Library
 
 if TYPE_CHECKING:
     import argparse
@@ -43,7 +45,9 @@ def run(args: argparse.Namespace) -> int:
     signal.signal(signal.SIGTERM, lambda *_: end.set())
     if args.leash:
         threading.Thread(target=_watch_parent, args=(end,), daemon=True).start()
-    node = rosglass.connect(args.url, name=args.name, arguments=args.ros_arguments)
+    library = Library()
+    library.add_text("flexbe_msgs/action/BehaviorExecution", BEHAVIOR_EXECUTION, source="FlexBE")
+    node = rosglass.connect(args.url, name=args.name, library=library, arguments=args.ros_arguments)
     try:
         robot = Robot(node, options)
         try:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ABORTED",
     "ACTIVE",
+    "BEHAVIOR_EXECUTION",
     "BEHAVIOURS",
     "MODES",
     "PREEMPTED",
@@ -33,6 +34,18 @@ __all__ = [
 ]
 
 
+#: FlexBE's action in ROS 2, which no distribution brings: others fetch it from the robot.
+BEHAVIOR_EXECUTION = """\
+string behavior_name
+string[] arg_keys
+string[] arg_values
+string[] input_keys
+string[] input_values
+---
+string outcome
+---
+int32 current_state
+"""
 #: Codes of ``actionlib_msgs/msg/GoalStatus``.
 ACTIVE, PREEMPTED, SUCCEEDED, ABORTED, REJECTED = 1, 2, 3, 4, 5
 #: Frames in which a goal is accepted: the robot's localization does not drift.
@@ -198,11 +211,11 @@ class Operation:
             node.create_service_server("/mission/restart", trigger, self._on_restart),
             self.goal,
         ]
-        if node.wire == "ros1":
-            kind = "flexbe_msgs/action/BehaviorExecution"
-            self._parts.append(
-                node.create_action_server("/flexbe/execute_behavior", kind, self._on_behaviour)
-            )
+        self._is_ros1 = node.wire == "ros1"
+        kind = "flexbe_msgs/action/BehaviorExecution"
+        self._parts.append(
+            node.create_action_server("/flexbe/execute_behavior", kind, self._on_behaviour)
+        )
 
     @property
     def max_speed(self) -> float:
@@ -302,12 +315,15 @@ class Operation:
         return ""
 
     def _on_behaviour(self, goal: Any) -> dict[str, str] | None:
-        """Execute a behaviour; the status text says why it failed or was cancelled."""
+        """Execute a behaviour; the status text says why it failed; in ROS 2, the outcome does."""
         try:
             return self._execute(goal)
         except Error as error:
             _log.info("%s: %s", goal.goal.behavior_name, error)
-            goal.abort(text=str(error))
+            if self._is_ros1:
+                goal.abort(text=str(error))
+            else:
+                goal.abort({"outcome": str(error)})
             return None
 
     def _execute(self, goal: ServerGoal) -> dict[str, str]:
@@ -348,6 +364,10 @@ class Operation:
                 raise Error(self._interruption)
             yield state
 
+    def _publish_feedback(self, goal: ServerGoal, text: str) -> None:
+        # FlexBE of ROS 2 has numbers instead of texts; a behaviour here has one state.
+        goal.publish_feedback({"current_state": text if self._is_ros1 else 0})
+
     def _turn(self, goal: ServerGoal, angle: float) -> None:
         last, remaining = self._state().yaw, angle
         for state in self._steps(goal):
@@ -355,7 +375,7 @@ class Operation:
             last = state.yaw
             if remaining < _ANGLE_TOLERANCE:
                 return
-            goal.publish_feedback({"current_state": f"{math.degrees(remaining):.0f}° to go"})
+            self._publish_feedback(goal, f"{math.degrees(remaining):.0f}° to go")
             self._drive(0.0, max(0.15, min(_TURN_RATE, 2 * remaining)))
 
     def _move_flippers(self, goal: ServerGoal, angle: float) -> None:
@@ -365,12 +385,12 @@ class Operation:
             remaining = max(abs(angle - now) for now in state.flippers)
             if remaining < _ANGLE_TOLERANCE or time.monotonic() > until:
                 return
-            goal.publish_feedback({"current_state": f"{math.degrees(remaining):.0f}° to go"})
+            self._publish_feedback(goal, f"{math.degrees(remaining):.0f}° to go")
 
     def _drive_to(self, goal: ServerGoal, target: tuple[float, float]) -> None:
         for state in self._steps(goal):
             remaining = math.dist(target, (state.x, state.y))
-            goal.publish_feedback({"current_state": f"{remaining:.1f} m to go"})
+            self._publish_feedback(goal, f"{remaining:.1f} m to go")
             if self._steer(state, target):
                 return
 
