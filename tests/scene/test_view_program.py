@@ -612,3 +612,64 @@ def test_reset_in_the_tool_bar_drops_what_was_received(bench: SceneBench, window
     window.findChild(QObject, "reset").clicked.emit()
     assert not len(path.root)
     bench.wait(is_shown)
+
+
+def test_views_are_saved_shown_and_removed(bench: SceneBench, tmp_path: Path) -> None:
+    view = bench.load("GridDisplay {}")
+    view.resetView()
+    assert view.setViewSetting("Distance", "7") == ""
+    assert view.saveView("far") == ""
+    assert view.setViewSetting("Distance", "3") == ""
+    assert view.saveView("") == ""
+    assert view.saveView("two\nlines") == "expected a name of one line, got 'two\\nlines'"
+    assert view.savedViews == ["far", "Orbit"]
+    view.save_config(tmp_path / "views.rviz")
+    view.load_config(tmp_path / "views.rviz")
+    assert view.savedViews == ["far", "Orbit"]
+    assert view.showSavedView(0) == ""
+    assert view.controller.get("Distance") == 7
+    assert view.showSavedView(2) == "there is no saved view 2; there are 2"
+    view.saveView("far")  # instead of the one before
+    assert view.savedViews == ["Orbit", "far"]
+    view.removeSavedView(0)
+    assert view.savedViews == ["far"]
+
+
+def test_tools_are_added_and_removed_in_the_tool_bar(bench: SceneBench, window: Any) -> None:
+    from PySide6.QtCore import QObject
+
+    tools = window.findChild(QObject, "scene").tools
+    before = [tool.TYPE for tool in tools]
+    assert "GoalTool" in tools.types
+    assert tools.addTool("GoalTool") == ""
+    assert [tool.TYPE for tool in tools] == [*before, "GoalTool"]
+    tools.removeTool(tools.find("GoalTool"))
+    assert [tool.TYPE for tool in tools] == before
+    assert "there is no tool" in tools.addTool("Hammer")
+
+
+def test_docks_are_hidden_as_the_config_says_and_saved(
+    bench: SceneBench, window: Any, tmp_path: Path
+) -> None:
+    from PySide6.QtCore import QMetaObject, QObject
+    from PySide6.QtQml import qmlContext
+
+    from rosglass.scene.rviz_config import RvizConfig
+
+    program = qmlContext(window).contextProperty("program")
+    scene = window.findChild(QObject, "scene")
+    narrow = scene.property("width")
+    file = tmp_path / "docks.rviz"
+    geometry = "Window Geometry: {Hide Left Dock: true, Hide Right Dock: true, Width: 700}\n"
+    file.write_text(GRID + geometry)
+    program.open(str(file))
+    bench.wait(lambda: scene.property("width") == window.property("width"))
+    # As its button does.
+    button = window.findChild(QObject, "leftDock")
+    assert button.property("checked") is False
+    QMetaObject.invokeMethod(button, "click")
+    assert button.property("checked") is True
+    bench.wait(lambda: narrow < scene.property("width") < window.property("width"))
+    program.save("")
+    expected = {"Hide Left Dock": False, "Hide Right Dock": True, "Width": 700}
+    assert RvizConfig.load(file).root["Window Geometry"] == expected

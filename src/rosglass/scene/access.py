@@ -26,13 +26,13 @@ from rosglass.rviz.orbit import Orbit, Point
 from rosglass.rviz.property_values import KINDS
 from rosglass.rviz.trackers import Frames, Trackers
 from rosglass.rviz.view import CurrentView, View, Views
-from rosglass.scene.rviz_config import RvizConfig, ViewConfig
+from rosglass.scene.rviz_config import RvizConfig
 from rosglass.scene.rviz_formats import DISPLAYS as DISPLAY_IDS
 from rosglass.scene.rviz_formats import TOOLS as TOOL_IDS
 from rosglass.scene.rviz_formats import VIEWS as VIEW_IDS
 from rosglass.scene.rviz_formats import class_id_of, display_type, tool_type, view_type
 from rosglass.scene.tools import Tools
-from rosglass.scene.views import VIEWS, TopDownOrthoView, create_view
+from rosglass.scene.views import VIEWS, TopDownOrthoView
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -361,7 +361,7 @@ class SceneViews(Views):
         self._view = view
         super().__init__()
         view.viewChanged.connect(self._on_view_changed)
-        view.configLoaded.connect(self._on_view_changed)
+        view.savedViewsChanged.connect(self._on_view_changed)
 
     @property
     def kinds(self) -> list[str]:
@@ -371,15 +371,12 @@ class SceneViews(Views):
     @property
     def saved(self) -> list[str]:
         """Names of the saved views, not unique."""
-        return [one.name for one in self._list()]
+        found: list[str] = self._view.property("savedViews")
+        return found
 
     @Slot()
     def _on_view_changed(self) -> None:
         self._on_change()
-
-    def _list(self) -> list[ViewConfig]:
-        config = self._view.config
-        return [] if config is None else config.saved_views
 
     def _known_id(self, kind: Any) -> Any:
         known = view_type(kind) if isinstance(kind, str) else ""
@@ -392,22 +389,14 @@ class SceneViews(Views):
         self._view.select_view(kind)
 
     def _append(self, name: str) -> None:
-        if self._view.config is None:
-            self._view.config = RvizConfig()
-        state = {**self._view.controller.state(), "Name": name}
-        self._view.config.saved_views.append(ViewConfig(state))
+        self._view.save_view(name)
 
     def _show(self, index: int) -> None:
-        saved = self._list()[index]
-        if view_type(saved.class_id) not in VIEWS:
-            raise Error(f"the saved view {saved.name!r} is of a type that does not exist here")
-        made = create_view(saved.class_id)
-        for warning in made.restore(saved.settings):
-            _log.warning("the saved view %s: %s", saved.name, warning)
-        self._view.show_view(made)
+        for note in self._view.show_saved_view(index):
+            _log.warning("%s", note)
 
     def _take(self, index: int) -> None:
-        del self._list()[index]
+        self._view.remove_saved_view(index)
 
 
 class ScenePicker(Picker):

@@ -35,6 +35,8 @@ WINDOW = Path(__file__).with_name("panels") / "View.qml"
 _REFRESH_MS = 500
 #: Seconds between two looks at whether the view has changed.
 _LOOK_S = 2.0
+#: RViz's names in ``Window Geometry`` for hidden panels.
+_LEFT_DOCK, _RIGHT_DOCK = "Hide Left Dock", "Hide Right Dock"
 #: Seconds for which a message stays in the status bar.
 _MESSAGE_S = 10.0
 
@@ -95,6 +97,9 @@ class ViewProgram(QtCore.QObject):
     kiosk = ReadOnly(bool, False)
     #: Whether an overlay wants the 3D view alone.
     bare = ReadOnly(bool, False)
+    #: Whether the config hides RViz's docks, i.e. the panels on this side.
+    hidesLeftDock = ReadOnly(bool, False)
+    hidesRightDock = ReadOnly(bool, False)
 
     def __init__(
         self,
@@ -193,12 +198,23 @@ class ViewProgram(QtCore.QObject):
         if self._access is not None:
             self._access.bare = bare
 
+    @Slot(bool, bool)
+    def hideDocks(self, left: bool, right: bool) -> None:
+        """Hide or show the panels on both sides; saved with the config, as RViz does."""
+        report(self, hidesLeftDock=left, hidesRightDock=right)
+
     def _show(self, config: RvizConfig) -> None:
         assert self._view is not None
         notes = self._view.show_config(config)
         for note in notes:
             _log.warning("%s: %s", config.source, note)
-        report(self, configName=Path(config.source).name)
+        geometry = _geometry(config)
+        report(
+            self,
+            configName=Path(config.source).name,
+            hidesLeftDock=geometry.get(_LEFT_DOCK) is True,
+            hidesRightDock=geometry.get(_RIGHT_DOCK) is True,
+        )
         if notes:
             self.say(f"{len(notes)} notes on {Path(config.source).name}: {notes[0]}")
 
@@ -206,6 +222,7 @@ class ViewProgram(QtCore.QObject):
     def _on_recording_failed(self, problem: str) -> None:
         self.say(f"the recording has ended: {problem}")
 
+    @Slot(str)
     def say(self, text: str) -> None:
         """Show a message in the status bar for some seconds."""
         self._said_at = time.monotonic()
@@ -264,6 +281,12 @@ class ViewProgram(QtCore.QObject):
         """Save the config; where it was opened for an empty place."""
         if self._view is None:
             return
+        config = self._view.config = self._view.collect_config()
+        docks = {_LEFT_DOCK: self.hidesLeftDock, _RIGHT_DOCK: self.hidesRightDock}
+        geometry = _geometry(config)
+        docks = {name: hidden for name, hidden in docks.items() if hidden or name in geometry}
+        if docks:
+            config.root["Window Geometry"] = {**geometry, **docks}
         try:
             self._view.save_config(_local(place))
         except Error as error:
@@ -310,6 +333,12 @@ class ViewProgram(QtCore.QObject):
             time=f"ROS {ros_time:.2f}   wall {time.strftime('%H:%M:%S')}",
             recording="" if self._recorder is None else self._recorder.text,
         )
+
+
+def _geometry(config: RvizConfig) -> dict[str, Any]:
+    """Return a config's mapping of RViz's window and docks."""
+    found = config.root.get("Window Geometry")
+    return found if isinstance(found, dict) else {}
 
 
 def _local(place: Any) -> str:

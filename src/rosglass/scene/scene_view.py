@@ -70,6 +70,7 @@ class SceneView(QQuickRhiItem):
     backgroundChanged = Signal()
     problemChanged = Signal()
     viewChanged = Signal()
+    savedViewsChanged = Signal()
     toolChanged = Signal()
     statusTextChanged = Signal()
     #: The camera was moved, or the size changed.
@@ -354,6 +355,83 @@ class SceneView(QQuickRhiItem):
         self._view.reset()
         self.camera_moved()
 
+    # -- saved views -----------------------------------------------------------------------------
+
+    def _saved_views(self) -> list[ViewConfig]:
+        return [] if self.config is None else self.config.saved_views
+
+    #: Names of the saved views, not unique.
+    savedViews = Property(
+        list, lambda self: [one.name for one in self._saved_views()], notify=savedViewsChanged
+    )
+
+    def save_view(self, name: str) -> None:
+        """Save where the camera is, as the last of the saved views."""
+        if self.config is None:
+            self.config = RvizConfig()
+        self.config.saved_views.append(ViewConfig({**self._view.state(), "Name": name}))
+        self.savedViewsChanged.emit()
+
+    def show_saved_view(self, index: int) -> list[str]:
+        """Look through a saved view.
+
+        Returns:
+            Settings of it that were left out, a line each.
+
+        Raises:
+            Error: There is none at this index, or it is of a type that does not exist here.
+        """
+        saved = self._saved_views()[self._saved_index(index)]
+        notes: list[str] = []
+        made = create_saved_view(saved, notes)
+        if made is None:
+            raise Error(f"the saved view {saved.name!r} is of a type that does not exist here")
+        self.show_view(made)
+        return notes
+
+    def remove_saved_view(self, index: int) -> None:
+        """Remove a saved view.
+
+        Raises:
+            Error: There is none at this index.
+        """
+        del self._saved_views()[self._saved_index(index)]
+        self.savedViewsChanged.emit()
+
+    def _saved_index(self, index: int) -> int:
+        count = len(self._saved_views())
+        if not 0 <= index < count:
+            raise Error(f"there is no saved view {index}; there are {count}")
+        return index
+
+    @Slot(str, result=str)
+    def saveView(self, name: str) -> str:
+        """Save the view instead of one of this name; return what is wrong, or an empty text."""
+        name = name.strip() or self._view.TYPE
+        if not name.isprintable():
+            return f"expected a name of one line, got {name!r}"
+        names = [one.name for one in self._saved_views()]
+        if name in names:
+            self.remove_saved_view(names.index(name))
+        self.save_view(name)
+        return ""
+
+    @Slot(int, result=str)
+    def showSavedView(self, index: int) -> str:
+        """Look through a saved view; return what is wrong with it, or an empty text."""
+        try:
+            return "; ".join(self.show_saved_view(index))
+        except Error as error:
+            return str(error)
+
+    @Slot(int)
+    def removeSavedView(self, index: int) -> None:
+        """Remove a saved view."""
+        try:
+            self.remove_saved_view(index)
+        except Error as error:
+            self.scene._refuse(f"SceneView: removeSavedView: {error}")
+
     def pictures_drawn(self) -> int:
         """Return how many pictures were drawn."""
         return sum(one.count for one in self._renderers if Shiboken.isValid(one))
@@ -384,6 +462,7 @@ class SceneView(QQuickRhiItem):
         if made is not None:
             self.show_view(made)
         self.config = config
+        self.savedViewsChanged.emit()
         self.configLoaded.emit(config.source)
         return notes
 

@@ -4,7 +4,7 @@ A view has one current tool. It gets each press first; what it does not take mov
 tool is declared in QML inside a ``SceneView``, or added with ``view.tools.add``. Own tools derive
 from :class:`Tool` in Python, or are a ``Tool`` in QML with handlers of its signals.
 """
-# ruff: noqa: N815 - the names of properties and signals are QML's
+# ruff: noqa: N802, N815 - the names of slots, properties and signals are QML's
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class ToolView(Protocol):
     def cursor(self) -> QtGui.QCursor:
         """Return the cursor of the mouse."""
 
-    def setCursor(self, cursor: QtCore.Qt.CursorShape, /) -> None:  # noqa: N802 - Qt's name
+    def setCursor(self, cursor: QtCore.Qt.CursorShape, /) -> None:
         """Change the cursor of the mouse."""
 
 
@@ -293,7 +293,7 @@ class Tool(Configurable, Element):
         return ""
 
     @Slot(str, str, result=str)
-    def setSetting(self, path: str, text: str) -> str:  # noqa: N802 - QML's name
+    def setSetting(self, path: str, text: str) -> str:
         """Change a setting to what the user has entered; return why it does not fit, or ""."""
         try:
             setting = self._setting(path)
@@ -476,6 +476,24 @@ class Tools(QtCore.QObject):
         for name in DEFAULT_TOOLS:
             if name in self.TYPES:
                 self._defaults.add(self.add(name))
+
+    #: Names of the types of tools that can be added.
+    types = Property(list, lambda self: sorted(self.TYPES), constant=True)
+
+    @Slot(str, result=str)
+    def addTool(self, kind: str) -> str:
+        """Add a tool of a type as the last one; return what is wrong, or an empty text."""
+        try:
+            self.add(kind)
+        except Error as error:
+            return str(error)
+        return ""
+
+    @Slot(QtCore.QObject)
+    def removeTool(self, tool: Any) -> None:
+        """Remove a tool."""
+        if tool in self._items:
+            self.remove(tool)
 
     # -- the list --------------------------------------------------------------------------------
 

@@ -72,6 +72,33 @@ ApplicationWindow {
                     }
                 }
             }
+            ToolButton {
+                objectName: "addTool"
+                text: "+"
+                onClicked: newTools.popup()
+                PlainToolTip { visible: parent.hovered; plain: "Add a tool" }
+                Menu {
+                    id: newTools
+                    Repeater {
+                        model: scene.tools.types
+                        MenuItem { required property string modelData; text: modelData; onTriggered: program.say(scene.tools.addTool(modelData)) }
+                    }
+                }
+            }
+            ToolButton {
+                objectName: "removeTool"
+                text: "−"
+                enabled: scene.tools.all.length > 1
+                onClicked: oldTools.popup()
+                PlainToolTip { visible: parent.hovered; plain: "Remove a tool" }
+                Menu {
+                    id: oldTools
+                    Repeater {
+                        model: scene.tools.all
+                        MenuItem { required property var modelData; text: modelData.name; onTriggered: scene.tools.removeTool(modelData) }
+                    }
+                }
+            }
             Item { Layout.fillWidth: true }
             ToolButton {
                 objectName: "reset"
@@ -80,7 +107,23 @@ ApplicationWindow {
                 onClicked: scene.reset()
                 PlainToolTip { visible: parent.hovered; plain: "Drop all data that was received" }
             }
-            ToolButton { text: "Panels"; checkable: true; checked: window.panels; onToggled: window.panels = checked }
+            ToolSeparator { }
+            ToolButton {
+                objectName: "leftDock"
+                text: "Displays"
+                checkable: true
+                checked: !program.hidesLeftDock
+                onToggled: program.hideDocks(!checked, program.hidesRightDock)
+                PlainToolTip { visible: parent.hovered; plain: "Show the Displays panel; F10 hides everything but the 3D view" }
+            }
+            ToolButton {
+                objectName: "rightDock"
+                text: "Views"
+                checkable: true
+                checked: !program.hidesRightDock
+                onToggled: program.hideDocks(program.hidesLeftDock, !checked)
+                PlainToolTip { visible: parent.hovered; plain: "Show the panels Views, Tools and Selection; F10 hides everything but the 3D view" }
+            }
         }
     }
 
@@ -89,7 +132,7 @@ ApplicationWindow {
         DisplaysPanel {
             id: displaysPanel
             objectName: "displaysPanel"
-            visible: window.panels
+            visible: window.panels && !program.hidesLeftDock
             SplitView.preferredWidth: 330
             view: scene
         }
@@ -123,7 +166,7 @@ ApplicationWindow {
             }
         }
         ColumnLayout {
-            visible: window.panels
+            visible: window.panels && !program.hidesRightDock
             spacing: 0
             SplitView.preferredWidth: 250
             TabBar {

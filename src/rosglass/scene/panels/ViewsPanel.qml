@@ -3,7 +3,7 @@ import QtQuick.Controls.Fusion
 import QtQuick.Layouts
 import RosScene 1.0
 
-// The type of a view, and its settings.
+// The type of a view, its settings, and the saved views.
 Pane {
     id: panel
 
@@ -58,6 +58,50 @@ Pane {
                     value: row.setting.value
                     choices: row.setting.choices
                     onEdited: value => panel.problem = panel.view.setViewSetting(row.setting.name, String(value))
+                }
+            }
+        }
+        RowLayout {
+            TextField {
+                id: name
+                objectName: "viewName"
+                Layout.fillWidth: true
+                placeholderText: "Name of this view"
+                onAccepted: save.clicked()
+            }
+            Button {
+                id: save
+                objectName: "saveView"
+                text: "Save"
+                onClicked: {
+                    panel.problem = panel.view.saveView(name.text)
+                    if (!panel.problem) name.clear()
+                }
+            }
+        }
+        ListView {
+            objectName: "savedViews"
+            Layout.fillWidth: true
+            Layout.preferredHeight: Math.min(contentHeight, 150)
+            clip: true
+            model: panel.view ? panel.view.savedViews : []
+            delegate: RowLayout {
+                required property int index
+                required property string modelData
+
+                width: ListView.view.width
+                spacing: 0
+                ItemDelegate {
+                    Layout.fillWidth: true
+                    text: modelData
+                    contentItem: Label { text: modelData; textFormat: Text.PlainText; elide: Text.ElideRight }
+                    onClicked: panel.problem = panel.view.showSavedView(index)
+                    PlainToolTip { visible: parent.hovered; plain: "Look from there" }
+                }
+                ToolButton {
+                    text: "×"
+                    onClicked: panel.view.removeSavedView(index)
+                    PlainToolTip { visible: parent.hovered; plain: "Remove this saved view" }
                 }
             }
         }
