@@ -18,7 +18,7 @@ rviz-demo: ## open RViz with a dashboard on a simulated robot (20 s on a virtual
 	@scripts/setup.sh rviz-demo
 	@ROSGLASS_QT=pyside2 .venv-system/bin/python -m rosglass.demo.rviz
 
-view-demo: ## open the 3D view of a simulated ROS 2 robot, without RViz (20 s on a virtual screen where there is no display)
+view-demo: ## open a dashboard over the 3D view of a simulated ROS 2 robot, without RViz (20 s on a virtual screen where there is no display)
 	@scripts/setup.sh demo
 	@$(BIN)/python -m rosglass.demo.view
 

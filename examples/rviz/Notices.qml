@@ -32,7 +32,7 @@ Column {
         id: status
         topic: "/move_base/status"; messageType: "actionlib_msgs/GoalStatusArray"; timeout: 2000
         property string last
-        onNewMessage: {
+        onNewMessage: function (message) {
             var goals = message.status_list, goal = goals.length ? goals.at(goals.length - 1) : null
             var now = goal ? goal.goal_id.id + " " + goal.status : "none"
             // A goal that had ended before this interface started is not shown.

@@ -18,7 +18,7 @@ Panel {
     Subscriber {
         id: imu
         topic: "/imu"; messageType: "sensor_msgs/Imu"; timeout: 1000
-        onNewMessage: {
+        onNewMessage: function (message) {
             var q = message.orientation
             panel.roll = Math.atan2(2 * (q.w * q.x + q.y * q.z), 1 - 2 * (q.x * q.x + q.y * q.y))
             panel.pitch = Math.asin(Math.max(-1, Math.min(1, 2 * (q.w * q.y - q.z * q.x))))
@@ -27,7 +27,7 @@ Panel {
     Subscriber {
         id: joints
         topic: "/joint_states"; messageType: "sensor_msgs/JointState"; timeout: 1000
-        onNewMessage: {
+        onNewMessage: function (message) {
             var found = {}
             for (var i = 0; i < message.name.length; ++i)
                 found[message.name[i]] = message.position[i]

@@ -1,4 +1,4 @@
-"""The 3D view as one command: a Zenoh router, a simulated ROS 2 robot, and ``rosglass view``."""
+"""The paper's dashboard over the 3D view: a Zenoh router, a ROS 2 robot, and ``rosglass view``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["main"]
 
-_CONFIG = Path(__file__).parents[3] / "examples/view/robot.rviz"
+_FOLDER = Path(__file__).parents[3] / "examples/rviz"
 
 
 def main(seconds: float | None = None, picture: Path | None = None) -> int:
@@ -32,7 +32,7 @@ def main(seconds: float | None = None, picture: Path | None = None) -> int:
     Raises:
         Error: The router does not start.
     """
-    command = ["view", str(_CONFIG)]
+    command = ["view", str(_FOLDER / "figure1.rviz"), "--overlay", str(_FOLDER / "Dashboard.qml")]
     return run_station("the view", command, _start_router, seconds, picture, Path("view-demo.png"))
 
 

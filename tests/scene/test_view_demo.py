@@ -1,0 +1,46 @@
+"""``make view-demo``: the paper's dashboard over the 3D view of a simulated ROS 2 robot."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+#: Seconds for a busy machine to show the robot, and until the picture.
+_SHOWN_S = "12"
+
+
+def test_it_shows_the_dashboard_over_the_robot_without_warnings(app: Any, tmp_path: Path) -> None:
+    from PySide6.QtGui import QImage
+
+    picture = tmp_path / "view-demo.png"
+    code = f"from rosglass.demo.view import main; main({_SHOWN_S}, {str(picture)!r})"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env={name: value for name, value in os.environ.items() if name != "DISPLAY"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    image = QImage(str(picture))
+    assert (image.width(), image.height()) == (1280, 800)
+
+    def count(is_wanted: Any, left: int, top: int, right: int, bottom: int) -> int:
+        places = ((x, y) for x in range(left, right, 4) for y in range(top, bottom, 4))
+        return sum(1 for x, y in places if is_wanted(*image.pixelColor(x, y).getRgb()[:3]))
+
+    def is_red(r: int, g: int, b: int) -> bool:
+        return r > 180 and g < 60 and b < 80
+
+    # The stop button, which is red only while the robot's state is known.
+    assert count(is_red, 10, 640, 165, 770) > 500
+    # The robot's orange body, in the middle of the 3D view.
+    assert count(lambda r, g, b: r > 110 and 30 < g < 110 and b < 40, 400, 100, 900, 520) > 100
+    assert "WARNING" not in done.stderr, done.stderr
