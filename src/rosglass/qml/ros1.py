@@ -36,6 +36,7 @@ from rosglass.qml.tf_buffer import RosTfBuffer, RosTfTransformListener
 from rosglass.qml.tf_transform import RosTfBroadcaster, RosTfTransform
 from rosglass.qml.waiting import FOLDER_TIMEOUT_S, MOST_WAITING, wait_for, within
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot
+from rosglass.wires.tcpros.graph import expand
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -412,8 +413,6 @@ class Ros(ValueFunctions):
 
     def _check_topic(self, topic: str) -> None:
         """Raise InvalidNameError unless `topic` is a valid name in ROS 1."""
-        from rosglass.ros1.names import expand  # noqa: PLC0415 - brings in the ROS 1 client
-
         expand(topic, "node", "/")
 
     # The graph.

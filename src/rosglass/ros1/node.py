@@ -18,13 +18,13 @@ from rosglass.errors import InvalidNameError, ServiceError
 from rosglass.ros1.actionlib import actions
 from rosglass.ros1.actionlib_client import ActionlibClient
 from rosglass.ros1.actionlib_server import ActionlibServer
-from rosglass.ros1.names import absolute_namespace, expand, validate_node_name
 from rosglass.ros1.options import Arguments, Ros1Options
 from rosglass.ros1.parameter_namespace import RemoteNamespace, Ros1Parameters
 from rosglass.ros1.parameter_server import ParameterServer, StartParameters
 from rosglass.ros1.services import Services
 from rosglass.ros1.type_discovery import fetch
 from rosglass.wires.tcpros.core import AnnouncedTypes
+from rosglass.wires.tcpros.graph import absolute_namespace, expand, validate_node_name
 from rosglass.wires.tcpros.node import TcprosNode
 
 if TYPE_CHECKING:

@@ -19,11 +19,11 @@ from rosglass.errors import (
     ParameterError,
     RosArgumentError,
 )
-from rosglass.ros1.names import absolute_namespace, expand, validate_node_name
 from rosglass.ros1.parameter_server import to_wire
 from rosglass.ros1.rosparam_files import parse_value
 from rosglass.wires.tcpros.address import bracketed, check_host, given_address, parse_uri
 from rosglass.wires.tcpros.core import TcprosOptions
+from rosglass.wires.tcpros.graph import absolute_namespace, expand, validate_node_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -33,8 +33,8 @@ from rosglass.ros1.actionlib import (
     announced,
     assemble,
 )
-from rosglass.ros1.names import split
 from rosglass.wires.tcpros.connection import ANY
+from rosglass.wires.tcpros.graph import split
 from rosglass.wires.tcpros.registrations import Member
 
 if TYPE_CHECKING:

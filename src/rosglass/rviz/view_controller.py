@@ -12,9 +12,9 @@ from rosglass.comm.qos import QoS
 from rosglass.errors import Error, ServiceError
 from rosglass.qml.log import RateLimit
 from rosglass.qt import QtCore, Signal, Slot, is_alive
-from rosglass.ros1.names import expand, split
 from rosglass.rviz.qt5 import QtCore as Qt5Core
 from rosglass.rviz.view import ViewMode
+from rosglass.wires.tcpros.graph import expand, split
 
 if TYPE_CHECKING:
     from collections.abc import Callable

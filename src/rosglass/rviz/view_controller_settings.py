@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 from rosglass.errors import Error
 from rosglass.rviz.property_values import shown
 from rosglass.rviz.registered_properties import RegisteredProperties
+from rosglass.wires.tcpros.graph import expand
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -91,9 +92,6 @@ class ControllerSetting(Generic[_T]):
 
 
 def _check_namespace(name: str) -> None:
-    # Outside of RViz, few programs use a package of ROS 1.
-    from rosglass.ros1.names import expand  # noqa: PLC0415
-
     if name:
         expand(name, "rviz", "/")
 

@@ -10,9 +10,9 @@ from ports import free_port
 import rosglass
 from rosglass import ConversionError, InvalidNameError
 from rosglass.comm import anonymous_name
-from rosglass.ros1.names import absolute_namespace, expand, validate_node_name
 from rosglass.ros1.options import Ros1Options
 from rosglass.wires.tcpros import address
+from rosglass.wires.tcpros.graph import absolute_namespace, expand, validate_node_name
 
 PLACE = "ros1://127.0.0.1:1"
 
