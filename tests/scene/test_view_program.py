@@ -511,6 +511,10 @@ class Rows:
         y = top + 24 * (row_of(self.model, label) + part)
         return self._list.mapToScene(self._pointf(x, y)).toPoint()
 
+    def bottom(self) -> Any:
+        """Return a place in the lowest row that is visible."""
+        return self._list.mapToScene(self._pointf(150, self._list.height() - 8)).toPoint()
+
     def drag(self, moved: str, target: Any) -> None:
         """Press on a row and move to a place, in steps."""
         start = self.at(moved)
@@ -562,6 +566,39 @@ def test_a_display_is_dragged_by_the_mouse(bench: SceneBench, window: Any) -> No
     assert outline(rows.scene) == ["TF", "Axes", "Robot", [], "Grid"]
     rows.key("Delete")
     assert outline(rows.scene) == ["TF", "Axes", "Robot", []]
+
+
+def test_a_display_is_dragged_by_a_finger_that_is_held_down(bench: SceneBench, window: Any) -> None:
+    from PySide6.QtTest import QTest
+
+    rows = Rows(window)
+    start, end = rows.at("Grid"), rows.at("TF", 0.9)
+    device = QTest.createTouchDevice()
+    QTest.touchEvent(window, device).press(0, start, window).commit()
+    bench.wait(lambda: rows.model.frozen)
+    QTest.touchEvent(window, device).move(0, end, window).commit()
+    QTest.touchEvent(window, device).release(0, end, window).commit()
+    assert outline(rows.scene) == ["TF", "Grid"]
+    # One that moves at once does not drag.
+    QTest.touchEvent(window, device).press(0, start, window).commit()
+    for share in (0.3, 0.6, 1.0):
+        QTest.touchEvent(window, device).move(0, start + (end - start) * share, window).commit()
+    QTest.touchEvent(window, device).release(0, end, window).commit()
+    assert not rows.model.frozen
+    assert outline(rows.scene) == ["TF", "Grid"]
+
+
+def test_a_list_scrolls_to_where_a_display_is_dragged(bench: SceneBench, window: Any) -> None:
+    rows = Rows(window)
+    for number in range(60):
+        rows.scene.add("Axes", f"A{number}")
+    bench.wait(lambda: rows.at("A59").y() > 900)
+    bottom = rows.bottom()
+    rows.drag("Grid", bottom)
+    bench.wait(lambda: rows.at("A59").y() < bottom.y())
+    rows.release(bottom)
+    names = [one.name for one in rows.scene.displays]
+    assert names.index("Grid") > 50
 
 
 def test_the_view_shows_the_color_that_a_dialog_has(bench: SceneBench, window: Any) -> None:
