@@ -169,6 +169,30 @@ def test_displays_are_dropped_between_others_and_into_groups(
     assert outline(scene) == after
 
 
+def test_a_display_is_duplicated_with_its_settings(bench: SceneBench, grouped: Any) -> None:
+    model, scene = grouped, bench.view.scene
+    scene.move(scene.find("Axes"), group=scene.find("Robot"))
+    scene.find("Axes").length = 2.5
+    scene.find("Plan").color = "#112233"
+    model.refresh()
+    row = model.duplicate(row_of(model, "Plan"))
+    assert (model.rows[row].label, row) == ("Plan", len(model.rows) - 1)
+    assert (scene.displays[-1].topic, scene.displays[-1].color.name()) == ("/plan", "#112233")
+    model.duplicate(row_of(model, "Robot"))
+    assert outline(scene) == ["Grid", "Robot", ["Axes"], "Robot", ["Axes"], "Plan", "Plan"]
+    axes = [one for one in scene.displays if one.name == "Axes"]
+    assert [one.length for one in axes] == [2.5, 2.5]
+    axes[1].length = 1.0
+    assert axes[0].length == 2.5
+    # What rosglass does not have is kept, too.
+    from rosglass.scene.display_configs import UnknownDisplay
+
+    scene.adopt(UnknownDisplay(scene, class_id="other/Radar"))
+    model.refresh()
+    model.duplicate(row_of(model, "Unknown"))
+    assert [one.class_id for one in scene.displays[-2:]] == ["other/Radar"] * 2
+
+
 def test_a_display_in_a_group_is_shown_and_hidden_with_it(bench: SceneBench, grouped: Any) -> None:
     scene = bench.view.scene
     publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")

@@ -6,6 +6,7 @@ say so (:class:`UnknownDisplay`), settings stay beside those that are known.
 
 from __future__ import annotations
 
+from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
@@ -34,6 +35,7 @@ __all__ = [
     "UnknownDisplay",
     "collect_displays",
     "create_saved_view",
+    "duplicate_display",
     "show_displays",
 ]
 
@@ -123,7 +125,7 @@ def _add_controller(scene: Scene, view: ViewConfig, notes: list[str]) -> None:
     found.trackedFrame = setting_text(view.settings.get("Tracked Frame"))
 
 
-def _add(scene: Scene, one: DisplayConfig, group: GroupDisplay | None, notes: list[str]) -> None:
+def _add(scene: Scene, one: DisplayConfig, group: Display | None, notes: list[str]) -> Display:
     runtime = scene._find_runtime()
     display: Display
     if one.is_group:
@@ -145,6 +147,7 @@ def _add(scene: Scene, one: DisplayConfig, group: GroupDisplay | None, notes: li
     if isinstance(display, GroupDisplay):
         for inner in one.displays:
             _add(scene, inner, display, notes)
+    return display
 
 
 def create_saved_view(saved: ViewConfig, notes: list[str]) -> ViewController | None:
@@ -192,23 +195,41 @@ def collect_displays(scene: Scene, ros: int, group: Display | None = None) -> li
         ros: The RViz that the config is for, 1 or 2.
         group: The group whose displays are wanted; None for those in no group.
     """
-    found = []
-    for display in scene.displays:
-        if display.group is not group:
-            continue
-        if isinstance(display, UnknownDisplay):
-            one = DisplayConfig(dict(display.saved))
-            one.settings["Class"] = display.class_id
-        elif display.saved:
-            one = DisplayConfig(display.save_settings(display.saved, ros))
-            if ros_of(one.class_id) not in (None, ros):
-                # From a file of the other RViz.
-                one.settings["Class"] = class_id_of(DISPLAYS, display.TYPE, ros)
-        else:
-            one = DisplayConfig.new(display.TYPE, ros)
-            one.settings = display.save_settings(one.settings, ros)
-        one.name, one.enabled = display.name, display.enabled
-        if isinstance(display, GroupDisplay):
-            one.settings["Displays"] = collect_displays(scene, ros, display)
-        found.append(one)
-    return found
+    displays = (display for display in scene.displays if display.group is group)
+    return [_config_of(scene, display, ros) for display in displays]
+
+
+def _config_of(scene: Scene, display: Display, ros: int) -> DisplayConfig:
+    if isinstance(display, UnknownDisplay):
+        one = DisplayConfig(dict(display.saved))
+        one.settings["Class"] = display.class_id
+    elif display.saved:
+        one = DisplayConfig(display.save_settings(display.saved, ros))
+        if ros_of(one.class_id) not in (None, ros):
+            # From a file of the other RViz.
+            one.settings["Class"] = class_id_of(DISPLAYS, display.TYPE, ros)
+    else:
+        one = DisplayConfig.new(display.TYPE, ros)
+        one.settings = display.save_settings(one.settings, ros)
+    one.name, one.enabled = display.name, display.enabled
+    if isinstance(display, GroupDisplay):
+        one.settings["Displays"] = collect_displays(scene, ros, display)
+    return one
+
+
+def duplicate_display(scene: Scene, display: Display) -> Display:
+    """Add another display with the settings of one, behind it; of a group, with all in it.
+
+    Returns:
+        The new one.
+
+    Raises:
+        Error: It cannot be written as a config has it.
+    """
+    node = scene.node
+    ros = 1 if node is not None and node.wire == "ros1" else 2
+    beside = [one for one in scene.displays if one.group is display.group]
+    after = beside[beside.index(display) + 1 :]
+    made = _add(scene, deepcopy(_config_of(scene, display, ros)), display.group, [])
+    scene.move(made, after[0] if after else None, display.group)
+    return made

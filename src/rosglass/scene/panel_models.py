@@ -14,7 +14,7 @@ from rosglass.interfaces.names import ros1_name
 from rosglass.qml.properties import Writable
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.scene.display import OneTopicDisplay
-from rosglass.scene.display_configs import GroupDisplay, UnknownDisplay
+from rosglass.scene.display_configs import GroupDisplay, UnknownDisplay, duplicate_display
 from rosglass.scene.scene_view import SceneView
 
 if TYPE_CHECKING:
@@ -437,6 +437,20 @@ class DisplaysModel(QAbstractListModel):
         if display is not None and name.strip():
             display.name = name.strip()
             self.refresh()
+
+    @Slot(int, result=int)
+    def duplicate(self, row: int) -> int:
+        """Add another display like one; return the row of the new one."""
+        display = self._display_at(row)
+        if display is None or self._view is None:
+            return row
+        try:
+            made = duplicate_display(self._view.scene, display)
+        except Error as error:
+            self.refused.emit(str(error))
+            return row
+        self.refresh()
+        return self._row_of(made)
 
     @Slot(int)
     def remove(self, row: int) -> None:

@@ -265,10 +265,12 @@ Pane {
         }
         RowLayout {
             Layout.margins: 4
-            Button { objectName: "addDisplay"; text: "Add"; onClicked: adding.open() }
-            Button { text: "Remove"; enabled: panel.ofDisplay; onClicked: rows.remove(panel.current) }
-            Button { text: "Rename"; enabled: panel.ofDisplay; onClicked: renaming.open() }
-            Item { Layout.fillWidth: true }
+            component PanelButton: Button { Layout.fillWidth: true; Layout.preferredWidth: 60; Layout.minimumWidth: 0 }
+
+            PanelButton { objectName: "addDisplay"; text: "Add"; onClicked: adding.open() }
+            PanelButton { text: "Duplicate"; enabled: panel.ofDisplay; onClicked: panel.current = rows.duplicate(panel.current) }
+            PanelButton { text: "Remove"; enabled: panel.ofDisplay; onClicked: rows.remove(panel.current) }
+            PanelButton { text: "Rename"; enabled: panel.ofDisplay; onClicked: renaming.open() }
         }
     }
 
