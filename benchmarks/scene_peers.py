@@ -280,10 +280,12 @@ class View:
         import rosglass.scene
         from rosglass.qml import Session, install
         from rosglass.scene import display, renderer
+        from rosglass.scene.displays import marker
 
         self.costs = Costs()
         self.costs.watch(display.Intake, "receive", "node")
         self.costs.watch(display.TopicDisplay, "_on_items", "gui")
+        self.costs.watch(marker.MarkerGroup, "flush", "gui")
         for kind in renderer._KINDS.values():
             self.costs.watch(kind, "upload", "gui")
         self._renderer = renderer

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from rosglass.scene.drawing import BOX, Labels, Lines, Mesh, Points
+from rosglass.scene.drawing import BOX, SPHERE, Labels, Lines, Mesh, Points
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -106,6 +106,29 @@ def test_boxes_are_instances_of_one_mesh(show: Callable[..., Any]) -> None:
     assert mesh.count == 48
     show(marker(1, action=DELETE_ALL, ns=""))
     assert drawables(display) == []
+
+
+def test_boxes_of_one_message_move_go_and_become_others(show: Callable[..., Any]) -> None:
+    def at(x: float, number: int, kind: int = 1, **fields: Any) -> dict[str, Any]:
+        pose = {"position": {"x": x}, "orientation": {"w": 1.0}}
+        return marker(kind, number, pose=pose, **fields)
+
+    display = show(*(at(x, x) for x in range(4)))
+    assert xs(display) == [0, 1, 2, 3]
+    blue = {**RED, "r": 0.0, "b": 1.0}
+    display = show(
+        at(13, 3, color=blue),  # becomes the second one in the place of that which goes
+        marker(1, 1, action=DELETE),
+        at(12, 2),
+        marker(1, 2, action=DELETE),
+        at(10, 0, kind=2),
+        at(14, 4),
+    )
+    (boxes, spheres) = drawables(display)
+    assert (boxes.shape, spheres.shape) == (BOX, SPHERE)
+    assert sorted(xs(display)) == [10, 13, 14]
+    colors = {round(float(m[12])): c.tolist() for m, c in boxes.instances[["matrix", "rgba"]]}
+    assert colors == {13: [0, 0, 1, 1], 14: [1, 0, 0, 1]}
 
 
 def test_a_marker_replaces_the_one_of_its_id(show: Callable[..., Any]) -> None:

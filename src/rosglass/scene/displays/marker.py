@@ -1,7 +1,8 @@
 """The displays Marker and MarkerArray: shapes, lines, points, meshes and texts that robots send.
 
-Messages are turned into records of numpy arrays in the node's thread. Boxes, spheres, cylinders and
-arrows of one namespace are instances of one mesh, so that ten thousand of them are drawn at once.
+Messages are turned into records of numpy arrays in the node's thread, all markers of one at once.
+Boxes, spheres, cylinders and arrows of one namespace are instances of one mesh, so that ten
+thousand of them are drawn at once.
 """
 # ruff: noqa: N815 - the names of properties are QML's
 
@@ -39,7 +40,8 @@ from rosglass.scene.meshes import load_mesh_cached
 from rosglass.scene.parts import Parts
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
+    from typing import TypeAlias
 
     from numpy.typing import NDArray
 
@@ -47,6 +49,9 @@ if TYPE_CHECKING:
     from rosglass.qt import QtCore
     from rosglass.scene.resource_retriever import ResourceRetriever
     from rosglass.scene.scene import Scene
+
+    Matrix: TypeAlias = NDArray[np.float64]
+    _Instances: TypeAlias = tuple[tuple[Shape, ...], tuple[Matrix, ...]]
 
 __all__ = [
     "MarkerArrayDisplay",
@@ -78,6 +83,14 @@ _HEAD_SHARE = 0.23
 #: Turns z, along which cylinders and cones stand, to x, along which arrows point.
 _TO_X = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 _IDENTITY = np.eye(4)
+#: What markers consist of, where these are always the same shapes.
+_SOLIDS: dict[int, tuple[Shape, ...]] = {
+    CUBE: (BOX,),
+    SPHERE_TYPE: (SPHERE,),
+    CYLINDER_TYPE: (CYLINDER,),
+}
+_ARROW_SHAPES = (CYLINDER, CONE)
+_NO_POINTS, _NO_COLORS = np.zeros((0, 3), np.float32), np.zeros((0, 4), np.float32)
 #: Directions of the scale that count, where not all do.
 _SCALED = {LINE_STRIP: "x", LINE_LIST: "x", POINTS: "xy", TEXT: "z", ARROW_STRIP: "xy"}
 #: Metres that are drawn for a scale of 0: surfaces without thickness have no shade.
@@ -116,9 +129,11 @@ class MarkerRecord(NamedTuple):
         colors: (n, 4) or (0, 4).
         text: Of texts.
         resource: URI of a mesh.
-        embedded: Whether a mesh has its own colours.
+        embedded: Whether a mesh has its own colors.
         problem: Why it is not drawn, in words; empty otherwise.
         warning: Why it may not look as it should, in words; empty otherwise.
+        instances: Shapes that it consists of, where these are always the same ones, and the matrix
+            of each in its frame; None to compute them when it is drawn.
     """
 
     key: tuple[str, int]
@@ -131,19 +146,14 @@ class MarkerRecord(NamedTuple):
     color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     lifetime: float = 0.0
     locked: bool = False
-    points: NDArray[np.float32] = np.zeros((0, 3), np.float32)
-    colors: NDArray[np.float32] = np.zeros((0, 4), np.float32)
+    points: NDArray[np.float32] = _NO_POINTS
+    colors: NDArray[np.float32] = _NO_COLORS
     text: str = ""
     resource: str = ""
     embedded: bool = False
     problem: str = ""
     warning: str = ""
-
-
-def _seconds(duration: Any) -> float:
-    if hasattr(duration, "secs"):
-        return float(duration.secs + duration.nsecs * 1e-9)
-    return float(duration.sec + duration.nanosec * 1e-9)
+    instances: _Instances | None = None
 
 
 def read_marker(message: Any, part: tuple[str, int] | None = None) -> MarkerRecord:
@@ -156,64 +166,118 @@ def read_marker(message: Any, part: tuple[str, int] | None = None) -> MarkerReco
         part: Its key where it is part of an interactive marker: it has no namespace and id of its
             own then, and a scale of 0 is 1 m, as in RViz.
     """
+    (record,) = _read_all([message], part)
+    return record
+
+
+def _read_all(messages: Sequence[Any], part: tuple[str, int] | None = None) -> list[MarkerRecord]:
+    """Return the records of markers; what numpy computes, it computes for all of them at once."""
+    rows = []
+    for message in messages:
+        p, q = message.pose.position, message.pose.orientation
+        s, c = message.scale, message.color
+        rows.append((p.x, p.y, p.z, q.x, q.y, q.z, q.w, s.x, s.y, s.z, c.r, c.g, c.b, c.a))
+    numbers = np.array(rows, np.float64).reshape(-1, 14)
+    finite: NDArray[np.bool_] = np.asarray(np.isfinite(numbers).all(axis=1))
+    sizes = numbers[:, 7:10]
+    if part is not None:
+        sizes[sizes == 0] = 1.0
+    warnings: dict[int, str] = {}
+    for at in np.flatnonzero((sizes == 0).any(axis=1)).tolist():
+        message, (x, y, z) = messages[at], sizes[at].tolist()
+        if finite[at] and 0 <= message.type <= ARROW_STRIP:
+            sizes[at], warnings[at] = _without_zeros(message.type, (x, y, z), len(message.points))
+    with np.errstate(invalid="ignore", over="ignore"):
+        poses = poses_matrices(numbers[:, :3], numbers[:, 3:7])
+        scaled = poses.copy()
+        scaled[:, :3, :3] *= sizes[:, np.newaxis]
+    return [
+        _read_one(message, part, row, bool(finite[at]), warnings.get(at, ""), poses[at], scaled[at])
+        for at, (message, row) in enumerate(zip(messages, numbers.tolist(), strict=True))
+    ]
+
+
+def _read_one(
+    message: Any,
+    part: tuple[str, int] | None,
+    numbers: list[float],
+    is_finite: bool,
+    warning: str,
+    pose: NDArray[np.float64],
+    scaled: NDArray[np.float64],
+) -> MarkerRecord:
+    """Return the record of a marker.
+
+    Args:
+        message: The message.
+        part: As for :func:`read_marker`.
+        numbers: Pose, scale and color.
+        is_finite: Whether all of these are.
+        warning: Of the record.
+        pose: Matrix of the pose.
+        scaled: The same, multiplied with the scale.
+    """
     key, kind, action = (message.ns, message.id), message.type, message.action
     if part is not None:
         key, action = part, _ADD
     if action in (_DELETE, _DELETE_ALL):
         return MarkerRecord(key, kind, action)
-    header, p, q = message.header, message.pose.position, message.pose.orientation
-    stamp = header.stamp
+    frame, stamp, lifetime = message.header.frame_id.lstrip("/"), message.header.stamp, 0.0
     if hasattr(stamp, "secs"):
         at = stamp.secs * 1_000_000_000 + stamp.nsecs
+        lifetime = message.lifetime.secs + message.lifetime.nsecs * 1e-9
     else:
         at = stamp.sec * 1_000_000_000 + stamp.nanosec
-    scale, tint = message.scale, message.color
-    numbers = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
-    size = (scale.x, scale.y, scale.z)
-    if part is not None:
-        size = (size[0] or 1.0, size[1] or 1.0, size[2] or 1.0)
-    color = (tint.r, tint.g, tint.b, tint.a)
-    problem = ""
+        lifetime = message.lifetime.sec + message.lifetime.nanosec * 1e-9
+    problem, count, tints = "", len(message.points), len(message.colors)
     if action != _ADD:
         problem = f"action {action}: expected 0 (add), 2 (delete) or 3 (delete all)"
     elif not 0 <= kind <= ARROW_STRIP:
         problem = f"type {kind}: expected 0 to {ARROW_STRIP}"
-    elif not np.isfinite([*numbers, *size, *color]).all():
+    elif not is_finite:
         problem = "pose, scale or color has a number that is not finite"
-    count = len(message.points)
-    if count > _MAX_POINTS:
+    elif count > _MAX_POINTS:
         problem = f"points: {count} are more than the {_MAX_POINTS} that are drawn"
-    if not problem:
+    elif count or kind not in _SOLIDS:
         problem = _points_problem(kind, count)
     if problem:
-        return MarkerRecord(key, kind, action, header.frame_id.lstrip("/"), at, problem=problem)
-    size, warning = _without_zeros(kind, size, count)
-    points = np.array([(o.x, o.y, o.z) for o in message.points], np.float32).reshape(-1, 3)
-    colors = np.array([(c.r, c.g, c.b, c.a) for c in message.colors], np.float32).reshape(-1, 4)
+        return MarkerRecord(key, kind, action, frame, at, problem=problem)
+    points, colors = _NO_POINTS, _NO_COLORS
+    if count:
+        points = np.array([(o.x, o.y, o.z) for o in message.points], np.float32)
+        try:
+            check_numbers("points", points)
+        except Error as error:
+            return MarkerRecord(key, kind, action, frame, at, problem=str(error))
+    if tints:
+        colors = np.array([(c.r, c.g, c.b, c.a) for c in message.colors], np.float32)
     warning = warning or _colors_warning(kind, count, colors)
-    try:
-        check_numbers("points", points)
-    except Error as error:
-        frame = header.frame_id.lstrip("/")
-        return MarkerRecord(key, kind, action, frame, at, problem=str(error))
-    return MarkerRecord(
+    x, y, z, red, green, blue, alpha = numbers[7:]
+    shapes = _SOLIDS.get(kind)
+    record = MarkerRecord(
         key,
         kind,
         action,
-        header.frame_id.lstrip("/"),
+        frame,
         at,
-        poses_matrices(numbers[:3], numbers[3:])[0],
-        size,
-        color,
-        max(_seconds(message.lifetime), 0.0),
+        # Copies: a record must not hold the arrays of all markers of its message.
+        pose.copy(),
+        (x, y, z),
+        (red, green, blue, alpha),
+        max(lifetime, 0.0),
         message.frame_locked,
         points,
         colors,
         message.text,
         message.mesh_resource,
         message.mesh_use_embedded_materials,
-        warning=warning,
+        "",
+        warning,
+        None if shapes is None else (shapes, (scaled.copy(),)),
     )
+    if shapes is None:
+        record = record._replace(instances=_instances(record))
+    return record
 
 
 def _without_zeros(
@@ -259,52 +323,73 @@ class _Batch:
         self._keys: list[tuple[str, int]] = []
         self._matrices = np.zeros((16, 4, 4), np.float32)
         self._colors = np.zeros((16, 4), np.float32)
-        self.dirty = True
+        #: What was put since the last flush, by slot: pose of its frame, matrix there, color.
+        self._changed: dict[int, tuple[Matrix, Matrix, tuple[float, ...]]] = {}
+        self._dirty = True
 
     def put(
-        self, key: tuple[str, int], matrix: NDArray[np.float64], color: tuple[float, ...]
+        self, key: tuple[str, int], pose: Matrix, place: Matrix, color: tuple[float, ...]
     ) -> None:
-        """Draw a marker, in place of the one of the same key."""
+        """Draw a marker, in place of the one of the same key.
+
+        Args:
+            key: Its namespace and id.
+            pose: Of its frame.
+            place: Pose and size in this frame.
+            color: RGBA.
+        """
         slot = self._slots.get(key)
         if slot is None:
             slot = self._slots[key] = len(self._keys)
             self._keys.append(key)
-            if slot == len(self._matrices):
-                self._matrices = np.concatenate([self._matrices, np.zeros_like(self._matrices)])
-                self._colors = np.concatenate([self._colors, np.zeros_like(self._colors)])
-        self._matrices[slot], self._colors[slot] = matrix, color
-        self.dirty = True
+        self._changed[slot] = (pose, place, color)
 
     def discard(self, key: tuple[str, int]) -> None:
         """Do not draw a marker any more."""
         slot = self._slots.pop(key, None)
-        if slot is not None:
-            # The last one takes its place.
-            last = self._keys.pop()
-            if last != key:
-                self._keys[slot] = last
-                self._slots[last] = slot
-                end = len(self._keys)
+        if slot is None:
+            return
+        # The last one takes its place.
+        last, end = self._keys.pop(), len(self._keys)
+        changed = self._changed.pop(end, None)
+        if slot != end:
+            self._keys[slot] = last
+            self._slots[last] = slot
+            if changed is not None:
+                self._changed[slot] = changed
+            else:
+                self._changed.pop(slot, None)
                 self._matrices[slot], self._colors[slot] = self._matrices[end], self._colors[end]
-            self.dirty = True
+        self._dirty = True
 
     def key_of(self, index: int) -> tuple[str, int]:
         """Return the marker of an instance."""
         return self._keys[index]
 
-    @property
-    def is_empty(self) -> bool:
-        """Whether it has no instance."""
-        return not self._keys
-
     def flush(self) -> None:
         """Give the mesh what has changed."""
-        if self.dirty:
-            self.dirty = False
-            count = len(self._keys)
-            self.mesh.set_instances(
-                self._matrices[:count].copy(), self._colors[:count].copy() if count else (1,) * 4
-            )
+        count = len(self._keys)
+        if self._changed:
+            while count > len(self._matrices):
+                self._matrices = np.concatenate([self._matrices, np.zeros_like(self._matrices)])
+                self._colors = np.concatenate([self._colors, np.zeros_like(self._colors)])
+            slots = list(self._changed)
+            poses, places, colors = zip(*self._changed.values(), strict=True)
+            first = poses[0]
+            if all(pose is first for pose in poses):
+                at = first
+            else:
+                at = np.concatenate(poses).reshape(-1, 4, 4)
+            with np.errstate(over="ignore", invalid="ignore"):
+                self._matrices[slots] = at @ np.concatenate(places).reshape(-1, 4, 4)
+            self._colors[slots] = colors
+        elif not self._dirty:
+            return
+        self._changed.clear()
+        self._dirty = False
+        self.mesh.set_instances(
+            self._matrices[:count].copy(), self._colors[:count].copy() if count else (1,) * 4
+        )
 
 
 class MarkerGroup:
@@ -318,6 +403,8 @@ class MarkerGroup:
         self.root = Group()
         self._owner = owner
         self._batches: dict[Shape, _Batch] = {}
+        #: What those that are instances consist of.
+        self._solids: dict[tuple[str, int], tuple[Shape, ...]] = {}
         #: Drawables of markers that are not instances.
         self._own: dict[tuple[str, int], Group] = {}
         #: What those of texts and meshes look like.
@@ -332,30 +419,34 @@ class MarkerGroup:
 
     def put(self, marker: MarkerRecord, pose: NDArray[np.float64], meshes: MarkerMeshes) -> None:
         """Draw a marker at a pose of its frame in the fixed frame."""
+        key = marker.key
+        shapes, places = marker.instances or _instances(marker)
+        if shapes:
+            if self._solids.get(key) is not shapes:
+                self.remove(key)
+                self._solids[key] = shapes
+            for shape, local in zip(shapes, places, strict=True):
+                self._batch(shape).put(key, pose, local, marker.color)
+            return
         place = pose @ marker.pose
         # Textures and texts are uploaded again only if they changed; a mesh that is read is empty.
         look: tuple[Any, ...] = ()
         if marker.kind in (TEXT, MESH):
             look = (marker.kind, marker.scale, marker.color, marker.text)
             look += (marker.resource, marker.embedded)
-        own = self._own.get(marker.key)
-        if own and look and self._looks.get(marker.key) == look:
+        own = self._own.get(key)
+        if own and look and self._looks.get(key) == look:
             own.pose = place
             return
-        self.remove(marker.key)
-        shapes = list(_instances(marker))
-        if shapes:
-            for shape, local, color in shapes:
-                self._batch(shape).put(marker.key, place @ local, color)
-            return
+        self.remove(key)
         group = Group(*_drawables(marker, meshes))
         for item in group:
             if isinstance(item, Drawable):
                 item.owner = self._owner
         group.pose = place
-        self._own[marker.key] = group
+        self._own[key] = group
         if look:
-            self._looks[marker.key] = look
+            self._looks[key] = look
         self.root.add(group)
 
     def remove(self, key: tuple[str, int]) -> None:
@@ -364,13 +455,13 @@ class MarkerGroup:
         if group is not None:
             self._looks.pop(key, None)
             group.remove()
-        for batch in self._batches.values():
-            batch.discard(key)
+        for shape in self._solids.pop(key, ()):
+            self._batches[shape].discard(key)
 
     @property
     def is_empty(self) -> bool:
         """Whether it has no marker."""
-        return not self._own and all(batch.is_empty for batch in self._batches.values())
+        return not self._own and not self._solids
 
     def flush(self) -> None:
         """Draw what has changed since the last call."""
@@ -384,33 +475,30 @@ def _scaled(x: float, y: float, z: float, along: float = 0.0) -> NDArray[np.floa
     return matrix
 
 
-def _instances(
-    marker: MarkerRecord,
-) -> Iterable[tuple[Shape, NDArray[np.float64], tuple[float, ...]]]:
-    """Iterate over the shapes that a marker consists of, where these are always the same ones."""
+def _instances(marker: MarkerRecord) -> _Instances:
+    """Return the shapes that a marker consists of, where these are always the same ones."""
     x, y, z = marker.scale
-    if marker.kind == CUBE:
-        yield BOX, _scaled(x, y, z), marker.color
-    elif marker.kind == SPHERE_TYPE:
-        yield SPHERE, _scaled(x, y, z), marker.color
-    elif marker.kind == CYLINDER_TYPE:
-        yield CYLINDER, _scaled(x, y, z), marker.color
-    elif marker.kind == ARROW and not len(marker.points):
+    if marker.kind in _SOLIDS:
+        return _SOLIDS[marker.kind], (marker.pose @ _scaled(x, y, z),)
+    if marker.kind != ARROW:
+        return (), ()
+    if not len(marker.points):
         # Proportions of RViz: 77 % shaft, and a head of twice its width.
-        shaft = _TO_X @ _scaled(y, z, 0.77 * x, 0.385 * x)
-        head = _TO_X @ _scaled(2 * y, 2 * z, 0.23 * x, 0.77 * x)
-        yield CYLINDER, shaft, marker.color
-        yield CONE, head, marker.color
-    elif marker.kind == ARROW:
-        start, end = marker.points[0].astype(np.float64), marker.points[1].astype(np.float64)
-        way = end - start
-        length = float(np.linalg.norm(way))
-        if length < 1e-9 or not np.isfinite(length):
-            return
-        tip = min(z, length) if z else _HEAD_SHARE * length
-        place = _standing(start, way / length)
-        yield CYLINDER, place @ _scaled(x, x, length - tip, (length - tip) / 2), marker.color
-        yield CONE, place @ _scaled(y, y, tip, length - tip), marker.color
+        place = marker.pose @ _TO_X
+        shaft = _scaled(y, z, 0.77 * x, 0.385 * x)
+        head = _scaled(2 * y, 2 * z, 0.23 * x, 0.77 * x)
+        return _ARROW_SHAPES, (place @ shaft, place @ head)
+    start, end = marker.points[0].astype(np.float64), marker.points[1].astype(np.float64)
+    way = end - start
+    length = float(np.linalg.norm(way))
+    if length < 1e-9 or not np.isfinite(length):
+        return (), ()
+    tip = min(z, length) if z else _HEAD_SHARE * length
+    place = marker.pose @ _standing(start, way / length)
+    return _ARROW_SHAPES, (
+        place @ _scaled(x, x, length - tip, (length - tip) / 2),
+        place @ _scaled(y, y, tip, length - tip),
+    )
 
 
 def _standing(origin: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -464,18 +552,19 @@ def _triangles(marker: MarkerRecord) -> Mesh:
         colors = np.repeat(marker.colors, 3, axis=0)
     if colors is None:
         return Mesh(Shape(points), marker.color)
-    # RViz does not light what has colours of its own.
+    # RViz does not light what has colors of its own.
     return Mesh(Shape(points, colors=colors), lit=False)
 
 
 def _arrow_strip(marker: MarkerRecord) -> Iterable[Mesh]:
+    arrow = marker._replace(kind=ARROW, pose=_IDENTITY)
     arrows = [
-        list(_instances(marker._replace(kind=ARROW, points=marker.points[at : at + 2])))
+        _instances(arrow._replace(points=marker.points[at : at + 2]))[1]
         for at in range(len(marker.points) - 1)
     ]
-    for part, shape in ((0, CYLINDER), (1, CONE)):
+    for part, shape in enumerate(_ARROW_SHAPES):
         mesh = Mesh(shape, marker.color)
-        mesh.set_instances(np.array([one[part][1] for one in arrows if one]).reshape(-1, 4, 4))
+        mesh.set_instances(np.array([one[part] for one in arrows if one]).reshape(-1, 4, 4))
         yield mesh
 
 
@@ -483,7 +572,7 @@ class _MeshFile(NamedTuple):
     """A mesh file that was read.
 
     Attributes:
-        parts: For each part a drawable, with its texture, and the colour of its material or None.
+        parts: For each part a drawable, with its texture, and the color of its material or None.
         problem: What could not be read, in words; empty otherwise.
     """
 
@@ -978,7 +1067,7 @@ def _read_markers(message: Any) -> list[MarkerRecord]:
     count = len(message.markers)
     if count > _MAX_MARKERS:
         raise Error(f"markers: {count} are more than the {_MAX_MARKERS} that are shown")
-    return [read_marker(marker) for marker in message.markers]
+    return _read_all(message.markers)
 
 
 class MarkerDisplay(Markers):
