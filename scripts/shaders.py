@@ -17,7 +17,7 @@ FOLDER = Path(__file__).parents[1] / "src/rosglass/scene/shaders"
 #: GLSL for OpenGL 3.3 and OpenGL ES 3.0, Direct3D 11, Metal 1.2; SPIR-V for Vulkan is always in.
 _TARGETS = ("--glsl", "330,300 es", "--hlsl", "50", "--msl", "12")
 #: Shaders that need the colours of points as well.
-_OF_POINTS = ("points.vert", "quads.vert", "boxes.vert")
+_OF_POINTS = ("points.vert", "quads.vert", "sprites.vert", "boxes.vert")
 
 
 def source_of(file: Path) -> str:

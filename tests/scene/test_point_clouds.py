@@ -203,6 +203,42 @@ def test_a_square_faces_the_eye_across_to_y(bench: SceneBench) -> None:
     assert 0.4 < len(rows) / box < 0.7
 
 
+@pytest.mark.parametrize("style", ["Squares", "Flat Squares"])
+@pytest.mark.parametrize("view", ["Orbit", "TopDownOrtho"])
+def test_squares_of_one_vertex_look_as_those_of_four(
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch, style: str, view: str
+) -> None:
+    from rosglass.scene import renderer
+
+    body = f'view: "{view}"; PointCloud2Display {{ topic: "/cloud"; style: "{style}" }}'
+    (display,) = bench.load(body).scene.displays
+    publisher = bench.robot.create_publisher("/cloud", "sensor_msgs/PointCloud2")
+    bench.wait(publisher.subscription_count)
+    random = np.random.default_rng(0)
+    rows = [*zip(*random.uniform(-4, 4, (3, 400)), random.uniform(0, 1, 400), strict=True)]
+    publisher.publish(cloud(rows, "intensity"))
+    bench.wait(lambda: display.received)
+    if view == "Orbit":
+        # So near that some are larger than the limit, and that they are turned.
+        for name, value in (("Distance", 6.0), ("Yaw", 0.5), ("Pitch", 0.3)):
+            bench.view.controller.set(name, value)
+        bench.view.camera_moved()
+    bench.wait(lambda: not bench.view.is_moving)
+
+    def picture(limit_px: float) -> Any:
+        monkeypatch.setattr(renderer, "SPRITE_PX", limit_px)
+        for size in (0.3, 0.2):
+            display.size = size
+        return bench.picture().astype(int)
+
+    by_points, by_quads = picture(16.0), picture(0.0)
+    drawn = np.abs(by_quads - BACKGROUND).max(axis=2) > 3
+    assert drawn.sum() > 1000
+    differs = np.abs(by_points - by_quads).max(axis=2) > 3
+    # Only pixels at edges, by rounding.
+    assert differs.sum() <= 0.02 * drawn.sum()
+
+
 def test_clouds_stay_for_the_decay_time(bench: SceneBench, show: Callable[..., Shown]) -> None:
     shown = show("PointCloud2", 'decayTime: 1000; colorTransformer: "FlatColor"')
     for x in (-3, 0, 3):

@@ -361,6 +361,7 @@ class Points(Drawable):
         position: int = 0,
         channel: int = -1,
         channel_is_bytes: bool = False,
+        box: tuple[ArrayLike, ArrayLike] | None = None,
     ) -> None:
         """Take bytes, without a copy.
 
@@ -371,6 +372,7 @@ class Points(Drawable):
             position: Offset of three float32.
             channel: Offset of the channel; -1 for none.
             channel_is_bytes: Whether it is B, G, R, A.
+            box: Smallest and largest x, y, z, if they are known; otherwise found when needed.
 
         Raises:
             Error: An offset is beyond a row or not divisible by 4, or `data` is too short.
@@ -386,6 +388,9 @@ class Points(Drawable):
         self.data, self.count, self.stride = view, count, stride
         self.position, self.channel, self.channel_is_bytes = position, channel, channel_is_bytes
         self.changed(geometry=True)
+        if box is not None:
+            self._boxed = self.geometry
+            self._box = (np.asarray(box[0], np.float64), np.asarray(box[1], np.float64))
 
     def set_points(self, points: ArrayLike, colors: ArrayLike | None = None) -> None:
         """Take positions of shape (n, 3) in metres, and RGBA for each or all."""

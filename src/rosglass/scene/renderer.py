@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import logging
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -78,6 +79,8 @@ _FRAME_BYTES, _OBJECT_BYTES = 144, 144
 _ORIGIN_STEP_M = 1000.0
 #: Points that software draws while the camera moves: more are thinned out.
 MOVING_POINTS = 60_000
+#: Pixels up to which software draws a square as one vertex: larger ones are clipped at the edges.
+SPRITE_PX = 16.0
 _MODES = {"flat": 0.0, "bgra": 1.0, "rainbow": 2.0, "gradient": 3.0, "axis": 4.0}
 _INDEX_UINT32 = QRhiCommandBuffer.IndexFormat.IndexUInt32
 #: Bytes from one vertex to the next that every graphics interface takes.
@@ -359,11 +362,15 @@ class _Pass(NamedTuple):
         commands: Where drawing is recorded.
         viewport: All of the target.
         thin: Of points, only every `thin`-th is drawn.
+        depth: What x, y, z, 1 from the renderer's origin are multiplied with to get the depth.
+        pixels: Of what is 1 m high at a depth of 1.
     """
 
     commands: QRhiCommandBuffer
     viewport: QRhiViewport
     thin: int
+    depth: NDArray[np.float64]
+    pixels: float
 
 
 class _OnDevice:
@@ -428,7 +435,14 @@ class _PointsOnDevice(_OnDevice):
     def __init__(self, device: _Device, drawable: Points) -> None:
         super().__init__(device, drawable)
         self._buffer: Any = None
+        self._place: NDArray[np.float64] = np.eye(4)
         self.bound = device.bindings(self.block)
+
+    def prepare(
+        self, batch: QRhiResourceUpdateBatch, place: NDArray[np.float64], alpha: float
+    ) -> None:
+        self._place = place
+        super().prepare(batch, place, alpha)
 
     def upload(self, batch: QRhiResourceUpdateBatch) -> None:
         points = self.drawable
@@ -439,7 +453,7 @@ class _PointsOnDevice(_OnDevice):
     def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
         points = self.drawable
         paint = points.coloring
-        block[0] = (1, 1, 1, points.alpha * alpha)
+        block[0] = (SPRITE_PX if self._has_sprites() else 0, 0, 0, points.alpha * alpha)
         flag = paint.per_point_alpha if paint.mode == "bgra" else paint.invert
         block[1] = (_MODES[paint.mode], paint.low, paint.high, flag)
         block[2] = (*paint.first, points.size)
@@ -447,33 +461,60 @@ class _PointsOnDevice(_OnDevice):
         block[3] = (*paint.last, unit)
         block[4] = paint.axis
 
-    def draw(self, run: _Pass, blend: bool) -> None:
+    def _has_sprites(self) -> bool:
+        """Whether small squares are points of the graphics interface, as the processor draws."""
+        device = self.device
+        is_square = self.drawable.style in ("squares", "flat squares")
+        return is_square and device.is_software and device.has_point_size
+
+    def _has_large(self, run: _Pass) -> bool:
+        """Whether squares may be too large for sprites, by the nearest corner of their box."""
         points = self.drawable
-        native = points.style == "points" and self.device.has_point_size
-        vertex = "points" if native else "boxes" if points.style == "boxes" else "quads"
-        fragment = points.style if points.style in ("spheres", "boxes") else "flat"
+        box = points.bounds()
+        if box is None:
+            return False
+        corners = np.array([(x, y, z, 1.0) for x, y, z in product(*zip(*box, strict=True))])
+        nearest = float((corners @ (run.depth @ self._place)).min())
+        size = float(np.max(points.sizes(corners)))
+        return not size * run.pixels < SPRITE_PX * nearest
+
+    def draw(self, run: _Pass, blend: bool) -> None:
+        style = self.drawable.style
+        if style == "points" and self.device.has_point_size:
+            self._draw_as("points", "points", run, blend)
+        elif style == "boxes":
+            self._draw_as("boxes", "boxes", run, blend)
+        elif self._has_sprites():
+            self._draw_as("sprites", "sprites", run, blend)
+            if self._has_large(run):
+                self._draw_as("quads", "points", run, blend)
+        else:
+            self._draw_as("quads", "spheres" if style == "spheres" else "points", run, blend)
+
+    def _draw_as(self, vertex: str, fragment: str, run: _Pass, blend: bool) -> None:
+        points = self.drawable
         channel = points.channel if points.channel >= 0 else points.position
         thin = max(min(run.thin, _MAX_STRIDE // points.stride), 1)
+        #: Vertices of each point.
+        each = {"quads": 4, "boxes": 36}.get(vertex, 1)
         layout = (
-            ((points.stride * thin, not native),),
+            ((points.stride * thin, each > 1),),
             (
                 (0, 0, _Format.Float3, points.position),
                 (0, 1, _Format.UNormByte4 if points.channel_is_bytes else _Format.Float, channel),
             ),
         )
-        topology = (
-            _Topology.Points if native else _Topology.Triangles if vertex == "boxes" else _QUAD
-        )
+        topology = {"quads": _QUAD, "boxes": _Topology.Triangles}.get(vertex, _Topology.Points)
         pipeline = self.device.pipeline(
             (f"{vertex}.vert", f"{fragment}.frag"), layout, topology, blend, self.bound
         )
         self.begin(run, pipeline)
         run.commands.setVertexInput(0, [(self._buffer, 0)])
         count = -(-points.count // thin)
-        if native:
-            run.commands.draw(count)
+        if each > 1:
+            run.commands.draw(each, count)
         else:
-            run.commands.draw(36 if vertex == "boxes" else 4, count)
+            run.commands.draw(count)
 
     def close(self) -> None:
         super().close()
@@ -810,7 +851,10 @@ class SceneRenderer(QQuickRhiItemRenderer):
         try:
             size = target.pixelSize()
             viewport = QRhiViewport(0, 0, size.width(), size.height())
-            run = _Pass(commands, viewport, self._thinning(device, frame))
+            camera = frame.camera
+            depth = camera.projection[3] @ self._view_of(camera)
+            pixels = abs(float(camera.projection[1, 1])) * size.height() / 2
+            run = _Pass(commands, viewport, self._thinning(device, frame), depth, pixels)
             for on_device, blend in ready:
                 try:
                     on_device.draw(run, blend)
@@ -874,12 +918,16 @@ class SceneRenderer(QQuickRhiItemRenderer):
                 del self._on_device[drawable]
         return [*opaque, *((one, True) for *_, one in sorted(blended))], problem
 
+    def _view_of(self, camera: Camera) -> NDArray[np.float64]:
+        """Return the matrix from the renderer's origin to the eye."""
+        view = np.array(camera.view, np.float64)
+        view[:3, 3] += view[:3, :3] @ self._origin
+        return view
+
     def _send_camera(self, device: _Device, frame: Frame, batch: QRhiResourceUpdateBatch) -> None:
         camera = frame.camera
         block = np.zeros(_FRAME_BYTES // 4, np.float32)
-        view = np.array(camera.view, np.float64)
-        view[:3, 3] += view[:3, :3] @ self._origin
-        block[:16] = view.T.reshape(-1)
+        block[:16] = self._view_of(camera).T.reshape(-1)
         block[16:32] = (device.correction @ camera.projection).T.reshape(-1)
         size = self.renderTarget().pixelSize()
         flat = abs(float(camera.projection[3, 3])) > 0.5

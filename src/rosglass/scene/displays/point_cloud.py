@@ -168,9 +168,10 @@ class _ShownCloud:
         """Take a cloud, its pose in the fixed frame, and its frame."""
         self._data, self._pose, self._frame = data, pose, frame
         self.points.pose = pose
-        self._set_vertices(data.vertices)
+        self._set_vertices(data)
 
-    def _set_vertices(self, vertices: VertexData) -> None:
+    def _set_vertices(self, data: _Prepared) -> None:
+        vertices = data.vertices
         self.points.set_data(
             vertices.data,
             vertices.count,
@@ -178,6 +179,7 @@ class _ShownCloud:
             position=vertices.position,
             channel=vertices.channel,
             channel_is_bytes=vertices.channel_is_bytes,
+            box=data.cloud.bounds(),
         )
 
     def restyle(self, settings: _ColorSettings) -> PointColors | None:
@@ -190,7 +192,7 @@ class _ShownCloud:
         if name != data.transformer or colors.channel != data.colors.channel:
             new = settings.prepare(data.cloud)
             data = self._data = new._replace(source=data.source, pixel_m=data.pixel_m)
-            self._set_vertices(data.vertices)
+            self._set_vertices(data)
         size, by_depth = display._point_size(data)
         self.points.set_look(
             style=display.style.lower(),

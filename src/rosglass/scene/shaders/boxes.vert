@@ -1,7 +1,7 @@
 // Points as boxes of some metres, along the axes of the fixed frame of the drawable.
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec4 channel;
-layout(location = 0) out vec4 v_colour;
+layout(location = 0) flat out vec4 v_colour;
 layout(location = 1) out vec2 v_corner;
 
 // RViz's light: of the sides towards -x, x, -y, y, -z and z.

@@ -1,7 +1,7 @@
 // Points of some pixels, where the graphics interface has them.
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec4 channel;
-layout(location = 0) out vec4 v_colour;
+layout(location = 0) flat out vec4 v_colour;
 
 void main()
 {

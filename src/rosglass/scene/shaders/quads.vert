@@ -1,7 +1,7 @@
 // Points as rectangles that face the viewer: of some pixels, or of some metres.
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec4 channel;
-layout(location = 0) out vec4 v_colour;
+layout(location = 0) flat out vec4 v_colour;
 layout(location = 1) out vec2 v_corner;
 
 void main()
@@ -13,13 +13,12 @@ void main()
         vec4 at = vec4(position + vec3(v_corner * object.b.w * 0.5, 0.0), 1.0);
         gl_Position = frame.projection * (frame.view * (object.model * at));
     } else if (object.c.w > 0.5) {  // metres
-        // As in RViz, they face the eye, and one side is across to the y axis of their frame.
-        vec3 at = frame.viewport.w > 0.5 ? vec3(0.0, 0.0, 1.0) : normalize(-eye.xyz);
-        vec3 right = cross((frame.view * object.model[1]).xyz, at);
-        right = dot(right, right) > 1e-12 ? normalize(right) : vec3(1.0, 0.0, 0.0);
-        vec3 up = cross(at, right);
-        eye.xyz += (v_corner.x * right + v_corner.y * up) * size_in_metres(position) * 0.5;
-        gl_Position = frame.projection * eye;
+        float size = size_in_metres(position);
+        bool drawn = object.colour.r == 0.0 || !is_small(frame.projection * eye, size);
+        vec3 across, up;
+        square_sides(eye.xyz, size, across, up);
+        eye.xyz += v_corner.x * across + v_corner.y * up;
+        gl_Position = drawn ? frame.projection * eye : NOWHERE;
     } else {
         gl_Position = frame.projection * eye;
         gl_Position.xy += v_corner * object.b.w * frame.viewport.z * gl_Position.w / frame.viewport.xy;
