@@ -10,7 +10,6 @@ from rosglass.qt import QtCore, Signal
 from rosglass.rviz.host import Hook, address, as_pyside, class_of
 from rosglass.rviz.plugins import DISPLAY, Plugin, PluginList, declared
 from rosglass.rviz.properties import (
-    child_properties,
     describe_properties,
     find_property,
     read_property,
@@ -20,7 +19,7 @@ from rosglass.rviz.property_values import shown
 from rosglass.rviz.tools import loading_error
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from rosglass.rviz.window import Window
 
@@ -95,12 +94,13 @@ class Display(Plugin):
         return status
 
     def properties(self) -> list[dict[str, Any]]:
-        """Return all its properties as nested dicts; see `describe_properties` of RViz.
+        """Return all its properties; see :func:`rosglass.rviz.properties.describe_properties`.
 
         Raises:
             Error: The display was removed.
         """
-        raise NotImplementedError(f"{type(self).__name__} must implement properties()")
+        properties: list[dict[str, Any]] = self._owner.describe(self.require())
+        return properties
 
     def get(self, path: str | Sequence[str]) -> Any:
         """Return the value of a property; see :func:`rosglass.rviz.properties.read_property`.
@@ -111,8 +111,7 @@ class Display(Plugin):
         Raises:
             Error: The property does not exist, or the display was removed.
         """
-        self.require()
-        return self._get(joined_path(path))
+        return self._owner.read(self.require(), joined_path(path), self.name)
 
     def set(self, path: str | Sequence[str], value: Any) -> None:
         """Change a property; see :func:`rosglass.rviz.properties.write_property`.
@@ -125,8 +124,7 @@ class Display(Plugin):
             Error: The property does not exist, does not accept the value, or the display was
                 removed.
         """
-        self.require()
-        self._set(joined_path(path), value)
+        self._owner.write(self.require(), joined_path(path), value, self.name)
         self._owner.emit_changes()
 
     def _rename(self, name: str) -> None:
@@ -134,12 +132,6 @@ class Display(Plugin):
 
     def _enable(self, enabled: bool) -> None:
         raise NotImplementedError(f"{type(self).__name__} must implement _enable()")
-
-    def _get(self, path: str) -> Any:
-        raise NotImplementedError(f"{type(self).__name__} must implement _get()")
-
-    def _set(self, path: str, value: Any) -> None:
-        raise NotImplementedError(f"{type(self).__name__} must implement _set()")
 
 
 class Displays(PluginList):
@@ -177,7 +169,7 @@ class Displays(PluginList):
             Error: The property does not exist.
         """
         display, rest = self._split(joined_path(path))
-        return self._get_option(rest) if display is None else display.get(rest)
+        return self.read(None, rest, "") if display is None else display.get(rest)
 
     def set(self, path: str | Sequence[str], value: Any) -> None:
         """Change a property of any display, or of the view; see :meth:`get`.
@@ -187,14 +179,14 @@ class Displays(PluginList):
         """
         display, rest = self._split(joined_path(path))
         if display is None:
-            self._set_option(rest, value)
+            self.write(None, rest, value, "")
             self.emit_changes()
         else:
             display.set(rest, value)
 
     def options(self) -> list[dict[str, Any]]:
-        """Return the view's global options as nested dicts; see `describe_properties` of RViz."""
-        raise NotImplementedError(f"{type(self).__name__} must implement options()")
+        """Return the view's global options as nested dicts, as those of displays."""
+        return self.describe(None)
 
     def _split(self, path: str) -> tuple[Display | None, str]:
         """Return the display of a path and the path below it; None for one of the view.
@@ -211,7 +203,7 @@ class Displays(PluginList):
             own = next((one["name"] for one in found.properties()), "Alpha")
             example = f"{first}/{own}"
             raise Error(f"{first!r} is a display; name one of its properties, e.g. {example!r}")
-        known = [*self._option_names(), *(display.name for display in self._items)]
+        known = [*(one["name"] for one in self.options()), *(one.name for one in self._items)]
         if first not in known:
             hint = similar(first, known) or f"; there are: {', '.join(known)}"
             raise Error(f"nothing in the Displays panel is called {shown(first)}{hint}")
@@ -246,15 +238,25 @@ class Displays(PluginList):
     def close(self) -> None:
         """Stop checking for changes; safe to call twice."""
 
-    def _option_names(self) -> Iterable[str]:
-        """Return the names of the view's properties at the top of the panel."""
-        raise NotImplementedError(f"{type(self).__name__} must implement _option_names()")
+    def describe(self, handle: Any) -> list[dict[str, Any]]:
+        """Return the properties of a display, or of the view for None, as nested dicts."""
+        raise NotImplementedError(f"{type(self).__name__} must implement describe()")
 
-    def _get_option(self, path: str) -> Any:
-        raise NotImplementedError(f"{type(self).__name__} must implement _get_option()")
+    def read(self, handle: Any, path: str, name: str) -> Any:
+        """Return the value of a property of a display, or of the view for None.
 
-    def _set_option(self, path: str, value: Any) -> None:
-        raise NotImplementedError(f"{type(self).__name__} must implement _set_option()")
+        Raises:
+            Error: The property does not exist; the error begins with `name`.
+        """
+        raise NotImplementedError(f"{type(self).__name__} must implement read()")
+
+    def write(self, handle: Any, path: str, value: Any, name: str) -> None:
+        """Change a property of a display, or of the view for None.
+
+        Raises:
+            Error: The property does not exist, or does not accept the value.
+        """
+        raise NotImplementedError(f"{type(self).__name__} must implement write()")
 
     def _add(self, class_id: str, name: str, enabled: bool) -> Any:
         """Append a display and return its handle."""
@@ -280,26 +282,11 @@ class RvizDisplay(Display):
         handle = self.handle
         return str(handle.getName()), bool(handle.isEnabled()), _status_of(handle)
 
-    def properties(self) -> list[dict[str, Any]]:
-        """Return all its properties; see :func:`rosglass.rviz.properties.describe_properties`.
-
-        Raises:
-            Error: The display was removed.
-        """
-        return describe_properties(self.require())
-
     def _rename(self, name: str) -> None:
         self.handle.setName(name)
 
     def _enable(self, enabled: bool) -> None:
         self.handle.setEnabled(enabled)
-
-    def _get(self, path: str) -> Any:
-        return read_property(find_property(self.handle, path, self.name))
-
-    def _set(self, path: str, value: Any) -> None:
-        name = f"{self.name}/{path}"[:_MAX_SHOWN]
-        write_property(find_property(self.handle, path, self.name), value, name)
 
 
 class RvizDisplays(Displays):
@@ -330,22 +317,25 @@ class RvizDisplays(Displays):
         """RViz's own status, e.g. an error for an unknown fixed frame."""
         return _status_of(self._root)
 
-    def options(self) -> list[dict[str, Any]]:
-        """Return RViz's global options; see `describe_properties`."""
-        return describe_properties(self._root)
-
     def close(self) -> None:
         """Stop checking for changes; safe to call twice."""
         self._timer.stop()
 
-    def _option_names(self) -> Iterable[str]:
-        return (str(child.getName()) for child in child_properties(self._root))
+    def describe(self, handle: Any) -> list[dict[str, Any]]:
+        """Return the properties of a display, or of RViz for None; see `describe_properties`."""
+        return describe_properties(self._of(handle))
 
-    def _get_option(self, path: str) -> Any:
-        return read_property(find_property(self._root, path, "RViz"))
+    def read(self, handle: Any, path: str, name: str) -> Any:
+        """Return the value of a property; see :func:`rosglass.rviz.properties.read_property`."""
+        return read_property(find_property(self._of(handle), path, name or "RViz"))
 
-    def _set_option(self, path: str, value: Any) -> None:
-        write_property(find_property(self._root, path, "RViz"), value, path[:_MAX_SHOWN])
+    def write(self, handle: Any, path: str, value: Any, name: str) -> None:
+        """Change a property; see :func:`rosglass.rviz.properties.write_property`."""
+        found = find_property(self._of(handle), path, name or "RViz")
+        write_property(found, value, (f"{name}/{path}" if name else path)[:_MAX_SHOWN])
+
+    def _of(self, handle: Any) -> Any:
+        return self._root if handle is None else handle
 
     def _add(self, class_id: str, name: str, enabled: bool) -> Any:
         handle = self._window.manager.createDisplay(class_id, name, enabled)

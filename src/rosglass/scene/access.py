@@ -699,25 +699,11 @@ class SceneDisplay(displays.Display):
             displays.Status(display.statusLevel, display.statusText),
         )
 
-    def properties(self) -> list[dict[str, Any]]:
-        """Return all its properties as nested dicts.
-
-        Raises:
-            Error: The display was removed.
-        """
-        return _describe(_properties_of(self.require()))
-
     def _rename(self, name: str) -> None:
         self.handle.name = name
 
     def _enable(self, enabled: bool) -> None:
         self.handle.enabled = enabled
-
-    def _get(self, path: str) -> Any:
-        return _read(_properties_of(self.handle), path, self.name)
-
-    def _set(self, path: str, value: Any) -> None:
-        _write(_properties_of(self.handle), path, value, self.name)
 
 
 class SceneDisplays(displays.Displays):
@@ -763,10 +749,6 @@ class SceneDisplays(displays.Displays):
         hint = similar(fixed, known)
         return displays.Status("error", f"Fixed Frame: there is no frame {fixed!r}{hint}")
 
-    def options(self) -> list[dict[str, Any]]:
-        """Return the global options."""
-        return _describe(self._options())
-
     def emit_changes(self) -> None:
         """Emit the signals of all changes since the last call."""
         if is_alive(self._view):
@@ -777,7 +759,21 @@ class SceneDisplays(displays.Displays):
         if is_alive(self._view):  # its displays are destroyed with it
             super()._on_change()
 
-    def _options(self) -> _Tree:
+    def describe(self, handle: Any) -> list[dict[str, Any]]:
+        """Return the properties of a display, or of the view for None, as nested dicts."""
+        return _describe(self._tree(handle))
+
+    def read(self, handle: Any, path: str, name: str) -> Any:
+        """Return the value of a property of a display, or of the view for None."""
+        return _read(self._tree(handle), path, name or "the view")
+
+    def write(self, handle: Any, path: str, value: Any, name: str) -> None:
+        """Change a property of a display, or of the view for None."""
+        _write(self._tree(handle), path, value, name)
+
+    def _tree(self, display: Display | None) -> _Tree:
+        if display is not None:
+            return _properties_of(display)
         scene, view = self._scene, self._view
         return {
             f"{_OPTIONS}/Fixed Frame": _Property(
@@ -793,15 +789,6 @@ class SceneDisplays(displays.Displays):
                 lambda color: view.setProperty("background", color),
             ),
         }
-
-    def _option_names(self) -> list[str]:
-        return [_OPTIONS]
-
-    def _get_option(self, path: str) -> Any:
-        return _read(self._options(), path, "the view")
-
-    def _set_option(self, path: str, value: Any) -> None:
-        _write(self._options(), path, value, "")
 
     def _add(self, class_id: str, name: str, enabled: bool) -> Any:
         kind = display_type(class_id) or class_id
