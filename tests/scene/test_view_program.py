@@ -470,11 +470,18 @@ def test_typed_paths_are_taken_as_they_are(app: Any, chosen: str, meant: str) ->
 
 
 def test_what_would_be_lost_is_asked_for(bench: SceneBench, tmp_path: Path) -> None:
+    from rosglass import Time
     from rosglass.scene.program import ViewProgram
+    from rosglass.tf import StaticTransformBroadcaster, Transform
 
     view = bench.load()
     program = ViewProgram()
     program.begin(view)
+    assert program.mayClose()
+    # What the robot has is no change, e.g. its frames.
+    broadcaster = StaticTransformBroadcaster(bench.robot)
+    broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), Time(1), "map", "tool"))
+    bench.wait(lambda: view.scene.find("TF").frames == ["map", "tool"])
     assert program.mayClose()
     view.scene.displays[0].cellSize = 2.0
     assert not program.mayClose()
