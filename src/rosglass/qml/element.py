@@ -357,6 +357,26 @@ class TopicElement(Element):
             self._set_problem(str(error))
             return ""
 
+    def _get_topic(self) -> str:
+        return self._resolved or self._topic
+
+    def _set_topic(self, topic: str) -> None:
+        if topic == self._topic:
+            return
+        self._topic = topic
+        if topic == self._resolved:
+            return  # the topic is the same, but no longer depends on the node's namespace
+        self._resolved = ""
+        # A paused picture would stay on the screen under the new topic's name.
+        self._clear_shown()
+        self.topicChanged.emit()  # type: ignore[attr-defined]
+        self._schedule()
+
+    def _set_resolved(self, topic: str) -> None:
+        if topic != self._resolved:
+            self._resolved = topic
+            self.topicChanged.emit()  # type: ignore[attr-defined]
+
     def _get_namespace(self) -> str:
         return resolve_namespace(self.node, self._namespace)
 

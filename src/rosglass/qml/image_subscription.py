@@ -265,21 +265,6 @@ class ImageTransportSubscription(LookElement):
         self._picture: Picture | None = None
         self._blank = True
 
-    def _get_topic(self) -> str:
-        return self._resolved or self._topic
-
-    def _set_topic(self, topic: str) -> None:
-        if topic == self._topic:
-            return
-        self._topic = topic
-        if topic == self._resolved:
-            return  # the topic is the same, but no longer depends on the node's namespace
-        self._resolved = ""
-        # A paused picture would stay on the screen under the new topic's name.
-        self._clear_shown()
-        self.topicChanged.emit()
-        self._schedule()
-
     def _on_enabled_changed(self) -> None:
         self.playbackStateChanged.emit()
         self._schedule()
@@ -413,9 +398,7 @@ class ImageTransportSubscription(LookElement):
 
         session = self._session
         assert session is not None
-        if wanted[1] != self._resolved:
-            self._resolved = wanted[1]
-            self.topicChanged.emit()
+        self._set_resolved(wanted[1])
         node, topic, transport = wanted
         look = self._best_look()
         try:

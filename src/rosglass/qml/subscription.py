@@ -104,20 +104,6 @@ class Subscription(TopicElement):
 
     # Properties that QML sets.
 
-    def _get_topic(self) -> str:
-        return self._resolved or self._topic
-
-    def _set_topic(self, topic: str) -> None:
-        if topic == self._topic:
-            return
-        self._topic = topic
-        if topic == self._resolved:
-            return  # the topic is the same, but no longer depends on the node's namespace
-        self._resolved = ""
-        self._clear_shown()
-        self.topicChanged.emit()
-        self._schedule()
-
     def _get_type(self) -> str:
         return self._wanted_type or self._found_type
 
@@ -200,9 +186,7 @@ class Subscription(TopicElement):
         return node, resolved, self._wanted_type, self._profile
 
     def _create_endpoint(self, wanted: tuple[Any, ...]) -> None:
-        if wanted[1] != self._resolved:
-            self._resolved = wanted[1]
-            self.topicChanged.emit()
+        self._set_resolved(wanted[1])
         self._publishers = self._count_publishers()
         super()._create_endpoint(wanted)
 
