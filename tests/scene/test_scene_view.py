@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import itertools
+import os
+import subprocess
+import sys
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from conftest import SceneBench
 
 STAMP = {"sec": 0, "nanosec": 0}
@@ -47,6 +52,34 @@ def test_nothing_is_drawn_while_nothing_changes(bench: SceneBench) -> None:
     assert bench.drawn() == before
     view.scene.displays[0].length = 3
     bench.wait(lambda: bench.drawn() > before)
+
+
+_SOFTWARE = """
+import sys
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtQuick import QQuickView
+import rosglass.scene
+from rosglass.qml import Session, install
+
+app = QGuiApplication(["software"])
+rosglass.scene.register()
+window = QQuickView()
+session = Session("local://software")
+install(window.engine(), session)
+window.setSource("file://" + sys.argv[1])
+window.show()
+print(window.rootObject().problem)
+session.close()
+"""
+
+
+def test_without_a_graphics_interface_it_says_so(tmp_path: Path) -> None:
+    file = tmp_path / "View.qml"
+    file.write_text("import RosScene 1.0\nSceneView {}")
+    env = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "QT_QUICK_BACKEND": "software"}
+    command = [sys.executable, "-c", _SOFTWARE, str(file)]
+    ended = subprocess.run(command, env=env, stdout=subprocess.PIPE, text=True, check=True)
+    assert "Unset QT_QUICK_BACKEND; without a graphics card, Mesa's llvmpipe" in ended.stdout
 
 
 def test_items_are_drawn_over_it_and_shine_through_from_below(bench: SceneBench) -> None:

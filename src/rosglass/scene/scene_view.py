@@ -635,6 +635,7 @@ class SceneView(QQuickRhiItem):
             if problem:
                 self.scene._set_problem(problem)
 
+    @Slot(QQuickWindow)
     def _on_window(self, window: QQuickWindow | None) -> None:
         if window is None:
             return
