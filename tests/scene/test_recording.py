@@ -55,8 +55,11 @@ def test_the_video_shows_the_window(bench: SceneBench, recorder: Any) -> None:
     bench.view.setProperty("background", "#2020c0")
     bench.wait(lambda: recorder.status().frames > 1)
     # Which side is above.
+    before = bench.drawn()
     bench.view.scene.displays[0].enabled = False
-    bench.wait(lambda: recorder.status().frames > 2)
+    bench.wait(lambda: bench.drawn() > before)
+    count = recorder.status().frames
+    bench.wait(lambda: bench.window.update() or recorder.status().frames > count)
     seen = bench.picture()
     status = recorder.close()
     assert (status.dropped, status.problem) == (0, "")

@@ -82,6 +82,45 @@ def test_without_a_graphics_interface_it_says_so(tmp_path: Path) -> None:
     assert "Unset QT_QUICK_BACKEND; without a graphics card, Mesa's llvmpipe" in ended.stdout
 
 
+def test_a_scene_that_changes_all_the_time_leaves_frames_to_qml(bench: SceneBench) -> None:
+    from scene_mouse import Hand
+
+    view = bench.load(
+        "AxesDisplay {}\n"
+        'Rectangle { width: 50; height: 50; color: "red"\n'
+        "NumberAnimation on rotation { from: 0; to: 360; duration: 999; loops: -1 } }"
+    )
+    (axes,) = view.scene.displays
+    frames: list[int] = []
+
+    def change() -> None:
+        frames.append(bench.drawn())
+        axes.length = 1 + len(frames) % 2
+
+    def share(count: int) -> float:
+        """Return the share of the window's frames that have a new picture of the scene."""
+        frames.clear()
+        bench.wait(lambda: len(frames) > count)
+        return (frames[-1] - frames[0]) / (len(frames) - 1)
+
+    bench.window.frameSwapped.connect(change)
+    bench.wait(lambda: view.scene.draws_in_software)
+    share(5)
+    assert share(40) < 0.75
+    # What the user drags is drawn at once.
+    hand = Hand(bench)
+    hand.press((200, 150))
+    bench.wait(lambda: view.tools.holds_mouse)
+    share(5)
+    assert share(20) == 1.0
+    hand.release((200, 150))
+    bench.window.frameSwapped.disconnect(change)
+    # The last change is drawn, too.
+    axes.length = 3
+    before = bench.drawn()
+    bench.wait(lambda: bench.drawn() > before)
+
+
 def test_items_are_drawn_over_it_and_shine_through_from_below(bench: SceneBench) -> None:
     view = bench.load(
         'background: "transparent"; AxesDisplay {}\n'

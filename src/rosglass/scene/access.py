@@ -434,6 +434,7 @@ class ScenePicker(Picker):
             raise Error("the 3D view is not visible")
         if self._access.is_drawing:
             raise Error("this cannot be called while the view is being drawn; use Qt.callLater()")
+        self._view.update()  # a change may wait for its picture
         return window.grabWindow()
 
 

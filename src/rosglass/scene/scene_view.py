@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import TYPE_CHECKING, Any, cast
 
@@ -55,6 +56,8 @@ NO_GPU = (
 _STILL_S = 0.2
 #: Seconds that the camera takes to what it is to look at, and milliseconds between two pictures.
 _TURN_S, _TURN_MS = 0.4, 16
+#: The longest pause after a picture, in seconds.
+_MAX_PAUSE_S = 0.5
 #: RViz's background.
 _BACKGROUND = QColor(48, 48, 48)
 
@@ -88,6 +91,16 @@ class SceneView(QQuickRhiItem):
         self._problem = ""
         #: The renderers that C++ still has: letting go of one too early frees it twice.
         self._renderers: list[SceneRenderer] = []
+        #: When the window began its frame, whether a picture of this view is part of it, and before
+        #: when no other one is drawn: all by the clock of :func:`time.monotonic`.
+        self._frame_began = self._next_picture = 0.0
+        self._is_in_frame = False
+        #: Whether a change waits until then.
+        self._is_late = False
+        self._later = QtCore.QTimer(self)
+        self._later.setSingleShot(True)
+        self._later.timeout.connect(self._draw_late)
+        self._frames: list[Any] = []
         #: What the view itself draws into the scene: its tools, the marks of what is selected.
         self.overlay = Group()
         #: What is selected.
@@ -156,7 +169,7 @@ class SceneView(QQuickRhiItem):
 
     @Slot()
     def _on_scene(self) -> None:
-        self.update()
+        self._request_picture()
         self._selection.on_scene()
 
     def _watch_scene(self) -> None:
@@ -564,7 +577,7 @@ class SceneView(QQuickRhiItem):
             reason = str(error)
         if self._view.update_target(pose, reason):
             self.cameraChanged.emit()
-            self.update()
+            self._request_picture()
 
     @property
     def is_moving(self) -> bool:
@@ -611,12 +624,43 @@ class SceneView(QQuickRhiItem):
         if any(one.draws_in_software for one in self._renderers) != self.scene.draws_in_software:
             QtCore.QTimer.singleShot(0, self, self._report_device)
         self._painted += 1
+        self._is_in_frame, self._is_late = True, False
         return Frame(
             list(self._drawables()),
             self.camera(),
             self._background,
             time.monotonic() - self._moved_at < _STILL_S,
         )
+
+    def _request_picture(self) -> None:
+        """Draw what has changed; where the processor draws, QML has half of the time.
+
+        What the user moves is drawn at once.
+        """
+        pause = self._next_picture - time.monotonic()
+        if pause <= 0 or self._tools.holds_mouse:
+            self.update()
+            return
+        self._is_late = True
+        if not self._later.isActive():
+            self._later.start(math.ceil(1000 * pause))
+
+    @Slot()
+    def _draw_late(self) -> None:
+        if self._is_late:
+            self._request_picture()
+
+    @Slot()
+    def _on_frame(self) -> None:
+        self._frame_began = time.monotonic()
+
+    @Slot()
+    def _on_frame_swapped(self) -> None:
+        if self._is_in_frame:
+            self._is_in_frame = False
+            if self.scene.draws_in_software:
+                now = time.monotonic()
+                self._next_picture = now + min(now - self._frame_began, _MAX_PAUSE_S)
 
     @Slot()
     def _report_device(self) -> None:
@@ -637,8 +681,12 @@ class SceneView(QQuickRhiItem):
 
     @Slot(QQuickWindow)
     def _on_window(self, window: QQuickWindow | None) -> None:
+        while self._frames:
+            QtCore.QObject.disconnect(self._frames.pop())
         if window is None:
             return
+        self._frames.append(window.afterAnimating.connect(self._on_frame))
+        self._frames.append(window.frameSwapped.connect(self._on_frame_swapped))
         api = window.rendererInterface().graphicsApi()
         self._set_problem(NO_GPU if api == QSGRendererInterface.GraphicsApi.Software else "")
 

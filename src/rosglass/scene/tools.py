@@ -737,6 +737,11 @@ class Tools(QtCore.QObject):
     # -- events ----------------------------------------------------------------------------------
 
     @property
+    def holds_mouse(self) -> bool:
+        """Whether the mouse drags the camera, or what belongs to a tool."""
+        return self._grab in ("camera", "tool")
+
+    @property
     def moves_camera(self) -> bool:
         """Whether the camera is being dragged."""
         return self._grab == "camera"
