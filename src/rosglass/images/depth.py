@@ -129,16 +129,7 @@ class DepthColors:
         rows = np.lib.stride_tricks.as_strided(
             rgbx, (image.height, image.width * 4), (rgbx.strides[0], 1)
         )
-        return Frame(
-            PixelFormat.RGBX,
-            image.width,
-            image.height,
-            (rows,),
-            image.encoding,
-            image.stamp,
-            received,
-            image.frame_id,
-        )
+        return Frame.of(image, PixelFormat.RGBX, (rows,), received)
 
     def _update_range(self, depths: NDArray[Any], unit: float) -> None:
         """Adapt the automatic range to an image."""
@@ -214,16 +205,7 @@ class GreyLevels:
         else:
             greys = np.zeros(numbers.shape, np.float32)
         rows = greys.astype(np.uint8)
-        return Frame(
-            PixelFormat.GRAY8,
-            image.width,
-            image.height,
-            (rows,),
-            image.encoding,
-            image.stamp,
-            received,
-            image.frame_id,
-        )
+        return Frame.of(image, PixelFormat.GRAY8, (rows,), received)
 
 
 def _steps(depths: NDArray[Any], near: float, far: float) -> NDArray[np.uint16]:

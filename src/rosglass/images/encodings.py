@@ -105,6 +105,18 @@ class Frame:
     received: Time | None = None
     frame_id: str = ""
 
+    @classmethod
+    def of(
+        cls,
+        image: RawImage,
+        format: PixelFormat,
+        planes: tuple[NDArray[np.uint8], ...],
+        received: Time | None,
+    ) -> Frame:
+        """Return the frame of a received image whose pixels were converted."""
+        size = image.width, image.height
+        return cls(format, *size, planes, image.encoding, image.stamp, received, image.frame_id)
+
     @property
     def has_alpha(self) -> bool:
         """Whether pixels can be transparent."""
@@ -376,16 +388,7 @@ def convert(
     planes: tuple[NDArray[np.uint8], ...] = (rows,)
     if layout in {PixelFormat.NV12, PixelFormat.NV21}:
         planes = (rows[: image.height], rows[image.height :])
-    return Frame(
-        layout,
-        image.width,
-        image.height,
-        planes,
-        image.encoding,
-        image.stamp,
-        received,
-        image.frame_id,
-    )
+    return Frame.of(image, layout, planes, received)
 
 
 #: Encodings whose pixels can be averaged. Depths cannot: 0 is unknown, not near. YUV is small
