@@ -574,3 +574,64 @@ def test_disabled_displays_report_nothing(bench: SceneBench) -> None:
         display.enabled = False
         display.alpha = 0.2
         assert display.statusText == ""
+
+
+def test_a_view_that_leaves_its_window_frees_what_it_made_there(bench: SceneBench) -> None:
+    from PySide6.QtCore import QObject
+
+    view = bench.load(
+        'Loader { objectName: "other"; active: false; sourceComponent: Component {\n'
+        "Window { width: 100; height: 100; visible: true } } }\n"
+        'SceneView { objectName: "guest"; width: 80; height: 80; GridDisplay {} }'
+    )
+    guest = view.findChild(type(view), "guest")
+    bench.picture()
+    (renderer,) = guest._renderers
+    assert renderer._device is not None
+    loader = view.findChild(QObject, "other")
+    loader.setProperty("active", True)
+    other = loader.property("item")
+    bench.wait(other.isExposed)
+    guest.setParentItem(other.contentItem())
+    bench.wait(lambda: guest.pictures_drawn() and renderer not in guest._renderers)
+    assert renderer._device is None
+    guest.setParentItem(view)
+    bench.picture()
+
+
+def test_texts_without_room_are_a_problem(bench: SceneBench) -> None:
+    from rosglass.scene.drawing import Labels
+
+    view = bench.load("GridDisplay {}")
+    labels = Labels(in_pixels=True)
+    texts = [f"{number} " + "frame" * 60 for number in range(600)]
+    labels.set_texts(texts, np.zeros((600, 3)), 10.0)
+    view.scene.root.add(labels)
+    bench.wait(lambda: "of 600 texts have no room" in view.problem)
+    labels.set_texts(texts[:10], np.zeros((10, 3)), 10.0)
+    bench.wait(lambda: view.problem == "")
+
+
+def test_an_image_beyond_the_limit_keeps_the_walls_of_a_map() -> None:
+    from rosglass.scene.renderer import _reduced
+
+    cells = np.zeros((101, 60), np.int8)
+    cells[:, 31] = 100
+    cells[:4] = -1
+    small = _reduced(cells.view(np.uint8), 51).view(np.int8)
+    assert small.shape == (51, 30)
+    assert (small[2:, 15] == 100).all()
+    assert (small[:2] == -1).all()
+    assert not small[2:, :15].any()
+    colors = np.arange(100 * 100 * 4, dtype=np.uint8).reshape(100, 100, 4)
+    assert _reduced(colors, 50).shape == (50, 50, 4)
+    assert _reduced(colors, 100) is colors
+
+
+def test_a_depth_that_a_config_may_not_have_is_named(bench: SceneBench) -> None:
+    view = bench.load('PathDisplay { topic: "/path" }')
+    (display,) = view.scene.displays
+    notes = display.load_settings({"Topic": {"Value": "/path", "Depth": 5000}})
+    assert notes == ["Depth: 5000 is out of range; 1000 is used"]
+    assert display.depth == 1000
+    assert display.load_settings({"Topic": {"Value": "/path", "Depth": 20}}) == []

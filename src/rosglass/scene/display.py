@@ -489,7 +489,10 @@ class OneTopicDisplay(Display):
         """Take the settings of a file of either RViz, which write topics differently."""
         refused = super().load_settings({k: v for k, v in saved.items() if k != "Topic"})
         try:
-            self._load_topic(read_topic(saved))
+            given = read_topic(saved)
+            self._load_topic(given)
+            if given.depth and given.depth != self.depth:
+                refused.append(f"Depth: {given.depth} is out of range; {self.depth} is used")
         except Error as error:
             refused.append(str(error))
         return refused

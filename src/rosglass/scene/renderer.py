@@ -83,6 +83,8 @@ MOVING_POINTS = 60_000
 SPRITE_PX = 16.0
 _MODES = {"flat": 0.0, "bgra": 1.0, "rainbow": 2.0, "gradient": 3.0, "axis": 4.0}
 _INDEX_UINT32 = QRhiCommandBuffer.IndexFormat.IndexUInt32
+#: Pipelines that are kept, each for a kind of drawable and a layout of its data.
+_MOST_PIPELINES = 64
 #: Bytes from one vertex to the next that every graphics interface takes.
 _MAX_STRIDE = 2048
 #: Pixels of a line of text in the image of labels.
@@ -203,10 +205,8 @@ class _Device:
     def texture(
         self, batch: QRhiResourceUpdateBatch, pixels: NDArray[np.uint8], old: QRhiTexture | None
     ) -> QRhiTexture:
-        """Upload an image of (h, w) or (h, w, 4) bytes; one that is too large is thinned out."""
-        step = -(-max(pixels.shape[:2]) // self.largest_texture)
-        if step > 1:
-            pixels = np.ascontiguousarray(pixels[::step, ::step])
+        """Upload an image of (h, w) or (h, w, 4) bytes; one that is too large is reduced."""
+        pixels = _reduced(pixels, self.largest_texture)
         height, width = pixels.shape[:2]
         kind = QRhiTexture.Format.R8 if pixels.ndim == 2 else QRhiTexture.Format.RGBA8
         size = QSize(width, height)
@@ -288,6 +288,9 @@ class _Device:
         key = (shaders, layout, topology, blend, cull)
         if key in self._pipelines:
             return self._pipelines[key]
+        if len(self._pipelines) >= _MOST_PIPELINES:
+            # The layouts of clouds are their publishers' choice. Freed later, after this frame.
+            self.free(self._pipelines.pop(next(iter(self._pipelines))))
         made = self.rhi.newGraphicsPipeline()
         kinds = (QRhiShaderStage.Type.Vertex, QRhiShaderStage.Type.Fragment)
         made.setShaderStages(
@@ -327,12 +330,33 @@ class _Device:
         return made
 
 
+def _reduced(pixels: NDArray[np.uint8], limit: int) -> NDArray[np.uint8]:
+    """Return an image with at most `limit` pixels in each direction.
+
+    Of the cells of a map that become one, the most occupied one is kept: walls stay.
+    """
+    step = -(-max(pixels.shape[:2]) // limit)
+    if step <= 1:
+        return pixels
+    if pixels.ndim > 2:
+        return np.ascontiguousarray(pixels[::step, ::step])
+    # As signed numbers, an unknown cell (-1) is below a free one (0).
+    cells = pixels.view(np.int8)
+    for axis in (0, 1):
+        cells = np.maximum.reduceat(cells, range(0, cells.shape[axis], step), axis=axis)
+    return np.ascontiguousarray(cells).view(np.uint8)
+
+
 class _ShapeBuffers:
     """Vertices and triangles of a shape on the device, shared by all meshes that draw it."""
 
     def __init__(self, device: _Device, batch: QRhiResourceUpdateBatch, shape: Shape) -> None:
         self.vertices = device.fill(batch, None, shape.rows)
-        self.indices = device.fill(batch, None, shape.faces, QRhiBuffer.UsageFlag.IndexBuffer)
+        try:
+            self.indices = device.fill(batch, None, shape.faces, QRhiBuffer.UsageFlag.IndexBuffer)
+        except MemoryError:
+            device.free(self.vertices)  # it is tried again with the next frame
+            raise
         self.count = shape.faces.size
         self.users = 0
 
@@ -383,6 +407,8 @@ class _OnDevice:
         self._placed: Any = None
         self.seen = True
         self.bound: Any = None
+        #: What of it is not drawn, in words.
+        self.problem = ""
 
     def prepare(
         self,
@@ -695,6 +721,8 @@ class _LabelsOnDevice(_OnDevice):
             )
             self._texture = self.device.texture(batch, pixels, self._texture)
             self.bind((self._texture, self.device.smooth))
+            left_out = np.count_nonzero(self._shapes[:, 1] == 0)
+            self.problem = f"{left_out} of {labels.count} texts have no room" if left_out else ""
         rows = np.zeros(labels.count, self.ROW)
         rows["position"] = np.nan_to_num(labels.positions, nan=0.0, posinf=0.0, neginf=0.0)
         # One that has no place is not shown.
@@ -732,7 +760,7 @@ def _paint_texts(
 
     Returns:
         The image (h, w), one byte for each pixel; place of each text as shares of it (left, top,
-        width, height); width and height of each in lines.
+        width, height); width and height of each in lines, 0 for texts for which there is no room.
     """
     font = QFont("DejaVu Sans")
     font.setPixelSize(int(_LINE_PX * 0.75))
@@ -900,6 +928,8 @@ class SceneRenderer(QQuickRhiItemRenderer):
                 place = pose.copy()
                 place[:3, 3] -= origin
                 on_device.prepare(batch, place, alpha)
+                if on_device.problem:
+                    problem = f"{type(drawable).__name__} of {drawable.owner}: {on_device.problem}"
             except Exception as error:  # the others are drawn all the same
                 problem = f"{type(drawable).__name__} of {drawable.owner}: {error}"
                 continue

@@ -613,14 +613,21 @@ class SceneView(QQuickRhiItem):
 
     def createRenderer(self) -> SceneRenderer:
         """Return what draws; called by Qt in the render thread."""
-        self._renderers[:] = [one for one in self._renderers if Shiboken.isValid(one)]
         made = SceneRenderer(self._take_frame, self._on_problem)
         self._renderers.append(made)
         return made
 
+    def _drop_renderers(self) -> None:
+        """Drop the renderers that C++ has deleted, e.g. those of a window that it has left."""
+        for one in self._renderers:
+            if not Shiboken.isValid(one):
+                one.close()
+        self._renderers[:] = [one for one in self._renderers if Shiboken.isValid(one)]
+
     def _take_frame(self) -> Frame | None:
         if not is_alive(self._scene):
             return None  # it was that of a view that is gone
+        self._drop_renderers()
         if any(one.draws_in_software for one in self._renderers) != self.scene.draws_in_software:
             QtCore.QTimer.singleShot(0, self, self._report_device)
         self._painted += 1
@@ -664,7 +671,6 @@ class SceneView(QQuickRhiItem):
 
     @Slot()
     def _report_device(self) -> None:
-        self._renderers[:] = [one for one in self._renderers if Shiboken.isValid(one)]
         in_software = any(one.draws_in_software for one in self._renderers)
         self.scene.set_draws_in_software(in_software)
 

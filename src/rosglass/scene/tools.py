@@ -831,7 +831,7 @@ class Tools(QtCore.QObject):
             self._show_status()
 
     def cancel(self) -> None:
-        """Drop what was begun by a press, and ignore all until every button is released."""
+        """Drop what was begun by a press."""
         self._cancel()
         self._grab = ""
 
