@@ -378,3 +378,31 @@ def test_messages_on_their_way_to_a_destroyed_display_are_dropped(robot: Robot) 
     robot.bench.wait(lambda: not is_alive(display))
     on_items()
     robot.check()
+
+
+def test_paths_beside_each_other_are_bounded(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rosglass.scene.displays.pose._MAX_PATH_POSES", 7)
+    case = next(case for case in CASES if case.display == "Path")
+    robot.show(case._replace(settings={"bufferLength": 100}))
+    for _ in range(5):
+        robot.send(robot.message)
+    text = "Buffer Length: only the latest 2 paths are shown, which have 6 poses; reduce it"
+    assert text in robot.display.statusText
+    assert len(robot.display._paths) == 2
+    robot.send({**robot.message, "poses": STAMPED_POSES * 3})
+    assert "poses: 9 are more than the 7" in robot.display.statusText
+
+
+def test_a_map_is_copied_once_for_many_updates(robot: Robot) -> None:
+    case = next(case for case in CASES if case.display == "Map")
+    robot.show(case)
+    display, bench = robot.display, robot.bench
+    updates = robot._node.create_publisher("/hostile/topic_updates", "map_msgs/OccupancyGridUpdate")
+    bench.wait(updates.subscription_count)
+    before, received = display._image.geometry, display.received
+    for at in (0, 1, 9, 2):
+        updates.publish({"header": HEADER, "x": at, "width": 1, "height": 1, "data": [100]})
+    bench.wait(lambda: display.received == received + 4)
+    assert display.cells.tolist() == [[100, 100, 100], [0, 0, 0]]
+    assert display._image.geometry == before + 1
+    assert display.statusLevel == "ok"

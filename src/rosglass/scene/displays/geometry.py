@@ -11,7 +11,7 @@ import numpy as np
 
 from rosglass.errors import Error
 from rosglass.scene.display import TopicDisplay
-from rosglass.scene.displays.shapes import ArrowShapes, rotation_of_z_to
+from rosglass.scene.displays.shapes import ArrowShapes, read_columns, rotation_of_z_to
 from rosglass.scene.drawing import (
     CONE,
     SPHERE,
@@ -167,7 +167,7 @@ def _read_corners(message: Any) -> NDArray[np.float32]:
         raise Error(
             f"polygon: {len(points)} points are more than the {_MAX_CORNERS} that are drawn"
         )
-    corners = np.array([(p.x, p.y, p.z) for p in points], np.float32).reshape(-1, 3)
+    corners = read_columns(points, "x", "y", "z").astype(np.float32)
     check_numbers("polygon.points", corners)
     return np.concatenate([corners, corners[:1]])
 

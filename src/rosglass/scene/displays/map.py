@@ -11,6 +11,7 @@ import numpy as np
 from rosglass.errors import Error
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.scene.display import TopicDisplay, matrix_of
+from rosglass.scene.displays.shapes import read_columns
 from rosglass.scene.drawing import MapImage, Points, check_numbers
 from rosglass.scene.settings import Setting, rgb_of
 
@@ -160,6 +161,8 @@ class MapDisplay(TopicDisplay):
         return _read_map
 
     def _show_waiting(self) -> None:
+        #: The map with the updates that are here: it is copied once for all of them.
+        changed: NDArray[np.uint8] | None = None
         while self._waiting:
             item = self._waiting.popleft()
             if isinstance(item.data, _Grid):
@@ -171,26 +174,31 @@ class MapDisplay(TopicDisplay):
                 rows, columns = self._cells.shape
                 report(self, resolution=item.data.resolution, rows=rows, columns=columns)
                 self.delete_status("Update")
-            else:
-                self._apply(item.data)
+                changed = None
+            elif self._fits(item.data):
+                assert self._cells is not None
+                if changed is None:
+                    changed = self._cells = self._cells.copy()
+                x, y, cells = item.data
+                changed[y : y + len(cells), x : x + cells.shape[1]] = cells
+        if changed is not None:
+            self._image.set_cells(changed, self.resolution)
         self._place_again()
 
-    def _apply(self, update: _Update) -> None:
+    def _fits(self, update: _Update) -> bool:
+        """Return whether an update is within the map; the status says why it is not."""
         if self._cells is None:
             self.set_status("Update", "warn", "an update came before the map; it is not used")
-            return
+            return False
         rows, columns = update.cells.shape
         x, y = update.x, update.y
         if x < 0 or y < 0 or x + columns > self._cells.shape[1] or y + rows > self._cells.shape[0]:
             whole = f"{self._cells.shape[1]} x {self._cells.shape[0]}"
             text = f"x {x}, y {y}, {columns} x {rows} cells: beyond the map of {whole} cells"
             self.set_status("Update", "error", text)
-            return
+            return False
         self.delete_status("Update")
-        changed = self._cells.copy()
-        changed[y : y + rows, x : x + columns] = update.cells
-        self._cells = changed
-        self._image.set_cells(changed, self.resolution)
+        return True
 
     def _place_again(self) -> None:
         if self._cells is None:
@@ -229,7 +237,6 @@ class GridCellsDisplay(TopicDisplay):
 
     TYPE = "GridCells"
     MESSAGES = ("nav_msgs/GridCells",)
-    EAGER = True
 
     color = Setting("Color", "color", "#19ff00", "Of the cells.")
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
@@ -266,7 +273,7 @@ def _read_cells(message: Any) -> tuple[NDArray[np.float32], float, float]:
         raise Error(f"cell_width {width}, cell_height {height}: expected metres above 0")
     if len(message.cells) > _MAX_CELLS:
         raise Error(f"cells: {len(message.cells)} are more than the {_MAX_CELLS} that are drawn")
-    points = np.array([(p.x, p.y, p.z) for p in message.cells], np.float32).reshape(-1, 3)
+    points = read_columns(message.cells, "x", "y", "z").astype(np.float32)
     check_numbers("cells", points)
     points[:, 1] *= width / height
     return points, width, height

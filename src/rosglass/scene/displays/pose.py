@@ -10,12 +10,12 @@ import numpy as np
 
 from rosglass.errors import Error
 from rosglass.scene.display import TopicDisplay, matrix_of
-from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, poses_matrices
+from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, poses_matrices, read_columns
 from rosglass.scene.drawing import CONE, CYLINDER, SPHERE, Group, Lines, Mesh, check_numbers
 from rosglass.scene.settings import Setting, rgb_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
@@ -31,6 +31,11 @@ __all__ = [
 ]
 
 _MAX_POSES = 100_000
+#: Where the position and the quaternion of a pose are in its message.
+_POSE_PATHS = (
+    *("position.x", "position.y", "position.z"),
+    *("orientation.x", "orientation.y", "orientation.z", "orientation.w"),
+)
 #: Odometry messages that are kept where none is to be dropped.
 _MAX_KEPT = 10_000
 #: Turns z, along which cylinders and cones stand, to x and y.
@@ -142,7 +147,6 @@ class PoseArrayDisplay(TopicDisplay):
 
     TYPE = "PoseArray"
     MESSAGES = ("geometry_msgs/PoseArray",)
-    EAGER = True
 
     shape = Setting(
         "Shape", "enum", "Arrow (Flat)", "How poses are drawn.",
@@ -197,20 +201,15 @@ class PoseArrayDisplay(TopicDisplay):
 
 
 def _read_poses(message: Any) -> NDArray[np.float64]:
-    rows = _rows(message.poses, len(message.poses), _MAX_POSES)
+    _check_count(message.poses, _MAX_POSES)
+    rows = read_columns(message.poses, *_POSE_PATHS)
+    check_numbers("poses", rows)
     return poses_matrices(rows[:, :3], rows[:, 3:])
 
 
-def _rows(poses: Iterable[Any], count: int, most: int) -> NDArray[np.float64]:
-    """Return position and quaternion of each pose, (n, 7)."""
-    if count > most:
-        raise Error(f"poses: {count} are more than the {most} that are drawn")
-    rows = np.empty((count, 7))
-    for at, pose in enumerate(poses):
-        p, q = pose.position, pose.orientation
-        rows[at] = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
-    check_numbers("poses", rows)
-    return rows
+def _check_count(poses: Any, most: int) -> None:
+    if len(poses) > most:
+        raise Error(f"poses: {len(poses)} are more than the {most} that are drawn")
 
 
 def _flat_arrows(poses: NDArray[np.float64], length: float) -> NDArray[np.float64]:
@@ -537,17 +536,32 @@ class PathDisplay(TopicDisplay):
         path.place(pose)
         self._paths.append(path)
         self.root.add(*path.parts)
-        self._restyle()
+        self._drop_old()
+        path.restyle(self)
 
     def reset(self) -> None:
         """Drop all paths."""
         super().reset()
         self._paths.clear()
 
-    def _restyle(self) -> None:
-        while len(self._paths) > self.bufferLength:
-            for part in self._paths.pop(0).parts:
+    def _drop_old(self) -> None:
+        """Drop the oldest paths until neither they nor all their poses are too many."""
+        count = sum(path.count for path in self._paths)
+        is_full = False
+        while len(self._paths) > self.bufferLength or count > _MAX_PATH_POSES:
+            is_full = len(self._paths) <= self.bufferLength
+            oldest = self._paths.pop(0)
+            count -= oldest.count
+            for part in oldest.parts:
                 part.remove()
+        if is_full:
+            text = f"only the latest {len(self._paths)} paths are shown, which have {count} poses"
+            self.set_status("Buffer Length", "warn", f"{text}; reduce it")
+        else:
+            self.delete_status("Buffer Length")
+
+    def _restyle(self) -> None:
+        self._drop_old()
         for path in self._paths:
             path.restyle(self)
 
@@ -556,7 +570,7 @@ class _Path:
     """One path: a line, and axes or arrows at its poses."""
 
     def __init__(self, poses: NDArray[np.float64], owner: PathDisplay) -> None:
-        self._poses = poses
+        self._poses, self.count = poses, len(poses)
         self._line, self._axes, self._arrows = Lines(), AxesShapes(owner), ArrowShapes(owner)
         self._line.owner = owner
         self.parts = (self._line, self._axes, self._arrows)
@@ -571,9 +585,10 @@ class _Path:
         self._line.in_metres = display.lineStyle == "Billboards"
         self._line.set_strip(points, (*rgb_of(display.color), display.alpha))
         self._line.set_look(width=display.lineWidth if self._line.in_metres else 1.0)
-        matrices = poses_matrices(points, self._poses[:, 3:])
-        none = matrices[:0]
         style = display.poseStyle
+        count = 0 if style == "None" else len(points)
+        matrices = poses_matrices(points[:count], self._poses[:count, 3:])
+        none = matrices[:0]
         self._axes.set_axes(
             matrices if style == "Axes" else none, display.axesLength, display.axesRadius
         )
@@ -587,5 +602,10 @@ class _Path:
 
 def _read_path(message: Any) -> NDArray[np.float64]:
     """Return position and quaternion of each pose, (n, 7)."""
-    poses = message.poses
-    return _rows((stamped.pose for stamped in poses), len(poses), _MAX_PATH_POSES)
+    _check_count(message.poses, _MAX_PATH_POSES)
+    rows = np.empty((len(message.poses), 7))
+    for at, stamped in enumerate(message.poses):
+        p, q = stamped.pose.position, stamped.pose.orientation
+        rows[at] = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+    check_numbers("poses", rows)
+    return rows

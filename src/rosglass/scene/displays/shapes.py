@@ -11,7 +11,16 @@ from rosglass.scene.drawing import CONE, CYLINDER, Group, Mesh
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ArrowShapes", "AxesShapes", "poses_matrices", "rotation_of_z_to", "stack_poses"]
+    from rosglass.messages import MessageSequence
+
+__all__ = [
+    "ArrowShapes",
+    "AxesShapes",
+    "poses_matrices",
+    "read_columns",
+    "rotation_of_z_to",
+    "stack_poses",
+]
 
 #: Turns z, along which cylinders and cones stand, to x, y and z.
 _ALONG = np.zeros((3, 4, 4))
@@ -19,6 +28,23 @@ _ALONG[0] = [[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
 _ALONG[1] = [[0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]
 _ALONG[2] = np.eye(4)
 _COLORS = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1]], np.float32)
+
+
+def read_columns(elements: MessageSequence, *paths: str) -> NDArray[np.float64]:
+    """Return fields of all elements of a message's array, (n, fields).
+
+    Args:
+        elements: The elements, of constant size.
+        paths: Of the fields, e.g. ``position.x``.
+    """
+    rows = elements.array
+    out = np.empty((len(rows), len(paths)))
+    for number, path in enumerate(paths):
+        column = rows
+        for name in path.split("."):
+            column = column[name]
+        out[:, number] = column
+    return out
 
 
 def stack_poses(poses: Any) -> NDArray[np.float64]:
