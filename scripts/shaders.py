@@ -18,11 +18,15 @@ FOLDER = Path(__file__).parents[1] / "src/rosglass/scene/shaders"
 _TARGETS = ("--glsl", "330,300 es", "--hlsl", "50", "--msl", "12")
 #: Shaders that need the colours of points as well.
 _OF_POINTS = ("points.vert", "quads.vert", "sprites.vert", "boxes.vert")
+#: Shaders of squares that have an edge.
+_WITH_EDGES = ("squares.frag", "sprites.frag")
 
 
 def source_of(file: Path) -> str:
     """Return the whole text of a shader."""
-    shared = ["frame.glsl", *(["points.glsl"] if file.name in _OF_POINTS else [])]
+    shared = ["frame.glsl"]
+    shared += ["points.glsl"] if file.name in _OF_POINTS else []
+    shared += ["edges.glsl"] if file.name in _WITH_EDGES else []
     parts = [(FOLDER / name).read_text(encoding="utf-8") for name in shared]
     return "\n".join(["#version 440", *parts, file.read_text(encoding="utf-8")])
 

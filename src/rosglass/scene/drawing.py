@@ -468,12 +468,20 @@ class Lines(Drawable):
     """Straight lines between pairs of points.
 
     Attributes:
-        rows: A row for each: start, end (float32 x 3 each), RGBA of both (uint8 x 4 each).
+        rows: A row for each: start, end (float32 x 3 each), RGBA of both (uint8 x 4 each), the
+            points before and after it (float32 x 3 each), which lines of metres bend to; its own
+            ones if it is alone.
         width: Pixels of the screen, or metres.
         in_metres: Whether `width` is metres.
     """
 
-    ROW = np.dtype([("start", "<f4", 3), ("end", "<f4", 3), ("first", "u1", 4), ("last", "u1", 4)])
+    ROW = np.dtype(
+        [
+            *(("start", "<f4", 3), ("end", "<f4", 3)),
+            *(("first", "u1", 4), ("last", "u1", 4)),
+            *(("before", "<f4", 3), ("after", "<f4", 3)),
+        ]
+    )
 
     def __init__(self, width: float = 1.0, *, in_metres: bool = False) -> None:
         super().__init__()
@@ -481,12 +489,18 @@ class Lines(Drawable):
         self.width, self.in_metres, self.alpha = width, in_metres, 1.0
         self._opaque = True
 
-    def set_segments(self, segments: ArrayLike, colors: ArrayLike = (1.0, 1.0, 1.0, 1.0)) -> None:
+    def set_segments(
+        self,
+        segments: ArrayLike,
+        colors: ArrayLike = (1.0, 1.0, 1.0, 1.0),
+        neighbours: NDArray[np.float32] | None = None,
+    ) -> None:
         """Take lines.
 
         Args:
             segments: Shape (n, 2, 3), metres.
             colors: For all, for each, or of both ends of each: shape (n, 2, 4).
+            neighbours: The points before and after each, of the same shape; None for none.
         """
         points = _checked("segments", segments, (2, 3))
         given = np.asarray(colors)
@@ -499,6 +513,9 @@ class Lines(Drawable):
         rows = np.zeros(int(good.sum()), self.ROW)
         rows["start"], rows["end"] = points[good, 0], points[good, 1]
         rows["first"], rows["last"] = ends[good, 0], ends[good, 1]
+        beside = points if neighbours is None else neighbours
+        beside = np.where(np.isfinite(beside), beside, points)[good]
+        rows["before"], rows["after"] = beside[:, 0], beside[:, 1]
         self._opaque = bool((ends[..., 3] == 255).all())
         self.rows, self.count = rows, len(rows)
         self.changed(geometry=True)
@@ -509,8 +526,11 @@ class Lines(Drawable):
         given = np.asarray(colors)
         if given.ndim == 2 and len(given) == len(line):
             given = np.stack([given[:-1], given[1:]], axis=1)
+        beside = np.concatenate([line[:1], line, line[-1:]])
         self.set_segments(
-            np.stack([line[:-1], line[1:]], axis=1), given if len(line) > 1 else (1, 1, 1)
+            np.stack([line[:-1], line[1:]], axis=1),
+            given if len(line) > 1 else (1, 1, 1),
+            np.stack([beside[:-3], beside[3:]], axis=1) if len(line) > 1 else None,
         )
 
     def set_look(self, *, width: float | None = None, alpha: float | None = None) -> None:

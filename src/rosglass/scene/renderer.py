@@ -457,6 +457,10 @@ class _OnDevice:
         self.device.free(self.block, self.bound)
 
 
+#: Fragment shaders of styles that are quads; others have one colour.
+_QUADS = {"spheres": "spheres", "squares": "squares", "tiles": "squares"}
+
+
 class _PointsOnDevice(_OnDevice):
     def __init__(self, device: _Device, drawable: Points) -> None:
         super().__init__(device, drawable)
@@ -479,7 +483,8 @@ class _PointsOnDevice(_OnDevice):
     def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
         points = self.drawable
         paint = points.coloring
-        block[0] = (SPRITE_PX if self._has_sprites() else 0, 0, 0, points.alpha * alpha)
+        sprites_px, has_edge = SPRITE_PX if self._has_sprites() else 0, points.style == "squares"
+        block[0] = (sprites_px, has_edge, 0, points.alpha * alpha)
         flag = paint.per_point_alpha if paint.mode == "bgra" else paint.invert
         block[1] = (_MODES[paint.mode], paint.low, paint.high, flag)
         block[2] = (*paint.first, points.size)
@@ -513,9 +518,9 @@ class _PointsOnDevice(_OnDevice):
         elif self._has_sprites():
             self._draw_as("sprites", "sprites", run, blend)
             if self._has_large(run):
-                self._draw_as("quads", "points", run, blend)
+                self._draw_as("quads", _QUADS.get(style, "points"), run, blend)
         else:
-            self._draw_as("quads", "spheres" if style == "spheres" else "points", run, blend)
+            self._draw_as("quads", _QUADS.get(style, "points"), run, blend)
 
     def _draw_as(self, vertex: str, fragment: str, run: _Pass, blend: bool) -> None:
         points = self.drawable
@@ -531,8 +536,9 @@ class _PointsOnDevice(_OnDevice):
             ),
         )
         topology = {"quads": _QUAD, "boxes": _Topology.Triangles}.get(vertex, _Topology.Points)
+        shaders = (f"{vertex}.vert", f"{fragment}.frag")
         pipeline = self.device.pipeline(
-            (f"{vertex}.vert", f"{fragment}.frag"), layout, topology, blend, self.bound
+            shaders, layout, topology, blend, self.bound, vertex == "boxes"
         )
         self.begin(run, pipeline)
         run.commands.setVertexInput(0, [(self._buffer, 0)])
@@ -549,12 +555,14 @@ class _PointsOnDevice(_OnDevice):
 
 class _LinesOnDevice(_OnDevice):
     _LAYOUT = (
-        ((32, True),),
+        ((Lines.ROW.itemsize, True),),
         (
             (0, 0, _Format.Float3, 0),
             (0, 1, _Format.Float3, 12),
             (0, 2, _Format.UNormByte4, 24),
             (0, 3, _Format.UNormByte4, 28),
+            (0, 4, _Format.Float3, 32),
+            (0, 5, _Format.Float3, 44),
         ),
     )
 

@@ -264,7 +264,9 @@ class GridCellsDisplay(TopicDisplay):
 
     def _restyle(self) -> None:
         coloring = replace(self._cells.coloring, mode="flat", first=rgb_of(self.color))
-        self._cells.set_look(style="tiles", size=self._size, coloring=coloring, alpha=self.alpha)
+        # RViz draws cells twice.
+        alpha = 1 - (1 - self.alpha) ** 2
+        self._cells.set_look(style="tiles", size=self._size, coloring=coloring, alpha=alpha)
 
 
 def _read_cells(message: Any) -> tuple[NDArray[np.float32], float, float]:

@@ -526,8 +526,8 @@ def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]
     elif kind in _POINT_STYLES:
         cloud = Points()
         # Their sides are equal: the others come with the pose.
-        sides = np.array([1.0, y / x, z / x]) if kind == CUBE_LIST else np.ones(3)
-        cloud.set_points(points / sides, each)
+        sides = np.abs([1.0, y / x, z / x]) if kind == CUBE_LIST else np.ones(3)
+        cloud.set_points(points / sides, _list_colours(each))
         cloud.pose = np.diag([*sides, 1.0])
         cloud.set_look(style=_POINT_STYLES[kind], size=abs(x))
         yield cloud
@@ -541,6 +541,17 @@ def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]
         yield from _arrow_strip(marker)
     elif kind == MESH:
         yield from meshes.of(marker)
+
+
+def _list_colours(colours: Any) -> NDArray[np.float64]:
+    """Return the colours of a list of points, with RViz's opacity, which draws these twice.
+
+    One colour for all counts for the points and for the list, so that its opacity is squared.
+    """
+    out = np.array(colours, np.float64)
+    alpha = out[..., 3] ** 2 if out.ndim == 1 else out[..., 3]
+    out[..., 3] = 1 - (1 - alpha) ** 2
+    return out
 
 
 def _triangles(marker: MarkerRecord) -> Mesh:

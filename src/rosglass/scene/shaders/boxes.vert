@@ -13,9 +13,10 @@ void main()
     int corner = gl_VertexIndex - face * 6;
     // Two triangles: corners 0 1 2, 2 1 3 of the face.
     int at = corner < 3 ? corner : (corner == 3 ? 2 : (corner == 4 ? 1 : 3));
-    float u = float(at & 1) - 0.5;
-    float v = float(at >> 1) - 0.5;
     float w = (face & 1) == 0 ? -0.5 : 0.5;
+    // Counter-clockwise from outside: the inner sides are not drawn.
+    float u = (float(at & 1) - 0.5) * w * 2.0;
+    float v = float(at >> 1) - 0.5;
     int axis = face >> 1;
     vec3 offset = axis == 0 ? vec3(w, u, v) : (axis == 1 ? vec3(v, w, u) : vec3(u, v, w));
     vec4 tint = point_colour(position, channel);
