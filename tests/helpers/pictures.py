@@ -36,7 +36,7 @@ def drawn(picture: NDArray[np.uint8]) -> NDArray[Any]:
 
 
 def unmatched(
-    one: NDArray[np.uint8], other: NDArray[np.uint8], within: int = 3, tolerance: int = 52
+    one: NDArray[np.uint8], other: NDArray[np.uint8], within: int = 3, tolerance: int = 36
 ) -> NDArray[Any]:
     """Return which drawn pixels of a picture have no similar one nearby in another picture.
 

@@ -320,6 +320,14 @@ def picture(encoding: str = "rgb8") -> dict[str, Any]:
     }  # fmt: skip
 
 
+def resource(number: int, file: str, at: Any, embedded: bool, colour: str | None = None) -> Any:
+    """Return a marker of a mesh file."""
+    found = {"mesh_resource": f"file://{MESHES / file}", "mesh_use_embedded_materials": embedded}
+    if colour is None:
+        found["color"] = {}
+    return marker(number, 10, colour or "white", at, (1, 1, 1), **found)
+
+
 #: Orientations whose x axes are z and y.
 Z_UP, Y_UP = (
     pose(0, 0, 0, 0, -math.pi / 2)["orientation"],
@@ -708,7 +716,7 @@ CASES: dict[str, Case] = {
                     Channel_Name="heat", Autocompute_Intensity_Bounds=False, Min_Intensity=5,
                     Max_Intensity=30, Invert_Rainbow=True, **{"Size (m)": 0.2}),
             display("PointCloud2", "/cloud3", Color_Transformer="AxisColor", Axis="X",
-                    Use_Fixed_Frame=False, Style="Boxes",
+                    Use_Fixed_Frame=False, Style="Boxes", Alpha=0.6,
                     Autocompute_Value_Bounds={"Value": False, "Min Value": 0.2, "Max Value": 1.2},
                     **{"Size (m)": 0.2}),
             display("PointCloud2", "/cloud4", Position_Transformer="XYZ", **{"Size (m)": 0.2}),
@@ -785,6 +793,76 @@ CASES: dict[str, Case] = {
                 marker(0, 1, "red", pose(-1.5, -1, 0, 0.4), (1, 0.7, 0.5), ns="away"),
                 marker(0, 3, "green", pose(1, -1, 0.5), (0.4, 0.4, 1), ns="here"),
                 marker(0, 1, "yellow", pose(1.5, 1), (0.3, 1, 0.3), ns="new")]}),
+        ],
+    ),
+    "mesh markers": Case(
+        [display("MarkerArray", "/meshes")],
+        [
+            Message(
+                "/meshes", "visualization_msgs/MarkerArray",
+                {
+                    "markers": [
+                        resource(0, "materials.dae", pose(-3.3, -2, 0, 0.4), True),
+                        resource(1, "materials.dae", pose(-1.9, -2), False, "blue"),
+                        resource(2, "plain.dae", pose(-0.5, -2, 0, 0.4), True),
+                        resource(3, "plain.dae", pose(0.9, -2), True, "yellow"),
+                        resource(4, "textured.dae", pose(2.3, -2, 0, 0.4), True),
+                        resource(5, "textured.dae", pose(-3.3, 0.3), False, "cyan"),
+                        resource(6, "wedge.stl", pose(-1.9, 0.3), False, "magenta"),
+                        resource(7, "wedge.stl", pose(-0.5, 0.3, 0, 0.4), True),
+                        resource(8, "wedge.obj", pose(0.9, 0.3, 0, 0.4), True),
+                        resource(9, "glass.dae", pose(2.3, 0.3), True),
+                        {**resource(10, "wedge.stl", pose(-1.2, 2), False),
+                         "color": {"g": 1.0, "a": 0.5}},
+                        {**resource(11, "materials.dae", pose(0.2, 2), True),
+                         "color": {"r": 1.0, "g": 1.0, "b": 1.0, "a": 0.5}},
+                        {**resource(12, "textured.dae", pose(1.6, 2, 0, 0.4), True, "blue"),
+                         "scale": {"x": 1, "y": -1, "z": 1}},
+                    ]
+                },
+            )
+        ],
+    ),
+    "markers of many colours": Case(
+        [display("MarkerArray", "/coloured")],
+        [
+            Message(
+                "/coloured", "visualization_msgs/MarkerArray",
+                {
+                    "markers": [
+                        marker(n, kind, "white", pose(*at), scale,
+                               points=points((0, 0, 0), (0.9, 0, 0.2), (0, 0.9, 0), (0.9, 0.9, 0.4),
+                                             (0.3, 0.5, 0.8), (0.6, 0.2, 0.6)),
+                               colors=[RGBA[name] for name in
+                                       ("red", "green", "blue", "cyan", "magenta", "yellow")])
+                        for n, (kind, scale, at) in enumerate([
+                            (4, (0.08, 0, 0), (-3.4, -2)), (5, (0.08, 0, 0), (-2, -2)),
+                            (6, (0.3, 0.2, 0.2), (-0.5, -2)), (7, (0.3, 0.3, 0.3), (1, -2)),
+                            (8, (0.2, 0.2, 0), (2.4, -2)), (11, (1, 1, 1), (-3.4, 0.3)),
+                        ])
+                    ] + [
+                        marker(6, 11, "white", pose(-1.7, 0.3), (1, 1, 1),
+                               points=points((0, 0, 0), (0.9, 0, 0.2), (0, 0.9, 0), (0.9, 0.9, 0.4),
+                                             (0.3, 0.5, 0.8), (0.6, 0.2, 0.6)),
+                               colors=[RGBA["red"], RGBA["cyan"]]),
+                        marker(7, 11, "green", pose(0, 0.3), (1, 1, 1),
+                               color={"g": 1.0, "a": 0.5},
+                               points=points((0, 0, 0), (1, 0, 0), (0, 1, 0.5))),
+                        marker(8, 6, "blue", pose(1.5, 0.3), (0.4, 0.4, 0.4),
+                               color={"b": 1.0, "a": 0.5},
+                               points=points((0, 0, 0), (0.5, 0, 0), (1, 0.3, 0.3))),
+                        marker(9, 2, "red", pose(-3, 2, 0, 0.4), (1, 0.5, 0.5),
+                               color={"r": 1.0, "a": 0.5}),
+                        marker(10, 0, "cyan", pose(-1.5, 2, 0, 0.4), (1, 0.2, 0.2),
+                               color={"g": 1.0, "b": 1.0, "a": 0.5}),
+                        marker(11, 4, "yellow", pose(0, 2), (0.2, 0, 0),
+                               color={"r": 1.0, "g": 1.0, "a": 0.5},
+                               points=points((0, 0, 0), (1, 0, 0), (1, 0.6, 0))),
+                        marker(12, 1, "magenta", pose(0.5, 0), (0.4, 0.4, 0.4),
+                               header={"frame_id": "arm"}, frame_locked=True),
+                    ]
+                },
+            )
         ],
     ),
     "covariances of all kinds": Case(

@@ -425,7 +425,8 @@ def test_markers_with_one_mesh_share_its_texture(
     # Another color, which needs a drawable of its own.
     second = {**first, "id": 1, "color": {**RED, "g": 0.5}}
     display = show(first, second)
-    bench.wait(lambda: len(drawables(display)) == 2)
+    # Each has its texture, and its colour over it.
+    bench.wait(lambda: len(drawables(display)) == 4)
     bench.picture()
     (renderer,) = bench.view._renderers
     (image,) = renderer._device.images.values()
@@ -460,9 +461,11 @@ def test_meshes_have_their_textures_and_are_made_in_another_thread(
         marker(10, 1, mesh_resource=uri),
         marker(10, 2, mesh_resource=f"file://{tmp_path}/gone.obj"),
     )
-    bench.wait(lambda: len(drawables(display)) == 2)
-    painted, plain = drawables(display)
+    bench.wait(lambda: len(drawables(display)) == 3)
+    painted, over, plain = drawables(display)
     assert painted.texture[0, 0].tolist() == [0, 255, 0, 255]
+    assert painted.color == (1.0, 1.0, 1.0, 1.0)
+    assert (over.texture, over.color) == (None, (1.0, 0.0, 0.0, 0.5))
     assert (plain.texture, plain.color) == (None, (1.0, 0.0, 0.0, 1.0))
     assert len(threads) == 1
     assert threading.main_thread() not in threads

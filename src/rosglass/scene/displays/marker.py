@@ -20,12 +20,13 @@ from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot, is_alive
 from rosglass.scene.display import Status, TopicDisplay
-from rosglass.scene.displays.robot_model import read_texture
+from rosglass.scene.displays.robot_model import STL_ENDINGS, material_of, read_texture
 from rosglass.scene.displays.shapes import poses_matrices
 from rosglass.scene.drawing import (
     BOX,
     CONE,
     CYLINDER,
+    OPAQUE,
     SPHERE,
     Drawable,
     Group,
@@ -36,7 +37,7 @@ from rosglass.scene.drawing import (
     Shape,
     check_numbers,
 )
-from rosglass.scene.meshes import load_mesh_cached
+from rosglass.scene.meshes import ending_of, load_mesh_cached
 from rosglass.scene.parts import Parts
 
 if TYPE_CHECKING:
@@ -527,7 +528,7 @@ def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]
         cloud = Points()
         # Their sides are equal: the others come with the pose.
         sides = np.abs([1.0, y / x, z / x]) if kind == CUBE_LIST else np.ones(3)
-        cloud.set_points(points / sides, _list_colours(each))
+        cloud.set_points(points / sides, _list_colors(each))
         cloud.pose = np.diag([*sides, 1.0])
         cloud.set_look(style=_POINT_STYLES[kind], size=abs(x))
         yield cloud
@@ -543,14 +544,15 @@ def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]
         yield from meshes.of(marker)
 
 
-def _list_colours(colours: Any) -> NDArray[np.float64]:
+def _list_colors(colors: Any) -> NDArray[np.float32]:
     """Return the colours of a list of points, with RViz's opacity, which draws these twice.
 
     One colour for all counts for the points and for the list, so that its opacity is squared.
     """
-    out = np.array(colours, np.float64)
+    out = np.array(colors, np.float32)
     alpha = out[..., 3] ** 2 if out.ndim == 1 else out[..., 3]
-    out[..., 3] = 1 - (1 - alpha) ** 2
+    if (alpha < 1).any():
+        out[..., 3] = 1 - (1 - alpha) ** 2
     return out
 
 
@@ -583,7 +585,8 @@ class _MeshFile(NamedTuple):
     """A mesh file that was read.
 
     Attributes:
-        parts: For each part a drawable, with its texture, and the color of its material or None.
+        parts: For each part a drawable, with its texture, and the color of its material; None in
+            STL files, which have none.
         problem: What could not be read, in words; empty otherwise.
     """
 
@@ -595,15 +598,35 @@ def _read_mesh(uri: str, resources: ResourceRetriever) -> _MeshFile:
     """Read a mesh and its textures; takes seconds for large ones."""
     made: list[tuple[Mesh, tuple[float, ...] | None]] = []
     problem = ""
+    is_stl = ending_of(uri) in STL_ENDINGS
     for part in load_mesh_cached(resources.find(uri), uri, resources.read):
-        mesh = Mesh(Shape(part.positions, part.normals, part.indices, uv=part.uv))
+        shape = Shape(part.positions, part.normals, part.indices, uv=part.uv, one_sided=True)
+        mesh = Mesh(shape)
         if part.texture is not None:
             try:
                 mesh.set_texture(read_texture(part.texture, uri, resources))
             except (Error, OSError) as error:
                 problem = str(error)
-        made.append((mesh, part.color))
+        made.append((mesh, None if is_stl else material_of(part)))
     return _MeshFile(made, problem)
+
+
+def _embedded_looks(
+    part: Mesh, own: tuple[float, ...] | None, color: tuple[float, ...]
+) -> Iterable[tuple[Mesh, tuple[float, ...]]]:
+    """Iterate over what is drawn of a part with the materials of its file, and its colours.
+
+    As in RViz, a marker's colour is painted over them, half translucent, unless it is all zeros.
+    """
+    *rgb, alpha = color
+    is_set, tint = any(color), (*rgb, min(alpha, 0.5))
+    if own is None:
+        plain = color if alpha >= OPAQUE else tint
+        yield copy(part), plain if is_set else (1.0, 1.0, 1.0, 1.0)
+        return
+    yield copy(part), (*own[:3], alpha if is_set else 1.0)
+    if is_set:
+        yield Mesh(part.shape), tint
 
 
 class MarkerMeshes:
@@ -643,15 +666,15 @@ class MarkerMeshes:
             )
         file = self._files[uri] = self._files.pop(uri)
         for part, own in file.parts if file is not None else ():
-            color: tuple[float, ...] = marker.color
-            if marker.embedded and color[:3] == (0.0, 0.0, 0.0):
-                color = (1.0, 1.0, 1.0, color[3] or 1.0)
-            if marker.embedded and own is not None:
-                color = tuple(a * b for a, b in zip(own, color, strict=True))
-            mesh = copy(part) if marker.embedded else Mesh(part.shape)
-            mesh.set_look(color=color)
-            mesh.set_instances(_scaled(*marker.scale)[np.newaxis])
-            yield mesh
+            looks: Iterable[tuple[Mesh, tuple[float, ...]]] = [(Mesh(part.shape), marker.color)]
+            if marker.embedded:
+                looks = _embedded_looks(part, own, marker.color)
+            for mesh, color in looks:
+                if np.prod(marker.scale) < 0:
+                    mesh.shape = mesh.shape.mirrored()
+                mesh.set_look(color=color)
+                mesh.set_instances(_scaled(*marker.scale)[np.newaxis])
+                yield mesh
 
     def problem_of(self, marker: MarkerRecord) -> str:
         """Return what is wrong with the file of a marker, in words; empty for none."""

@@ -64,6 +64,8 @@ _LINK_DETAILS = (
 )
 #: Status lines of links without a transform, before the rest is counted.
 _MAX_LINK_LINES = 10
+#: Files without materials of their own.
+STL_ENDINGS = (".stl", ".stlb")
 _AUTOMATIC, _TOPIC, _FILE, _PARAMETER = "Automatic", "Topic", "File", "Parameter"
 
 
@@ -221,7 +223,7 @@ def _mesh_drawables(
     except (Error, OSError) as error:
         problems[geometry.uri] = str(error)
         return []
-    is_stl = ending_of(geometry.uri) in (".stl", ".stlb")
+    is_stl = ending_of(geometry.uri) in STL_ENDINGS
     made = []
     for part in parts:
         scaled = moved(part, _matrix(*geometry.scale))
