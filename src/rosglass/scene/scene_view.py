@@ -615,8 +615,11 @@ class SceneView(QQuickRhiItem):
         """Return what draws; called by Qt in the render thread."""
         made = SceneRenderer(self._take_frame, self._on_problem)
         self._renderers.append(made)
+        # C++ deletes the one of the window before later.
+        QtCore.QTimer.singleShot(0, self, self._drop_renderers)
         return made
 
+    @Slot()
     def _drop_renderers(self) -> None:
         """Drop the renderers that C++ has deleted, e.g. those of a window that it has left."""
         for one in self._renderers:
@@ -627,7 +630,6 @@ class SceneView(QQuickRhiItem):
     def _take_frame(self) -> Frame | None:
         if not is_alive(self._scene):
             return None  # it was that of a view that is gone
-        self._drop_renderers()
         if any(one.draws_in_software for one in self._renderers) != self.scene.draws_in_software:
             QtCore.QTimer.singleShot(0, self, self._report_device)
         self._painted += 1
