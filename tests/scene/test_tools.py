@@ -362,6 +362,35 @@ def test_one_finger_sets_a_goal_and_two_move_the_camera(bench: SceneBench, hand:
     assert view.controller.yaw != yaw
 
 
+def test_a_finger_that_stays_after_a_pinch_sends_no_goal(bench: SceneBench, hand: Hand) -> None:
+    from PySide6.QtCore import QPoint
+    from PySide6.QtTest import QTest
+
+    view = bench.load()
+    goals = listen(bench, "/goal_pose", "geometry_msgs/PoseStamped")
+    device = QTest.createTouchDevice()
+    view.tool = "SetGoal"
+    first, second, drifted = QPoint(150, 150), QPoint(250, 150), QPoint(251, 150)
+
+    def fingers() -> Any:
+        return QTest.touchEvent(bench.window, device)
+
+    fingers().press(0, first, bench.window).commit()
+    fingers().stationary(0).press(1, second, bench.window).commit()
+    fingers().release(0, first, bench.window).stationary(1).commit()
+    yaw = view.controller.yaw
+    fingers().move(1, drifted, bench.window).commit()
+    fingers().release(1, drifted, bench.window).commit()
+    bench.wait.settled(bench.session)
+    assert goals == []
+    assert view.tool == "SetGoal"
+    assert view.controller.yaw != yaw  # it has moved the camera
+    # The next finger sets a goal again.
+    fingers().press(0, first, bench.window).commit()
+    fingers().release(0, first, bench.window).commit()
+    bench.wait(lambda: goals)
+
+
 def test_a_goal_without_subscribers_says_so(bench: SceneBench, hand: Hand, caplog: Any) -> None:
     view = bench.load('SetGoalTool { topic: "/gaol_pose" }')
     listen(bench, "/goal_pose", "geometry_msgs/PoseStamped")

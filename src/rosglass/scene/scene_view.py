@@ -769,31 +769,32 @@ class SceneView(QQuickRhiItem):
         event.accept()
         self._stop_turning()
         points = event.points()
-        released = any(point.state() == QEventPoint.State.Released for point in points)
         now = {point.id(): point.position() for point in points}
+        held = {p.id(): p.position() for p in points if p.state() != QEventPoint.State.Released}
         if self._finger_is_button and len(now) > 1:
             self._finger_is_button = False
             self._tools.cancel()
         elif len(now) == 1:
-            (at,) = now.values()
-            pointer = self._event_at(at, event, finger=True)
-            if not self._fingers and not released:
+            (point,) = points
+            pointer = self._event_at(point.position(), event, finger=True)
+            # Not a finger that has stayed after a pinch: its release would send a goal.
+            if not self._fingers and point.state() == QEventPoint.State.Pressed:
                 pointer.button = pointer.buttons = Button.LEFT
                 self._finger_is_button = self._tools.on_press(pointer)
                 if not self._finger_is_button:
                     self._tools.cancel()
             elif self._finger_is_button:
-                if released:
+                if not held:
                     pointer.button = Button.LEFT
                     self._tools.on_release(pointer)
                     self._finger_is_button = False
                 else:
                     pointer.buttons = Button.LEFT
                     self._tools.on_move(pointer)
-                self._fingers = {} if released else now
+                self._fingers = held
                 return
         self._drag_by_fingers(now)
-        self._fingers = {} if released else now
+        self._fingers = held
 
     def _drag_by_fingers(self, now: dict[int, QtCore.QPointF]) -> None:
         ids = [one for one in now if one in self._fingers]
