@@ -63,7 +63,9 @@ class MarkerServer:
             "visualization_msgs/GetInteractiveMarkers",
             self._answer,
         )
-        node.create_subscription(f"{namespace}/feedback", FEEDBACK, self._take, qos=100)
+        self._feedback = node.create_subscription(
+            f"{namespace}/feedback", FEEDBACK, self._take, qos=100
+        )
 
     def _answer(self, _request: Any) -> dict[str, Any]:
         self.requests += 1
@@ -93,6 +95,9 @@ class MarkerServer:
 
     def events(self, kind: int) -> list[Any]:
         return [one for one in self.feedback if one.event_type == kind]
+
+    def ignore_feedback(self) -> None:
+        self._feedback.close()
 
     def close(self) -> None:
         self._update.close()
@@ -371,6 +376,58 @@ def test_a_button_is_clicked(
     hand.release((5, 5))
     bench.wait(lambda: len(server.events(MOUSE_UP)) == 2)
     assert len(server.events(BUTTON_CLICK)) == 1
+
+
+def test_a_click_that_reaches_no_server_says_so(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand, caplog: Any
+) -> None:
+    display = show(
+        marker(control(BUTTON, "stop", boxes=True, always_visible=True), menu_entries=MENU_ENTRIES)
+    )
+    middle = hand.at((0, 0, 0))
+    hand.click(middle)
+    bench.wait(lambda: server.events(MOUSE_UP))
+    assert "stop" not in bench.view.statusText
+    server.ignore_feedback()
+    bench.wait(lambda: not display._endpoint.feedback.subscription_count())
+    hand.click(middle)
+    text = "button stop of marker arm: sent on /server/feedback, which no server receives"
+    assert bench.view.statusText == text
+    assert f"display 'InteractiveMarkers': {text}" in caplog.text
+    assert display.statusLevel == "error"
+    assert "which no server receives" in display.statusText
+    # The markers of a robot that is gone are still shown, as old ones.
+    bench.session.shutdown()
+    bench.wait(lambda: display.root.alpha < 1.0)
+    hand.click(middle)
+    text = "button stop of marker arm: not sent, for the robot is not connected"
+    assert text in bench.view.statusText
+    hand.click(middle, hand.RIGHT)
+    open_menu(bench)
+    display.selectMenuEntry(4)
+    assert "menu entry 4 of marker arm: not sent, for the robot" in bench.view.statusText
+    assert len(server.events(BUTTON_CLICK)) == 1
+
+
+def test_a_drag_that_reaches_no_server_says_so(
+    bench: SceneBench, show: Callable[..., Any], server: MarkerServer, hand: Hand
+) -> None:
+    display = show(marker(control(MOVE_AXIS)))
+    hand.press(hand.at((1.5, 0, 0)))
+    bench.wait(lambda: server.events(MOUSE_DOWN))
+    server.ignore_feedback()
+    bench.wait(lambda: not display._endpoint.feedback.subscription_count())
+    hand.move(hand.at((2.5, 0, 0)))
+    hand.release(hand.at((2.5, 0, 0)))
+    assert bench.view.statusText == (
+        "drag by mode3 of marker arm: sent on /server/feedback, which no server receives"
+    )
+    # A marker that is gone under the mouse takes nothing.
+    hand.press(hand.at((2.5, 0, 0)))
+    server.erase("arm")
+    bench.wait(lambda: display.markers == [])
+    hand.release(hand.at((2.5, 0, 0)))
+    assert "control mode3 of arm was removed: its release was not sent" in bench.view.statusText
 
 
 MENU_ENTRIES = [
@@ -817,4 +874,13 @@ def test_a_server_of_ros_1(ros1: tuple[SceneBench, RospyServer, RosMaster]) -> N
     bench.wait(lambda: display.markers == ["arm"], lambda: display.statusText)
     bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
     assert place(display) == [0.0, 0.0, 0.0]
+    # Without the master it stays connected, but the robot may have another one.
+    bench.wait(display._endpoint.feedback.subscription_count)
+    master.kill()
+    bench.wait(lambda: bench.session.state != "connected")
+    bench.picture()
+    hand.drag(hand.at((1.5, 0, 0)), hand.at((2.5, 0, 0)))
+    assert (
+        "drag by along of marker arm: sent on /arm_markers/feedback, but the robot is not connected"
+    ) in view.statusText
     other.kill()

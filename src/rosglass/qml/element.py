@@ -270,6 +270,14 @@ class Element(QtCore.QObject):
     def _on_tick(self) -> None:
         """Handle the session's tick, ten times per second."""
 
+    def _disconnected(self) -> str:
+        """Return in words that the robot is not connected; empty if it is."""
+        session = self._session
+        if session is not None and self.node is not None and session.state == "connected":
+            return ""
+        detail = session.detail if session is not None else ""
+        return f"the robot is not connected{f': {detail}' if detail else ''}"
+
     # -- problems --------------------------------------------------------------------------------
 
     def _get_problem(self) -> str:

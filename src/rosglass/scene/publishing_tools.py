@@ -197,14 +197,6 @@ class PublishingTool(Tool):
         except Error:
             return 0
 
-    def _disconnected(self) -> str:
-        """Return in words that the robot is not connected; empty if it is."""
-        session = self._session
-        if session is not None and self.node is not None and session.state == "connected":
-            return ""
-        detail = session.detail if session is not None else ""
-        return f"the robot is not connected{f': {detail}' if detail else ''}"
-
     def _hint(self) -> str:
         node, sender = self.node, self._endpoint
         try:

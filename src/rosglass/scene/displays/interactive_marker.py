@@ -9,6 +9,7 @@ numbers it gets them again. What the user does goes to ``<namespace>/feedback``.
 from __future__ import annotations
 
 import contextlib
+import logging
 import time
 from collections import deque
 from pathlib import Path
@@ -170,7 +171,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
     KEEPS_ALL: ClassVar[bool] = True
     EAGER: ClassVar[bool] = True
     SETTINGS: ClassVar[dict[str, Setting]] = {}
-    _HOLDS = ("_view", "_camera", "_asked")
+    _HOLDS = ("_view", "used_view", "_camera", "_asked")
 
     topic = Setting(
         "Interactive Markers Namespace", "topic", "",
@@ -203,7 +204,9 @@ class InteractiveMarkersDisplay(TopicDisplay):
         #: The control whose menu is open, and where it was clicked.
         self._asked: tuple[Control, Any] | None = None
         self._ready: Any = None
+        #: The view that the scene belongs to, and that in which the mouse has used a marker.
         self._view: Any = None
+        self.used_view: Any = None
         #: Its camera, until that moves.
         self._camera: Camera | None = None
         super().__init__(parent, runtime)
@@ -360,24 +363,59 @@ class InteractiveMarkersDisplay(TopicDisplay):
             self.set_status("Server", "warn", f"the markers were not received: {text}")
             self._retry_request.start(_RETRY_MS)
 
-    def publish(self, feedback: dict[str, Any]) -> bool:
-        """Send a feedback; return whether a server receives it."""
-        connection, node = self._endpoint, self.node
+    def publish(
+        self, marker: InteractiveMarker, feedback: dict[str, Any], command: str = ""
+    ) -> bool:
+        """Send a feedback; the status says so if no server receives it.
+
+        Args:
+            marker: What it is about.
+            feedback: Fields of the message, without `client_id`.
+            command: What the user wants, for the status bar if it is not received; empty for what
+                is sent again until it is, or is of no consequence.
+
+        Returns:
+            Whether a server receives it.
+        """
+        problem = self._publish(marker, feedback)
+        if not problem:
+            self.delete_status("Feedback")
+            return True
+        self.set_status("Feedback", "error", problem)
+        if command:
+            self.announce(f"{command}: {problem}")
+        return False
+
+    def _publish(self, marker: InteractiveMarker, feedback: dict[str, Any]) -> str:
+        """Send a feedback; return why no server receives it, as far as is known."""
+        connection, node, why = self._endpoint, self.node, self._disconnected()
         if connection is None or node is None:
-            return False
+            return f"not sent, for {why or 'its topic is not advertised yet'}"
         feedback["client_id"] = f"{node.namespace.rstrip('/')}/{node.name}/{self.name}"
         try:
-            received: bool = connection.feedback.subscription_count() > 0
+            count = connection.feedback.subscription_count()
+            # In ROS 1, servers stay connected without the master.
+            if why and not count:
+                return f"not sent, for {why}"
             connection.feedback.publish(feedback)
         except Error as error:
-            self.set_status("Feedback", "error", str(error))
-            return False
-        if received:
-            self.delete_status("Feedback")
-        else:
-            topic = connection.feedback.topic
-            self.set_status("Feedback", "warn", f"no server receives {topic} yet")
-        return received
+            return f"not sent: {error}"
+        topic = connection.feedback.topic
+        if not count:
+            return f"sent on {topic}, which no server receives"
+        servers = [one for one in self._servers.values() if marker.record.name in one.markers]
+        if not why and self._outdated:
+            why = "the server is gone"
+        elif not why and servers and all(one.silent for one in servers):
+            why = f"the server has given no sign of life for more than {_SILENCE_S:g} s"
+        return f"sent on {topic}, but {why}" if why else ""
+
+    def announce(self, text: str) -> None:
+        """Log what did not reach a server, and show it in the view that was used last."""
+        self._log(f"{self.label}: {text}", logging.WARNING)
+        view = self.used_view or self._view
+        if view is not None and is_alive(view):
+            view.tools.announce(text)
 
     # -- updates ---------------------------------------------------------------------------------
 
@@ -616,6 +654,9 @@ class InteractiveMarkersDisplay(TopicDisplay):
         """
         asked, number = self._asked, int(entry)
         if asked is None:
+            self.announce(
+                f"menu entry {number}: not sent: no marker has opened a menu, or not since"
+            )
             return
         control, point = asked
         program = control.marker.record.programs.get(number)

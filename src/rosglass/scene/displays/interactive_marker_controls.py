@@ -53,6 +53,8 @@ __all__ = ["MENU_SELECT", "Control", "InteractiveMarker"]
 
 # visualization_msgs/InteractiveMarkerFeedback: types of events.
 KEEP_ALIVE, POSE_UPDATE, MENU_SELECT, BUTTON_CLICK, MOUSE_DOWN, MOUSE_UP = range(6)
+#: Feedback by which the user wants something, in words.
+_COMMANDS = {POSE_UPDATE: "drag by", MENU_SELECT: "menu entry", BUTTON_CLICK: "button"}
 #: Seconds until a feedback without a change, by which servers know that the user still holds a
 #: marker; RViz's.
 _HOLD_S = 0.25
@@ -218,9 +220,12 @@ class Control:
 
     def handle_pointer(self, what: str, event: PointerEvent) -> bool:
         """Handle an event of the tool Interact; see ``Interactive`` there."""
-        if self.marker.controls.get(self.record.name) is not self:
-            return False  # it was removed under the mouse
         if not is_alive(self.display):
+            return False
+        self.display.used_view = event.view
+        if self.marker.controls.get(self.record.name) is not self:  # removed under the mouse
+            if what == "release" and (self._grab is not None or self.record.mode == BUTTON):
+                self.display.announce(f"{self} was removed: its release was not sent")
             return False
         if what == "press":
             return self._on_press(event)
@@ -588,18 +593,23 @@ class InteractiveMarker:
             return
         if self._changed:
             # In ROS 1, a server connects a little later than its markers are shown.
-            self._changed = not self.send(POSE_UPDATE, self.dragged.record.name)
+            self._changed = not self.send(POSE_UPDATE, self.dragged.record.name, is_last=False)
         elif time.monotonic() - self._sent > _HOLD_S:
             self.send(KEEP_ALIVE, "")
 
-    def send(self, event: int, control: str, point: Any = None, entry: int = 0) -> bool:
+    def send(
+        self, event: int, control: str, point: Any = None, entry: int = 0, *, is_last: bool = True
+    ) -> bool:
         """Send a feedback; return whether a server receives it.
+
+        A click, a choice from a menu, or a last pose that does not reach a server is announced.
 
         Args:
             event: Its type, e.g. :data:`MOUSE_DOWN`.
             control: Name of the control.
             point: Where the mouse is, in the fixed frame; None for unknown.
             entry: Number of the menu's entry.
+            is_last: Whether nothing more will be sent if no server receives it.
         """
         self._sent = time.monotonic()
         scene = self.display.scene
@@ -616,7 +626,12 @@ class InteractiveMarker:
                 at = (inverse(self.root.pose) @ (*at, 1.0))[:3]
         if event == POSE_UPDATE:
             self._echoes.append((self._sent, pose))
+        command = ""
+        if is_last and event in _COMMANDS:
+            what = f"{_COMMANDS[event]} {entry or control}".strip()
+            command = f"{what} of marker {self.record.name}"
         return self.display.publish(
+            self,
             {
                 "header": {"frame_id": frame, "stamp": Time(stamp)},
                 "marker_name": self.record.name,
@@ -629,7 +644,8 @@ class InteractiveMarker:
                 "menu_entry_id": entry,
                 "mouse_point": {} if at is None else dict(zip("xyz", at.tolist(), strict=True)),
                 "mouse_point_valid": at is not None,
-            }
+            },
+            command,
         )
 
 
