@@ -96,6 +96,7 @@ def test_a_scene_that_changes_all_the_time_leaves_frames_to_qml(bench: SceneBenc
     def change() -> None:
         frames.append(bench.drawn())
         axes.length = 1 + len(frames) % 2
+        view.camera_moved()
 
     def share(count: int) -> float:
         """Return the share of the window's frames that have a new picture of the scene."""
@@ -114,6 +115,8 @@ def test_a_scene_that_changes_all_the_time_leaves_frames_to_qml(bench: SceneBenc
     share(5)
     assert share(20) == 1.0
     hand.release((200, 150))
+    share(5)
+    assert share(40) < 0.75
     bench.window.frameSwapped.disconnect(change)
     # The last change is drawn, too.
     axes.length = 3

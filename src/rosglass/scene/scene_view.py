@@ -95,6 +95,8 @@ class SceneView(QQuickRhiItem):
         #: when no other one is drawn: all by the clock of :func:`time.monotonic`.
         self._frame_began = self._next_picture = 0.0
         self._is_in_frame = False
+        #: When the wheel or a finger has last moved the camera.
+        self._touched_at = -math.inf
         #: Whether a change waits until then.
         self._is_late = False
         self._later = QtCore.QTimer(self)
@@ -562,7 +564,7 @@ class SceneView(QQuickRhiItem):
         self._still.start()
         self._show_focal_shape()
         self.cameraChanged.emit()
-        self.update()
+        self._request_picture()
 
     @Slot()
     def _on_placed(self) -> None:
@@ -646,13 +648,17 @@ class SceneView(QQuickRhiItem):
 
         What the user moves is drawn at once.
         """
-        pause = self._next_picture - time.monotonic()
-        if pause <= 0 or self._tools.holds_mouse:
+        now = time.monotonic()
+        if now >= self._next_picture or self._is_moved_by_user(now):
             self.update()
             return
         self._is_late = True
         if not self._later.isActive():
-            self._later.start(math.ceil(1000 * pause))
+            self._later.start(math.ceil(1000 * (self._next_picture - now)))
+
+    def _is_moved_by_user(self, now: float) -> bool:
+        is_touched = self._tools.holds_mouse or now - self._touched_at < _STILL_S
+        return is_touched or self.is_turning
 
     @Slot()
     def _draw_late(self) -> None:
@@ -760,6 +766,7 @@ class SceneView(QQuickRhiItem):
     def wheelEvent(self, event: Any) -> None:
         """Zoom."""
         self._stop_turning()
+        self._touched_at = time.monotonic()
         at = self._event_at(event.position(), event)
         self._tools.on_wheel(at, Wheel(event.angleDelta().y() / 120, at.modifiers))
         event.accept()
@@ -768,6 +775,7 @@ class SceneView(QQuickRhiItem):
         """Let one finger be the tool's left button; otherwise rotate, move and zoom by fingers."""
         event.accept()
         self._stop_turning()
+        self._touched_at = time.monotonic()
         points = event.points()
         now = {point.id(): point.position() for point in points}
         held = {p.id(): p.position() for p in points if p.state() != QEventPoint.State.Released}
