@@ -528,7 +528,7 @@ def meshes(args: argparse.Namespace, home: str, verdicts: Verdicts) -> None:
 
 def dashboard(args: argparse.Namespace, home: str, verdicts: Verdicts) -> None:
     """Figure 1's dashboard over both, on the live robot of benchmarks/rviz_dashboard.py."""
-    found: dict[str, list[dict[str, float]]] = {"view": [], "busy": [], "rviz": []}
+    found: dict[str, list[dict[str, float]]] = {"view": [], "rviz": []}
     with ros_master(home) as master:
         url = master.replace("http:", "ros1:")
         live = start_robot(url, ("--equipped", "--fps", "30", "--mode", "autonomous"))
@@ -543,7 +543,6 @@ def dashboard(args: argparse.Namespace, home: str, verdicts: Verdicts) -> None:
                 with rviz.paused():
                     view("wait", seconds=_SETTLE_S)
                     turn["view"] = view("wait", seconds=args.seconds)
-                    turn["busy"] = view("move", seconds=args.seconds)
                 with view.paused():
                     rviz("wait", seconds=_SETTLE_S)
                     turn["rviz"] = rviz("wait", seconds=args.seconds)
@@ -565,9 +564,6 @@ def dashboard(args: argparse.Namespace, home: str, verdicts: Verdicts) -> None:
     verdicts.line("Figure 1: frames per second, to RViz's", figure, ratio, 2, True)
     figure = f"frame {median('both_ms'):.0f} ms, without 3D {median('plain_ms'):.0f}"
     verdicts.line("the same: percent of the time for QML", figure, median("qml_percent"), 50, True)
-    figure = f"{median('fps', 'busy'):.1f}/s of 3D"
-    share = median("qml_percent", "busy")
-    verdicts.line("the same while the camera moves", figure, share, 50, True)
 
 
 def first(args: argparse.Namespace, home: str) -> tuple[str, float]:

@@ -361,6 +361,7 @@ class View:
         def turn() -> None:
             controller.set("Yaw", (controller.get("Yaw") + _STEP_RAD) % 6.28)
             view.camera_moved()
+            view.update()  # at once, as when the user drags it
 
         self._window.frameSwapped.connect(turn)
         self._frames.clear()
@@ -383,11 +384,17 @@ class View:
         return found | {"redrawn": self._view.pictures_drawn() - before}
 
     def pick(self, times: int) -> dict[str, float]:
-        """Pick again and again, at several places."""
-        took, hits = [], 0
+        """Pick again and again, at several places and in the middle of what is drawn."""
+        drawn = [one for one in self._view._drawables() if one[0].owner is not None]
+        camera, took, hits = self._view.camera(), [], 0
         for number in range(times):
-            started = time.thread_time()
             x, y = 300 + 37 * number % 700, 200 + 53 * number % 400
+            if number % 2:
+                drawable, pose, _ = drawn[number * 7 % len(drawn)]
+                low, high = drawable.bounds()
+                seen = camera.project(tuple((pose @ [*(low + high) / 2, 1])[:3]))
+                x, y = seen.x, seen.y
+            started = time.thread_time()
             hits += self._view.pick(x, y) is not None
             took.append(1000 * (time.thread_time() - started))
         return {"ms": statistics.median(took), "longest": max(took), "hits": hits}
