@@ -529,9 +529,9 @@ def first_frame(what: str) -> None:
     # In the order of the installed command.
     from rosglass.cli import main, view
 
-    show = view.show
+    show = view.show_interface
 
-    def watched(file: str, **options: Any) -> int:
+    def watched(*args: Any, **options: Any) -> int:
         program = type(options["context"]["program"])
         begin = program.begin
 
@@ -540,9 +540,9 @@ def first_frame(what: str) -> None:
             view.window().frameSwapped.connect(lambda: view.pictures_drawn() and shown())
 
         program.begin = watch
-        return show(file, **options)
+        return show(*args, **options)
 
-    view.show = watched
+    view.show_interface = watched
     sys.exit(main(["view", "--url", "local://benchmark"]))
 
 

@@ -502,6 +502,7 @@ def test_what_would_be_lost_is_asked_for(bench: SceneBench, tmp_path: Path) -> N
 @pytest.fixture
 def window(bench: SceneBench) -> Iterator[Any]:
     """The window of the program, connected to the robot of the bench."""
+    from PySide6.QtCore import QObject
     from PySide6.QtQml import QQmlApplicationEngine
 
     from rosglass.qml import install
@@ -513,7 +514,10 @@ def window(bench: SceneBench) -> Iterator[Any]:
     engine.rootContext().setContextProperty("program", program)
     engine.load(str(WINDOW))
     (window,) = engine.rootObjects()
-    bench.wait(window.isExposed)
+    # The first picture does not wait for the panels.
+    assert window.findChild(QObject, "displayRows") is None
+    bench.wait(lambda: window.property("drawn"))
+    assert window.findChild(QObject, "displayRows") is not None
     yield window
     # It would ask whether to save what has changed.
     program.discard()

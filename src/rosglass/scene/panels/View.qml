@@ -9,7 +9,9 @@ ApplicationWindow {
     id: window
 
     property bool panels: !program.kiosk
-    property var displays: displaysPanel
+    // Whether the first picture is on the screen; what is beside the 3D view is made after it.
+    property bool drawn: false
+    property var displays: displaysPanel.item
 
     width: 1280
     height: 800
@@ -17,6 +19,7 @@ ApplicationWindow {
     title: (program.configName || "new view") + (program.modified ? " *" : "") + " - rosglass"
 
     Component.onCompleted: program.begin(scene)
+    onFrameSwapped: drawn = true
     onClosing: close => {
         if (!program.mayClose()) {
             close.accepted = false
@@ -50,91 +53,94 @@ ApplicationWindow {
 
     header: ToolBar {
         visible: window.panels
-        RowLayout {
+        Loader {
             anchors.fill: parent
-            ToolButton { text: "Open"; onClicked: window.openOther() }
-            ToolButton { text: "Save"; onClicked: window.save() }
-            ToolButton { text: "Save as"; onClicked: saving.open() }
-            ToolSeparator { }
-            Repeater {
-                model: scene.tools.all
-                ToolButton {
-                    required property var modelData
+            active: window.drawn
+            sourceComponent: RowLayout {
+                ToolButton { text: "Open"; onClicked: window.openOther() }
+                ToolButton { text: "Save"; onClicked: window.save() }
+                ToolButton { text: "Save as"; onClicked: saving.open() }
+                ToolSeparator { }
+                Repeater {
+                    model: scene.tools.all
+                    ToolButton {
+                        required property var modelData
 
-                    text: modelData.name
-                    down: modelData.selected ? true : undefined
-                    // Keys are the view's.
+                        text: modelData.name
+                        down: modelData.selected ? true : undefined
+                        // Keys are the view's.
+                        focusPolicy: Qt.NoFocus
+                        onClicked: modelData.select()
+                        PlainToolTip {
+                            visible: parent.hovered
+                            plain: modelData.description + (modelData.shortcutKey ? " (" + modelData.shortcutKey.toUpperCase() + ")" : "")
+                        }
+                    }
+                }
+                ToolButton {
+                    objectName: "addTool"
+                    text: "+"
+                    onClicked: newTools.popup()
+                    PlainToolTip { visible: parent.hovered; plain: "Add a tool" }
+                    Menu {
+                        id: newTools
+                        Repeater {
+                            model: scene.tools.types
+                            MenuItem { required property string modelData; text: modelData; onTriggered: program.say(scene.tools.addTool(modelData)) }
+                        }
+                    }
+                }
+                ToolButton {
+                    objectName: "removeTool"
+                    text: "−"
+                    enabled: scene.tools.all.length > 1
+                    onClicked: oldTools.popup()
+                    PlainToolTip { visible: parent.hovered; plain: "Remove a tool" }
+                    Menu {
+                        id: oldTools
+                        Repeater {
+                            model: scene.tools.all
+                            MenuItem { required property var modelData; text: modelData.name; onTriggered: scene.tools.removeTool(modelData) }
+                        }
+                    }
+                }
+                Item { Layout.fillWidth: true }
+                ToolButton {
+                    objectName: "reset"
+                    text: "Reset"
                     focusPolicy: Qt.NoFocus
-                    onClicked: modelData.select()
-                    PlainToolTip {
-                        visible: parent.hovered
-                        plain: modelData.description + (modelData.shortcutKey ? " (" + modelData.shortcutKey.toUpperCase() + ")" : "")
-                    }
+                    onClicked: scene.reset()
+                    PlainToolTip { visible: parent.hovered; plain: "Drop all data that was received" }
                 }
-            }
-            ToolButton {
-                objectName: "addTool"
-                text: "+"
-                onClicked: newTools.popup()
-                PlainToolTip { visible: parent.hovered; plain: "Add a tool" }
-                Menu {
-                    id: newTools
-                    Repeater {
-                        model: scene.tools.types
-                        MenuItem { required property string modelData; text: modelData; onTriggered: program.say(scene.tools.addTool(modelData)) }
-                    }
+                ToolSeparator { }
+                ToolButton {
+                    objectName: "leftDock"
+                    text: "Displays"
+                    checkable: true
+                    checked: !program.hidesLeftDock
+                    onToggled: program.hideDocks(!checked, program.hidesRightDock)
+                    PlainToolTip { visible: parent.hovered; plain: "Show the Displays panel; F10 hides everything but the 3D view" }
                 }
-            }
-            ToolButton {
-                objectName: "removeTool"
-                text: "−"
-                enabled: scene.tools.all.length > 1
-                onClicked: oldTools.popup()
-                PlainToolTip { visible: parent.hovered; plain: "Remove a tool" }
-                Menu {
-                    id: oldTools
-                    Repeater {
-                        model: scene.tools.all
-                        MenuItem { required property var modelData; text: modelData.name; onTriggered: scene.tools.removeTool(modelData) }
-                    }
+                ToolButton {
+                    objectName: "rightDock"
+                    text: "Views"
+                    checkable: true
+                    checked: !program.hidesRightDock
+                    onToggled: program.hideDocks(program.hidesLeftDock, !checked)
+                    PlainToolTip { visible: parent.hovered; plain: "Show the panels Views, Tools and Selection; F10 hides everything but the 3D view" }
                 }
-            }
-            Item { Layout.fillWidth: true }
-            ToolButton {
-                objectName: "reset"
-                text: "Reset"
-                focusPolicy: Qt.NoFocus
-                onClicked: scene.reset()
-                PlainToolTip { visible: parent.hovered; plain: "Drop all data that was received" }
-            }
-            ToolSeparator { }
-            ToolButton {
-                objectName: "leftDock"
-                text: "Displays"
-                checkable: true
-                checked: !program.hidesLeftDock
-                onToggled: program.hideDocks(!checked, program.hidesRightDock)
-                PlainToolTip { visible: parent.hovered; plain: "Show the Displays panel; F10 hides everything but the 3D view" }
-            }
-            ToolButton {
-                objectName: "rightDock"
-                text: "Views"
-                checkable: true
-                checked: !program.hidesRightDock
-                onToggled: program.hideDocks(program.hidesLeftDock, !checked)
-                PlainToolTip { visible: parent.hovered; plain: "Show the panels Views, Tools and Selection; F10 hides everything but the 3D view" }
             }
         }
     }
 
     SplitView {
         anchors.fill: parent
-        DisplaysPanel {
+        Loader {
             id: displaysPanel
-            objectName: "displaysPanel"
             visible: window.panels && !program.hidesLeftDock
             SplitView.preferredWidth: 330
-            view: scene
+            active: window.drawn
+            sourceComponent: DisplaysPanel { objectName: "displaysPanel"; view: scene }
         }
         SceneView {
             id: scene
@@ -165,40 +171,48 @@ ApplicationWindow {
                 background: Rectangle { color: "#c0801010"; radius: 6 }
             }
         }
-        ColumnLayout {
+        Loader {
             visible: window.panels && !program.hidesRightDock
-            spacing: 0
             SplitView.preferredWidth: 250
-            TabBar {
-                id: tabs
+            active: window.drawn
+            sourceComponent: ColumnLayout {
+                spacing: 0
+                TabBar {
+                    id: tabs
 
-                Layout.fillWidth: true
-                TabButton { text: "Views" }
-                TabButton { text: "Tools" }
-                TabButton { text: "Selection" }
-            }
-            StackLayout {
-                currentIndex: tabs.currentIndex
-                ViewsPanel { view: scene }
-                ToolsPanel { view: scene }
-                SelectionPanel { view: scene }
+                    Layout.fillWidth: true
+                    TabButton { text: "Views" }
+                    TabButton { text: "Tools" }
+                    TabButton { text: "Selection" }
+                }
+                StackLayout {
+                    currentIndex: tabs.currentIndex
+                    ViewsPanel { view: scene }
+                    ToolsPanel { view: scene }
+                    SelectionPanel { view: scene }
+                }
             }
         }
     }
 
+    FontMetrics { id: line; font: window.font }
     footer: Pane {
         visible: window.panels
         padding: 4
-        RowLayout {
+        contentHeight: Math.ceil(line.height)
+        Loader {
             anchors.fill: parent
-            Label { Layout.maximumWidth: window.width / 2; text: program.connection; textFormat: Text.PlainText; elide: Text.ElideRight; color: program.connected ? palette.text : "#9a5b00" }
-            ToolSeparator { }
-            Label { text: program.time; textFormat: Text.PlainText }
-            ToolSeparator { }
-            Label { Layout.fillWidth: true; visible: program.message !== ""; text: program.message; textFormat: Text.PlainText; elide: Text.ElideRight }
-            Label { objectName: "status"; Layout.fillWidth: true; visible: program.message === ""; text: scene.statusText.replace(/<[^>]*>/g, "").replace(/&lt;/g, "<").replace(/&amp;/g, "&"); textFormat: Text.PlainText; elide: Text.ElideRight }
-            Label { objectName: "recording"; visible: text !== ""; text: program.recording; textFormat: Text.PlainText; color: "#c02020" }
-            Label { text: program.frameRate + " fps"; textFormat: Text.PlainText }
+            active: window.drawn
+            sourceComponent: RowLayout {
+                Label { Layout.maximumWidth: window.width / 2; text: program.connection; textFormat: Text.PlainText; elide: Text.ElideRight; color: program.connected ? palette.text : "#9a5b00" }
+                ToolSeparator { }
+                Label { text: program.time; textFormat: Text.PlainText }
+                ToolSeparator { }
+                Label { Layout.fillWidth: true; visible: program.message !== ""; text: program.message; textFormat: Text.PlainText; elide: Text.ElideRight }
+                Label { objectName: "status"; Layout.fillWidth: true; visible: program.message === ""; text: scene.statusText.replace(/<[^>]*>/g, "").replace(/&lt;/g, "<").replace(/&amp;/g, "&"); textFormat: Text.PlainText; elide: Text.ElideRight }
+                Label { objectName: "recording"; visible: text !== ""; text: program.recording; textFormat: Text.PlainText; color: "#c02020" }
+                Label { text: program.frameRate + " fps"; textFormat: Text.PlainText }
+            }
         }
     }
 
