@@ -137,8 +137,8 @@ def send(args: argparse.Namespace) -> int:
         print(to_json({"id": goal.id_text, "status": status.value, "result": found}))
     else:
         print(_block("result", found))
-        colour = "green" if status is GoalStatus.SUCCEEDED else "red"
-        print(style(f"# goal {goal.id_text} {status.value}", colour))
+        color = "green" if status is GoalStatus.SUCCEEDED else "red"
+        print(style(f"# goal {goal.id_text} {status.value}", color))
     return 0 if status is GoalStatus.SUCCEEDED else 1
 
 

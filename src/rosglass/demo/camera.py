@@ -219,9 +219,9 @@ class Camera:
 
     def _draw_body(self, picture: Picture, state: RobotState) -> None:
         """Draw the deck and the front flippers, which reach into the picture from below."""
-        for (front, half, up), colour in _DECK:
+        for (front, half, up), color in _DECK:
             deck = [(0.05, half, up), (front, half, up), (front, -half, up), (0.05, -half, up)]
-            self._fill(picture, np.array(deck), colour)
+            self._fill(picture, np.array(deck), color)
         for side, angle in ((1, state.flippers[0]), (-1, state.flippers[1])):
             c, s = math.cos(angle), math.sin(angle)
             along, thick = _FLIPPER_OUTLINE
@@ -243,10 +243,10 @@ class Camera:
             ends = [(int(p[0]), int(p[1])) for p in points[:2]]
             cv2.line(picture, ends[0], ends[1], (74, 78, 86), 2, cv2.LINE_AA)
 
-    def _fill(self, picture: Picture, points: Floats, colour: tuple[int, int, int]) -> None:
+    def _fill(self, picture: Picture, points: Floats, color: tuple[int, int, int]) -> None:
         outline = outline_of(from_body(points))
         if outline is not None:
-            cv2.fillConvexPoly(picture, outline, colour, cv2.LINE_AA)
+            cv2.fillConvexPoly(picture, outline, color, cv2.LINE_AA)
 
 
 _DOUBLE = np.array([[2.0, 0, 0.5], [0, 2.0, 0.5], [0, 0, 1.0]])

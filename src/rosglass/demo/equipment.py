@@ -152,7 +152,7 @@ def _turned(state: RobotState, turn: float) -> RobotState:
 #: Metres between two points of objects, and of the ground.
 _SPACING, _GROUND_SPACING = 0.11, 0.12
 #: Bare concrete is left to the map: it would need the most points, and show the least.
-_COLOURED, _RAISED = 30, 0.02
+_COLORED, _RAISED = 30, 0.02
 #: Height of the yard's walls in the cloud, metres: a camera behind the robot sees over them.
 _PARAPET = 0.85
 #: Range in metres at which the robot sees colours.
@@ -178,18 +178,18 @@ class Cloud:
             u, v = (grid.ravel() for grid in np.meshgrid(_middles(across), _middles(down)))
             places = face.origin + u[:, None] * face.across + v[:, None] * face.down
             texture = cv2.resize(sides[face.texture], (across, down), interpolation=cv2.INTER_AREA)
-            colours = np.clip(texture.reshape(-1, 3) * face.shade, 0, 255).astype(np.uint8)
-            parts.append((places, colours))
+            colors = np.clip(texture.reshape(-1, 3) * face.shade, 0, 255).astype(np.uint8)
+            parts.append((places, colors))
         places = np.concatenate([part[0] for part in parts])
-        colours = np.concatenate([part[1] for part in parts])
+        colors = np.concatenate([part[1] for part in parts])
         outer = (np.abs(places[:, :2]) > (world.half_length - 0.05, world.half_width - 0.05)).any(1)
         included = ~outer | (places[:, 2] < _PARAPET)
-        places, colours = places[included], colours[included]
+        places, colors = places[included], colors[included]
         self._places = places[:, :2]
         self._seen = np.zeros(len(places), bool)
         self._rows = np.empty((len(places), 4), np.float32)
         self._rows[:, :3] = places
-        red, green, blue = (colours[:, k].astype(np.uint32) for k in range(3))
+        red, green, blue = (colors[:, k].astype(np.uint32) for k in range(3))
         self._rows[:, 3] = (red << 16 | green << 8 | blue).view(np.float32)
 
     def look(self, state: RobotState, ranges: npt.NDArray[np.float32]) -> bool:
@@ -238,7 +238,7 @@ def _ground(world: World) -> tuple[Floats, Pixels]:
     picture, _ = textures.ground(world)
     columns = round(2 * world.half_length / _GROUND_SPACING)
     rows = round(2 * world.half_width / _GROUND_SPACING)
-    colours = cv2.resize(picture, (columns, rows), interpolation=cv2.INTER_AREA).reshape(-1, 3)
+    colors = cv2.resize(picture, (columns, rows), interpolation=cv2.INTER_AREA).reshape(-1, 3)
     xs = (2 * _middles(columns) - 1) * world.half_length
     ys = (1 - 2 * _middles(rows)) * world.half_width
     x, y = (grid.ravel() for grid in np.meshgrid(xs, ys))
@@ -249,9 +249,9 @@ def _ground(world: World) -> tuple[Floats, Pixels]:
             covered &= (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0) >= 0
         inside |= covered
     places = np.column_stack([x, y, world.ground(x, y)])
-    telling = (np.ptp(colours, axis=1) > _COLOURED) | (places[:, 2] > _RAISED)
+    telling = (np.ptp(colors, axis=1) > _COLORED) | (places[:, 2] > _RAISED)
     kept = ~inside & (world.ramp.ground(x, y) == 0) & telling
-    return places[kept], colours[kept].astype(np.uint8)
+    return places[kept], colors[kept].astype(np.uint8)
 
 
 #: Fixed parts: name, position and roll, pitch, yaw on ``base_link``.
@@ -261,7 +261,7 @@ PARTS: tuple[tuple[str, tuple[float, float, float], tuple[float, float, float]],
     ("right_camera_link", (0.0, -0.24, 0.30), (0.0, 0.0, -math.pi / 2)),
     ("thermal_camera_link", (-0.02, 0.0, 0.60), (0.0, MOUNT[2], 0.0)),
 )
-_COLOURS = {
+_COLORS = {
     "hull": "0.17 0.19 0.22",
     "deck": "0.90 0.45 0.12",
     "track": "0.07 0.07 0.08",
@@ -316,11 +316,11 @@ def urdf() -> str:
     ]
     for name, place, turn, visuals in fixed:
         links += [_link(name, *visuals), _joint(name, "fixed", place, turn)]
-    colours = [
+    colors = [
         f'<material name="{name}"><color rgba="{rgb} 1"/></material>'
-        for name, rgb in _COLOURS.items()
+        for name, rgb in _COLORS.items()
     ]
-    body = "\n".join([*colours, *links])
+    body = "\n".join([*colors, *links])
     return f'<?xml version="1.0"?>\n<robot name="rosglass_robot">\n{body}\n</robot>\n'
 
 
@@ -328,18 +328,18 @@ def _numbers(values: Any) -> str:
     return " ".join(f"{value:.6g}" for value in values)
 
 
-def _visual(shape: str, place: Any, turn: Any, colour: str) -> str:
+def _visual(shape: str, place: Any, turn: Any, color: str) -> str:
     origin = f'<origin xyz="{_numbers(place)}" rpy="{_numbers(turn)}"/>'
-    material = f'<material name="{colour}"/>'
+    material = f'<material name="{color}"/>'
     return f"<visual>{origin}<geometry>{shape}</geometry>{material}</visual>"
 
 
-def _box(size: Any, place: Any, colour: str) -> str:
-    return _visual(f'<box size="{_numbers(size)}"/>', place, (0, 0, 0), colour)
+def _box(size: Any, place: Any, color: str) -> str:
+    return _visual(f'<box size="{_numbers(size)}"/>', place, (0, 0, 0), color)
 
 
-def _cylinder(radius: float, length: float, place: Any, turn: Any, colour: str) -> str:
-    return _visual(f'<cylinder radius="{radius}" length="{length}"/>', place, turn, colour)
+def _cylinder(radius: float, length: float, place: Any, turn: Any, color: str) -> str:
+    return _visual(f'<cylinder radius="{radius}" length="{length}"/>', place, turn, color)
 
 
 def _link(name: str, *visuals: str) -> str:

@@ -50,13 +50,13 @@ def paint_map(cells: npt.NDArray[np.int8], width: int, height: int) -> QtGui.QIm
     """
     if width * height != cells.size or not cells.size:
         raise Error(f"the map says {width} x {height} cells but brings {cells.size}")
-    colours = np.empty((256, 4), np.uint8)
+    colors = np.empty((256, 4), np.uint8)
     share = np.linspace(0.0, 1.0, 101)[:, None] ** 0.8
     free, taken = np.array([27, 38, 49, 255]), np.array([126, 151, 173, 255])
-    colours[:101] = (free + (taken - free) * share).astype(np.uint8)
+    colors[:101] = (free + (taken - free) * share).astype(np.uint8)
     # Unknown and invalid values stay transparent: the panel shows through.
-    colours[101:] = 0
-    pixels = np.ascontiguousarray(colours[cells.view(np.uint8).reshape(height, width)[::-1]])
+    colors[101:] = 0
+    pixels = np.ascontiguousarray(colors[cells.view(np.uint8).reshape(height, width)[::-1]])
     kind = QtGui.QImage.Format.Format_RGBA8888
     return QtGui.QImage(pixels.data, width, height, 4 * width, kind).copy()
 

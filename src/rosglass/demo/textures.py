@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rosglass.demo.world import World
 
     Picture = npt.NDArray[np.uint8]
-    Colour = tuple[int, int, int]
+    Color = tuple[int, int, int]
     Locator = Callable[[float, float], tuple[int, int]]
 
 __all__ = ["PIXELS_PER_METRE", "SUN", "TILED", "ground", "panorama", "sides"]
@@ -28,7 +28,7 @@ TILED = frozenset({"panel", "brick", "hazard", "container"})
 #: Direction towards the sun; a low evening sun in the south-west.
 SUN = (-0.62, -0.55, 0.56)
 _GROUND_SCALE = 96
-_CRATE: Colour = (176, 128, 74)
+_CRATE: Color = (176, 128, 74)
 
 
 def _noise(
@@ -59,8 +59,8 @@ def _noise(
 
 
 def _tinted(base: Sequence[int], noise: npt.NDArray[np.float32], strength: float) -> Picture:
-    colour = np.array(base, np.float32)
-    return cast("Picture", np.clip(colour + noise[..., None] * strength, 0, 255).astype(np.uint8))
+    color = np.array(base, np.float32)
+    return cast("Picture", np.clip(color + noise[..., None] * strength, 0, 255).astype(np.uint8))
 
 
 def _darken_foot(picture: Picture, reach: float) -> None:
@@ -91,9 +91,9 @@ def _brick(random: np.random.Generator, width: int, height: int) -> Picture:
         shift = (row % 2) * brick_length // 2
         for x in range(-shift, width, brick_length):
             tint = int(random.integers(-22, 22))
-            colour = (158 + tint, 78 + tint // 2, 58 + tint // 2)
+            color = (158 + tint, 78 + tint // 2, 58 + tint // 2)
             cv2.rectangle(
-                picture, (x + 2, y + 2), (x + brick_length - 2, y + brick_height - 2), colour, -1
+                picture, (x + 2, y + 2), (x + brick_length - 2, y + brick_height - 2), color, -1
             )
     grain = _noise(random, height, width, (2, 40))[..., None] * 16
     bricks: Picture = np.clip(picture + grain, 0, 255).astype(np.uint8)
@@ -110,8 +110,8 @@ def _crate(random: np.random.Generator, size: int) -> Picture:
         shade = -12 if i % 2 else 6
         part[:] = _tinted(tuple(c + shade for c in _CRATE), grain[:size], 34)
         cv2.line(picture, (x, 0), (x, size), (74, 50, 26), 2)
-    frame: Colour = (146, 102, 56)
-    edge: Colour = (84, 56, 30)
+    frame: Color = (146, 102, 56)
+    edge: Color = (84, 56, 30)
     border = size // 8
     diagonal = np.array(
         [
@@ -150,7 +150,7 @@ def _hazard(width: int, height: int) -> Picture:
     return cv2.GaussianBlur(picture, (3, 3), 0).astype(np.uint8)
 
 
-def _barrel(random: np.random.Generator, base: Colour, size: int) -> Picture:
+def _barrel(random: np.random.Generator, base: Color, size: int) -> Picture:
     picture = _tinted(base, _noise(random, size * 2, size, (3, 30)), 18)
     dark = (base[0] * 6 // 10, base[1] * 6 // 10, base[2] * 6 // 10)
     for y in (size * 2 // 3, size * 4 // 3):
@@ -229,7 +229,7 @@ def ground(world: World) -> tuple[Picture, float]:
         cv2.line(picture, at(k * slab, -9), at(k * slab, 9), (92, 89, 85), 2, cv2.LINE_AA)
         cv2.line(picture, at(-9, k * slab), at(9, k * slab), (92, 89, 85), 2, cv2.LINE_AA)
     _rubble(picture, world, random, at, scale)
-    white: Colour = (214, 212, 204)
+    white: Color = (214, 212, 204)
     for k in range(16):
         y = -4.4 + 0.55 * k
         cv2.line(picture, at(0.1, y), at(0.1, y + 0.3), white, 5, cv2.LINE_AA)
@@ -254,8 +254,8 @@ def _rubble(
         turn = float(random.uniform(0, 180))
         shifted = (spot[0] + 2, spot[1] - 2)
         cv2.ellipse(picture, shifted, axes, turn, 0, 360, (58, 54, 50), -1, cv2.LINE_AA)
-        colour = (128 + tint, 112 + tint, 94 + tint)
-        cv2.ellipse(picture, spot, axes, turn, 0, 360, colour, -1, cv2.LINE_AA)
+        color = (128 + tint, 112 + tint, 94 + tint)
+        cv2.ellipse(picture, spot, axes, turn, 0, 360, color, -1, cv2.LINE_AA)
     centre = at(*rough.centre)
     cv2.circle(picture, centre, round(rough.radius * scale), (226, 186, 40), 3, cv2.LINE_AA)
 
@@ -313,7 +313,7 @@ def panorama(pixels_per_radian: float) -> Picture:
     cover = np.clip((clouds - 0.05) * 1.6, 0, 1)[..., None] * (0.3 + 0.5 * rows[:, None])
     sky = sky * (1 - cover) + np.array([252, 238, 224]) * cover
     columns = np.arange(width) / width * 2 * math.pi
-    for depth, colour in enumerate(((132, 140, 158), (104, 112, 128), (78, 88, 92))):
+    for depth, color in enumerate(((132, 140, 158), (104, 112, 128), (78, 88, 92))):
         angles = (
             0.055 * np.sin(columns * 3 + 2 * depth)
             + 0.035 * np.sin(columns * 7 + depth)
@@ -321,7 +321,7 @@ def panorama(pixels_per_radian: float) -> Picture:
         )
         crest = horizon - (0.19 - 0.045 * depth + angles * (0.8 - 0.15 * depth)) * pixels_per_radian
         hill = np.arange(height)[:, None] > crest[None, :]
-        sky[hill] = colour
+        sky[hill] = color
     picture = sky.astype(np.uint8)
     wrap = round(math.radians(100) * pixels_per_radian)
     return np.ascontiguousarray(np.concatenate([picture, picture[:, :wrap]], axis=1))

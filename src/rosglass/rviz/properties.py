@@ -44,7 +44,7 @@ _MAX_TEXT_LENGTH = 10_000
 _INT32 = (-(2**31), 2**31 - 1)
 #: Properties whose value is a text of numbers with semicolons between them -> their names.
 _VECTOR_PARTS = {"rviz::VectorProperty": "xyz", "rviz::QuaternionProperty": "xyzw"}
-_COLOUR_CLASS = "rviz::ColorProperty"
+_COLOR_CLASS = "rviz::ColorProperty"
 #: Read-only properties that show a display's status.
 _STATUS_CLASSES = ("rviz::StatusList", "rviz::StatusProperty")
 
@@ -102,7 +102,7 @@ def read_property(item: Any) -> Any:
         quaternions, in RViz's order; None for a property that has only children.
     """
     value, kind = item.getValue(), class_of(item)
-    if kind == _COLOUR_CLASS:
+    if kind == _COLOR_CLASS:
         parts = _split(value)
         return "#{:02x}{:02x}{:02x}".format(*map(int, parts)) if len(parts) == 3 else str(value)
     if kind in _VECTOR_PARTS:
@@ -180,8 +180,8 @@ def _kind(item: Any) -> str:
 
 def _convert(item: Any, kind: str, value: Any, name: str) -> tuple[Any, Any]:
     """Return a value as returned by :func:`read_property`, and as set in RViz."""
-    if kind == _COLOUR_CLASS:
-        return _colour(value, name)
+    if kind == _COLOR_CLASS:
+        return _color(value, name)
     if kind in _VECTOR_PARTS:
         return _vector(value, _VECTOR_PARTS[kind], name)
     now = item.getValue()
@@ -226,16 +226,16 @@ def _number(value: Any, name: str) -> float:
     raise Error(f"{name}: expected a finite number, got {shown(value)}")
 
 
-def _colour(value: Any, name: str) -> tuple[str, str]:
+def _color(value: Any, name: str) -> tuple[str, str]:
     parts = _split(value) if isinstance(value, str) and value.count(";") == 2 else []
     if len(parts) == 3 and all(0 <= part <= 255 and part == int(part) for part in parts):
         value = QtGui.QColor(*map(int, parts))
-    colour = QtGui.QColor(value) if isinstance(value, (str, QtGui.QColor)) else QtGui.QColor()
-    if not colour.isValid():
+    color = QtGui.QColor(value) if isinstance(value, (str, QtGui.QColor)) else QtGui.QColor()
+    if not color.isValid():
         raise Error(f"{name}: expected a colour, e.g. '#ff8800' or 'orange', got {shown(value)}")
-    if colour.alpha() != 255:
+    if color.alpha() != 255:
         raise Error(f"{name}: RViz's colours have no transparency; set the property Alpha")
-    plain = (colour.red(), colour.green(), colour.blue())
+    plain = (color.red(), color.green(), color.blue())
     return "#{:02x}{:02x}{:02x}".format(*plain), "; ".join(map(str, plain))
 
 
@@ -373,7 +373,7 @@ def _line_with_button() -> Any:
             action = self.addAction(
                 self.style().standardIcon(widgets.QStyle.SP_DirOpenIcon)
                 if model.kind.NAME == "path"
-                else _colour_icon(model),
+                else _color_icon(model),
                 widgets.QLineEdit.TrailingPosition,
             )
             window = self.window()
@@ -385,7 +385,7 @@ def _line_with_button() -> Any:
     return LineWithButton
 
 
-def _colour_icon(model: RegisteredProperty) -> Any:
+def _color_icon(model: RegisteredProperty) -> Any:
     gui = pyqt("QtGui")
     picture = gui.QPixmap(16, 16)
     picture.fill(gui.QColor(model.kind.saved(model.get())))
@@ -399,7 +399,7 @@ def _choose(model: RegisteredProperty, window: Any, choices: Choices) -> None:
         dialog = widgets.QColorDialog(gui.QColor(model.kind.saved(model.get())), window)
         dialog.setOption(widgets.QColorDialog.ShowAlphaChannel)
         dialog.colorSelected.connect(
-            lambda colour: choices.set_property(model, colour.name(gui.QColor.HexArgb))
+            lambda color: choices.set_property(model, color.name(gui.QColor.HexArgb))
         )
     else:
         dialog = widgets.QFileDialog(window, model.path[-1], str(model.get()))

@@ -285,10 +285,10 @@ class _Color(Kind):
 
     def read(self, value: Any) -> QtGui.QColor:
         if isinstance(value, (QtGui.QColor, str)):
-            colour = QtGui.QColor(value)
-            if colour.isValid():
+            color = QtGui.QColor(value)
+            if color.isValid():
                 # Normalise it: the same colour in another notation is equal.
-                return QtGui.QColor(colour.name(QtGui.QColor.NameFormat.HexArgb))
+                return QtGui.QColor(color.name(QtGui.QColor.NameFormat.HexArgb))
         raise self._value_error(value)
 
     def saved(self, value: QtGui.QColor) -> str:
