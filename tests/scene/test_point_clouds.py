@@ -234,8 +234,8 @@ def test_squares_of_one_vertex_look_as_those_of_four(
     by_points, by_quads = picture(16.0), picture(0.0)
     drawn = np.abs(by_quads - BACKGROUND).max(axis=2) > 3
     assert drawn.sum() > 1000
-    differs = np.abs(by_points - by_quads).max(axis=2) > 3
-    # Only pixels at edges, by rounding.
+    # Only pixels at edges, by rounding; Squares have edges of less than a pixel.
+    differs = np.abs(by_points - by_quads).max(axis=2) > (24 if style == "Squares" else 3)
     assert differs.sum() <= 0.02 * drawn.sum()
 
 
