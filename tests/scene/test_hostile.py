@@ -406,3 +406,20 @@ def test_a_map_is_copied_once_for_many_updates(robot: Robot) -> None:
     assert display.cells.tolist() == [[100, 100, 100], [0, 0, 0]]
     assert display._image.geometry == before + 1
     assert display.statusLevel == "ok"
+
+
+def test_frames_without_a_transform_are_counted(robot: Robot) -> None:
+    display = robot.view.scene.add("TF")
+    tf = robot._node.create_publisher("/tf", "tf2_msgs/TFMessage")
+    robot.bench.wait(tf.subscription_count)
+    stamped = {"stamp": {"sec": 5}}
+    still = {"rotation": TURN}
+    pairs = [{"header": {**stamped, "frame_id": f"from{at}"}, "child_frame_id": f"to{at}",
+              "transform": still} for at in range(3000)]  # fmt: skip
+    tf.publish({"transforms": pairs})
+    robot.bench.wait(lambda: "of 6002 frames are shown" in display.statusText)
+    assert "Transforms: 2000 frames have no transform" in display.statusText
+    assert len(display.status_lines) == 22
+    robot.view.scene.reset()
+    robot.bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
+    robot.check()

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from rosglass.qt import QtCore
     from rosglass.scene.display import Display
     from rosglass.scene.resource_retriever import ResourceRetriever
-    from rosglass.tf import FrameTree, TransformBuffer
+    from rosglass.tf import TransformBuffer
 
 __all__ = ["Scene"]
 
@@ -81,8 +81,6 @@ class Scene(Element):
         self._watch: Any = None
         self._loader: Dispatcher | None = None
         self._ticks = 0
-        #: The frames, as they were half a second ago at most.
-        self._tree: FrameTree | None = None
         super().__init__(parent, runtime)
         self._timer = single_shot(self, self._follow)
         self._reset_at = -math.inf
@@ -279,7 +277,7 @@ class Scene(Element):
     def frames(self) -> list[str]:
         """Return the names of all frames."""
         buffer = self.transforms
-        return [] if buffer is None else sorted(buffer.tree())
+        return [] if buffer is None else sorted(buffer.frame_names())
 
     def look_up(self, frame: str, stamp: int = 0, target: str = "") -> NDArray[np.float64]:
         """Return the pose of a frame in the fixed frame.
@@ -347,16 +345,8 @@ class Scene(Element):
             return 0.0
         if session is None or session.state != "connected":
             return math.inf
-        tree = self._tree
-        if tree is None:
-            return 0.0
-        try:
-            links = tree.chain(self._fixed_frame, frame)
-        except TransformException:
-            return 0.0
-        # The topmost frame's own link to its parent is not part of the way.
-        moving = (tree[one] for one in links if tree[one].parent in links)
-        return max((link.silence for link in moving if not link.static), default=0.0)
+        buffer = self.transforms
+        return 0.0 if buffer is None else buffer.silence(self._fixed_frame, frame)
 
     @Slot()
     def _on_tick(self) -> None:
@@ -365,17 +355,16 @@ class Scene(Element):
         buffer = self.transforms
         if self._ticks % 5 or buffer is None:
             return
-        self._tree = buffer.tree()
-        self._check_fixed_frame()
+        self._check_fixed_frame(buffer)
         for display in self._alive():
             display.check_frame()
 
-    def _check_fixed_frame(self) -> None:
+    def _check_fixed_frame(self, buffer: TransformBuffer) -> None:
         """Say that the fixed frame is none of the robot's."""
-        tree, frame = self._tree, self._fixed_frame
-        known = tree is None or frame in tree or not len(tree)
-        hint = "" if known or tree is None else similar(frame, tree)
-        self._set_problem("" if known else f"the fixed frame [{frame}] does not exist{hint}")
+        frame = self._fixed_frame
+        names = [] if buffer.has_frame(frame) else buffer.frame_names()
+        hint = similar(frame, names)
+        self._set_problem(f"the fixed frame [{frame}] does not exist{hint}" if names else "")
 
     def load(self, work: Callable[[ResourceRetriever], Any], done: Callable[[Any], None]) -> None:
         """Run a job that takes long, such as reading meshes, in a thread of the scene.
@@ -450,7 +439,7 @@ class Scene(Element):
         leave = self._cleanup.pop("transforms", None)
         if leave is not None:
             leave()
-        self._link = self._watch = self._tree = None
+        self._link = self._watch = None
         self._resources = []
 
     def _on_transforms(self) -> None:

@@ -6,6 +6,7 @@ Behaviour: tf2's ``BufferCore`` and tf2_ros's ``Buffer``.
 from __future__ import annotations
 
 import logging
+import math
 import threading
 from collections import Counter
 from dataclasses import dataclass
@@ -316,7 +317,7 @@ class TransformBuffer(Handle):
     Attributes:
         ignored: Number of refused transforms by reason: ``old`` (beyond the cache time),
             ``repeated`` (same frame and stamp), ``self``, ``no name``, ``not finite``,
-            ``not normalised``, ``loop``.
+            ``not normalised``, ``loop``, ``too deep``.
 
     Raises:
         ArgumentError: The cache time is not above zero.
@@ -642,9 +643,26 @@ class TransformBuffer(Handle):
         """Return the state of a frame; None if it does not exist."""
         return self._infos([name])[0] if self.has_frame(name) else None
 
-    def tree(self) -> FrameTree:
-        """Return a snapshot of all frames."""
-        return FrameTree(self._infos(None))
+    def frame_names(self) -> list[str]:
+        """Return the names of all frames, those that appeared first at the beginning."""
+        with self._lock:
+            return list(self._store.names)
+
+    def tree(self, frames: Iterable[str] | None = None) -> FrameTree:
+        """Return a snapshot of all frames, or of those of these names that exist."""
+        return FrameTree(self._infos(None if frames is None else list(frames)))
+
+    def silence(self, target: str, source: str) -> float:
+        """Return for how long one frame may have been somewhere else in another one, in seconds.
+
+        That is since the last transform of whichever link between them was received longest ago; 0
+        if all are static, or if nothing connects the frames.
+        """
+        store, now = self._store, monotonic()
+        with self._lock:
+            up, down = links_between(store.caches, target, source) or ([], [])
+            moving = [frame for frame in (*up, *down) if not store.caches[frame].static]
+            return max((now - store.arrivals.get(one, -math.inf) for one in moving), default=0.0)
 
     # -- changes ---------------------------------------------------------------------------------
 
@@ -757,7 +775,7 @@ class TransformBuffer(Handle):
     def _infos(self, names: list[str] | None) -> list[FrameInfo]:
         store = self._store
         with self._lock:
-            wanted = [name for name in names or store.names if name in store.names]
+            wanted = list(store.names) if names is None else [n for n in names if n in store.names]
             authorities = [store.authorities.get(name, "") for name in wanted]
         # Without the lock: names of publishers are looked up in the graph.
         texts = [str(authority) for authority in authorities]

@@ -123,12 +123,12 @@ class FrameTree:
 
     def ancestors(self, name: str) -> list[str]:
         """Return a frame's parent, its parent, and so on; raises LookupException."""
-        found: list[str] = []
+        found: dict[str, None] = {}
         frame = self[name]
         while frame.parent and frame.parent not in found:
-            found.append(frame.parent)
+            found[frame.parent] = None
             frame = self[frame.parent]
-        return found
+        return list(found)
 
     def chain(self, target: str, source: str) -> list[str]:
         """Return the frames from `source` to `target`, both included.
@@ -138,9 +138,10 @@ class FrameTree:
             ConnectivityException: They are not connected.
         """
         up, down = [source, *self.ancestors(source)], [target, *self.ancestors(target)]
+        places = {frame: place for place, frame in enumerate(up)}
         for place, frame in enumerate(down):
-            if frame in up:
-                return [*up[: up.index(frame) + 1], *reversed(down[:place])]
+            if frame in places:
+                return [*up[: places[frame] + 1], *reversed(down[:place])]
         raise ConnectivityException(
             f"nothing connects '{target}', which belongs to '{down[-1]}', and '{source}', which "
             f"belongs to '{up[-1]}'"
@@ -185,6 +186,8 @@ def _quoted(text: str) -> str:
 
 #: The parent's name, the translation (x, y, z) and the rotation (x, y, z, w).
 Entry: TypeAlias = tuple[str, float, float, float, float, float, float, float]
+#: Links between a frame and its root that are followed, as in tf2.
+_MAX_DEPTH = 1000
 #: Number of outdated entries to delete at once.
 _PRUNE_SIZE = 256
 
@@ -356,6 +359,7 @@ _PREFIX = {
     "not finite": "TF_NAN_INPUT ",
     "not normalised": "TF_DENORMALIZED_QUATERNION ",
     "loop": "TF_LOOP ",
+    "too deep": "",
 }
 _REASON = {
     "repeated": "there is one of the same time already",
@@ -364,6 +368,7 @@ _REASON = {
     "not finite": "a number in it is not finite",
     "not normalised": "its rotation is no quaternion of length 1; an empty one has w = 1",
     "loop": "the parent is itself placed in the child; find out which of the two is wrong",
+    "too deep": f"the parent is below more than {_MAX_DEPTH} other frames; find out who names them",
 }
 
 
@@ -490,10 +495,11 @@ class FrameStore:
             return wrong
         cache = self.caches.get(child)
         before = None if cache is None else (cache.parent, cache.static)
-        if (cache is None or cache.parent != parent) and self._closes_loop(
-            child, parent, None if static else stamp
-        ):
-            return "loop"
+        # A frame that is new has nothing below it.
+        if child in self.names and (cache is None or cache.parent != parent):
+            wrong = self._closes_loop(child, parent, None if static else stamp)
+            if wrong:
+                return wrong
         if cache is None or cache.static is not static:
             if cache is not None:
                 self.disagreements.append((child, self.authorities.get(child), authority))
@@ -505,14 +511,16 @@ class FrameStore:
             self.version += before != (cache.parent, static)
         return kind
 
-    def _closes_loop(self, child: str, parent: str, stamp: int | None) -> bool:
-        """Return whether a link would close a loop; outdated links are removed for it."""
+    def _closes_loop(self, child: str, parent: str, stamp: int | None) -> str:
+        """Return why a link is refused, as it closes a loop; outdated links are removed for it."""
         path: list[str] = []
         frame = parent
         while frame != child:
             cache = self.caches.get(frame)
-            if cache is None or len(path) > len(self.caches):
-                return False
+            if cache is None:
+                return ""
+            if len(path) > _MAX_DEPTH:
+                return "too deep"
             path.append(frame)
             frame = cache.parent
         # Otherwise a robot that reversed its tree would be ignored until it is restarted.
@@ -520,7 +528,7 @@ class FrameStore:
         old = [name for name in path if not (c := self.caches[name]).static and c.latest < limit]
         for name in old:
             self._remove(name)
-        return not old
+        return "" if old else "loop"
 
     def _remove(self, name: str) -> None:
         del self.caches[name]
@@ -544,7 +552,7 @@ _UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 def root_of(caches: Mapping[str, DynamicCache | StaticCache], frame: str) -> str:
     """Return the root of a frame's tree."""
-    for _ in range(len(caches) + 1):
+    for _ in range(_MAX_DEPTH + 1):
         cache = caches.get(frame)
         if cache is None:
             break
@@ -561,14 +569,14 @@ def links_between(
         Those from the source up, and those from the target up; None without a common ancestor.
     """
     up = [source]
-    while up[-1] in caches and len(up) <= len(caches) + 1:
+    while up[-1] in caches and len(up) <= _MAX_DEPTH + 1:
         up.append(caches[up[-1]].parent)
     places = {frame: place for place, frame in reversed(list(enumerate(up)))}
     down: list[str] = []
     frame = target
     while frame not in places:
         cache = caches.get(frame)
-        if cache is None or len(down) > len(caches):
+        if cache is None or len(down) > _MAX_DEPTH:
             return None
         down.append(frame)
         frame = cache.parent
@@ -610,7 +618,6 @@ def look_up(
         ExtrapolationException: A link is unknown at that time.
         LookupException: The frames form a loop.
     """
-    most = len(caches) + 1
     # From the source up to the target, or to where the data ends.
     frame, depth = source, 0
     moved, turned = _ORIGIN, _UPRIGHT
@@ -631,7 +638,7 @@ def look_up(
         turned = multiply(entry[4:], turned)
         frame = entry[0]
         depth += 1
-        if depth > most:
+        if depth > _MAX_DEPTH:
             raise _loop(frame)
     top = frame
     # From the target up.
@@ -652,7 +659,7 @@ def look_up(
         tilt = multiply(entry[4:], tilt)
         frame = entry[0]
         depth += 1
-        if depth > most:
+        if depth > _MAX_DEPTH:
             raise _loop(frame)
     if frame != top:
         raise ExtrapolationException(gap) if gap else _unconnected(caches, target, source)
@@ -725,7 +732,7 @@ class _FramesBelow:
         frame, times = source, self._times
         while frame not in times:
             cache = self._caches.get(frame)
-            if cache is None or len(path) > len(self._caches):
+            if cache is None or len(path) > _MAX_DEPTH:
                 return None
             path.append(frame)
             frame = cache.parent
@@ -752,8 +759,8 @@ def _unconnected(
 
 def _loop(frame: str) -> TransformException:
     return LookupException(
-        f"The tf tree is invalid because it contains a loop, with '{frame}' in it: find out which "
-        "of its publishers is wrong"
+        f"The tf tree is invalid because it contains a loop, or more than {_MAX_DEPTH} links, at "
+        f"'{frame}': find out which of its publishers is wrong"
     )
 
 

@@ -414,3 +414,54 @@ def test_a_hint_at_similar_frames_is_found_once(monkeypatch: pytest.MonkeyPatch)
     with pytest.raises(LookupException, match="; there are 3"):
         buffer.lookup_transform("map", "arms")
     assert found == ["arms"] * 2, "another frame may be similar"
+
+
+def test_chains_as_long_as_those_of_tf2_are_followed() -> None:
+    count = 20_000  # without a limit, this takes minutes
+    links = [("base" if not n else f"f{n - 1}", f"f{n}") for n in range(count)]
+    for order in (links, list(reversed(links))):
+        buffer = TransformBuffer()
+        for parent, child in order:
+            assert put(buffer, parent, child)
+        assert buffer.lookup_transform("base", "f999").translation[0] == 1000
+        assert buffer.silence("base", "f999") < 60.0
+        for target, source in (("base", "f1001"), ("f1001", "base"), ("base", "f19999")):
+            with pytest.raises(LookupException, match="a loop, or more than 1000 links"):
+                buffer.lookup_transform(target, source)
+            (found,) = buffer.lookup_newest(target, [source]).values()
+            assert isinstance(found, LookupException)
+        assert buffer.silence("base", "f19999") == 0.0
+        assert len(buffer.tree().chain("base", "f19999")) == count + 1
+        # Whether this closes a loop is not found out at any length.
+        with pytest.raises(InvalidArgumentException, match="below more than 1000 other frames"):
+            put(buffer, "f19998", "f9", 2.0)
+        assert buffer.ignored["too deep"] == 1
+
+
+def test_a_tree_of_some_frames() -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "odom")
+    put(buffer, "odom", "base", static=True)
+    assert buffer.frame_names() == ["odom", "map", "base"]
+    tree = buffer.tree(["base", "nowhere", "odom"])
+    assert sorted(tree) == ["base", "odom"]
+    assert tree["base"].static
+
+
+def test_silence_is_that_of_the_link_that_moved_longest_ago(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    buffer = TransformBuffer()
+    for now, parent, child, static in (
+        (0.0, "map", "odom", False),
+        (5.0, "odom", "base", False),
+        (1.0, "base", "lamp", True),
+        (2.0, "earth", "map", False),
+    ):
+        monkeypatch.setattr("rosglass.tf.buffer.monotonic", lambda now=now: now)
+        put(buffer, parent, child, static=static)
+    monkeypatch.setattr("rosglass.tf.buffer.monotonic", lambda: 10.0)
+    assert buffer.silence("map", "lamp") == buffer.silence("lamp", "map") == 10.0
+    assert buffer.silence("odom", "lamp") == 5.0
+    assert buffer.silence("base", "lamp") == 0.0
+    assert buffer.silence("map", "nowhere") == 0.0

@@ -18,17 +18,19 @@ from rosglass.scene.parts import Parts
 from rosglass.scene.settings import Setting
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
 
+    from rosglass.errors import TransformException
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.tf import FrameInfo
 
 __all__ = ["TFDisplay"]
 
-_MAX_FRAMES = 2000
+#: Frames that are shown, frames of which these are chosen, and lines of the status about them.
+_MAX_FRAMES, _MAX_NAMES, _MAX_LINES = 2000, 10_000, 20
 #: Sizes in RViz at a marker scale of 1, metres.
 _AXIS_M, _AXIS_RADIUS_M, _NAME_M = 0.2, 0.02, 0.1
 _SHAFT_M, _HEAD_M, _HEAD_WIDTH_M = 0.01, 0.1, 0.04
@@ -95,6 +97,8 @@ class TFDisplay(Display):
         self._next_look = 0.0
         #: What is drawn, to draw nothing anew while nothing changes.
         self._drawn: Any = None
+        #: Lines of the status about frames.
+        self._lines: set[str] = set()
         super().__init__(parent, runtime)
         self.parts: Parts = Parts(
             "Frames",
@@ -186,30 +190,41 @@ class TFDisplay(Display):
         buffer = scene.transforms if scene is not None else None
         if scene is None or buffer is None or not self.shown:
             return
-        tree = buffer.tree()
-        chosen = [name for name in sorted(tree) if self._is_chosen(name)]
-        if len(chosen) > _MAX_FRAMES:
-            self.set_status("Frames", "warn", f"only the first {_MAX_FRAMES} frames are shown")
+        names = buffer.frame_names()
+        chosen = [name for name in sorted(names[:_MAX_NAMES]) if self._is_chosen(name)]
+        if len(chosen) > _MAX_FRAMES or len(names) > _MAX_NAMES:
             del chosen[_MAX_FRAMES:]
+            text = f"only {len(chosen)} of {len(names)} frames are shown"
+            self.set_status("Frames", "warn", text)
+        else:
+            self.delete_status("Frames")
+        tree = buffer.tree(chosen)
         poses, unknown = scene.look_up_all(chosen)
         is_lost = self._session is not None and self._session.state != "connected"
         shown: list[_Frame] = []
+        self._report_unknown(unknown)
         for name, pose in zip(chosen, poses, strict=True):
-            if name in unknown:
-                self.set_status(name, "warn", f"no transform: {unknown[name]}")
+            if name in unknown or name not in tree:
                 continue
-            self.delete_status(name)
             share = OUTDATED_ALPHA if is_lost else self._share(tree[name])
             shown.append(_Frame(name, pose, share, tree[name].parent))
         self._moves = any(not tree[frame.name].static for frame in shown)
         shown = [frame for frame in shown if frame.share > 0]
-        for line in list(self.status_lines):
-            if line not in tree and line in self.frames:
-                self.delete_status(line)
         self._fill(shown)
         names = [frame.name for frame in shown]
         if names != self.frames:
             report(self, frames=names)
+
+    def _report_unknown(self, unknown: Mapping[str, TransformException]) -> None:
+        """Say which frames have no transform, a line for each of the first ones."""
+        lines = {name: f"no transform: {unknown[name]}" for name in list(unknown)[:_MAX_LINES]}
+        if len(unknown) > _MAX_LINES:
+            lines["Transforms"] = f"{len(unknown)} frames have no transform"
+        for line in self._lines - lines.keys():
+            self.delete_status(line)
+        for line, text in lines.items():
+            self.set_status(line, "warn", text)
+        self._lines = set(lines)
 
     def _share(self, info: FrameInfo) -> float:
         """Return the opacity of a frame by its age: 1 while it is updated, 0 after the timeout."""
