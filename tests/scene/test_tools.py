@@ -758,3 +758,22 @@ def test_ros_1_has_topics_of_its_own(ros1_bench: SceneBench) -> None:
         assert received[0].header.frame_id == "map"
         assert received[0].header.stamp.secs > 1e9
     assert goals[0].pose.orientation.w == pytest.approx(1, abs=0.01)
+
+
+def test_a_goal_of_an_action_is_not_sent_while_disconnected(
+    make_bench: Any, tmp_path: Path
+) -> None:
+    from rosmaster import RosMaster
+
+    with RosMaster(tmp_path / "ros") as master:
+        bench = make_bench(master.url)
+        view = bench.load('SetGoalTool { name: "Go"; action: "/move_base" }\ntool: "Go"')
+        hand, goal = Hand(bench), view.tools.current
+        bench.wait(lambda: goal._endpoint is not None)
+        master.kill()
+        bench.wait(lambda: bench.session.state != "connected")
+        hand.drag(hand.at((0, 0, 0)), hand.at((1, 0, 0)))
+        assert "not sent, for the robot is not connected" in view.statusText
+        assert view.tool == "Interact"
+        master.start()
+        bench.close()

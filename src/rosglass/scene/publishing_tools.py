@@ -433,6 +433,9 @@ class SetGoalTool(PoseTool):
         message = {"header": self.header(), "pose": self.pose(x, y, yaw)}
         self.send(message, self._text("Goal", x, y, yaw))
 
+    def _subscribers(self) -> int:
+        return 0 if self.action else super()._subscribers()
+
     def _send_waiting(self) -> None:
         client, waiting = self._endpoint, self._waiting
         if not self.action or client is None or waiting is None or self._session is None:
