@@ -896,6 +896,24 @@ CASES: dict[str, Case] = {
         ],
         repeats=True,
     ),
+    "covariances without limits": Case(
+        [
+            display("PoseWithCovariance", "/flat", Color=RED, Alpha=0.5),
+            display("PoseWithCovariance", "/whole", Color=CYAN, Alpha=0.5,
+                    Covariance={"Value": True, "Position": {"Value": True, "Color": GREEN},
+                                "Orientation": {"Value": True, "Color": MAGENTA, "Offset": 0.5,
+                                                "Scale": 0.8}}),
+        ],
+        [
+            Message("/flat", "geometry_msgs/PoseWithCovarianceStamped",
+                    {"header": HEADER, "pose": {
+                        "pose": pose(-1, -1.5), "covariance": covariance(0.2, 0.1, 0, 0, 0, 1e6)}}),
+            Message("/whole", "geometry_msgs/PoseWithCovarianceStamped",
+                    {"header": HEADER, "pose": {
+                        "pose": pose(0.5, 1.5, 0, 0.5),
+                        "covariance": covariance(0.3, 0.1, 0.2, 0.05, 0.05, 1e6)}}),
+        ],
+    ),
     "translucent displays": Case(
         [
             display("Axes", Length=0.8, Radius=0.1, Alpha=0.5, Reference_Frame="base"),

@@ -38,6 +38,8 @@ _POSE_PATHS = (
 )
 #: Odometry messages that are kept where none is to be dropped.
 _MAX_KEPT = 10_000
+#: Deviations of orientations that are drawn as this, as in RViz.
+_MAX_DEVIATION_RAD = math.radians(89)
 #: Turns z, along which cylinders and cones stand, to x and y.
 _STANDING = np.array(
     [
@@ -362,7 +364,7 @@ class _WithCovariance(_Shaped):
     def _cone(self, pose: NDArray[np.float64], variance: float) -> NDArray[np.float64]:
         """Return a flat cone in front of a pose: where a robot in the plane may be heading."""
         reach = self.orientationOffset
-        angle = min(math.sqrt(variance) * self.orientationScale, math.radians(85))
+        angle = min(math.sqrt(variance) * self.orientationScale, _MAX_DEVIATION_RAD)
         wide = 2 * reach * math.tan(angle)
         # From its tip at the pose to its base at the offset; 1 mm high.
         local = np.diag([1e-3, wide, -reach, 1.0])
@@ -384,7 +386,7 @@ class _WithCovariance(_Shaped):
             angles = np.sqrt(np.maximum(values, 0)) * self.orientationScale
             if not angles.any():
                 continue
-            size = 2 * reach * np.tan(np.minimum(angles, math.radians(85)))
+            size = 2 * reach * np.tan(np.minimum(angles, _MAX_DEVIATION_RAD))
             local = np.eye(4)
             local[:2, :2] = vectors * np.maximum(size, 1e-4)
             local[2, 2], local[2, 3] = 1e-3, reach
