@@ -248,6 +248,20 @@ def _read_covariance(message: Any) -> _Covariance:
     return _Covariance(matrix_of(part.pose), covariance, problem)
 
 
+class _Uncertainty(NamedTuple):
+    """What one covariance is drawn as: matrices of shapes, 4 x 4.
+
+    Attributes:
+        ellipsoid: Of the position; None for none.
+        discs: Of the orientation, each with the axis whose end it is around.
+        cone: Of the orientation of a robot in the plane, instead; None for none.
+    """
+
+    ellipsoid: NDArray[np.float64] | None
+    discs: list[tuple[int, NDArray[np.float64]]]
+    cone: NDArray[np.float64] | None
+
+
 class _WithCovariance(_Shaped):
     """A display of poses with covariances."""
 
@@ -298,6 +312,9 @@ class _WithCovariance(_Shaped):
     ) -> None:
         #: Beside each pose: its covariance, and the rotation of its frame in the fixed frame.
         self._covariances: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
+        #: What the first of them are drawn as, with the settings that it depends on.
+        self._shapes: list[_Uncertainty] = []
+        self._shapes_look: tuple[Any, ...] = ()
         self._ellipsoids, self._discs, self._cones = Mesh(SPHERE), Mesh(CYLINDER), Mesh(CONE)
         self._uncertain = Group(self._ellipsoids, self._discs, self._cones)
         super().__init__(parent, runtime)
@@ -310,6 +327,7 @@ class _WithCovariance(_Shaped):
         """Show a pose with its covariance."""
         self._report_covariance(data)
         self._poses, self._covariances = [pose @ data.pose], [(data.covariance, pose[:3, :3])]
+        self._shapes = []
         self._draw()
 
     def _report_covariance(self, data: _Covariance) -> None:
@@ -325,34 +343,27 @@ class _WithCovariance(_Shaped):
     def reset(self) -> None:
         """Drop all poses."""
         super().reset()
-        self._covariances = []
+        self._covariances, self._shapes = [], []
 
     def _restyle(self) -> None:
         super()._restyle()
-        pairs = list(zip(self._poses, self._covariances, strict=True)) if self.covariance else []
-        ellipsoids = [
-            found
-            for pose, (covariance, turn) in pairs
-            if self.covariancePosition
-            for found in (
-                # Positions vary along the axes of the message's frame.
-                _ellipsoid(_turned(pose, turn), covariance[:3, :3], self.positionScale),
-            )
-            if found is not None
-        ]
+        look = (
+            *(self.covariance, self.covariancePosition, self.positionScale),
+            *(self.covarianceOrientation, self.orientationFrame),
+            *(self.orientationOffset, self.orientationScale),
+        )
+        if look != self._shapes_look:
+            self._shapes_look, self._shapes = look, []
+        # Of poses that are drawn already they stay: a long way has many.
+        for at in range(len(self._shapes), len(self._poses)):
+            self._shapes.append(self._shape_of(self._poses[at], *self._covariances[at]))
+        ellipsoids = [shape.ellipsoid for shape in self._shapes if shape.ellipsoid is not None]
+        cones = [shape.cone for shape in self._shapes if shape.cone is not None]
+        discs = [disc for shape in self._shapes for disc in shape.discs]
         self._ellipsoids.set_instances(
             np.array(ellipsoids).reshape(-1, 4, 4),
             (*rgb_of(self.positionColor), self.positionAlpha),
         )
-        discs: list[tuple[int, NDArray[np.float64]]] = []
-        cones: list[NDArray[np.float64]] = []
-        for pose, (covariance, turn) in pairs if self.covarianceOrientation else ():
-            whole = _turned(pose, turn) if self.orientationFrame == "Fixed" else pose
-            turns = covariance[3:, 3:]
-            if covariance[2, 2] <= 0 and turns[0, 0] <= 0 and turns[1, 1] <= 0 < turns[2, 2]:
-                cones.append(self._cone(whole, turns[2, 2]))
-            else:
-                discs += self._discs_of(whole, turns)
         alpha = self.orientationAlpha
         unique = (*rgb_of(self.orientationColor), alpha)
         axes = [(1, 0, 0, alpha), (0, 1, 0, alpha), (0, 0, 1, alpha)]
@@ -360,6 +371,23 @@ class _WithCovariance(_Shaped):
         colors = [axes[axis] if rgb else unique for axis, _ in discs] or [unique]
         self._discs.set_instances(np.array([m for _, m in discs]).reshape(-1, 4, 4), colors)
         self._cones.set_instances(np.array(cones).reshape(-1, 4, 4), axes[2] if rgb else unique)
+
+    def _shape_of(
+        self, pose: NDArray[np.float64], covariance: NDArray[np.float64], turn: NDArray[np.float64]
+    ) -> _Uncertainty:
+        ellipsoid, cone = None, None
+        discs: list[tuple[int, NDArray[np.float64]]] = []
+        if self.covariance and self.covariancePosition:
+            # Positions vary along the axes of the message's frame.
+            ellipsoid = _ellipsoid(_turned(pose, turn), covariance[:3, :3], self.positionScale)
+        if self.covariance and self.covarianceOrientation:
+            whole = _turned(pose, turn) if self.orientationFrame == "Fixed" else pose
+            turns = covariance[3:, 3:]
+            if covariance[2, 2] <= 0 and turns[0, 0] <= 0 and turns[1, 1] <= 0 < turns[2, 2]:
+                cone = self._cone(whole, turns[2, 2])
+            else:
+                discs = self._discs_of(whole, turns)
+        return _Uncertainty(ellipsoid, discs, cone)
 
     def _cone(self, pose: NDArray[np.float64], variance: float) -> NDArray[np.float64]:
         """Return a flat cone in front of a pose: where a robot in the plane may be heading."""
@@ -449,7 +477,8 @@ class OdometryDisplay(_WithCovariance):
         self._poses.append(new)
         self._covariances.append((data.covariance, pose[:3, :3]))
         most = min(self.keep or _MAX_KEPT, _MAX_KEPT)
-        del self._poses[:-most], self._covariances[:-most]
+        gone = max(len(self._poses) - most, 0)
+        del self._poses[:gone], self._covariances[:gone], self._shapes[:gone]
         self._draw()
 
     def _is_near(self, before: NDArray[np.float64], after: NDArray[np.float64]) -> bool:
