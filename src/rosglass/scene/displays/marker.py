@@ -135,6 +135,8 @@ class MarkerRecord(NamedTuple):
         warning: Why it may not look as it should, in words; empty otherwise.
         instances: Shapes that it consists of, where these are always the same ones, and the matrix
             of each in its frame; None to compute them when it is drawn.
+        triangles: Of a triangle list, which may be long: its shape; None to make it when it is
+            drawn.
     """
 
     key: tuple[str, int]
@@ -155,6 +157,7 @@ class MarkerRecord(NamedTuple):
     problem: str = ""
     warning: str = ""
     instances: _Instances | None = None
+    triangles: Shape | None = None
 
 
 def read_marker(message: Any, part: tuple[str, int] | None = None) -> MarkerRecord:
@@ -277,7 +280,8 @@ def _read_one(
         None if shapes is None else (shapes, (scaled.copy(),)),
     )
     if shapes is None:
-        record = record._replace(instances=_instances(record))
+        triangles = _triangles(record) if kind == TRIANGLE_LIST else None
+        record = record._replace(instances=_instances(record), triangles=triangles)
     return record
 
 
@@ -537,7 +541,10 @@ def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]
         labels.set_texts([marker.text], [[0, 0, 0]], abs(z), marker.color)
         yield labels
     elif kind == TRIANGLE_LIST:
-        yield _triangles(marker)
+        # RViz does not light what has colors of its own.
+        own = len(marker.colors) in (len(marker.points), len(marker.points) // 3)
+        shape = marker.triangles or _triangles(marker)
+        yield Mesh(shape, lit=False) if own else Mesh(shape, marker.color)
     elif kind == ARROW_STRIP:
         yield from _arrow_strip(marker)
     elif kind == MESH:
@@ -556,17 +563,14 @@ def _list_colors(colors: Any) -> NDArray[np.float32]:
     return out
 
 
-def _triangles(marker: MarkerRecord) -> Mesh:
+def _triangles(marker: MarkerRecord) -> Shape:
     points = marker.points * np.array(marker.scale, np.float32)
     colors: NDArray[np.float32] | None = None
     if len(marker.colors) == len(points):
         colors = marker.colors
     elif len(marker.colors) == len(points) // 3:
         colors = np.repeat(marker.colors, 3, axis=0)
-    if colors is None:
-        return Mesh(Shape(points), marker.color)
-    # RViz does not light what has colors of its own.
-    return Mesh(Shape(points, colors=colors), lit=False)
+    return Shape(points, colors=colors)
 
 
 def _arrow_strip(marker: MarkerRecord) -> Iterable[Mesh]:
