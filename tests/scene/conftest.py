@@ -65,6 +65,7 @@ class SceneBench:
     Attributes:
         view: The ``SceneView``.
         robot: The robot's node.
+        url: Where it is.
     """
 
     def __init__(self, wait: QtWaiting, folder: Path, url: str = "") -> None:
@@ -75,6 +76,7 @@ class SceneBench:
 
         self.wait, self._folder, self._count = wait, folder, 0
         url = url or f"local://scene-{uuid.uuid4().hex}"
+        self.url = url
         self.robot = rosglass.connect(url, "robot")
         self.session = Session(url)
         self.window = QQuickView()

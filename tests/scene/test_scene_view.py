@@ -381,6 +381,34 @@ def test_frames_fade_one_by_one_and_all_when_transforms_stop(bench: SceneBench) 
     assert bench.drawn() == before
 
 
+def test_what_follows_frames_fades_without_a_node(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    view = bench.load('TFDisplay { frameTimeout: 2 } AxesDisplay { frame: "arm" } GridDisplay {}')
+    frames, axes, grid = view.scene.displays
+    moving = TransformBroadcaster(bench.robot)
+    sent = itertools.count(1)
+
+    def move() -> bool:
+        stamp = Time.from_parts(next(sent), 0)
+        moving.send_transform(Transform((1, 0, 0), (0, 0, 0, 1), stamp, "map", "arm"))
+        return frames.frames == ["arm", "map"] and axes.statusLevel == "ok"
+
+    bench.wait(move)
+    assert (frames.root.alpha, axes.root.alpha) == (1.0, 1.0)
+    bench.session.url = "zenho://robot"
+    bench.wait(lambda: frames.root.alpha < 1.0 and axes.root.alpha < 1.0)
+    assert "may be somewhere else: the robot is not connected" in frames.statusText
+    assert "[arm] may be somewhere else: the robot is not connected" in axes.statusText
+    assert (frames.statusLevel, axes.statusLevel) == ("warn", "warn")
+    assert (grid.root.alpha, grid.statusLevel) == (1.0, "ok")
+    assert frames.frames == ["arm", "map"]
+    bench.session.url = bench.url
+    bench.wait(lambda: move() and frames.root.alpha == axes.root.alpha == 1.0)
+    assert (frames.statusLevel, axes.statusLevel) == ("ok", "ok")
+
+
 def test_a_silent_link_above_the_fixed_frame_is_of_no_account(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import Transform, TransformBroadcaster

@@ -259,7 +259,7 @@ class Display(Configurable, TopicElement):
         self._frame_is_silent = silence > _SILENT_S
         if self._frame_is_silent:
             since = (
-                "the connection is lost"
+                "the robot is not connected"
                 if math.isinf(silence)
                 else (f"no transform has come for {silence:.0f} s")
             )

@@ -352,17 +352,16 @@ class Scene(Element):
     def _on_tick(self) -> None:
         """Look twice a second for displays whose frames are not updated any more."""
         self._ticks += 1
-        buffer = self.transforms
-        if self._ticks % 5 or buffer is None:
+        if self._ticks % 5:
             return
-        self._check_fixed_frame(buffer)
+        self._check_fixed_frame()
         for display in self._alive():
             display.check_frame()
 
-    def _check_fixed_frame(self, buffer: TransformBuffer) -> None:
+    def _check_fixed_frame(self) -> None:
         """Say that the fixed frame is none of the robot's."""
-        frame = self._fixed_frame
-        names = [] if buffer.has_frame(frame) else buffer.frame_names()
+        buffer, frame = self.transforms, self._fixed_frame
+        names = [] if buffer is None or buffer.has_frame(frame) else buffer.frame_names()
         hint = similar(frame, names)
         self._set_problem(f"the fixed frame [{frame}] does not exist{hint}" if names else "")
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot
-from rosglass.scene.display import OUTDATED_ALPHA, Display
+from rosglass.scene.display import Display
 from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, stack_poses
 from rosglass.scene.drawing import Labels
 from rosglass.scene.parts import Parts
@@ -165,6 +165,17 @@ class TFDisplay(Display):
             self._next = now + self.updateInterval
             self._draw()
 
+    def check_frame(self) -> None:
+        """Fade all frames while the robot is not connected."""
+        why = self._disconnected() if self.shown and self.frames else ""
+        self._frame_is_silent = bool(why)
+        if why:
+            # Their own timeouts count again once it is.
+            self.set_status("Connection", "warn", f"frames may be somewhere else: {why}")
+        else:
+            self.delete_status("Connection")
+        self._fade()
+
     @Slot()
     def _on_tick(self) -> None:
         # Frames that are not updated any more fade without a transform.
@@ -200,13 +211,12 @@ class TFDisplay(Display):
             self.delete_status("Frames")
         tree = buffer.tree(chosen)
         poses, unknown = scene.look_up_all(chosen)
-        is_lost = self._session is not None and self._session.state != "connected"
         shown: list[_Frame] = []
         self._report_unknown(unknown)
         for name, pose in zip(chosen, poses, strict=True):
             if name in unknown or name not in tree:
                 continue
-            share = OUTDATED_ALPHA if is_lost else self._share(tree[name])
+            share = 1.0 if self._frame_is_silent else self._share(tree[name])
             shown.append(_Frame(name, pose, share, tree[name].parent))
         self._moves = any(not tree[frame.name].static for frame in shown)
         shown = [frame for frame in shown if frame.share > 0]
