@@ -154,6 +154,34 @@ def test_two_views_show_one_scene_from_two_sides(bench: SceneBench) -> None:
     assert not (shaded(picture, 0) | shaded(picture, 1)).any()
 
 
+def test_a_view_whose_scene_is_gone_shows_nothing_old(bench: SceneBench) -> None:
+    from PySide6.QtCore import QObject
+
+    from rosglass.qt import is_alive, send_deferred_deletes
+
+    view = bench.load(
+        'Loader { id: loader; objectName: "loader"\n'
+        "sourceComponent: Component { SceneView { AxesDisplay { length: 2; radius: 0.3 } } } }\n"
+        'SceneView { objectName: "other"; anchors.fill: parent\n'
+        "scene: loader.item ? loader.item.scene : null }"
+    )
+    other = view.findChild(type(view), "other")
+    assert shaded(bench.picture(), 2).sum() > 100
+    assert other.problem == ""
+    view.findChild(QObject, "loader").setProperty("active", False)
+    send_deferred_deletes()
+    assert other.problem == "The scene was that of another view, which is gone: nothing is shown."
+    assert not shaded(bench.picture(), 2).any()
+    bench.wait(lambda: is_alive(other.scene))
+    assert other.scene.displays == []
+    assert "which is gone" in other.problem
+    # It is a view like others again.
+    other.scene.add("Axes", length=2, radius=0.3)
+    bench.wait(lambda: shaded(bench.picture(), 2).sum() > 100)
+    other.setProperty("scene", view.scene)
+    assert other.problem == ""
+
+
 def test_a_destroyed_view_frees_what_it_made_on_the_device(bench: SceneBench) -> None:
     from PySide6.QtCore import QObject
 

@@ -828,9 +828,7 @@ class SceneRenderer(QQuickRhiItemRenderer):
             once all could.
     """
 
-    def __init__(
-        self, take_frame: Callable[[], Frame | None], on_problem: Callable[[str], None]
-    ) -> None:
+    def __init__(self, take_frame: Callable[[], Frame], on_problem: Callable[[str], None]) -> None:
         super().__init__()
         self._take_frame, self._on_problem = take_frame, on_problem
         self._device: _Device | None = None

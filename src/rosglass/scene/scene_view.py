@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from typing import TYPE_CHECKING, Any, cast
@@ -58,6 +59,7 @@ _STILL_S = 0.2
 _TURN_S, _TURN_MS = 0.4, 16
 #: The longest pause after a picture, in seconds.
 _MAX_PAUSE_S = 0.5
+_SCENE_GONE = "The scene was that of another view, which is gone: nothing is shown."
 #: RViz's background.
 _BACKGROUND = QColor(48, 48, 48)
 
@@ -89,6 +91,8 @@ class SceneView(QQuickRhiItem):
         self._runtime = runtime
         self._background = QColor(_BACKGROUND)
         self._problem = ""
+        #: Whether it showed the scene of another view, which is gone.
+        self._scene_is_gone = False
         #: The renderers that C++ still has: letting go of one too early frees it twice.
         self._renderers: list[SceneRenderer] = []
         #: When the window began its frame, whether a picture of this view is part of it, and before
@@ -179,6 +183,7 @@ class SceneView(QQuickRhiItem):
         self._scene.placed.connect(self._on_placed)
         self._scene.fixedFrameChanged.connect(self.fixedFrameChanged)
         self._scene.problemChanged.connect(self.problemChanged)
+        self._scene.destroyed.connect(self._on_scene_destroyed)
         self._scene.root.add(self.overlay)
 
     def _get_scene(self) -> Scene:
@@ -196,13 +201,30 @@ class SceneView(QQuickRhiItem):
             before.placed.disconnect(self._on_placed)
             before.fixedFrameChanged.disconnect(self.fixedFrameChanged)
             before.problemChanged.disconnect(self.problemChanged)
+            before.destroyed.disconnect(self._on_scene_destroyed)
             if before.parent() is self:
                 before.deleteLater()
-        self._scene = scene
+        self._show_scene(scene)
+
+    def _show_scene(self, scene: Scene, *, is_gone: bool = False) -> None:
+        self._scene, self._scene_is_gone = scene, is_gone
         self._watch_scene()
         self.sceneChanged.emit()
         self.fixedFrameChanged.emit()
+        self.problemChanged.emit()
         self.update()
+
+    @Slot()
+    def _on_scene_destroyed(self) -> None:
+        # Later: this view may be about to be destroyed as well.
+        QtCore.QTimer.singleShot(0, self._replace_scene)
+
+    @Slot()
+    def _replace_scene(self) -> None:
+        """Show an empty scene instead of that of another view that is gone."""
+        if is_alive(self) and not is_alive(self._scene):
+            self._show_scene(Scene(self, self._runtime), is_gone=True)
+            self._scene._log(_SCENE_GONE, logging.WARNING)
 
     if TYPE_CHECKING:
         scene: Scene
@@ -238,9 +260,12 @@ class SceneView(QQuickRhiItem):
     background = Property(QColor, _get_background, _set_background, notify=backgroundChanged)
 
     #: Why nothing, or not everything, is drawn; empty without a problem.
-    problem = Property(
-        str, lambda self: self._problem or self._scene.problem, notify=problemChanged
-    )
+    problem = Property(str, lambda self: self._get_problem(), notify=problemChanged)
+
+    def _get_problem(self) -> str:
+        if self._scene_is_gone or not is_alive(self._scene):
+            return _SCENE_GONE
+        return self._problem or self._scene.problem
 
     def _get_view_name(self) -> str:
         return self._view.TYPE
@@ -629,9 +654,9 @@ class SceneView(QQuickRhiItem):
                 one.close()
         self._renderers[:] = [one for one in self._renderers if Shiboken.isValid(one)]
 
-    def _take_frame(self) -> Frame | None:
-        if not is_alive(self._scene):
-            return None  # it was that of a view that is gone
+    def _take_frame(self) -> Frame:
+        if not is_alive(self._scene):  # it was that of a view that is gone
+            return Frame([], self.camera(), self._background)
         if any(one.draws_in_software for one in self._renderers) != self.scene.draws_in_software:
             QtCore.QTimer.singleShot(0, self, self._report_device)
         self._painted += 1

@@ -817,9 +817,9 @@ class CameraView(SceneView):
         """Return the robot's camera; any, where that is unknown."""
         return self._robot_camera() or super().camera()
 
-    def _take_frame(self) -> Frame | None:
+    def _take_frame(self) -> Frame:
         frame, display = super()._take_frame(), self._display
-        if frame is None or display is None:
+        if display is None:
             return frame
         if not isinstance(frame.camera, PinholeCamera):
             return frame._replace(drawables=[])
