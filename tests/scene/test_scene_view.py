@@ -182,6 +182,26 @@ def test_a_view_whose_scene_is_gone_shows_nothing_old(bench: SceneBench) -> None
     assert other.problem == ""
 
 
+def test_a_picture_that_cannot_be_made_is_a_problem_until_one_can(
+    bench: SceneBench, monkeypatch: Any, caplog: Any
+) -> None:
+    view = bench.load("AxesDisplay {}")
+    bench.picture()
+    with monkeypatch.context() as patch:
+        patch.setattr(view, "_drawables", lambda: 1 / 0)
+        view.update()
+        bench.picture()
+        bench.wait(lambda: view.problem)
+        bench.wait.nothing_happens(0.8)
+        assert view.problem == "the 3D view cannot draw: division by zero"
+        assert "division by zero" in caplog.text
+    # The scene does not remember it, without a node either.
+    bench.session.shutdown()
+    view.update()
+    bench.picture()
+    bench.wait(lambda: not view.problem)
+
+
 def test_a_destroyed_view_frees_what_it_made_on_the_device(bench: SceneBench) -> None:
     from PySide6.QtCore import QObject
 

@@ -255,7 +255,7 @@ class DisplaysModel(QAbstractListModel):
                 (*key, _BACKGROUND), 1, _BACKGROUND, "color",
                 view.property("background").name(), "What is behind everything.",
             )  # fmt: skip
-        problem = scene.problem
+        problem = str(view.property("problem"))
         yield PanelRow(
             ("status",), 0, "Global Status", "status", problem or "Ok", problem,
             "error" if problem else "ok",

@@ -836,6 +836,8 @@ class SceneRenderer(QQuickRhiItemRenderer):
         self._on_device: dict[Drawable, _OnDevice] = {}
         self._origin = np.zeros(3)
         self._problem = ""
+        #: Why there is no newer frame than the last one.
+        self._failure = ""
         #: How many pictures were drawn.
         self.count = 0
 
@@ -862,11 +864,13 @@ class SceneRenderer(QQuickRhiItemRenderer):
 
     def synchronize(self, item: QQuickRhiItem) -> None:  # noqa: ARG002 - Qt's signature
         """Take the next frame; the GUI thread waits."""
+        self._failure = ""
         try:
             self._frame = self._take_frame()
         except Exception as error:
             _log.exception("the 3D view")
-            self._report(f"the 3D view cannot draw: {error}")
+            self._failure = f"the 3D view cannot draw: {error}"
+            self._report(self._failure)
 
     def render(self, commands: QRhiCommandBuffer) -> None:
         """Draw the frame."""
@@ -901,7 +905,7 @@ class SceneRenderer(QQuickRhiItemRenderer):
         finally:
             commands.endPass()
         self.count += 1
-        self._report(problem)
+        self._report(self._failure or problem)
 
     def _thinning(self, device: _Device, frame: Frame) -> int:
         """Return k where only every k-th point is drawn, as the processor draws a moving view."""

@@ -715,8 +715,8 @@ class SceneView(QQuickRhiItem):
         if is_alive(self) and problem != self._problem:
             self._problem = problem
             self.problemChanged.emit()
-            if problem:
-                self.scene._set_problem(problem)
+            if is_alive(self._scene):
+                self._scene._log(problem, logging.WARNING)
 
     @Slot(QQuickWindow)
     def _on_window(self, window: QQuickWindow | None) -> None:
