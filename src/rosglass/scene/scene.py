@@ -37,8 +37,9 @@ if TYPE_CHECKING:
 __all__ = ["Scene"]
 
 _log = logging.getLogger("rosglass.scene")
-#: Milliseconds between two looks at transforms that have changed.
-_TRANSFORMS_MS = 33
+#: Seconds between two looks at transforms that have changed: below 1/30, so that each of 30
+#: messages a second is seen.
+_TRANSFORMS_S = 0.03
 _ORIGIN, _UPRIGHT = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 #: Seconds between two resets as the time jumps back again and again.
 _RESETS_S = 1.0
@@ -83,7 +84,7 @@ class Scene(Element):
         self._ticks = 0
         super().__init__(parent, runtime)
         self._timer = single_shot(self, self._follow)
-        self._reset_at = -math.inf
+        self._followed_at = self._reset_at = -math.inf
         self._resets = single_shot(self, self._begin_anew)
         self.root.on_change = self.changed.emit
         root = self.root
@@ -443,10 +444,12 @@ class Scene(Element):
 
     def _on_transforms(self) -> None:
         if is_alive(self) and not self._timer.isActive():
-            self._timer.start(_TRANSFORMS_MS)
+            wait = self._followed_at + _TRANSFORMS_S - time.monotonic()
+            self._timer.start(int(max(wait, 0.0) * 1000))
 
     @Slot()
     def _follow(self) -> None:
+        self._followed_at = time.monotonic()
         self._each(lambda display: display.on_transforms())
         self.placed.emit()
 

@@ -664,6 +664,15 @@ class TransformBuffer(Handle):
             moving = [frame for frame in (*up, *down) if not store.caches[frame].static]
             return max((now - store.arrivals.get(one, -math.inf) for one in moving), default=0.0)
 
+    def rest(self) -> tuple[int, int] | None:
+        """Return a value that stays the same while the newest pose of no frame changes.
+
+        None while poses may change without further transforms that differ, as the newest common
+        time of frames has not come to the last move yet.
+        """
+        with self._lock:
+            return self._store.rest()
+
     # -- changes ---------------------------------------------------------------------------------
 
     def on_change(

@@ -205,13 +205,15 @@ class StaticCache:
         entry: The transform.
     """
 
-    __slots__ = ("entry", "stamp")
+    __slots__ = ("entry", "moves", "stamp")
     static = True
     #: Number and times of the transforms, as tf2 counts static ones.
     count, latest, oldest = 1, 0, 0
 
     def __init__(self, stamp: int, entry: Entry) -> None:
         self.stamp, self.entry = stamp, entry
+        #: Counts changes.
+        self.moves = 0
 
     @property
     def parent(self) -> str:
@@ -220,6 +222,7 @@ class StaticCache:
 
     def insert(self, stamp: int, entry: Entry) -> str:
         """Replace the transform."""
+        self.moves += entry != self.entry
         self.stamp, self.entry = stamp, entry
         return ""
 
@@ -239,7 +242,7 @@ class DynamicCache:
         keep: Time before the newest transform to keep, in nanoseconds.
     """
 
-    __slots__ = ("_entries", "_first", "_keep", "_stamps")
+    __slots__ = ("_entries", "_first", "_keep", "_stamps", "moved", "moves")
     static = False
 
     def __init__(self, keep: int) -> None:
@@ -248,6 +251,8 @@ class DynamicCache:
         self._stamps: list[int] = []
         self._entries: list[Entry] = []
         self._first = 0
+        #: Counts transforms that differ from the one before, and the stamp of the last of them.
+        self.moves = self.moved = 0
 
     @property
     def count(self) -> int:
@@ -278,6 +283,8 @@ class DynamicCache:
         """Insert a transform; return why it is refused, ``old`` or ``repeated``, or empty."""
         stamps = self._stamps
         if not stamps or stamp > stamps[-1]:
+            if not stamps or entry != self._entries[-1]:
+                self.moves, self.moved = self.moves + 1, stamp
             stamps.append(stamp)
             self._entries.append(entry)
             limit = stamp - self._keep
@@ -291,6 +298,7 @@ class DynamicCache:
             return "repeated"
         stamps.insert(place, stamp)
         self._entries.insert(place, entry)
+        self.moves, self.moved = self.moves + 1, stamps[-1]
         return ""
 
     def at(self, time: int) -> Entry | None:
@@ -348,6 +356,8 @@ class DynamicCache:
         self._first = first
 
 
+#: Frames up to which it is found out whether they move.
+_MAX_RESTING = 2000
 #: How far the squared length of a quaternion may be from 1, as in tf2.
 _TOLERANCE = 10e-3
 #: Seconds of old stamps only after which the time of a frame counts as jumped back.
@@ -482,6 +492,20 @@ class FrameStore:
         return FrameInfo(
             name, cache.parent, authority, cache.static, latest, oldest, cache.count, silence
         )
+
+    def rest(self) -> tuple[int, int] | None:
+        """Return a value that is the same while no frame moves; None while one may still move.
+
+        The last move of a frame is seen by all lookups once each frame is known at a later time.
+        None as well for more frames than a robot has.
+        """
+        if len(self.caches) > _MAX_RESTING:
+            return None
+        moving = [cache for cache in self.caches.values() if isinstance(cache, DynamicCache)]
+        known = min((cache.latest for cache in moving), default=0)
+        if any(cache.moved > known for cache in moving):
+            return None
+        return self.version, sum(cache.moves for cache in self.caches.values())
 
     def _place(self, child: str, stamp: int, entry: Entry, static: bool, authority: object) -> str:
         """Insert a transform of a new frame or parent; return why it is refused."""

@@ -465,3 +465,43 @@ def test_silence_is_that_of_the_link_that_moved_longest_ago(
     assert buffer.silence("odom", "lamp") == 5.0
     assert buffer.silence("base", "lamp") == 0.0
     assert buffer.silence("map", "nowhere") == 0.0
+
+
+def test_at_rest_no_pose_changes() -> None:
+    buffer = TransformBuffer()
+    put(buffer, "map", "odom", 1.0, 0.0)
+    put(buffer, "base", "mast", static=True)
+    put(buffer, "odom", "base", 1.0, 5.0)
+    rest = buffer.rest()
+    assert rest is not None
+    # The same again, or another frame of the same place: nothing moves.
+    put(buffer, "odom", "base", 2.0, 5.0)
+    put(buffer, "map", "odom", 2.0, 0.0)
+    assert buffer.rest() == rest
+    # The common time of map and mast is before the move, and comes to it later.
+    put(buffer, "odom", "base", 3.0, 7.0)
+    assert buffer.rest() is None
+    assert buffer.lookup_transform("map", "mast").translation == pytest.approx((6, 0, 0))
+    put(buffer, "map", "odom", 2.5, 0.0)
+    assert buffer.rest() is None
+    assert buffer.lookup_transform("map", "mast").translation == pytest.approx((7, 0, 0))
+    put(buffer, "map", "odom", 3.5, 0.0)
+    moved = buffer.rest()
+    assert moved not in (None, rest)
+    assert buffer.lookup_transform("map", "mast").translation == pytest.approx((8, 0, 0))
+    put(buffer, "odom", "base", 4.0, 7.0)
+    assert buffer.rest() == moved
+    # Late, between two others; a static one; a new frame.
+    put(buffer, "odom", "base", 3.5, 9.0)
+    assert buffer.rest() != moved
+    put(buffer, "map", "odom", 5.0, 0.0)
+    put(buffer, "odom", "base", 5.0, 7.0)
+    states = {buffer.rest()}
+    put(buffer, "base", "mast", x=2.0, static=True)
+    states.add(buffer.rest())
+    put(buffer, "base", "arm", 5.0)
+    states.add(buffer.rest())
+    assert len(states - {None, moved}) == 3
+    for number in range(2000):
+        put(buffer, "map", f"many{number}", static=True)
+    assert buffer.rest() is None, "a peer may send any number of frames"

@@ -381,8 +381,9 @@ class RobotModelDisplay(Display):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         self._bodies: dict[str, _Link] = {}
-        #: Where the links were last, (n, 4, 4).
+        #: Where the links were last, (n, 4, 4), and the state of the transforms then.
         self._poses = np.zeros((0, 4, 4))
+        self._rest: object = None
         self._body, self._trails = Group(), Group()
         self._root_link = ""
         self._text: str | None = None
@@ -490,7 +491,7 @@ class RobotModelDisplay(Display):
 
     def _clear(self) -> None:
         self._bodies.clear()
-        self._poses = np.zeros((0, 4, 4))
+        self._poses, self._rest = np.zeros((0, 4, 4)), None
         self._body.clear()
         self._trails.clear()
         self._loaded_lines = {}
@@ -534,10 +535,16 @@ class RobotModelDisplay(Display):
 
     def on_transforms(self) -> None:
         """Move the links."""
+        if self._rest is not None and self._rest == self._find_rest():
+            return
         now = time.monotonic()
         if now >= self._next:
             self._next = now + self.updateInterval
             self._follow()
+
+    def _find_rest(self) -> object:
+        buffer = None if self.scene is None else self.scene.transforms
+        return None if buffer is None else buffer.rest()
 
     def on_fixed_frame(self) -> None:
         """Place the links in the new fixed frame."""
@@ -552,6 +559,7 @@ class RobotModelDisplay(Display):
         scene = self.scene
         if scene is None or not self._bodies or not self.shown:
             return
+        self._rest = self._find_rest()
         poses, unknown = scene.look_up_all([self._frame_of(name) for name in self._bodies])
         before, self._poses = self._poses, poses
         # Links are moved one by one, which takes longer than finding out which have moved.

@@ -99,6 +99,8 @@ class TFDisplay(Display):
         self._drawn: Any = None
         #: Lines of the status about frames.
         self._lines: set[str] = set()
+        #: The state of the transforms then.
+        self._rest: object = None
         super().__init__(parent, runtime)
         self.parts: Parts = Parts(
             "Frames",
@@ -160,6 +162,9 @@ class TFDisplay(Display):
 
     def on_transforms(self) -> None:
         """Follow the frames."""
+        buffer = None if self.scene is None else self.scene.transforms
+        if buffer is not None and self._rest is not None and self._rest == buffer.rest():
+            return  # what fades is looked at without a transform
         now = time.monotonic()
         if now >= self._next:
             self._next = now + self.updateInterval
@@ -201,6 +206,7 @@ class TFDisplay(Display):
         buffer = scene.transforms if scene is not None else None
         if scene is None or buffer is None or not self.shown:
             return
+        self._rest = buffer.rest()
         names = buffer.frame_names()
         chosen = [name for name in sorted(names[:_MAX_NAMES]) if self._is_chosen(name)]
         if len(chosen) > _MAX_FRAMES or len(names) > _MAX_NAMES:
