@@ -445,7 +445,7 @@ def test_meshes_have_their_textures_and_are_made_in_another_thread(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from rosglass.scene.displays import marker as module
+    from rosglass.scene.displays import robot_model as module
 
     threads = []
 

@@ -365,3 +365,58 @@ def test_the_status_is_the_same_after_it_was_disabled(bench: SceneBench) -> None
     bench.wait(lambda: robot.statusText == before)
     bench.wait.nothing_happens(0.3)
     assert robot.statusText == before
+
+
+def arms(files: list[str]) -> str:
+    """Return a robot with a link for each mesh file."""
+    links = "".join(
+        f'<link name="arm{at}"><visual><geometry><mesh filename="{file}"/></geometry></visual>'
+        f"</link>"
+        f'<joint name="j{at}" type="fixed"><parent link="base"/><child link="arm{at}"/></joint>'
+        for at, file in enumerate(files)
+    )
+    return f'<robot name="r"><link name="base"/>{links}</robot>'
+
+
+def triangles(folder: Path, name: str, count: int) -> str:
+    corners = [0.0] * 3 + [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+    facet = struct.pack("<12fH", *corners, 0)
+    (folder / name).write_bytes(b"\0" * 80 + struct.pack("<I", count) + facet * count)
+    return f"file://{folder / name}"
+
+
+def test_links_share_the_mesh_that_they_name(
+    bench: SceneBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene.displays import robot_model
+
+    read: list[str] = []
+    load = robot_model.load_mesh_cached
+
+    def count(path: Any, name: str, *rest: Any) -> Any:
+        read.append(name)
+        return load(path, name, *rest)
+
+    monkeypatch.setattr(robot_model, "load_mesh_cached", count)
+    view = bench.load("RobotModelDisplay {}")
+    (robot,) = view.scene.displays
+    send_transforms(bench, "base", *(f"arm{at}" for at in range(30)))
+    publish(bench, arms([triangles(tmp_path, "arm.stl", 2)] * 30))
+    bench.wait(lambda: len(list(robot.root.drawables())) == 30)
+    assert len(shapes(robot)) == 1
+    assert len(read) == 1
+
+
+def test_all_meshes_of_a_robot_are_bounded(
+    bench: SceneBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rosglass.scene.displays.robot_model.MAX_TRIANGLES", 5)
+    view = bench.load("RobotModelDisplay {}")
+    (robot,) = view.scene.displays
+    small, large = triangles(tmp_path, "small.stl", 2), triangles(tmp_path, "large.stl", 4)
+    publish(bench, arms([small, large, small]))
+    bench.wait(lambda: "Mesh large.stl: " in robot.statusText, lambda: robot.statusText)
+    text = "large.stl: with its 4 triangles, all meshes have more than 5; reduce them"
+    assert text in robot.statusText
+    send_transforms(bench, "base", "arm0", "arm1", "arm2")
+    bench.wait(lambda: len(list(robot.root.drawables())) == 2)

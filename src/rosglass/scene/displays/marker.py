@@ -20,7 +20,7 @@ from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot, is_alive
 from rosglass.scene.display import Status, TopicDisplay
-from rosglass.scene.displays.robot_model import STL_ENDINGS, material_of, read_texture
+from rosglass.scene.displays.robot_model import STL_ENDINGS, MeshFiles, material_of
 from rosglass.scene.displays.shapes import poses_matrices
 from rosglass.scene.drawing import (
     BOX,
@@ -37,7 +37,7 @@ from rosglass.scene.drawing import (
     Shape,
     check_numbers,
 )
-from rosglass.scene.meshes import ending_of, load_mesh_cached
+from rosglass.scene.meshes import ending_of
 from rosglass.scene.parts import Parts
 
 if TYPE_CHECKING:
@@ -603,12 +603,12 @@ def _read_mesh(uri: str, resources: ResourceRetriever) -> _MeshFile:
     made: list[tuple[Mesh, tuple[float, ...] | None]] = []
     problem = ""
     is_stl = ending_of(uri) in STL_ENDINGS
-    for part in load_mesh_cached(resources.find(uri), uri, resources.read):
-        shape = Shape(part.positions, part.normals, part.indices, uv=part.uv, one_sided=True)
+    files = MeshFiles(resources)
+    for part, shape in files.mesh(uri):
         mesh = Mesh(shape)
         if part.texture is not None:
             try:
-                mesh.set_texture(read_texture(part.texture, uri, resources))
+                mesh.set_texture(files.texture(part.texture, uri))
             except (Error, OSError) as error:
                 problem = str(error)
         made.append((mesh, None if is_stl else material_of(part)))

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
 from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.errors import Error, UnsupportedError
+from rosglass.images.encodings import MAX_PIXELS
 from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
@@ -28,7 +29,7 @@ from rosglass.scene.rviz_formats import (
     write_description,
 )
 from rosglass.scene.settings import Setting
-from rosglass.scene.triangles import moved
+from rosglass.scene.triangles import MAX_TRIANGLES, moved
 from rosglass.scene.urdf import Box, Capsule, Cylinder, MeshFile, Robot, Sphere, parse_urdf
 
 if TYPE_CHECKING:
@@ -44,8 +45,9 @@ if TYPE_CHECKING:
     from rosglass.scene.triangles import MeshPart
     from rosglass.scene.urdf import Visual
 
-__all__ = ["DescriptionSource", "RobotModelDisplay", "link_drawables", "read_texture"]
+__all__ = ["DescriptionSource", "MeshFiles", "RobotModelDisplay", "link_drawables", "read_texture"]
 
+_T = TypeVar("_T")
 #: Milliseconds until a parameter that is not there is looked up again.
 _RETRY_MS = 2000
 #: RViz's colour of what has no material.
@@ -161,11 +163,82 @@ def read_texture(source: str | bytes, name: str, resources: ResourceRetriever) -
     return whole.reshape(image.height(), image.width(), 4)
 
 
-def link_drawables(
-    visual: Visual,
-    problems: dict[str, str],
-    resources: ResourceRetriever,
-) -> list[Mesh]:
+class MeshFiles:
+    """Meshes and textures, each read once however often it is used; not for the GUI thread.
+
+    Args:
+        resources: Reads the files.
+    """
+
+    def __init__(self, resources: ResourceRetriever) -> None:
+        self._resources = resources
+        #: What was read, or why it was not.
+        self._meshes: dict[Any, list[tuple[MeshPart, Shape]] | Exception] = {}
+        self._textures: dict[str | bytes, NDArray[np.uint8] | Exception] = {}
+        self._triangles = self._pixels = 0
+
+    def mesh(
+        self, uri: str, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    ) -> list[tuple[MeshPart, Shape]]:
+        """Return the parts of a mesh, each with its shape.
+
+        Raises:
+            Error: It cannot be read, or has more triangles than are left of 10 million for all.
+        """
+        return _once(self._meshes, (uri, scale), lambda: self._read_mesh(uri, scale))
+
+    def _read_mesh(
+        self, uri: str, scale: tuple[float, float, float]
+    ) -> list[tuple[MeshPart, Shape]]:
+        parts = load_mesh_cached(self._resources.find(uri), uri, self._resources.read)
+        triangles = sum(part.triangles for part in parts)
+        if self._triangles + triangles > MAX_TRIANGLES:
+            raise Error(
+                f"{uri}: with its {triangles} triangles, all meshes have more than "
+                f"{MAX_TRIANGLES}; reduce them"
+            )
+        self._triangles += triangles
+        return [(part, _shape_of(part, scale)) for part in parts]
+
+    def texture(self, source: str | bytes, name: str) -> NDArray[np.uint8]:
+        """Return the pixels of a picture, (h, w, 4); see :func:`read_texture`.
+
+        Raises:
+            Error: It cannot be read, or has more pixels than are left of 2^26 for all.
+        """
+        return _once(self._textures, source, lambda: self._read_texture(source, name))
+
+    def _read_texture(self, source: str | bytes, name: str) -> NDArray[np.uint8]:
+        found = read_texture(source, name, self._resources)
+        pixels = found.shape[0] * found.shape[1]
+        if self._pixels + pixels > MAX_PIXELS:
+            raise Error(
+                f"{name}: with its {pixels} pixels, all textures have more than {MAX_PIXELS}; "
+                "reduce them"
+            )
+        self._pixels += pixels
+        return found
+
+
+def _once(known: dict[Any, _T | Exception], key: Any, read: Callable[[], _T]) -> _T:
+    """Return what was read under a key, or raise why it could not be, as the first time."""
+    if key not in known:
+        try:
+            known[key] = read()
+        except (Error, OSError) as error:
+            known[key] = error
+    found = known[key]
+    if isinstance(found, Exception):
+        raise found
+    return found
+
+
+def _shape_of(part: MeshPart, scale: tuple[float, float, float]) -> Shape:
+    scaled = part if scale == (1.0, 1.0, 1.0) else moved(part, _matrix(*scale))
+    return Shape(scaled.positions, scaled.normals, scaled.indices, uv=part.uv, one_sided=True)
+
+
+def link_drawables(visual: Visual, problems: dict[str, str], files: MeshFiles) -> list[Mesh]:
     """Return what a visual or collision of a link draws, in the link's frame.
 
     Reads mesh files: not for the GUI thread.
@@ -173,7 +246,7 @@ def link_drawables(
     Args:
         visual: The visual.
         problems: What could not be loaded is added, by the name of the file.
-        resources: Reads meshes and textures.
+        files: Reads meshes and textures.
     """
     geometry = visual.geometry
     material = visual.material
@@ -197,10 +270,10 @@ def link_drawables(
         mesh.set_instances((visual.origin @ local)[np.newaxis])
         made.append(mesh)
     if isinstance(geometry, MeshFile):
-        made += _mesh_drawables(visual, geometry, own, problems, resources)
+        made += _mesh_drawables(visual, geometry, own, problems, files)
     elif material is not None and material.texture:
         try:
-            pixels = read_texture(material.texture, material.texture, resources)
+            pixels = files.texture(material.texture, material.texture)
             for mesh in made:
                 mesh.set_texture(pixels)
                 # RViz uses one or the other.
@@ -215,25 +288,22 @@ def _mesh_drawables(
     geometry: MeshFile,
     own: tuple[float, float, float, float],
     problems: dict[str, str],
-    resources: ResourceRetriever,
+    files: MeshFiles,
 ) -> list[Mesh]:
     try:
-        found = resources.find(geometry.uri)
-        parts = load_mesh_cached(found, geometry.uri, resources.read)
+        parts = files.mesh(geometry.uri, geometry.scale)
     except (Error, OSError) as error:
         problems[geometry.uri] = str(error)
         return []
     is_stl = ending_of(geometry.uri) in STL_ENDINGS
     made = []
-    for part in parts:
-        scaled = moved(part, _matrix(*geometry.scale))
-        shape = Shape(scaled.positions, scaled.normals, scaled.indices, uv=part.uv, one_sided=True)
+    for part, shape in parts:
         # In RViz, only STL files have no materials of their own.
         mesh = Mesh(shape, own if is_stl else material_of(part))
         mesh.set_instances(visual.origin[np.newaxis])
         if part.texture is not None:
             try:
-                mesh.set_texture(read_texture(part.texture, geometry.uri, resources))
+                mesh.set_texture(files.texture(part.texture, geometry.uri))
             except (Error, OSError) as error:
                 problems[geometry.uri] = str(error)
         made.append(mesh)
@@ -252,12 +322,11 @@ def _load(text: str, source: str, resources: ResourceRetriever) -> _Loaded:
         raise Error(f"{source}: the robot description is empty")
     robot = parse_urdf(text, source)
     problems: dict[str, str] = {}
+    files = MeshFiles(resources)
     visuals, collisions = {}, {}
     for name, link in robot.links.items():
-        visuals[name] = [m for v in link.visuals for m in link_drawables(v, problems, resources)]
-        collisions[name] = [
-            m for v in link.collisions for m in link_drawables(v, problems, resources)
-        ]
+        visuals[name] = [m for v in link.visuals for m in link_drawables(v, problems, files)]
+        collisions[name] = [m for v in link.collisions for m in link_drawables(v, problems, files)]
     return _Loaded(robot, visuals, collisions, problems)
 
 
