@@ -423,3 +423,22 @@ def test_frames_without_a_transform_are_counted(robot: Robot) -> None:
     robot.view.scene.reset()
     robot.bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
     robot.check()
+
+
+def test_all_interactive_markers_are_bounded(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot.show(next(case for case in CASES if case.display == "InteractiveMarkers"))
+    monkeypatch.setattr("rosglass.scene.displays.interactive_marker.MAX_PARTS", 10)
+    display, update = robot.display, {"type": 1}
+
+    def made(name: str, count: int) -> dict[str, Any]:
+        controls = [control(7, name=str(at), markers=[marker(1)]) for at in range(count)]
+        return {**INTERACTIVE, "name": name, "controls": controls}
+
+    # Each of their controls counts twice, with what it looks like; "handle" has 5 parts.
+    robot.send({**update, "markers": [made("small", 2), made("large", 2), made("tiny", 0)]})
+    text = "Marker large: it is not shown: all have more than 10 controls and shapes"
+    assert text in display.statusText
+    assert display.markers == ["handle", "small"]
+    robot.send({**update, "markers": [made("handle", 1), made("large", 2)]})
+    assert display.markers == ["handle", "large", "small"]
+    assert "Marker large" not in display.statusText

@@ -27,7 +27,7 @@ from rosglass.scene.displays.interactive_marker_controls import (
     InteractiveMarker,
 )
 from rosglass.scene.displays.interactive_marker_messages import (
-    MAX_MARKERS,
+    MAX_PARTS,
     MarkerUpdate,
     read_update,
 )
@@ -489,15 +489,19 @@ class InteractiveMarkersDisplay(TopicDisplay):
 
     def _apply(self, server: _Server, update: MarkerUpdate) -> None:
         server.number = update.number
+        parts = sum(marker.record.parts for marker in self._all())
         for record in update.markers:
             marker = server.markers.get(record.name)
-            if not record.controls:
+            parts -= 0 if marker is None else marker.record.parts
+            are_too_many = parts + record.parts > MAX_PARTS
+            if are_too_many or not record.controls:
                 self._erase(server, record.name)
-                self.set_line(record.name, record.problem)
-            elif marker is not None:
+                text = f"it is not shown: all have more than {MAX_PARTS} controls and shapes"
+                self.set_line(record.name, text if are_too_many else record.problem)
+                continue
+            parts += record.parts
+            if marker is not None:
                 marker.change(record)
-            elif len(self._all()) >= MAX_MARKERS:
-                self.set_status("Markers", "error", f"only {MAX_MARKERS} markers are shown")
             else:
                 marker = server.markers[record.name] = InteractiveMarker(self, record)
                 server.root.add(marker.root)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "HELP",
-    "MAX_MARKERS",
+    "MAX_PARTS",
     "ControlRecord",
     "InteractiveMarkerRecord",
     "MarkerUpdate",
@@ -61,8 +61,8 @@ HELP = {
 _MAX_CONTROLS, _MAX_SHAPES = 1000, 10_000
 #: Entries of a menu, how deep they are in each other, and letters of a title.
 _MAX_ENTRIES, _MAX_DEPTH, _MAX_TITLE = 500, 10, 200
-#: Interactive markers that are shown.
-MAX_MARKERS = 2000
+#: Interactive markers of a message; controls of all that are shown, and what these look like.
+_MAX_MARKERS, MAX_PARTS = 2000, 6000
 # visualization_msgs/InteractiveMarkerUpdate: types.
 _KEEP_ALIVE = 0
 #: RViz's opacity of the arrows and rings that it makes.
@@ -122,6 +122,11 @@ class InteractiveMarkerRecord(NamedTuple):
     menu: tuple[dict[str, Any], ...] = ()
     programs: dict[int, str] = {}  # noqa: RUF012 - never written
     problem: str = ""
+
+    @property
+    def parts(self) -> int:
+        """How many controls and shapes it has."""
+        return sum(1 + len(control.markers) for control in self.controls)
 
 
 # -- messages --------------------------------------------------------------------------------------
@@ -337,9 +342,9 @@ class MarkerUpdate(NamedTuple):
 
 def read_update(message: Any, *, named: bool) -> MarkerUpdate:
     """Return the record of an update, of all markers, or of the service's response."""
-    if len(message.markers) > MAX_MARKERS:
+    if len(message.markers) > _MAX_MARKERS:
         count = len(message.markers)
-        raise Error(f"markers: {count} are more than the {MAX_MARKERS} that are shown")
+        raise Error(f"markers: {count} are more than the {_MAX_MARKERS} that are shown")
     server = message.server_id if named else ""
     markers = tuple(read_interactive_marker(one) for one in message.markers)
     if "type" not in message:
@@ -347,7 +352,7 @@ def read_update(message: Any, *, named: bool) -> MarkerUpdate:
         return MarkerUpdate(server, number, True, False, markers)
     if message.type == _KEEP_ALIVE:
         return MarkerUpdate(server, message.seq_num, False, True)
-    poses = tuple(_read_pose(one) for one in message.poses[:MAX_MARKERS])
+    poses = tuple(_read_pose(one) for one in message.poses[:_MAX_MARKERS])
     erased = tuple(message.erases)
     return MarkerUpdate(server, message.seq_num, False, False, markers, poses, erased)
 
