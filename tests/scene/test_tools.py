@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -438,10 +439,23 @@ def test_the_status_has_no_tags_of_the_robot(bench: SceneBench) -> None:
     assert view.statusText == '&lt;img src="http://robot/x"&gt;'
 
 
-def test_a_goal_is_sent_to_an_action(bench: SceneBench, hand: Hand, tmp_path: Path) -> None:
+@pytest.fixture
+def nav2(bench: SceneBench, tmp_path: Path) -> Iterator[Any]:
+    """A node that knows Nav2's action."""
     import rosglass
     from rosglass.interfaces import Library
 
+    file = tmp_path / "nav2_msgs" / "action" / "NavigateToPose.action"
+    file.parent.mkdir(parents=True)
+    file.write_text("geometry_msgs/PoseStamped pose\nstring behavior_tree\n---\n---\n")
+    library = Library()
+    library.add_path(tmp_path)
+    node = rosglass.connect(bench.session.url, "nav2", library=library)
+    yield node
+    node.close()
+
+
+def test_a_goal_is_sent_to_an_action(bench: SceneBench, hand: Hand, nav2: Any) -> None:
     view = bench.load('Nav2GoalTool { name: "Go" }\ntool: "Go"')
     poses: list[Any] = []
 
@@ -449,19 +463,57 @@ def test_a_goal_is_sent_to_an_action(bench: SceneBench, hand: Hand, tmp_path: Pa
         poses.append(goal.goal.pose)
         return {}
 
-    file = tmp_path / "nav2_msgs" / "action" / "NavigateToPose.action"
-    file.parent.mkdir(parents=True)
-    file.write_text("geometry_msgs/PoseStamped pose\nstring behavior_tree\n---\n---\n")
-    library = Library()
-    library.add_path(tmp_path)
-    nav2 = rosglass.connect(bench.session.url, "nav2", library=library)
     nav2.create_action_server("/navigate_to_pose", "nav2_msgs/action/NavigateToPose", execute)
     hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
     bench.wait(lambda: "Goal: succeeded" in view.statusText, lambda: view.statusText)
     assert poses[0].header.frame_id == "map"
     assert poses[0].pose.orientation.z == pytest.approx(math.sqrt(0.5), abs=0.05)
     assert view.tool == "Interact"
-    nav2.close()
+
+
+class Driver:
+    """A server of Nav2's action that drives until its goal ends; another goal preempts it.
+
+    Attributes:
+        goals: Those that it has received.
+    """
+
+    def __init__(self, node: Any) -> None:
+        self.goals: list[Any] = []
+        self.server = node.create_action_server(
+            "/navigate_to_pose", "nav2_msgs/action/NavigateToPose", self._execute
+        )
+
+    def _execute(self, goal: Any) -> dict[str, Any]:
+        self.goals.append(goal)
+        number = len(self.goals)
+        while not goal.is_cancel_requested:
+            if len(self.goals) > number:
+                raise RuntimeError("preempted")
+            time.sleep(0.01)
+        return {}
+
+
+def test_the_goal_before_does_not_speak_for_the_next(
+    bench: SceneBench, hand: Hand, nav2: Any
+) -> None:
+    view = bench.load('Nav2GoalTool { name: "Go" }\ntool: "Go"')
+    goal, driver, statuses = view.tools.current, Driver(nav2), []
+    goal.goalStatusChanged.connect(statuses.append)
+    hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
+    bench.wait(lambda: "executing" in statuses)
+    first = goal.goal
+    del statuses[:]
+    view.tools.select("Go")
+    hand.drag(hand.at((1, 0, 0)), hand.at((1, 1, 0)))
+    bench.wait(lambda: first.done.done() and "executing" in statuses)
+    bench.wait.settled(bench.session)
+    assert len(driver.goals) == 2
+    assert first.status.value == "aborted"
+    assert "aborted" not in statuses
+    assert "executing" in view.statusText
+    goal.goal.cancel()
+    bench.wait(lambda: "canceled" in statuses)
 
 
 def test_a_goal_to_an_action_without_server_says_so(

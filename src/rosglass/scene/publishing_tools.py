@@ -449,22 +449,26 @@ class SetGoalTool(PoseTool):
         if not client.ready:
             self._complain(f"{text}: not sent: {client.problem}")
             return
+        on_status = weak_callback(self._on_goal_status)
         try:
-            self._goal = client.send_goal(
+            # Reports come through the event loop, after this goal has become the current one.
+            goal: ClientGoal = client.send_goal(
                 {"pose": fields},
-                on_status_change=weak_callback(self._on_goal_status),
+                on_status_change=lambda status: on_status(goal, status),
                 on_done=weak_callback(self._on_goal_done),
                 executor=self._session.executor,
                 timeout=_GOAL_TIMEOUT_S,
             )
+            self._goal = goal
         except Error as error:
             self._complain(f"{text}: not sent: {error}")
         else:
             self._set_problem("")
             self.announce(f"{text}: sent to {client.name}")
 
-    def _on_goal_status(self, status: GoalStatus) -> None:
-        if is_alive(self):
+    def _on_goal_status(self, goal: ClientGoal, status: GoalStatus) -> None:
+        # A new goal preempts the one before, whose end is not its own.
+        if is_alive(self) and goal is self._goal:
             self.announce(f"Goal: {status.value}")
             self.goalStatusChanged.emit(status.value)
 
