@@ -142,3 +142,19 @@ def bench(make_bench: Callable[[str], SceneBench]) -> Iterator[SceneBench]:
     made = make_bench("")
     yield made
     made.close()
+
+
+@pytest.fixture
+def nav2(bench: SceneBench, tmp_path: Path) -> Iterator[Any]:
+    """A node that knows Nav2's action."""
+    import rosglass
+    from rosglass.interfaces import Library
+
+    file = tmp_path / "nav2_msgs" / "action" / "NavigateToPose.action"
+    file.parent.mkdir(parents=True)
+    file.write_text("geometry_msgs/PoseStamped pose\nstring behavior_tree\n---\n---\n")
+    library = Library()
+    library.add_path(tmp_path)
+    node = rosglass.connect(bench.session.url, "nav2", library=library)
+    yield node
+    node.close()

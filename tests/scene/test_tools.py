@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from nav2_server import Driver
 from scene_mouse import Hand, has_color
 
 if TYPE_CHECKING:
@@ -439,22 +439,6 @@ def test_the_status_has_no_tags_of_the_robot(bench: SceneBench) -> None:
     assert view.statusText == '&lt;img src="http://robot/x"&gt;'
 
 
-@pytest.fixture
-def nav2(bench: SceneBench, tmp_path: Path) -> Iterator[Any]:
-    """A node that knows Nav2's action."""
-    import rosglass
-    from rosglass.interfaces import Library
-
-    file = tmp_path / "nav2_msgs" / "action" / "NavigateToPose.action"
-    file.parent.mkdir(parents=True)
-    file.write_text("geometry_msgs/PoseStamped pose\nstring behavior_tree\n---\n---\n")
-    library = Library()
-    library.add_path(tmp_path)
-    node = rosglass.connect(bench.session.url, "nav2", library=library)
-    yield node
-    node.close()
-
-
 def test_a_goal_is_sent_to_an_action(bench: SceneBench, hand: Hand, nav2: Any) -> None:
     view = bench.load('Nav2GoalTool { name: "Go" }\ntool: "Go"')
     poses: list[Any] = []
@@ -469,29 +453,6 @@ def test_a_goal_is_sent_to_an_action(bench: SceneBench, hand: Hand, nav2: Any) -
     assert poses[0].header.frame_id == "map"
     assert poses[0].pose.orientation.z == pytest.approx(math.sqrt(0.5), abs=0.05)
     assert view.tool == "Interact"
-
-
-class Driver:
-    """A server of Nav2's action that drives until its goal ends; another goal preempts it.
-
-    Attributes:
-        goals: Those that it has received.
-    """
-
-    def __init__(self, node: Any) -> None:
-        self.goals: list[Any] = []
-        self.server = node.create_action_server(
-            "/navigate_to_pose", "nav2_msgs/action/NavigateToPose", self._execute
-        )
-
-    def _execute(self, goal: Any) -> dict[str, Any]:
-        self.goals.append(goal)
-        number = len(self.goals)
-        while not goal.is_cancel_requested:
-            if len(self.goals) > number:
-                raise RuntimeError("preempted")
-            time.sleep(0.01)
-        return {}
 
 
 def test_the_goal_before_does_not_speak_for_the_next(
@@ -514,6 +475,70 @@ def test_the_goal_before_does_not_speak_for_the_next(
     assert "executing" in view.statusText
     goal.goal.cancel()
     bench.wait(lambda: "canceled" in statuses)
+
+
+def test_a_goal_of_an_action_is_canceled(bench: SceneBench, hand: Hand, nav2: Any) -> None:
+    view = bench.load(
+        'id: top; property bool going: go.goalActive; tool: "Go"\n'
+        'Nav2GoalTool { id: go; name: "Go" }\nfunction halt() { go.cancelGoal() }'
+    )
+    driver, goal = Driver(nav2), view.tools.current
+    view.halt()
+    assert view.statusText == "There is no goal to cancel."
+    hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
+    bench.wait(lambda: driver.goals)
+    assert view.property("going")
+    view.halt()
+    assert view.statusText == "Goal: requested to cancel it"
+    bench.wait(lambda: view.statusText == "Goal: canceled", lambda: view.statusText)
+    bench.wait(lambda: not view.property("going"))
+    # A server may refuse.
+    driver.server.close()
+    nav2.create_action_server(
+        "/navigate_to_pose", "nav2_msgs/action/NavigateToPose", driver._execute,
+        cancel=lambda _: False,
+    )  # fmt: skip
+    bench.wait(lambda: goal._endpoint.ready)
+    view.tools.select("Go")
+    hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
+    bench.wait(lambda: len(driver.goals) == 2)
+    view.halt()
+    bench.wait(lambda: "navigate_to_pose: not canceled: " in view.statusText)
+    assert view.property("going")
+    driver.goals.append(None)  # ends it
+
+
+def test_escape_drops_a_goal_that_waits_for_its_server(
+    bench: SceneBench, hand: Hand, nav2: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rosglass.scene.publishing_tools._MATCH_TIMEOUT_S", 60.0)
+    view = bench.load('Nav2GoalTool { name: "Go" }\ntool: "Go"')
+    goal = view.tools.current
+    bench.wait(lambda: goal._endpoint is not None)
+    hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
+    assert "looking for a server" in view.statusText
+    hand.key(hand.keys.Key_Escape)
+    assert "not sent, for it was dropped" in view.statusText
+    driver = Driver(nav2)
+    bench.wait(lambda: goal._endpoint.ready)
+    bench.wait.settled(bench.session)
+    assert not driver.goals
+    assert goal.goal is None
+
+
+def test_a_config_does_not_silently_end_the_reports_of_a_goal(
+    bench: SceneBench, hand: Hand, nav2: Any, caplog: Any
+) -> None:
+    view = bench.load()
+    driver = Driver(nav2)
+    view.tools.add("GoalTool")
+    view.tools.select("GoalTool")
+    hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
+    bench.wait(lambda: driver.goals)
+    view.tools.load_configs([{"Class": "rviz_default_plugins/Interact"}])
+    assert "navigate_to_pose: the tool was removed: its goal continues" in view.statusText
+    assert "its goal continues" in caplog.text
+    driver.goals.append(None)  # ends it
 
 
 def test_a_goal_to_an_action_without_server_says_so(

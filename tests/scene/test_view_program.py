@@ -8,6 +8,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from nav2_server import Driver
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -745,3 +746,21 @@ def test_docks_are_hidden_as_the_config_says_and_saved(
     program.save("")
     expected = {"Hide Left Dock": False, "Hide Right Dock": True, "Width": 700}
     assert RvizConfig.load(file).root["Window Geometry"] == expected
+
+
+def test_a_goal_is_canceled_by_its_button(bench: SceneBench, window: Any, nav2: Any) -> None:
+    from PySide6.QtCore import QMetaObject, QObject
+
+    driver = Driver(nav2)
+    scene = window.findChild(QObject, "scene")
+    goal = scene.tools.add("GoalTool")
+    goal.activate()
+    button = window.findChild(QObject, "cancelGoal")
+    assert not button.property("visible")
+    bench.wait(lambda: goal._endpoint is not None and goal._endpoint.ready)
+    goal.send_pose(1.0, 0.0, 0.0)
+    bench.wait(lambda: driver.goals)
+    assert button.property("visible")
+    QMetaObject.invokeMethod(button, "click")
+    bench.wait(lambda: not button.property("visible"))
+    assert scene.property("statusText") == "Goal: canceled"

@@ -1,5 +1,5 @@
 """The tools that send something to the robot: a goal, an estimate of its pose, a point."""
-# ruff: noqa: N815 - the names of properties and signals are QML's
+# ruff: noqa: N802, N815 - the names of slots, properties and signals are QML's
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from rosglass.comm.names import similar
 from rosglass.comm.qos import QoS
 from rosglass.errors import Error
 from rosglass.qml.callbacks import weak_callback
+from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import QtCore, QtGui, Signal, Slot, is_alive
 from rosglass.scene.displays.shapes import ArrowShapes
 from rosglass.scene.drawing import instance_matrix
@@ -30,7 +31,8 @@ from rosglass.scene.tools import PointerEvent, Tool, point_text
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from rosglass.comm.action_client import ClientGoal, GoalStatus
+    from rosglass.comm.action_client import CancelAnswer, ClientGoal, GoalStatus
+    from rosglass.comm.promise import Promise
     from rosglass.qml.runtime import Runtime
     from rosglass.rviz.orbit import Point
 
@@ -206,6 +208,13 @@ class PublishingTool(Tool):
         except Error:
             return ""
         return similar(sender.topic, names)
+
+    def drop_waiting(self) -> bool:
+        """Drop what waits for a subscriber or a server; return whether there was something."""
+        waiting, self._waiting = self._waiting, None
+        if waiting is not None:
+            self.announce(f"{waiting[1]}: not sent, for it was dropped")
+        return waiting is not None
 
     def _drop(self, why: str) -> None:
         waiting, self._waiting = self._waiting, None
@@ -399,6 +408,8 @@ class SetGoalTool(PoseTool):
 
     #: The status of the last goal, with an action: ``accepted``, ``executing``, ``succeeded`` ...
     goalStatusChanged = Signal(str)
+    #: Whether the action has not ended the last goal yet.
+    goalActive = ReadOnly(bool, False)
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -408,8 +419,38 @@ class SetGoalTool(PoseTool):
 
     @property
     def goal(self) -> ClientGoal | None:
-        """The last goal of the action, e.g. to cancel it; None before the first one."""
+        """The last goal of the action; None before the first one."""
         return self._goal
+
+    @Slot()
+    def cancelGoal(self) -> None:
+        """Request the action's server to cancel the last goal; the status bar says what came of it.
+
+        A goal that still waits for its server is not sent.
+        """
+        goal, session = self._goal, self._session
+        if self.drop_waiting():
+            return
+        if goal is None or session is None or not self.goalActive:
+            self.announce("There is no goal to cancel.")
+            return
+        self.announce("Goal: requested to cancel it")
+        on_answer = weak_callback(self._on_cancel_answer)
+        goal.cancel(_GOAL_TIMEOUT_S).on_done(lambda got: on_answer(goal, got), session.executor)
+
+    def _on_cancel_answer(self, goal: ClientGoal, answer: Promise[CancelAnswer]) -> None:
+        if not is_alive(self) or goal is not self._goal or not self.goalActive:
+            return
+        why = answer.exception() or answer.result().reason
+        if why:
+            self._complain(f"goal of {self.action}: not canceled: {why}")
+
+    def leave(self) -> None:
+        """Belong to no view any more; the robot keeps its goal, which is reported no longer."""
+        if self.goalActive:
+            text = "the tool was removed: its goal continues, and is reported no longer"
+            self._complain(f"goal of {self.action}: {text}")
+        super().leave()
 
     def _wanted(self) -> tuple[Any, ...] | None:
         wanted = super()._wanted()
@@ -460,6 +501,7 @@ class SetGoalTool(PoseTool):
                 timeout=_GOAL_TIMEOUT_S,
             )
             self._goal = goal
+            report(self, goalActive=True)
         except Error as error:
             self._complain(f"{text}: not sent: {error}")
         else:
@@ -473,7 +515,7 @@ class SetGoalTool(PoseTool):
             self.goalStatusChanged.emit(status.value)
 
     def _on_goal_done(self, goal: ClientGoal) -> None:
-        if not is_alive(self) or goal is not self._goal:
+        if not is_alive(self) or goal is not self._goal or not report(self, goalActive=False):
             return
         failure = goal.done.exception()
         if failure is not None:

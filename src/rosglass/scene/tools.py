@@ -369,6 +369,10 @@ class Tool(Configurable, Element):
         """
         return False
 
+    def drop_waiting(self) -> bool:
+        """Drop what still waits to be sent (Escape); return whether there was something."""
+        return False
+
     def set_status(self, text: str, *, hit: bool | None = None) -> None:
         """Show what to do now, and whether there is something under the mouse for it.
 
@@ -815,9 +819,12 @@ class Tools(QtCore.QObject):
         return self._view.move_camera(lambda view: view.on_key(key, point))
 
     def on_escape(self) -> bool:
-        """Cancel what was begun, or return to the default tool; return whether there was one."""
+        """Cancel what was begun, or return to the default tool; return whether it was used."""
         if self._grab == "tool":
             self._cancel()
+            return True
+        dropped = [tool.drop_waiting() for tool in self._items]
+        if any(dropped):
             return True
         if self._current is not self.default:
             self._make_current(self.default)

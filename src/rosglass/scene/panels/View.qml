@@ -159,6 +159,16 @@ ApplicationWindow {
                 source: "ImagePanels.qml"
                 onLoaded: item.view = scene
             }
+            // A goal can be ended from everywhere, as in RViz's panel of Nav2.
+            Button {
+                objectName: "cancelGoal"
+                readonly property var tool: scene.tools.all.find(one => one.goalActive === true) || null
+                anchors { left: parent.left; top: parent.top; margins: 8 }
+                visible: tool !== null
+                text: "Cancel goal"
+                focusPolicy: Qt.NoFocus
+                onClicked: tool.cancelGoal()
+            }
             Label {
                 anchors.centerIn: parent
                 width: Math.min(implicitWidth, parent.width - 40)
