@@ -68,7 +68,7 @@ _MAX_KEPT_POINTS = 20_000_000
 _MAX_KEPT_BYTES = 1 << 30
 
 #: Bits of a cell's number along x, y and z; 16 in all at most, which numpy sorts fastest.
-_CELL_BITS = (4, 4, 4)
+_CELL_BITS = (5, 5, 5)
 #: Number of points that decide whether a cloud is ordered.
 _SAMPLED_POINTS = 1024
 #: Largest ratio of the distance between successive points to the cloud's diagonal, if ordered.

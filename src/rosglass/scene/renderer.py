@@ -77,8 +77,8 @@ _SOFTWARE = ("llvmpipe", "lavapipe", "softpipe", "swiftshader", "basic render")
 _FRAME_BYTES, _OBJECT_BYTES = 144, 144
 #: Metres from the origin of what is drawn at which the origin moves: 32 bits stay exact to 0.1 mm.
 _ORIGIN_STEP_M = 1000.0
-#: Points that software draws while the camera moves: more are thinned out.
-MOVING_POINTS = 60_000
+#: Points that software draws while the camera moves: twice as many and more are thinned out to it.
+MOVING_POINTS = 50_000
 #: Pixels up to which software draws a square as one vertex: larger ones are clipped at the edges.
 SPRITE_PX = 16.0
 _MODES = {"flat": 0.0, "bgra": 1.0, "rainbow": 2.0, "gradient": 3.0, "axis": 4.0}
