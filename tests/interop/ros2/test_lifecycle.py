@@ -251,7 +251,7 @@ def test_nodes_leave_no_threads_and_no_descriptors_behind(router):
     time.sleep(0.5)
     threads, native, descriptors = threading.active_count(), native_threads(), open_files()
     before = time.monotonic()
-    for _ in range(100):
+    for _ in range(40):
         cycle()
     # Undeclaring at a bad moment once stopped the whole interpreter for 10 s.
     assert time.monotonic() - before < 60
