@@ -289,6 +289,27 @@ def test_a_call_of_the_master_that_is_out_of_date_ends_no_node(
     eventually(lambda: node.status().state is ConnectionState.CLOSED)
 
 
+def test_a_publisher_that_leaves_while_its_subscriber_registers_again_is_dropped(
+    master: FakeMaster, node: Any
+) -> None:
+    robot = connected(master, "robot")
+    robot.create_publisher("/a", "std_msgs/Int32")
+    node.create_subscription("/a", "std_msgs/Int32")
+    (link,) = eventually(lambda: [one for one in publisher_links(node, "/a") if one.connected])
+
+    def answer(*arguments: Any) -> Any:
+        del master.answers["registerSubscriber"]
+        listed = master.registerSubscriber(*arguments)
+        with xmlrpc.client.ServerProxy(node_uri(node)) as api:
+            api.publisherUpdate("/master", "/a", [])  # which is newer than the answer
+        return listed
+
+    master.answers["registerSubscriber"] = answer
+    del master.subscribers["/a"]["/panel"]
+    eventually(lambda: link.ended)
+    robot.close()
+
+
 def test_own_messages_are_ignored_also_after_the_address_has_changed(
     master: FakeMaster, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -104,6 +104,8 @@ class TopicSubscription(Member):
         self._closed = False
         #: The number of the master that lists it, from 0, and of its lists of publishers.
         self._epoch, self._updates = -1, 0
+        #: The publishers of the last update.
+        self._listed: list[str] = []
 
     def links(self) -> list[PublisherLink]:
         """Return the connections with publishers; from any thread."""
@@ -190,6 +192,7 @@ class TopicSubscription(Member):
 
     def on_publishers_changed(self, uris: list[str]) -> None:
         """Connect to new publishers, and drop those that have left; from any thread."""
+        self._listed = uris
         self._updates += 1
         self.core.loop.call(lambda: self._set_publishers(uris))
 
@@ -240,9 +243,12 @@ class TopicSubscription(Member):
         uris = list(master.call("registerSubscriber", self.topic, self.type_name, self.core.uri))
 
         def set_publishers() -> None:
-            # An update that the master has sent since then is newer than this answer.
-            if updates == self._updates:
-                self._set_publishers(uris)
+            for link in self.links():
+                if link.uri in uris:
+                    link.epoch = self._epoch
+            # An update that the master has sent since then is newer than this answer: what it does
+            # not list any more has left.
+            self._set_publishers(uris if updates == self._updates else self._listed)
 
         self.core.loop.call(set_publishers)
 
