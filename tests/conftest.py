@@ -53,6 +53,14 @@ def eventually() -> Callable[..., Any]:
     return waiting.eventually
 
 
+@pytest.fixture(scope="session", autouse=True)
+def frequent_polls() -> Iterator[None]:
+    """Poll a ROS 1 master five times as often: most of its tests wait for what it shows next."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rosglass.wires.tcpros.registrations._POLL_S", 0.2)
+        yield
+
+
 @pytest.fixture(autouse=True)
 def log_levels() -> Iterator[None]:
     """Undo what commands that a test runs in this process have done to the library's logging."""

@@ -255,12 +255,6 @@ def _tell_parameter(api: str, name: str, value: Any) -> None:
         proxy.paramUpdate("/master", name, value)
 
 
-@pytest.fixture(autouse=True)
-def frequent_looks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Look at the master five times as often: most tests wait for what it shows next."""
-    monkeypatch.setattr("rosglass.wires.tcpros.registrations._POLL_S", 0.2)
-
-
 @pytest.fixture
 def master() -> Iterator[FakeMaster]:
     """A master of the test's own."""
