@@ -351,7 +351,10 @@ class Tool(Configurable, Element):
         """Handle the release of the button whose press it has taken."""
 
     def on_cancel(self) -> None:
-        """Drop what was begun by a press: another button, Escape, or a second finger."""
+        """Drop what was begun by a press, as for Escape, a second finger or another fixed frame."""
+
+    def on_fixed_frame(self) -> None:
+        """Drop points of the fixed frame before."""
 
     def on_leave(self) -> None:
         """Follow the mouse out of the view."""
@@ -477,6 +480,7 @@ class Tools(QtCore.QObject):
         self._defaults: set[Tool] = set()
         #: Tools of a file that rosglass does not have, by their number in it.
         self._unknown: dict[int, dict[str, Any]] = {}
+        view.fixedFrameChanged.connect(self._on_fixed_frame)
         for name in DEFAULT_TOOLS:
             if name in self.TYPES:
                 self._defaults.add(self.add(name))
@@ -836,6 +840,16 @@ class Tools(QtCore.QObject):
         if modifiers != self._modifiers:
             self._modifiers = modifiers
             self._show_status()
+
+    @Slot()
+    def _on_fixed_frame(self) -> None:
+        """Drop points of the fixed frame before."""
+        tool = self._current
+        if self._grab == "tool" and tool is not None:
+            self._cancel()
+            self.announce(f"{tool.name}: dropped, for there is another fixed frame")
+        for one in list(self._items):
+            self._call(one, one.on_fixed_frame)
 
     def cancel(self) -> None:
         """Drop what was begun by a press."""

@@ -245,6 +245,10 @@ class MeasureTool(Tool):
         """Drop the first point."""
         self.clear()
 
+    def on_fixed_frame(self) -> None:
+        """Drop the line, which is in the frame before."""
+        self.clear()
+
     def clear(self) -> None:
         """Remove the line."""
         self._start = self._end = None
