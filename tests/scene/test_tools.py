@@ -363,6 +363,27 @@ def test_one_finger_sets_a_goal_and_two_move_the_camera(bench: SceneBench, hand:
     assert view.controller.yaw != yaw
 
 
+def test_another_fixed_frame_drops_points_of_the_one_before(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load()
+    goals = listen(bench, "/goal_pose", "geometry_msgs/PoseStamped")
+    view.tool = "SetGoal"
+    hand.press(hand.at((1, 0, 0)))
+    view.fixedFrame = "odom"
+    assert view.statusText == "2D Goal Pose: dropped, for there is another fixed frame"
+    hand.release(hand.at((1, 0, 0)))
+    bench.wait.settled(bench.session)
+    assert goals == []
+    add_box(view)
+    view.tool = "Measure"
+    measure = view.tools.current
+    hand.click(hand.at((0, 0, 0.5)))
+    hand.move(hand.at((0, 0.2, 0.5)))
+    assert measure.length > 0
+    view.tool = "Interact"
+    view.fixedFrame = "map"
+    assert measure.length == -1
+
+
 def test_a_finger_that_stays_after_a_pinch_sends_no_goal(bench: SceneBench, hand: Hand) -> None:
     from PySide6.QtCore import QPoint
     from PySide6.QtTest import QTest
@@ -804,6 +825,33 @@ def test_tools_of_config_files(bench: SceneBench) -> None:
     assert saved[4]["Topic"] == {"Value": "goal"}
     tools.find("SetGoal").topic = "/dock"
     assert tools.save_configs(2)[3]["Topic"]["Value"] == "/dock"
+
+
+def test_a_declared_tool_replaces_that_of_a_file(bench: SceneBench) -> None:
+    tools = bench.load(
+        'SetGoalTool { topic: "/robot1/goal_pose" }\nSetGoalTool { name: "Two"; topic: "/two" }'
+    ).tools
+    saved = [
+        {"Class": "rviz_default_plugins/MoveCamera"},
+        {"Class": "rviz_default_plugins/SetGoal", "Topic": {"Value": "/goal_pose"}, "Own": 1},
+        {"Class": "rviz_default_plugins/Measure"},
+    ]
+    for _ in range(2):
+        assert tools.load_configs(saved) == []
+        shown = [(tool.TYPE, getattr(tool, "topic", "")) for tool in tools]
+        assert shown == [
+            ("MoveCamera", ""),
+            ("SetGoal", "/robot1/goal_pose"),
+            ("Measure", ""),
+            ("SetGoal", "/two"),
+        ]
+        # What the file has stays in it; the interface has its own.
+        assert tools.save_configs(2)[:3] == saved
+    tools.find("SetGoal").topic = "/robot2/goal_pose"
+    changed = tools.save_configs(2)[1]
+    assert (changed["Topic"]["Value"], changed["Own"]) == ("/robot2/goal_pose", 1)
+    tools.load_configs(saved[:1])
+    assert [(tool.TYPE, tool.saved) for tool in tools][1:] == [("SetGoal", {})] * 2
 
 
 # -- ROS 1 ---------------------------------------------------------------------------------------

@@ -478,6 +478,8 @@ class Tools(QtCore.QObject):
         self._outcome_end = single_shot(self, self._show_status)
         #: The tools from DEFAULT_TOOLS, which declared ones replace.
         self._defaults: set[Tool] = set()
+        #: The tools that QML has declared, which replace those of a file.
+        self._declared: set[Tool] = set()
         #: Tools of a file that rosglass does not have, by their number in it.
         self._unknown: dict[int, dict[str, Any]] = {}
         view.fixedFrameChanged.connect(self._on_fixed_frame)
@@ -575,6 +577,8 @@ class Tools(QtCore.QObject):
             replaced = next((t for t in self._defaults if t.TYPE == tool.TYPE), None)
             index = self._items.index(replaced) if replaced is not None else index
         self._items.insert(index, tool)
+        if declared:
+            self._declared.add(tool)
         root = tool.root
 
         def forget() -> None:
@@ -582,6 +586,7 @@ class Tools(QtCore.QObject):
             root.remove()
             if is_alive(self) and tool in self._items:
                 self._items.remove(tool)
+                self._declared.discard(tool)
                 if self._current is tool:
                     self._current, self._grab = None, ""
                     self._make_current(self.default)
@@ -605,6 +610,7 @@ class Tools(QtCore.QObject):
             raise Error(f"{tool.label} is not in this view")
         self._items.remove(tool)
         self._defaults.discard(tool)
+        self._declared.discard(tool)
         if tool is self._current:
             self._make_current(self.default)
         tool.leave()
@@ -664,6 +670,8 @@ class Tools(QtCore.QObject):
     def load_configs(self, configs: Iterable[Mapping[str, Any]]) -> list[str]:
         """Replace RViz's tools by those of a ``.rviz`` file; own tools stay, after them.
 
+        A tool that QML has declared takes the place of the file's first one of its type.
+
         Args:
             configs: The settings of each, with ``Class``.
 
@@ -673,9 +681,12 @@ class Tools(QtCore.QObject):
         notes = []
         self._make_current(None)
         for tool in list(self._items):
-            if tool.class_id:
+            if tool in self._declared:
+                tool.saved, tool.loaded = {}, {}
+            elif tool.class_id:
                 self.remove(tool)
         self._unknown = {}
+        order: list[Tool] = []
         for number, settings in enumerate(configs):
             class_id = settings.get("Class")
             if not isinstance(class_id, str) or tool_type(class_id) not in self.TYPES:
@@ -683,11 +694,17 @@ class Tools(QtCore.QObject):
                 notes.append(f"tool {text}: rosglass has no such tool; it is kept as it is")
                 self._unknown[number] = dict(settings)
                 continue
-            tool = self._make(class_id)
-            notes += [f"tool {tool.name!r}: {text}" for text in tool.load_settings(settings)]
+            own = (t for t in self._items if t in self._declared and t not in order)
+            declared = next((t for t in own if tool_type(class_id) == t.TYPE), None)
+            if declared is not None:
+                tool, tool.class_id = declared, class_id
+            else:
+                tool = self._make(class_id)
+                notes += [f"tool {tool.name!r}: {text}" for text in tool.load_settings(settings)]
+                self.adopt(tool)
             tool.saved, tool.loaded = dict(settings), tool.values()
-            self.adopt(tool)
-        self._items.sort(key=lambda tool: not tool.class_id)
+            order.append(tool)
+        self._items.sort(key=lambda tool: order.index(tool) if tool in order else len(order))
         self._make_current(self.default)
         self.changed.emit()
         return notes
