@@ -442,3 +442,21 @@ def test_all_interactive_markers_are_bounded(robot: Robot, monkeypatch: pytest.M
     robot.send({**update, "markers": [made("handle", 1), made("large", 2)]})
     assert display.markers == ["handle", "large", "small"]
     assert "Marker large" not in display.statusText
+
+
+def test_a_second_topic_that_is_none_is_named_and_the_first_is_shown(robot: Robot) -> None:
+    robot.show(next(case for case in CASES if case.display == "Map"))
+    display, bench = robot.display, robot.bench
+    display.reset()
+    display.updateTopic = "~updates"
+    bench.wait(lambda: "Update Topic: " in display.statusText, lambda: display.statusText)
+    bench.wait(lambda: robot.publisher.publish(robot.message) or display.columns == 3)
+    display.updateTopic = ""
+    bench.wait(lambda: "Update Topic" not in display.statusText, lambda: display.statusText)
+
+
+def test_a_description_topic_that_is_none_is_among_what_is_left_out(robot: Robot) -> None:
+    display = robot.view.scene.add("RobotModel")
+    (refused,) = display.load_settings({"Description Topic": {"Value": "not a topic"}})
+    assert "Description Topic: expected the name of a topic" in refused
+    assert display.descriptionTopic == "/robot_description"

@@ -623,6 +623,21 @@ class TopicDisplay(OneTopicDisplay):
         """Return topics that are received beside `topic`, e.g. of updates."""
         return ()
 
+    def _resolve_further(self, path: str, topic: str) -> tuple[str, ...]:
+        """Return the absolute name of a topic; none, with a status, for a name that is none.
+
+        Args:
+            path: The setting that names it.
+            topic: The name; empty for no topic.
+        """
+        found = self._resolve(topic)
+        if topic and not found:
+            self.set_status(path, "error", self._problem)
+            return ()
+        self._set_problem("")
+        self.delete_status(path)
+        return (found,) if found else ()
+
     def _factory(self, *wanted: Any) -> Callable[[], Any]:
         node, topics, qos = wanted
         intake = self._intake = Intake(

@@ -154,7 +154,7 @@ class MapDisplay(TopicDisplay):
 
     def further_topics(self, topic: str) -> tuple[str, ...]:
         """Return the topic of updates."""
-        return (self._resolve(self.updateTopic or f"{topic}_updates"),)
+        return self._resolve_further("Update Topic", self.updateTopic or f"{topic}_updates")
 
     def preparer(self) -> Callable[[Any], Any]:
         """Return the function that checks and copies cells."""

@@ -767,8 +767,8 @@ class DepthCloudDisplay(CloudDisplay):
 
     def further_topics(self, topic: str) -> tuple[str, ...]:
         """Return the topics of the calibration, and of color images."""
-        color = self._resolve(self.colorTopic)
-        return (_info_topic(topic), *([_transported(color, self.colorTransport)] if color else []))
+        colors = self._resolve_further("Color Image Topic", self.colorTopic)
+        return (_info_topic(topic), *(_transported(one, self.colorTransport) for one in colors))
 
     def _wanted(self) -> tuple[Any, ...] | None:
         wanted = super()._wanted()

@@ -675,8 +675,8 @@ class RobotModelDisplay(Display):
             return refused
         try:
             found = read_description(saved)
-            name = {"topic": "descriptionTopic", "file": "descriptionFile"}
-            setattr(self, name.get(found.source, "robotDescription"), found.name)
+            path = {"topic": "Description Topic", "file": "Description File"}
+            self.set(path.get(found.source, "Robot Description"), found.name)
             # A file of RViz 1 names the parameter, which robots with ROS 2 do not have.
             source = found.source.capitalize()
             self.descriptionSource = _AUTOMATIC if source == _PARAMETER else source
