@@ -308,12 +308,9 @@ def picture(encoding: str = "rgb8") -> dict[str, Any]:
     pixels = np.zeros((120, 160, 3), np.uint8)
     pixels[:, :80], pixels[:, 80:] = (40, 40, 160), (40, 140, 40)
     pixels[20:30, 20:140] = 255
+    rows: Any = pixels
     if encoding == "32FC1":
         rows = np.tile(np.linspace(1, 5, 160, dtype="<f4"), (120, 1))
-    elif encoding == "mono8":
-        rows = pixels[..., 1]
-    else:
-        rows = pixels[..., ::-1] if encoding == "bgr8" else pixels
     return {
         "header": {"frame_id": "camera"}, "width": 160, "height": 120, "encoding": encoding,
         "step": rows[0].nbytes, "data": np.ascontiguousarray(rows).tobytes(),
@@ -860,6 +857,25 @@ CASES: dict[str, Case] = {
                                points=points((0, 0, 0), (1, 0, 0), (1, 0.6, 0))),
                         marker(12, 1, "magenta", pose(0.5, 0), (0.4, 0.4, 0.4),
                                header={"frame_id": "arm"}, frame_locked=True),
+                        *(
+                            marker(n, kind, "white", pose(*at), (size, size, size),
+                                   points=points((0, 0, 0), (0.7, 0, 0.2), (0, 0.7, 0)),
+                                   colors=[{**RGBA[name], "a": 0.5}
+                                           for name in ("red", "green", "blue")])
+                            for n, (kind, size, at) in enumerate(
+                                [(7, 0.4, (2.8, 0.3)), (8, 0.3, (1.2, 2)), (11, 1, (2.6, 2)),
+                                 (4, 0.15, (-2.6, 1.2)), (6, 0.3, (-4.3, 0.6))], 13)
+                        ),
+                        *(
+                            marker(n, 11, "white", pose(*at), (1, 1, 1),
+                                   points=points((0, 0, 0), (0.7, 0, 0.2), (0, 0.7, 0)),
+                                   color={"a": 0.5},
+                                   colors=[{**RGBA[name], "a": alpha} for name in names])
+                            for n, (alpha, names, at) in enumerate(
+                                [(0.5, ("red", "green", "blue"), (1, 1.2)),
+                                 (1, ("cyan", "yellow", "magenta"), (2, 1.2)),
+                                 (1, ("green",), (3, 1.2))], 18)
+                        ),
                     ]
                 },
             )

@@ -173,7 +173,7 @@ class Control:
         if light and len(marker.points) <= _MAX_HIGHLIGHTED:
             red, green, blue, alpha = color
             if marker.kind == MESH and marker.embedded:
-                # Multiplied with the mesh's own colours.
+                # Painted over the mesh's own colours.
                 if not (red or green or blue):
                     red = green = blue = 1.0
                 bright = 1 + light

@@ -256,7 +256,7 @@ def _complete(control: ControlRecord, scale: float) -> ControlRecord:
         points, shades = _ring(control.mode)
         colors = np.empty((len(shades), 4), np.float32)
         colors[:, :3] = np.outer(shades, (red, green, blue))
-        colors[:, 3] = AUTOMATIC_ALPHA
+        colors[:, 3] = 1.0  # multiplied with that of the marker
         if control.mode == MOVE_ROTATE:
             colors[shades == 1.0, 3] /= 2  # as in RViz
         size = (scale, scale, scale)

@@ -522,6 +522,9 @@ def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]
     each = marker.colors if len(marker.colors) == len(points) else marker.color
     if kind in (LINE_STRIP, LINE_LIST):
         lines = Lines(abs(x), in_metres=True)
+        if not isinstance(each, tuple) and marker.color[3] >= OPAQUE:
+            # As in RViz, points are translucent only if the marker is.
+            each = np.column_stack([each[:, :3], np.ones(len(each), np.float32)])
         if kind == LINE_STRIP:
             lines.set_strip(points, each)
         else:
@@ -565,12 +568,16 @@ def _list_colors(colors: Any) -> NDArray[np.float32]:
 
 def _triangles(marker: MarkerRecord) -> Shape:
     points = marker.points * np.array(marker.scale, np.float32)
-    colors: NDArray[np.float32] | None = None
-    if len(marker.colors) == len(points):
-        colors = marker.colors
-    elif len(marker.colors) == len(points) // 3:
-        colors = np.repeat(marker.colors, 3, axis=0)
-    return Shape(points, colors=colors)
+    colors, alpha = marker.colors, marker.color[3]
+    # RViz's rules for the opacity of vertices, and of triangles.
+    if len(colors) == len(points):
+        blended = bool((colors[:, 3] < OPAQUE).any())
+    elif len(colors) == len(points) // 3:
+        colors, blended = np.repeat(colors, 3, axis=0), alpha < OPAQUE
+    else:
+        return Shape(points)
+    each = colors[:, 3:] * alpha if blended else np.ones((len(points), 1), np.float32)
+    return Shape(points, colors=np.hstack([colors[:, :3], each]))
 
 
 def _arrow_strip(marker: MarkerRecord) -> Iterable[Mesh]:
