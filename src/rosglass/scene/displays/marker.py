@@ -913,7 +913,7 @@ class Markers(TopicDisplay):
         """Show a marker that is new, with its frame at a pose in the fixed frame."""
         key = marker.key
         before = self._shown.get(key)
-        if before is not None and self._group_of(before) is self._group_of(marker):
+        if before is not None and self._group_key(before) == self._group_key(marker):
             # Its group replaces it, or moves it if nothing else has changed.
             del self._shown[key]
             self._forget_hidden(before)
@@ -933,7 +933,8 @@ class Markers(TopicDisplay):
 
     def _draw(self, marker: MarkerRecord, pose: NDArray[np.float64]) -> None:
         try:
-            group = self._group_of(marker)
+            where = self._group_key(marker)
+            group = self._groups.get(where)
             if group is None:
                 group = self._add_group(marker)
             if marker.locked and marker.frame:
@@ -941,7 +942,7 @@ class Markers(TopicDisplay):
                     group.root.pose = pose
                 pose = _IDENTITY
             group.put(marker, pose, self._meshes)
-            self._empty.pop(self._group_key(marker), None)
+            self._empty.pop(where, None)
             problem = self._meshes.problem_of(marker)
             if problem:
                 self._note_problem(marker.key, "error", problem)
