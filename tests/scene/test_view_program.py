@@ -670,6 +670,39 @@ def test_a_frame_is_hidden_by_its_check_box(bench: SceneBench, window: Any) -> N
     bench.wait(lambda: tf.frames == ["map"])
 
 
+def test_a_typed_frame_counts_when_the_user_goes_on(bench: SceneBench, window: Any) -> None:
+    from PySide6.QtCore import QObject, QPoint
+    from PySide6.QtTest import QTest
+
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    broadcaster = StaticTransformBroadcaster(bench.robot)
+    broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), Time(1), "map", "tool"))
+    rows = Rows(window)
+    view = window.findChild(QObject, "scene")
+    bench.wait(lambda: "tool" in rows.scene.frames())
+    bench.wait(lambda: "tool" in rows.model.rows[row_of(rows.model, "Fixed Frame")].choices)
+    middle = view.mapToScene(view.boundingRect().center()).toPoint()
+
+    def type_text(text: str) -> Any:
+        rows.click(rows.at("Fixed Frame", x=230))
+        field = window.activeFocusItem()
+        field.selectAll()
+        for letter in text:
+            QTest.keyClick(window, letter)
+        rows.click(middle + QPoint(5, 5))
+        return field
+
+    field = type_text("odom")
+    assert view.fixedFrame == "odom"
+    bench.wait(lambda: field.property("text") == "odom")
+    # What is refused is not left standing.
+    field = type_text(" ")
+    assert view.fixedFrame == "odom"
+    assert field.property("text") == "odom"
+
+
 def test_reset_in_the_tool_bar_drops_what_was_received(bench: SceneBench, window: Any) -> None:
     from PySide6.QtCore import QObject
 

@@ -53,11 +53,19 @@ RowLayout {
         currentIndex: editor.names.indexOf(String(editor.value))
         // What is set may be none of the choices, e.g. a frame that is not there yet.
         readonly property string given: String(editor.value)
-        onGivenChanged: if (editable) editText = given
-        onModelChanged: if (editable) Qt.callLater(() => { editText = given })
-        Component.onCompleted: if (editable) editText = given
+        function showGiven() { if (editable) editText = given }
+        function commit() {
+            if (!editable || editText === given) return
+            editor.edited(editText)
+            // What was refused is not left standing.
+            showGiven()
+        }
+        onGivenChanged: showGiven()
+        onModelChanged: Qt.callLater(showGiven)
+        Component.onCompleted: showGiven()
         onActivated: editor.edited(currentText)
-        onAccepted: editor.edited(editText)
+        onAccepted: commit()
+        onActiveFocusChanged: if (!activeFocus) commit()
     }
     TextField {
         visible: editor.isText
