@@ -797,3 +797,26 @@ def test_a_goal_is_canceled_by_its_button(bench: SceneBench, window: Any, nav2: 
     QMetaObject.invokeMethod(button, "click")
     bench.wait(lambda: not button.property("visible"))
     assert scene.property("statusText") == "Goal: canceled"
+
+
+def test_what_was_sent_is_shown_before_messages_and_without_panels(
+    bench: SceneBench, window: Any
+) -> None:
+    from PySide6.QtCore import QObject
+    from PySide6.QtQml import qmlContext
+
+    program = qmlContext(window).contextProperty("program")
+    scene = window.findChild(QObject, "scene")
+    status, bare = (window.findChild(QObject, name) for name in ("status", "bareStatus"))
+    program.say("3 notes on robot.rviz")
+    assert status.property("text") == "3 notes on robot.rviz"
+    scene.tools.announce("Goal <at> [1, 2]: sent")
+    assert status.property("text") == "Goal <at> [1, 2]: sent"
+    assert not bare.property("visible")
+    window.setProperty("panels", False)
+    assert bare.property("visible")
+    assert bare.property("text") == "Goal <at> [1, 2]: sent"
+    bench.wait(lambda: not bare.property("visible"))
+    bench.session.shutdown()
+    bench.wait(lambda: bare.property("visible"))
+    assert "connected" not in bare.property("text").split(":")[0]

@@ -463,6 +463,8 @@ class Tools(QtCore.QObject):
     current = Property(QtCore.QObject, lambda self: self._current, notify=currentChanged)
     #: What the current tool says, or for some seconds what one has done.
     statusText = ReadOnly(str, "")
+    #: What a tool has done in the last seconds, as plain text; empty otherwise.
+    outcome = ReadOnly(str, "")
 
     def __init__(self, view: Any, runtime: Runtime | None = None) -> None:
         super().__init__(view)
@@ -474,7 +476,7 @@ class Tools(QtCore.QObject):
         self._grab = ""
         self._held = Button.NONE
         self._modifiers = Modifier.NONE
-        self._outcome, self._outcome_at = "", 0.0
+        self._outcome_at = 0.0
         self._outcome_end = single_shot(self, self._show_status)
         #: The tools from DEFAULT_TOOLS, which declared ones replace.
         self._defaults: set[Tool] = set()
@@ -741,19 +743,20 @@ class Tools(QtCore.QObject):
 
     def announce(self, outcome: str) -> None:
         """Show for some seconds what a tool has done, as plain text."""
-        # Names and errors are the robot's: they must not become tags.
-        self._outcome, self._outcome_at = escape(outcome, quote=False), time.monotonic()
+        self._outcome_at = time.monotonic()
         self._outcome_end.start(int(_OUTCOME_S * 1000) + 50)
-        self._show_status()
+        if report(self, outcome=outcome):
+            self._show_status()
 
     @Slot()
     def _show_status(self) -> None:
         if not is_alive(self):
             return
-        if self._outcome and time.monotonic() - self._outcome_at < _OUTCOME_S:
-            text = self._outcome
+        if self.outcome and time.monotonic() - self._outcome_at < _OUTCOME_S:
+            # Names and errors are the robot's: they must not become tags.
+            text = escape(self.outcome, quote=False)
         else:
-            self._outcome = ""
+            report(self, outcome="")
             text = "" if self._current is None else self._current.help(self._modifiers)
             if self._current is None:
                 text = self._view.controller.help(self._modifiers)

@@ -169,6 +169,19 @@ ApplicationWindow {
                 focusPolicy: Qt.NoFocus
                 onClicked: tool.cancelGoal()
             }
+            // Without the status bar: keys still select tools, which send something.
+            Label {
+                objectName: "bareStatus"
+                anchors { left: parent.left; bottom: parent.bottom; margins: 8 }
+                width: Math.min(implicitWidth, parent.width - 16)
+                visible: !window.panels && text !== ""
+                text: scene.tools.outcome || (program.connected ? "" : program.connection)
+                textFormat: Text.PlainText
+                elide: Text.ElideRight
+                padding: 6
+                color: "white"
+                background: Rectangle { color: "#c0202020"; radius: 4 }
+            }
             Label {
                 anchors.centerIn: parent
                 width: Math.min(implicitWidth, parent.width - 40)
@@ -218,8 +231,8 @@ ApplicationWindow {
                 ToolSeparator { }
                 Label { text: program.time; textFormat: Text.PlainText }
                 ToolSeparator { }
-                Label { Layout.fillWidth: true; visible: program.message !== ""; text: program.message; textFormat: Text.PlainText; elide: Text.ElideRight }
-                Label { objectName: "status"; Layout.fillWidth: true; visible: program.message === ""; text: scene.statusText.replace(/<[^>]*>/g, "").replace(/&lt;/g, "<").replace(/&amp;/g, "&"); textFormat: Text.PlainText; elide: Text.ElideRight }
+                // What was sent to the robot, or was not, comes first.
+                Label { objectName: "status"; Layout.fillWidth: true; text: scene.tools.outcome || program.message || scene.statusText.replace(/<[^>]*>/g, "").replace(/&lt;/g, "<").replace(/&amp;/g, "&"); textFormat: Text.PlainText; elide: Text.ElideRight }
                 Label { objectName: "recording"; visible: text !== ""; text: program.recording; textFormat: Text.PlainText; color: "#c02020" }
                 Label { text: program.frameRate + " fps"; textFormat: Text.PlainText }
             }
