@@ -514,7 +514,8 @@ class Lines(Drawable):
         rows["start"], rows["end"] = points[good, 0], points[good, 1]
         rows["first"], rows["last"] = ends[good, 0], ends[good, 1]
         beside = points if neighbours is None else neighbours
-        beside = np.where(np.isfinite(beside), beside, points)[good]
+        usable = np.isfinite(beside).all(axis=2, keepdims=True)
+        beside = np.where(usable, beside, points)[good]
         rows["before"], rows["after"] = beside[:, 0], beside[:, 1]
         self._opaque = bool((ends[..., 3] == 255).all())
         self.rows, self.count = rows, len(rows)

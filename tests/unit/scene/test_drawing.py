@@ -1,0 +1,48 @@
+"""What a scene draws, as far as pictures of RViz do not show it: test_against_rviz.py."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Lines, Shape
+
+POINTS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 1, 0)]
+
+
+def test_lines_of_a_strip_bend_to_their_neighbours() -> None:
+    lines = Lines(0.1, in_metres=True)
+    lines.set_strip(POINTS)
+    assert lines.rows["before"].tolist() == [[0, 0, 0], [0, 0, 0], [1, 0, 0]]
+    assert lines.rows["after"].tolist() == [[1, 1, 0], [2, 1, 0], [2, 1, 0]]
+
+
+def test_lines_beside_a_gap_end_there() -> None:
+    lines = Lines(0.1, in_metres=True)
+    lines.set_strip([*POINTS[:2], (np.nan, 0, 0), *POINTS[2:]])
+    assert lines.rows["start"].tolist() == [[0, 0, 0], [1, 1, 0]]
+    assert (lines.rows["before"] == lines.rows["start"]).all()
+    assert (lines.rows["after"] == lines.rows["end"]).all()
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_a_strip_of_less_than_two_points_has_no_lines(count: int) -> None:
+    lines = Lines()
+    lines.set_strip(POINTS[:count])
+    assert lines.count == 0
+
+
+@pytest.mark.parametrize("shape", [BOX, SPHERE, CYLINDER])
+def test_shapes_are_seen_from_outside(shape: Shape) -> None:
+    a, b, c = (shape.rows["position"][shape.faces[:, corner]] for corner in range(3))
+    outward = (np.cross(b - a, c - a) * (a + b + c)).sum(axis=1)
+    assert (outward > -1e-6).all()
+    assert shape.one_sided
+    assert len(np.unique(shape.rows["uv"], axis=0)) > 3
+
+
+def test_a_mirrored_shape_is_seen_from_the_other_side() -> None:
+    shape = Shape([(0, 0, 0), (1, 0, 0), (0, 1, 0)], one_sided=True)
+    assert shape.mirrored().faces.tolist() == [[2, 1, 0]]
+    assert shape.faces.tolist() == [[0, 1, 2]]
+    assert shape.mirrored().one_sided
