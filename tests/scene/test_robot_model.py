@@ -350,6 +350,40 @@ def test_a_robot_whose_transforms_stop_fades(bench: SceneBench, monkeypatch: Any
     assert robot.statusLevel == "ok", robot.statusText
 
 
+def test_a_robot_fades_when_one_of_its_joints_is_not_updated(
+    bench: SceneBench, monkeypatch: Any
+) -> None:
+    from rosglass import Time
+    from rosglass.scene import display
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    monkeypatch.setattr(display, "_SILENT_S", 0.5)
+    view = bench.load("RobotModelDisplay {}")
+    (robot,) = view.scene.displays
+    publish(bench, URDF)
+    broadcaster = TransformBroadcaster(bench.robot)
+    sent = itertools.count(1)
+
+    def move(*links: tuple[str, str]) -> None:
+        stamp = Time.from_parts(5, next(sent))
+        for parent, child in links:
+            broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), stamp, parent, child))
+
+    base, mast = ("map", "base_link"), ("base_link", "mast")
+    bench.wait(lambda: move(base, mast) or shapes(robot) == {BOX, CYLINDER})
+    assert robot.root.alpha == 1.0
+    # The odometry goes on without the node that publishes the joints.
+    bench.wait(lambda: move(base) or robot.root.alpha < 1.0)
+    assert "[mast] may be somewhere else: no transform has come for" in robot.statusText
+    # One that is hidden is of no account.
+    robot.setLinkEnabled("mast", False)
+    bench.wait(lambda: move(base) or robot.root.alpha == 1.0)
+    robot.setLinkEnabled("mast", True)
+    bench.wait(lambda: move(base) or robot.root.alpha < 1.0)
+    bench.wait(lambda: move(base, mast) or robot.root.alpha == 1.0)
+    assert robot.statusLevel == "ok", robot.statusText
+
+
 def test_the_status_is_the_same_after_it_was_disabled(bench: SceneBench) -> None:
     view = bench.load("RobotModelDisplay {}")
     (robot,) = view.scene.displays

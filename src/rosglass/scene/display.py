@@ -29,7 +29,7 @@ from rosglass.scene.rviz_formats import TopicSetting, read_topic, write_topic
 from rosglass.scene.settings import Configurable, Setting
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -161,8 +161,8 @@ class Display(Configurable, TopicElement):
         self.saved: dict[str, Any] = {}
         #: When a frame was found last, by the clock of :func:`time.monotonic`.
         self._placed_at = -math.inf
-        #: Whether the frame that it follows is not updated any more.
-        self._frame_is_silent = False
+        #: Frames that it follows and that are not updated any more, and for how many seconds.
+        self._outdated_frames: dict[str, float] = {}
         #: What of it is shown and hidden one by one; None for nothing.
         self.parts: Parts | None = None
         #: The group that it is in; None for none.
@@ -246,31 +246,36 @@ class Display(Configurable, TopicElement):
         """Place everything anew: another frame is the fixed one."""
         self.on_transforms()
 
-    def followed_frame(self) -> str:
-        """Return the frame whose newest pose is shown; empty for none."""
-        return ""
+    def followed_frames(self) -> Iterable[str]:
+        """Return the frames whose newest poses are shown."""
+        return ()
 
-    def check_frame(self) -> None:
-        """Fade what follows a frame that is not updated any more; called by the scene."""
-        frame = self.followed_frame().lstrip("/") if self.shown else ""
-        silence = (
-            0.0 if frame in ("", FIXED_FRAME) or self.scene is None else (self.scene.silence(frame))
-        )
-        self._frame_is_silent = silence > _SILENT_S
-        if self._frame_is_silent:
-            since = (
-                "the robot is not connected"
-                if math.isinf(silence)
-                else (f"no transform has come for {silence:.0f} s")
-            )
-            self.set_status("Frame", "warn", f"[{frame}] may be somewhere else: {since}")
-        else:
-            self.delete_status("Frame")
+    def check_frames(self) -> None:
+        """Fade what follows frames that are not updated any more; called by the scene."""
+        scene, ages = self.scene, {}
+        if scene is not None and self.shown:
+            frames = (frame.lstrip("/") for frame in self.followed_frames())
+            ages = {one: scene.silence(one) for one in frames if one not in ("", FIXED_FRAME)}
+        self._outdated_frames = {one: age for one, age in ages.items() if age > _SILENT_S}
+        self._report_outdated_frames()
         self._fade()
+
+    def _report_outdated_frames(self) -> None:
+        frames = self._outdated_frames
+        if not frames:
+            self.delete_status("Frame")
+            return
+        # Those behind a joint are as old as it is, but for the time that this takes.
+        worst = max(frames, key=lambda one: round(frames[one], 1))
+        why = "the robot is not connected"
+        if not math.isinf(frames[worst]):
+            why = f"no transform has come for {frames[worst]:.0f} s"
+        more = f"[{worst}]" if len(frames) == 1 else f"[{worst}] and {len(frames) - 1} more"
+        self.set_status("Frame", "warn", f"{more} may be somewhere else: {why}")
 
     def _fade(self) -> None:
         """Draw what may be out of date as such."""
-        self.root.alpha = OUTDATED_ALPHA if self._frame_is_silent else 1.0
+        self.root.alpha = OUTDATED_ALPHA if self._outdated_frames else 1.0
 
     def reset(self) -> None:
         """Drop all data that was received, e.g. as time has jumped back."""
@@ -718,14 +723,14 @@ class TopicDisplay(OneTopicDisplay):
         age_s = (scene.now() - newest.stamp) * 1e-9 if newest.stamp else math.inf
         return min(age_s, time.monotonic() - self._placed_at) > _LATE_S
 
-    def check_frame(self) -> None:
+    def check_frames(self) -> None:
         """Try again to place what is late, so that the status says why it is not shown."""
         if self.shown and self._is_late():
             self._show_waiting()
-        super().check_frame()
+        super().check_frames()
 
     def _fade(self) -> None:
-        faded = self._is_gone or self._frame_is_silent
+        faded = self._is_gone or self._outdated_frames
         self.root.alpha = OUTDATED_ALPHA if faded else 1.0
 
     # -- messages --------------------------------------------------------------------------------

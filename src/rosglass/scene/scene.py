@@ -357,7 +357,7 @@ class Scene(Element):
             return
         self._check_fixed_frame()
         for display in self._alive():
-            display.check_frame()
+            display.check_frames()
 
     def _check_fixed_frame(self) -> None:
         """Say that the fixed frame is none of the robot's."""

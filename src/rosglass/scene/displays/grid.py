@@ -31,9 +31,9 @@ class _InFrame(Display):
         super().__init__(parent, runtime)
         self.root.add(self._body)
 
-    def followed_frame(self) -> str:
+    def followed_frames(self) -> tuple[str, ...]:
         """Return the frame that it is drawn in."""
-        return str(self.frame)
+        return (str(self.frame),)
 
     def on_transforms(self) -> None:
         """Follow the frame."""

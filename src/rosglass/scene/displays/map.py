@@ -209,9 +209,9 @@ class MapDisplay(TopicDisplay):
         if pose is not None:
             self._image.pose = pose @ self._corner
 
-    def followed_frame(self) -> str:
+    def followed_frames(self) -> tuple[str, ...]:
         """Return the map's frame, unless it is placed at its own time."""
-        return "" if self.useTimestamp or self._cells is None else self._where[0]
+        return () if self.useTimestamp or self._cells is None else (self._where[0],)
 
     def on_transforms(self) -> None:
         """Follow the map's frame."""

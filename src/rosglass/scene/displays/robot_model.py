@@ -574,9 +574,13 @@ class RobotModelDisplay(Display):
         if any(line.startswith("Mesh ") for line in self._loaded_lines):
             self._text = None
 
-    def followed_frame(self) -> str:
-        """Return the frame of the robot's root link."""
-        return self._frame_of(self._root_link) if self._root_link else ""
+    def followed_frames(self) -> list[str]:
+        """Return the frames of the links that are shown, the root link's first."""
+        shown = [
+            name for name, link in self._bodies.items() if link.root.visible and link.has_shape
+        ]
+        shown.sort(key=lambda name: name != self._root_link)
+        return [self._frame_of(name) for name in shown]
 
     def _frame_of(self, link: str) -> str:
         prefix = self.tfPrefix.strip("/")

@@ -11,7 +11,7 @@ import numpy as np
 
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot
-from rosglass.scene.display import Display
+from rosglass.scene.display import OUTDATED_ALPHA, Display
 from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, stack_poses
 from rosglass.scene.drawing import Labels
 from rosglass.scene.parts import Parts
@@ -94,6 +94,8 @@ class TFDisplay(Display):
         self._next = 0.0
         #: Whether a frame is not static, and when they are looked at without a transform.
         self._moves = False
+        #: Whether the robot is not connected: all fade then.
+        self._is_lost = False
         self._next_look = 0.0
         #: What is drawn, to draw nothing anew while nothing changes.
         self._drawn: Any = None
@@ -170,16 +172,16 @@ class TFDisplay(Display):
             self._next = now + self.updateInterval
             self._draw()
 
-    def check_frame(self) -> None:
+    def check_frames(self) -> None:
         """Fade all frames while the robot is not connected."""
         why = self._disconnected() if self.shown and self.frames else ""
-        self._frame_is_silent = bool(why)
+        self._is_lost = bool(why)
         if why:
             # Their own timeouts count again once it is.
             self.set_status("Connection", "warn", f"frames may be somewhere else: {why}")
         else:
             self.delete_status("Connection")
-        self._fade()
+        self.root.alpha = OUTDATED_ALPHA if why else 1.0
 
     @Slot()
     def _on_tick(self) -> None:
@@ -222,7 +224,7 @@ class TFDisplay(Display):
         for name, pose in zip(chosen, poses, strict=True):
             if name in unknown or name not in tree:
                 continue
-            share = 1.0 if self._frame_is_silent else self._share(tree[name])
+            share = 1.0 if self._is_lost else self._share(tree[name])
             shown.append(_Frame(name, pose, share, tree[name].parent))
         self._moves = any(not tree[frame.name].static for frame in shown)
         shown = [frame for frame in shown if frame.share > 0]
