@@ -155,6 +155,28 @@ def test_what_is_shown_fades_while_newer_data_waits_for_its_transform(bench: Sce
     assert display.statusLevel == "ok", display.statusText
 
 
+def test_what_is_shown_fades_while_newer_data_is_stamped_ahead(bench: SceneBench) -> None:
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    view = bench.load('PointStampedDisplay { topic: "/point" }')
+    (display,) = view.scene.displays
+    points = bench.robot.create_publisher("/point", "geometry_msgs/PointStamped")
+    moving = TransformBroadcaster(bench.robot)
+
+    def send(ahead_ns: int) -> None:
+        now = bench.robot.now()
+        moving.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), now, "map", "arm"))
+        stamp = type(now)(now.nanoseconds + ahead_ns)
+        points.publish({"header": {"frame_id": "arm", "stamp": stamp}})
+
+    bench.wait(points.subscription_count)
+    bench.wait(lambda: send(0) or len(parts(display, SPHERE)) == 1)
+    # The clock of the sensor's computer jumps ahead; transforms do not.
+    bench.wait(lambda: send(5_000_000_000) or display.root.alpha < 1.0)
+    assert "the transform of the newest message is not known" in display.statusText
+    bench.wait(lambda: send(0) or display.root.alpha == 1.0)
+
+
 def test_nothing_is_late_while_the_robots_time_stands_still(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import Transform, TransformBroadcaster

@@ -720,7 +720,8 @@ class TopicDisplay(OneTopicDisplay):
         if scene is None or newest is None or not self._waiting or self._waiting[-1] is not newest:
             return False
         # While a simulation or recording is paused, nothing is late.
-        age_s = (scene.now() - newest.stamp) * 1e-9 if newest.stamp else math.inf
+        # What is stamped ahead, by a clock that has jumped, waits in vain as well.
+        age_s = abs(scene.now() - newest.stamp) * 1e-9 if newest.stamp else math.inf
         return min(age_s, time.monotonic() - self._placed_at) > _LATE_S
 
     def check_frames(self) -> None:
