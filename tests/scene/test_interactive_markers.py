@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -612,6 +613,34 @@ def test_controls_face_the_viewer_or_stay_fixed_or_turn_with_the_marker(
         assert group.pose[:3, 0] == pytest.approx([0, 1, 0], abs=0.01)
         bench.view.controller.set("Yaw", 2.0)
         bench.view.camera_moved()
+
+
+def test_markers_fade_when_their_frame_is_not_updated(
+    bench: SceneBench, show: Callable[..., Any], monkeypatch: Any
+) -> None:
+    from rosglass import Time
+    from rosglass.scene import display as displays
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    monkeypatch.setattr(displays, "_SILENT_S", 0.5)
+    broadcaster = TransformBroadcaster(bench.robot)
+    sent = itertools.count(1)
+
+    def move() -> None:
+        stamp = Time.from_parts(1, next(sent))
+        broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), stamp, "map", "gripper"))
+
+    display = show(
+        marker(control(MOVE_AXIS), header={"frame_id": "gripper"}),
+        marker(control(MOVE_AXIS), name="goal"),
+    )
+    arm, goal = shown(display), shown(display, "goal")
+    bench.wait(lambda: move() or arm.root.visible)
+    assert arm.root.alpha == 1.0
+    bench.wait(lambda: arm.root.alpha < 1.0)
+    assert goal.root.alpha == 1.0
+    assert "[gripper] may be somewhere else: no transform has come for" in display.statusText
+    bench.wait(lambda: move() or arm.root.alpha == 1.0)
 
 
 def test_markers_of_a_frame_follow_it_and_stamped_ones_stay(

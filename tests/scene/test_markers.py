@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
-from rosglass.scene.drawing import BOX, SPHERE, Labels, Lines, Mesh, Points
+from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Labels, Lines, Mesh, Points
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -223,6 +224,42 @@ def test_markers_wait_for_their_frame_and_locked_ones_follow_it(
     bench.wait(lambda: xs(display) == [3.0, 1.0])
     # Only its pose was set.
     assert (drawables(display)[0], boxes.geometry) == (boxes, uploads)
+
+
+def test_locked_markers_fade_when_their_frame_is_not_updated(
+    bench: SceneBench, show: Callable[..., Any], monkeypatch: Any
+) -> None:
+    from rosglass import Time
+    from rosglass.scene import display as displays
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    monkeypatch.setattr(displays, "_SILENT_S", 0.5)
+    display = show(
+        marker(1, header={"frame_id": "arm"}, frame_locked=True),
+        marker(2, 1, header={"frame_id": "arm"}),
+        marker(3, 2),
+    )
+    broadcaster = TransformBroadcaster(bench.robot)
+    sent = itertools.count(1)
+
+    def move() -> None:
+        stamp = Time.from_parts(1, next(sent))
+        broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), stamp, "map", "arm"))
+
+    def opacities() -> dict[int, float]:
+        shapes = {BOX: 1, SPHERE: 2, CYLINDER: 3}
+        return {shapes[one.shape]: alpha for one, _, alpha in display.root.drawables()}
+
+    bench.wait(lambda: move() or opacities() == {1: 1.0, 2: 1.0, 3: 1.0})
+    bench.wait(lambda: move() or display.statusLevel == "ok")
+    # The others are where they were meant to be.
+    bench.wait(lambda: opacities() == {1: 0.35, 2: 1.0, 3: 1.0}, opacities)
+    assert "[arm] may be somewhere else: no transform has come for" in display.statusText
+    bench.wait(lambda: move() or opacities()[1] == 1.0)
+    assert display.statusLevel == "ok", display.statusText
+    bench.wait(lambda: opacities()[1] < 1.0)
+    display.setNamespaceEnabled("shapes", False)
+    bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
 
 
 def send_static(node: Any, parent: str, child: str, x: float = 0.0) -> None:

@@ -604,6 +604,16 @@ class InteractiveMarkersDisplay(TopicDisplay):
         for marker in self._all():
             marker.place_anew()
 
+    def followed_frames(self) -> set[str]:
+        """Return the frames that markers follow."""
+        return {marker.frame for marker in self._all() if not marker.stamp}
+
+    def _fade(self) -> None:
+        self.root.alpha = OUTDATED_ALPHA if self._is_gone else 1.0
+        for marker in self._all():
+            is_outdated = not marker.stamp and marker.frame in self._outdated_frames
+            marker.root.alpha = OUTDATED_ALPHA if is_outdated else 1.0
+
     # -- drags and menus -------------------------------------------------------------------------
 
     def on_drag(self, marker: InteractiveMarker | None) -> None:

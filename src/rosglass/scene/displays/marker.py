@@ -19,7 +19,7 @@ from rosglass.errors import Error, TransformException
 from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot, is_alive
-from rosglass.scene.display import Status, TopicDisplay
+from rosglass.scene.display import OUTDATED_ALPHA, Status, TopicDisplay
 from rosglass.scene.displays.robot_model import STL_ENDINGS, MeshFiles, material_of
 from rosglass.scene.displays.shapes import poses_matrices
 from rosglass.scene.drawing import (
@@ -847,6 +847,16 @@ class Markers(TopicDisplay):
             if not marker.locked:
                 self._place_anew(marker, poses)
         self._follow(poses, hide=True)
+
+    def followed_frames(self) -> set[str]:
+        """Return the frames to which markers are locked."""
+        groups = self._groups.items()
+        return {frame for (_, frame), one in groups if one.root.visible and not one.is_empty}
+
+    def _fade(self) -> None:
+        self.root.alpha = OUTDATED_ALPHA if self._is_gone else 1.0
+        for (_, frame), group in self._groups.items():
+            group.root.alpha = OUTDATED_ALPHA if frame in self._outdated_frames else 1.0
 
     def _follow(self, poses: _Poses, *, hide: bool = False) -> None:
         """Place what has waited, and what is locked to its frame."""
