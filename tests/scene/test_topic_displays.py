@@ -177,6 +177,88 @@ def test_what_is_shown_fades_while_newer_data_is_stamped_ahead(bench: SceneBench
     bench.wait(lambda: send(0) or display.root.alpha == 1.0)
 
 
+SCAN = {
+    "header": {"frame_id": "map"},
+    "angle_min": -1.0,
+    "angle_max": 1.0,
+    "angle_increment": 1.0,
+    "range_max": 10.0,
+    "ranges": [1.0, 2.0, 3.0],
+    "intensities": [1.0, 2.0, 3.0],
+}
+RANGE = {
+    "header": {"frame_id": "map"},
+    "field_of_view": 0.5,
+    "max_range": 5.0,
+    "range": 2.0,
+}
+CLOUD = {"header": {"frame_id": "map"}, "height": 1, "is_dense": True}
+
+
+def test_obstacles_fade_when_a_sensor_sends_nothing_any_more(
+    bench: SceneBench, monkeypatch: Any
+) -> None:
+    from rosglass.comm.qos import QoS
+    from rosglass.scene import display as displays
+
+    monkeypatch.setattr(displays, "_CONTINUOUS_S", 0.5)
+    view = bench.load(
+        'LaserScanDisplay { topic: "/scan" } RangeDisplay { topic: "/range" }'
+        'PointCloud2Display { topic: "/points" } PointCloud2Display { topic: "/cloud_map" }'
+    )
+    *sensors, cloud_map = view.scene.displays
+    cloud = "sensor_msgs/PointCloud2"
+    publishers = [
+        (bench.robot.create_publisher("/scan", "sensor_msgs/LaserScan"), SCAN),
+        (bench.robot.create_publisher("/range", "sensor_msgs/Range"), RANGE),
+        (bench.robot.create_publisher("/points", cloud), CLOUD),
+    ]
+    # A map that is published once is valid until there is another one.
+    bench.robot.create_publisher("/cloud_map", cloud, QoS.latched()).publish(CLOUD)
+
+    def send() -> bool:
+        for publisher, message in publishers:
+            publisher.publish(message)
+        return all(one.received for one in view.scene.displays)
+
+    bench.wait(send)
+    assert [one.root.alpha for one in view.scene.displays] == [1.0] * 4
+    # The drivers hang: their publishers are still there.
+    bench.wait(lambda: all(one.root.alpha < 1.0 for one in sensors))
+    for display in sensors:
+        assert "Data: no message for" in display.statusText
+        assert display.statusLevel == "warn"
+    assert (cloud_map.root.alpha, cloud_map.statusLevel) == (1.0, "ok")
+    bench.wait(lambda: send() and all(one.root.alpha == 1.0 for one in sensors))
+
+
+def test_a_sensor_may_send_nothing_while_a_simulation_is_paused(
+    bench: SceneBench, monkeypatch: Any
+) -> None:
+    from rosglass.scene import display as displays
+
+    monkeypatch.setattr(displays, "_CONTINUOUS_S", 0.5)
+    view = bench.load('LaserScanDisplay { topic: "/scan" }')
+    (display,) = view.scene.displays
+    clock = bench.robot.create_publisher("/clock", "rosgraph_msgs/msg/Clock")
+    scans = bench.robot.create_publisher("/scan", "sensor_msgs/LaserScan")
+    view.scene.node.parameters.set({"use_sim_time": True})
+    bench.wait(lambda: clock.subscription_count() and scans.subscription_count())
+
+    def set_time(seconds: int) -> None:
+        clock.publish({"clock": {"sec": seconds, "nanosec": 0}})
+        bench.wait(lambda: view.scene.now() == seconds * 10**9)
+
+    set_time(10)
+    # The change of time makes it subscribe anew.
+    bench.wait.settled(bench.session)
+    bench.wait(lambda: scans.publish(SCAN) or display.statusLevel == "ok")
+    bench.wait.nothing_happens(0.8)
+    assert (display.root.alpha, display.statusLevel) == (1.0, "ok"), display.statusText
+    set_time(11)
+    bench.wait(lambda: display.root.alpha < 1.0)
+
+
 def test_nothing_is_late_while_the_robots_time_stands_still(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import Transform, TransformBroadcaster

@@ -556,8 +556,9 @@ class TopicDisplay(OneTopicDisplay):
     Attributes:
         KEEPS_ALL: Whether each message counts, as for markers; otherwise the newest does.
         EAGER: Whether all fields of a message are decoded at once, which is faster if all are used.
-        IS_CONTINUOUS: Whether publishers send all the time, so that what is shown is out of date
-            after 3 s without a message, as pictures are.
+        IS_CONTINUOUS: Whether publishers send all the time, unless they keep the last message for
+            later subscribers; what is shown is out of date after 3 s without a message then, or
+            after twice the time between messages.
     """
 
     KEEPS_ALL: ClassVar[bool] = False
@@ -586,6 +587,9 @@ class TopicDisplay(OneTopicDisplay):
         #: The newest message, which may still wait for its transform.
         self._newest: _Item | None = None
         self._arrived = self._arrived_at = 0.0
+        #: The robot's time then, nanoseconds, and seconds between the last messages.
+        self._arrived_ns = 0
+        self._intervals = deque((0.0, 0.0), maxlen=2)
         super().__init__(parent, runtime)
 
     def _load_topic(self, given: TopicSetting) -> None:
@@ -675,18 +679,40 @@ class TopicDisplay(OneTopicDisplay):
             return
         if session.state != "connected":
             return
+        if self._is_latched():
+            self._outdated = False
+            self._show_age()
+
+    def _is_latched(self) -> bool:
+        """Return whether the publisher of the last message keeps it for later subscribers."""
+        intake, node = self._intake, self.node
+        if intake is None or node is None:
+            return False
         try:
             publishers = node.publishers(self._resolved)
         except Error:
-            return
+            return False
         known = any(one.gid for one in publishers)
-        if any(
+        return any(
             one.qos.durability is Durability.TRANSIENT_LOCAL
             and (one.gid == intake.publisher or not known)
             for one in publishers
-        ):
-            self._outdated = False
-            self._show_age()
+        )
+
+    def _outdated_after_s(self) -> float:
+        """Return after how many seconds without a message the last one is out of date."""
+        if not self.IS_CONTINUOUS or self._is_latched():
+            return math.inf
+        # Maps are sent as clouds as well, every few seconds.
+        return max(_CONTINUOUS_S, 2 * min(self._intervals))
+
+    def _seconds_without_message(self) -> float:
+        seconds, scene = self._steady() - self._arrived_at, self.scene
+        node = None if scene is None else scene.node
+        if scene is None or node is None or not node.clock.is_simulated:
+            return seconds
+        # While a simulation is paused, nothing is sent, and nothing changes.
+        return min(seconds, abs(scene.now() - self._arrived_ns) * 1e-9)
 
     def _update_stale(self) -> None:
         super()._update_stale()
@@ -699,11 +725,11 @@ class TopicDisplay(OneTopicDisplay):
         """Fade data that is out of date, and say so."""
         reason = ""
         if self._last is not None and self.enabled:
-            silence_s = self._steady() - self._arrived_at
+            seconds = self._seconds_without_message()
             if self._outdated:
                 reason = "its publisher is gone"
-            elif self.IS_CONTINUOUS and silence_s > _CONTINUOUS_S:
-                reason = f"no message for {silence_s:.0f} s that could be shown"
+            elif seconds > _CONTINUOUS_S and seconds > self._outdated_after_s():
+                reason = f"no message for {seconds:.0f} s that could be shown"
             elif self._is_late():
                 reason = "the transform of the newest message is not known"
         self._is_gone = bool(reason)
@@ -764,7 +790,10 @@ class TopicDisplay(OneTopicDisplay):
             self.delete_status("Message")
         if not items:
             return
-        self._arrived, self._arrived_at = time.time(), self._steady()
+        now = self._steady()
+        self._intervals.append(now - self._arrived_at)
+        self._arrived, self._arrived_at = time.time(), now
+        self._arrived_ns = self.scene.now()
         self._newest = items[-1]
         self.set_status("Topic", "ok", f"{intake.received} messages received")
         self._outdated = False

@@ -176,6 +176,7 @@ class RangeDisplay(HistoryDisplay):
     """A ``sensor_msgs/Range``, as a cone. See its page in ``docs/scene.md``."""
 
     TYPE = "Range"
+    IS_CONTINUOUS = True
     MESSAGES = ("sensor_msgs/Range",)
 
     color = Setting("Color", "color", "#ffffff", "Of the cone.")

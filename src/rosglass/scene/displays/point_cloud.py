@@ -522,6 +522,7 @@ class PointCloud2Display(CloudDisplay):
     """A ``sensor_msgs/PointCloud2``. See its page in ``docs/scene.md``."""
 
     TYPE = "PointCloud2"
+    IS_CONTINUOUS = True
     MESSAGES = ("sensor_msgs/PointCloud2",)
 
 
@@ -529,6 +530,7 @@ class PointCloudDisplay(CloudDisplay):
     """A ``sensor_msgs/PointCloud``, the type before PointCloud2. See ``docs/scene.md``."""
 
     TYPE = "PointCloud"
+    IS_CONTINUOUS = True
     MESSAGES = ("sensor_msgs/PointCloud",)
     READ = cloud_from_point_cloud
 
@@ -537,6 +539,7 @@ class LaserScanDisplay(CloudDisplay):
     """A ``sensor_msgs/LaserScan``, corrected by the scanner's motion. See ``docs/scene.md``."""
 
     TYPE = "LaserScan"
+    IS_CONTINUOUS = True
     MESSAGES = ("sensor_msgs/LaserScan",)
 
     def preparer(self) -> Callable[[Message], Any]:
