@@ -282,13 +282,26 @@ def test_all_markers_of_an_array_are_applied_in_order(show: Callable[..., Any]) 
     assert display.statusLevel == "ok", display.statusText
 
 
-def test_one_that_cannot_be_drawn_does_not_hide_the_others(show: Callable[..., Any]) -> None:
-    flat = {"x": 1e-200, "y": 1e200, "z": 1.0}
-    display = show(
-        marker(1), marker(6, 1, scale=flat, points=points((0, 0, 0))), marker(2, 2), marker(3, 3)
-    )
+def test_one_that_cannot_be_drawn_does_not_hide_the_others(
+    show: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail() -> None:
+        raise ValueError("no points today")
+
+    monkeypatch.setattr("rosglass.scene.displays.marker.Points", fail)
+    display = show(marker(1), marker(6, 1, points=points((0, 0, 0))), marker(2, 2), marker(3, 3))
     assert len(drawables(display)) == 3
-    assert "shapes/1: it cannot be drawn: a pose must be" in display.statusText
+    assert "shapes/1: it cannot be drawn: no points today" in display.statusText
+
+
+def test_scales_that_are_beyond_what_is_drawn_are_named(show: Callable[..., Any]) -> None:
+    display = show(
+        marker(1, scale={"x": 1e30, "y": 1.0, "z": 1.0}),
+        marker(6, 1, scale={"x": 1e-160, "y": 1.0, "z": 1.0}, points=points((0, 0, 0))),
+    )
+    assert "shapes/0: scale: 1e+30 is beyond the 1e+18 that is drawn" in display.statusText
+    assert "shapes/1: scale (0.0, 1.0, 1.0) of a cube_list is 0" in display.statusText
+    assert len(drawables(display)) == 1
 
 
 def test_a_waiting_marker_is_replaced_and_deleted_by_newer_ones(
@@ -431,7 +444,7 @@ def test_flat_shapes_are_drawn_with_a_warning(
 
 
 def test_labels_of_wild_texts_are_bounded(bench: SceneBench, show: Callable[..., Any]) -> None:
-    display = show(marker(9, text="wide " * 5000, scale={"z": 1e30}))
+    display = show(marker(9, text="wide " * 5000, scale={"z": 1e18}))
     (labels,) = drawables(display)
     assert isinstance(labels, Labels)
     assert len(labels.texts[0]) == Labels.MAX_LENGTH

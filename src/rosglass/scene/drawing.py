@@ -36,6 +36,7 @@ __all__ = [
     "Mesh",
     "Points",
     "Shape",
+    "are_drawable",
     "check_numbers",
     "instance_matrix",
     "rgba_bytes",
@@ -244,6 +245,11 @@ def rgba_bytes(colors: ArrayLike, count: int) -> NDArray[np.uint8]:
     return out
 
 
+def are_drawable(numbers: ArrayLike) -> NDArray[np.bool_]:
+    """Return whether numbers of a message can be drawn: those that are finite and at most 1e18."""
+    return np.asarray(np.abs(np.asarray(numbers)) <= _MAX_NUMBER)  # NaN is not
+
+
 def check_numbers(name: str, numbers: ArrayLike) -> None:
     """Check that numbers of a message can be drawn.
 
@@ -255,8 +261,7 @@ def check_numbers(name: str, numbers: ArrayLike) -> None:
     Raises:
         Error: One is not finite, or beyond 1e18.
     """
-    array = np.asarray(numbers)
-    good = np.abs(array) <= _MAX_NUMBER  # NaN is not
+    array, good = np.asarray(numbers), are_drawable(numbers)
     if good.all():
         return
     bad = float(array[~good][0])

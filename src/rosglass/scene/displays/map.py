@@ -105,6 +105,7 @@ def _read_map(message: Any) -> _Grid | _Update:
     resolution = float(info.resolution)
     if not (np.isfinite(resolution) and resolution > 0):
         raise Error(f"info.resolution: expected metres above 0, got {resolution}")
+    check_numbers("info.resolution", resolution)
     cells = _cells_of(message, info.width, info.height)
     return _Grid(cells.copy(), resolution, matrix_of(info.origin))
 
@@ -273,6 +274,7 @@ def _read_cells(message: Any) -> tuple[NDArray[np.float32], float, float]:
     width, height = float(message.cell_width), float(message.cell_height)
     if not (np.isfinite([width, height]).all() and width > 0 and height > 0):
         raise Error(f"cell_width {width}, cell_height {height}: expected metres above 0")
+    check_numbers("cell_width, cell_height", (width, height))
     if len(message.cells) > _MAX_CELLS:
         raise Error(f"cells: {len(message.cells)} are more than the {_MAX_CELLS} that are drawn")
     points = read_columns(message.cells, "x", "y", "z").astype(np.float32)

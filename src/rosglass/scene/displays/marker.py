@@ -35,6 +35,7 @@ from rosglass.scene.drawing import (
     Mesh,
     Points,
     Shape,
+    are_drawable,
     check_numbers,
 )
 from rosglass.scene.meshes import ending_of
@@ -94,6 +95,8 @@ _ARROW_SHAPES = (CYLINDER, CONE)
 _NO_POINTS, _NO_COLORS = np.zeros((0, 3), np.float32), np.zeros((0, 4), np.float32)
 #: Directions of the scale that count, where not all do.
 _SCALED = {LINE_STRIP: "x", LINE_LIST: "x", POINTS: "xy", TEXT: "z", ARROW_STRIP: "xy"}
+#: Metres below which a scale is 0.
+_LEAST_M = 1e-18
 #: Metres that are drawn for a scale of 0: surfaces without thickness have no shade.
 _THIN_M = 1e-4
 #: Markers that wait for a transform, of which the oldest make room.
@@ -182,8 +185,9 @@ def _read_all(messages: Sequence[Any], part: tuple[str, int] | None = None) -> l
         s, c = message.scale, message.color
         rows.append((p.x, p.y, p.z, q.x, q.y, q.z, q.w, s.x, s.y, s.z, c.r, c.g, c.b, c.a))
     numbers = np.array(rows, np.float64).reshape(-1, 14)
-    finite: NDArray[np.bool_] = np.asarray(np.isfinite(numbers).all(axis=1))
+    finite: NDArray[np.bool_] = np.asarray(are_drawable(numbers).all(axis=1))
     sizes = numbers[:, 7:10]
+    sizes[np.abs(sizes) < _LEAST_M] = 0.0
     if part is not None:
         sizes[sizes == 0] = 1.0
     warnings: dict[int, str] = {}
@@ -216,7 +220,7 @@ def _read_one(
         message: The message.
         part: As for :func:`read_marker`.
         numbers: Pose, scale and color.
-        is_finite: Whether all of these are.
+        is_finite: Whether all of these are, and can be drawn.
         warning: Of the record.
         pose: Matrix of the pose.
         scaled: The same, multiplied with the scale.
@@ -239,7 +243,7 @@ def _read_one(
     elif not 0 <= kind <= ARROW_STRIP:
         problem = f"type {kind}: expected 0 to {ARROW_STRIP}"
     elif not is_finite:
-        problem = "pose, scale or color has a number that is not finite"
+        problem = _numbers_problem(numbers)
     elif count > _MAX_POINTS:
         problem = f"points: {count} are more than the {_MAX_POINTS} that are drawn"
     elif count or kind not in _SOLIDS:
@@ -295,6 +299,20 @@ def _without_zeros(
     if (x, y, z) == size or (kind == ARROW and size[0] and size[1]):
         return (x, y, z), ""
     return (x, y, z), f"scale {size} of a {_NAMES[kind]} is 0 in a direction: drawn as {_THIN_M} m"
+
+
+def _numbers_problem(numbers: list[float]) -> str:
+    """Return which of pose, scale and color has a number that cannot be drawn."""
+    try:
+        for name, part in (
+            ("pose", numbers[:7]),
+            ("scale", numbers[7:10]),
+            ("color", numbers[10:]),
+        ):
+            check_numbers(name, part)
+    except Error as error:
+        return str(error)
+    return ""
 
 
 def _colors_warning(kind: int, points: int, colors: NDArray[np.float32]) -> str:
