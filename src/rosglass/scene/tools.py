@@ -9,7 +9,6 @@ from :class:`Tool` in Python, or are a ``Tool`` in QML with handlers of its sign
 from __future__ import annotations
 
 import logging
-import time
 from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
@@ -55,8 +54,8 @@ DEFAULT_TOOLS = (
     "SetGoal",
     "PublishPoint",
 )
-#: Seconds that the status bar shows the outcome of a tool, e.g. what was published.
-_OUTCOME_S = 5.0
+#: Milliseconds that the status bar shows the outcome of a tool, e.g. what was published.
+_OUTCOME_MS = 5000
 #: Types of Qt by name, which PySide's hints do not have.
 _MAP: Any = "QVariantMap"
 _LIST: Any = "QVariantList"
@@ -476,7 +475,6 @@ class Tools(QtCore.QObject):
         self._grab = ""
         self._held = Button.NONE
         self._modifiers = Modifier.NONE
-        self._outcome_at = 0.0
         self._outcome_end = single_shot(self, self._show_status)
         #: The tools from DEFAULT_TOOLS, which declared ones replace.
         self._defaults: set[Tool] = set()
@@ -743,8 +741,7 @@ class Tools(QtCore.QObject):
 
     def announce(self, outcome: str) -> None:
         """Show for some seconds what a tool has done, as plain text."""
-        self._outcome_at = time.monotonic()
-        self._outcome_end.start(int(_OUTCOME_S * 1000) + 50)
+        self._outcome_end.start(_OUTCOME_MS)
         if report(self, outcome=outcome):
             self._show_status()
 
@@ -752,7 +749,7 @@ class Tools(QtCore.QObject):
     def _show_status(self) -> None:
         if not is_alive(self):
             return
-        if self.outcome and time.monotonic() - self._outcome_at < _OUTCOME_S:
+        if self.outcome and self._outcome_end.isActive():
             # Names and errors are the robot's: they must not become tags.
             text = escape(self.outcome, quote=False)
         else:
