@@ -113,6 +113,29 @@ def test_a_new_view_is_written_for_either_rviz(bench: SceneBench, tmp_path: Path
         view.config = None
 
 
+@pytest.mark.parametrize("ros", [1, 2])
+def test_views_are_saved_for_the_rviz_of_the_file(
+    bench: SceneBench, tmp_path: Path, ros: int
+) -> None:
+    view, file = bench.load(), tmp_path / "views.rviz"
+    package = ("rviz", "rviz_default_plugins")[ros - 1]
+    file.write_text(
+        "Visualization Manager:\n  Displays: []\n"
+        f"  Tools: [{{Class: {package}/Interact}}]\n"
+        f"  Views: {{Current: {{Class: {package}/Orbit, Name: Mine, Distance: 7}}}}\n"
+    )
+    assert view.load_config(file) == []
+    view.view = "TopDownOrtho"
+    assert view.saveView("above") == ""
+    view.save_config()
+    found = RvizConfig.load(file)
+    for one in (found.current_view, found.saved_views[0]):
+        assert one is not None
+        assert one.class_id == f"{package}/TopDownOrtho"
+        assert one.settings["Value"] == f"TopDownOrtho ({package})"
+    assert found.saved_views[0].name == "above"
+
+
 def test_groups_hide_what_is_in_them(bench: SceneBench, tmp_path: Path) -> None:
     file = tmp_path / "groups.rviz"
     file.write_text(

@@ -868,6 +868,14 @@ def ros1_bench(make_bench: Any, tmp_path: Path) -> Iterator[SceneBench]:
         made.close()
 
 
+def test_the_first_saved_view_begins_a_config_of_rviz_1(ros1_bench: SceneBench) -> None:
+    view = ros1_bench.load()
+    ros1_bench.wait(lambda: view.scene.node is not None)
+    assert view.saveView("start") == ""
+    assert view.collect_config().ros == 1
+    assert view.config.saved_views[0].class_id == "rviz/Orbit"
+
+
 def test_ros_1_has_topics_of_its_own(ros1_bench: SceneBench) -> None:
     bench = ros1_bench
     hand, view = Hand(bench), bench.load()

@@ -28,6 +28,7 @@ from rosglass.scene.events import Button, Modifier, Touch, Wheel
 from rosglass.scene.picking import pick
 from rosglass.scene.renderer import Frame, SceneRenderer
 from rosglass.scene.rviz_config import RvizConfig, ToolConfig, ViewConfig
+from rosglass.scene.rviz_formats import ros_of
 from rosglass.scene.scene import Scene
 from rosglass.scene.selection import Selection
 from rosglass.scene.tools import PointerEvent, Tool, Tools
@@ -408,9 +409,23 @@ class SceneView(QQuickRhiItem):
     def save_view(self, name: str) -> None:
         """Save where the camera is, as the last of the saved views."""
         if self.config is None:
-            self.config = RvizConfig()
-        self.config.saved_views.append(ViewConfig({**self._view.state(), "Name": name}))
+            self.config = RvizConfig(self._ros())
+        self.config.saved_views.append(self._view_config(name, self.config.ros))
         self.savedViewsChanged.emit()
+
+    def _ros(self) -> int:
+        """Return the RViz of the config, 1 or 2; that of the robot if there is none."""
+        if self.config is not None:
+            return self.config.ros
+        node = self.scene.node
+        return 1 if node is not None and node.wire == "ros1" else 2
+
+    def _view_config(self, name: str, ros: int) -> ViewConfig:
+        """Return the view for a config of one RViz, also if it is one of the other RViz."""
+        view = self._view
+        if ros_of(view.class_id) in (None, ros):
+            return ViewConfig({**view.state(), "Name": name})
+        return ViewConfig.new(view.TYPE, ros, name=name, settings=view.state())
 
     def show_saved_view(self, index: int) -> list[str]:
         """Look through a saved view.
@@ -512,17 +527,14 @@ class SceneView(QQuickRhiItem):
         Args:
             ros: The RViz that a new config is for, 1 or 2; by default that of the robot.
         """
-        if ros is None:
-            node = self.scene.node
-            ros = 1 if node is not None and node.wire == "ros1" else 2
-        config = self.config or RvizConfig(ros)
+        config = self.config or RvizConfig(ros or self._ros())
         config.fixed_frame = self.scene.fixed_frame
         config.background_color = cast("tuple[float, ...]", self._background.getRgbF())
         config.displays[:] = collect_displays(self.scene, config.ros)
         config.tools[:] = [ToolConfig(one) for one in self.tools.save_configs(config.ros)]
-        state = self._view.state()
         current = config.current_view
         before = {} if current is None else current.settings
+        state = self._view_config(self._view.name, config.ros).settings
         config.current_view = ViewConfig({**before, **state})
         return config
 
