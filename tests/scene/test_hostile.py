@@ -504,3 +504,34 @@ def test_robots_of_ros_1_may_be_wrong_as_well(ros1_robot: Robot, kind: str) -> N
     robot.send(robot.message)
     robot.bench.wait(lambda: robot.display.statusLevel == "ok", lambda: robot.display.statusText)
     robot.check()
+
+
+def test_transforms_that_are_refused_are_named(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    display = robot.view.scene.add("TF")
+    tf = robot._node.create_publisher("/tf", "tf2_msgs/TFMessage")
+    robot.bench.wait(tf.subscription_count)
+
+    def send(parent: str, child: str, x: float = 0.0) -> None:
+        move = {"translation": {"x": x}, "rotation": TURN}
+        header = {"frame_id": parent, "stamp": {"sec": 5}}
+        tf.publish({"transforms": [{"header": header, "child_frame_id": child, "transform": move}]})
+
+    def is_reported(text: str) -> None:
+        robot.bench.wait(lambda: text in display.statusText, lambda: display.statusText)
+
+    send("odom", "base")
+    send("base", "base")
+    is_reported(
+        "Refused: 1 were refused; the last one: TF_SELF_TRANSFORM ignoring the transform of"
+    )
+    send("odom", "arm", math.nan)
+    is_reported(
+        "Refused: 2 were refused; the last one: TF_NAN_INPUT ignoring the transform of 'arm'"
+    )
+    send("base", "map")
+    is_reported("the last one: TF_LOOP ignoring the transform of 'map' in 'base'")
+    monkeypatch.setattr("rosglass.scene.displays.tf._REFUSED_S", 0.0)
+    robot.bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
+    robot.check()

@@ -319,6 +319,9 @@ class TransformBuffer(Handle):
             ``repeated`` (same frame and stamp), ``self``, ``no name``, ``not finite``,
             ``not normalised``, ``loop``, ``too deep``.
 
+        last_fault: Why the last transform was refused that was neither old nor repeated; empty for
+            none.
+
     Raises:
         ArgumentError: The cache time is not above zero.
     """
@@ -331,6 +334,7 @@ class TransformBuffer(Handle):
             raise ArgumentError("cache_time", cache_time, "seconds above zero, or a Duration")
         self.cache_time = kept
         self.ignored: Counter[str] = Counter()
+        self.last_fault = ""
         #: Guards the frames, the listeners and the pending lookups.
         self._lock = threading.Lock()
         self._store = FrameStore(kept.nanoseconds)
@@ -403,6 +407,8 @@ class TransformBuffer(Handle):
                     changed.add(name)
             store.arrivals.update(dict.fromkeys(changed, monotonic()))
             self.ignored.update(kind for kind, _, _ in refused)
+            faults = [reason for kind, _, reason in refused if kind not in ("old", "repeated")]
+            self.last_fault = faults[-1] if faults else self.last_fault
             moved = store.version != tree
             disagreements, store.disagreements = store.disagreements, []
             jumps, store.jumps = store.jumps, []

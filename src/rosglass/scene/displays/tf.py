@@ -35,6 +35,8 @@ _MAX_FRAMES, _MAX_NAMES, _MAX_LINES = 2000, 10_000, 20
 _AXIS_M, _AXIS_RADIUS_M, _NAME_M = 0.2, 0.02, 0.1
 _SHAFT_M, _HEAD_M, _HEAD_WIDTH_M = 0.01, 0.1, 0.04
 _SHAFT_COLOR, _HEAD_COLOR = (0.8, 0.8, 0.3, 1.0), (1.0, 0.1, 0.6, 1.0)
+#: Seconds for which the status says that a transform was refused.
+_REFUSED_S = 10.0
 #: Seconds between two looks at frames that are not updated any more.
 _LOOK_S = 0.5
 #: The share of its timeout after which a frame begins to fade.
@@ -99,6 +101,8 @@ class TFDisplay(Display):
         self._next_look = 0.0
         #: What is drawn, to draw nothing anew while nothing changes.
         self._drawn: Any = None
+        #: How many transforms were refused, and when the last one was.
+        self._refused, self._refused_at = 0, 0.0
         #: Lines of the status about frames.
         self._lines: set[str] = set()
         #: The state of the transforms then.
@@ -173,7 +177,8 @@ class TFDisplay(Display):
             self._draw()
 
     def check_frames(self) -> None:
-        """Fade all frames while the robot is not connected."""
+        """Fade all frames while the robot is not connected, and say what was refused."""
+        self._report_refused()
         why = self._disconnected() if self.shown and self.frames else ""
         self._is_lost = bool(why)
         if why:
@@ -191,6 +196,21 @@ class TFDisplay(Display):
         if self.shown and self._moves and now >= self._next_look:
             self._next_look = now + _LOOK_S
             self._draw()
+
+    def _report_refused(self) -> None:
+        """Say which transform was refused last, while there are any."""
+        buffer = self.scene.transforms if self.scene is not None else None
+        if buffer is None or not self.shown:
+            return
+        ignored, now = buffer.ignored, time.monotonic()
+        count = sum(ignored.values()) - ignored["old"] - ignored["repeated"]
+        if count != self._refused:
+            self._refused, self._refused_at = count, now
+        if count and now - self._refused_at < _REFUSED_S:
+            text = f"{count} were refused; the last one: {buffer.last_fault}"
+            self.set_status("Refused", "warn", text)
+        else:
+            self.delete_status("Refused")
 
     def _is_chosen(self, name: str) -> bool:
         if self.parts.is_enabled(name):
