@@ -189,14 +189,11 @@ class SceneAccess(Access):
         if not path.is_file():
             wrong = "is a folder" if path.is_dir() else "does not exist"
             raise Error(f"{path} {wrong}; expected an RViz config file (.rviz)")
-        RvizConfig.load(path)
+        config = RvizConfig.load(path)
 
         def load() -> None:
-            try:
-                for note in self.scene_view.load_config(path):
-                    _log.warning("%s: %s", path, note)
-            except Error as error:
-                _log.error("rviz.loadConfig: %s", error)
+            for note in self.scene_view.show_config(config):
+                _log.warning("%s: %s", path, note)
 
         QtCore.QTimer.singleShot(0, self, load)
 
