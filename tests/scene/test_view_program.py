@@ -820,3 +820,32 @@ def test_what_was_sent_is_shown_before_messages_and_without_panels(
     bench.session.shutdown()
     bench.wait(lambda: bare.property("visible"))
     assert "connected" not in bare.property("text").split(":")[0]
+
+
+def test_the_program_follows_configs_of_overlays(
+    bench: SceneBench, window: Any, tmp_path: Path
+) -> None:
+    from PySide6.QtCore import QObject
+    from PySide6.QtQml import qmlContext
+
+    from rosglass.scene.access import access_of
+    from rosglass.scene.rviz_config import RvizConfig
+
+    program = qmlContext(window).contextProperty("program")
+    access = access_of(window.findChild(QObject, "scene"))
+    first, second = tmp_path / "a.rviz", tmp_path / "b.rviz"
+    first.write_text(GRID + "Window Geometry: {Hide Left Dock: true}\n")
+    second.write_text(GRID)
+    program.open(str(first))
+    assert (program.configName, program.hidesLeftDock) == ("a.rviz", True)
+    access.load_config(str(second))
+    bench.wait(lambda: window.title() == "b.rviz - rosglass")
+    assert not program.hidesLeftDock
+    assert program.mayClose()
+    program.save("")
+    assert "Window Geometry" not in RvizConfig.load(second).root
+    access.scene_view.scene.add("Axes")
+    bench.wait(lambda: program.modified)
+    access.save_config(str(tmp_path / "c.rviz"))
+    assert window.title() == "c.rviz - rosglass"
+    assert program.mayClose()

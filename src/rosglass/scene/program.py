@@ -147,6 +147,8 @@ class ViewProgram(QtCore.QObject):
         runtime = runtime_of(view)
         assert runtime is not None
         self._session = session = runtime.session
+        view.configLoaded.connect(self._on_config_loaded)
+        view.configSaved.connect(self._on_config_saved)
         if self._config is None:
             view.scene.add("Grid")
             view.scene.add("TF")
@@ -208,15 +210,26 @@ class ViewProgram(QtCore.QObject):
         notes = self._view.show_config(config)
         for note in notes:
             _log.warning("%s: %s", config.source, note)
-        geometry = _geometry(config)
+        if notes:
+            self.say(f"{len(notes)} notes on {Path(config.source).name}: {notes[0]}")
+
+    @Slot(str)
+    def _on_config_loaded(self, source: str) -> None:
+        """Follow what is shown: an overlay may have loaded it."""
+        assert self._view is not None
+        assert self._view.config is not None
+        geometry = _geometry(self._view.config)
         report(
             self,
-            configName=Path(config.source).name,
             hidesLeftDock=geometry.get(_LEFT_DOCK) is True,
             hidesRightDock=geometry.get(_RIGHT_DOCK) is True,
         )
-        if notes:
-            self.say(f"{len(notes)} notes on {Path(config.source).name}: {notes[0]}")
+        self._on_config_saved(source)
+
+    @Slot(str)
+    def _on_config_saved(self, source: str) -> None:
+        report(self, configName=Path(source).name)
+        self._remember()
 
     @Slot(str)
     def _on_recording_failed(self, problem: str) -> None:
@@ -252,7 +265,6 @@ class ViewProgram(QtCore.QObject):
             _log.error("%s", error)
             self.say(str(error))
             return
-        self._remember()
         self._refresh()
 
     @Slot(QtCore.QUrl, result=QtCore.QUrl)
@@ -293,9 +305,6 @@ class ViewProgram(QtCore.QObject):
             _log.error("%s", error)
             self.say(str(error))
             return
-        assert self._view.config is not None
-        report(self, configName=Path(self._view.config.source).name)
-        self._remember()
         self.say(f"saved to {self._view.config.source}")
         self._refresh()
 

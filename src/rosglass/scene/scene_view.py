@@ -86,6 +86,8 @@ class SceneView(QQuickRhiItem):
     configLoading = Signal()
     #: A config was shown: its file, if any.
     configLoaded = Signal(str)
+    #: What is shown was saved to a file.
+    configSaved = Signal(str)
 
     def __init__(self, parent: Any = None, runtime: Runtime | None = None) -> None:
         super().__init__(parent)
@@ -553,6 +555,7 @@ class SceneView(QQuickRhiItem):
         config.save(path or config.source)
         config.source = str(path or config.source)
         self.config = config
+        self.configSaved.emit(config.source)
 
     def camera(self) -> Camera:
         """Return the camera of the next picture; its pixels are units of this item."""
