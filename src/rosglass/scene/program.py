@@ -324,7 +324,7 @@ class ViewProgram(QtCore.QObject):
             self._timer.stop()
             return
         now = time.monotonic()
-        if now >= self._next_look:
+        if now >= self._next_look and not self.kiosk:
             self._next_look = now + _LOOK_S
             report(self, modified=self._state() != self._saved)
         if self.message and now - self._said_at > _MESSAGE_S:
