@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import struct
+import threading
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -454,3 +455,29 @@ def test_all_meshes_of_a_robot_are_bounded(
     assert text in robot.statusText
     send_transforms(bench, "base", "arm0", "arm1", "arm2")
     bench.wait(lambda: len(list(robot.root.drawables())) == 2)
+
+
+def test_of_descriptions_that_wait_the_newest_is_read(
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene.displays import robot_model
+
+    may_read, read, load = threading.Event(), [], robot_model._load
+
+    def count(text: str, *rest: Any) -> Any:
+        read.append(text)
+        assert may_read.wait(30)
+        return load(text, *rest)
+
+    monkeypatch.setattr(robot_model, "_load", count)
+    view = bench.load("RobotModelDisplay {}")
+    (robot,) = view.scene.displays
+    texts = [URDF.replace("rover", f"rover{number}") for number in range(6)]
+    publisher = publish(bench, texts[0])
+    bench.wait(lambda: read == texts[:1])
+    for text in texts[1:]:
+        publisher.publish({"data": text})
+    bench.wait(lambda: robot._text == texts[-1])
+    may_read.set()
+    bench.wait(lambda: robot.robotName == "rover5", lambda: robot.statusText)
+    assert read == [texts[0], texts[-1]]

@@ -17,7 +17,7 @@ from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot, is_alive
 from rosglass.scene.display import Status
 from rosglass.scene.displays.geometry import HistoryDisplay
-from rosglass.scene.displays.robot_model import DescriptionSource
+from rosglass.scene.displays.robot_model import DescriptionLoader, DescriptionSource
 from rosglass.scene.displays.shapes import rotation_of_z_to
 from rosglass.scene.drawing import CONE, Lines, Mesh
 from rosglass.scene.parts import Parts
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.drawing import Group
+    from rosglass.scene.resource_retriever import ResourceRetriever
     from rosglass.scene.urdf import Joint
 
 __all__ = ["EffortDisplay"]
@@ -160,7 +161,7 @@ class _JointStates:
             return _Efforts({name: one[:2] for name, one in self._latest.items()}, {})
 
 
-def _joints_of(text: str, source: str) -> tuple[str, dict[str, Joint]]:
+def _joints_of(text: str, source: str, _: ResourceRetriever) -> tuple[str, dict[str, Joint]]:
     """Return the robot's name, and its joints that turn."""
     if not text.strip():
         raise Error(f"{source}: the robot description is empty")
@@ -208,6 +209,7 @@ class EffortDisplay(HistoryDisplay):
         self._turning: dict[str, Joint] | None = None
         self._robot_name = ""
         self._text: str | None = None
+        self._loader = DescriptionLoader(_joints_of, weak_callback(self._set_robot))
         self._urdf = Status("warn", "")
         #: What :meth:`_place` has found for the message that :meth:`show` gets next.
         self._poses: dict[str, NDArray[np.float64]] = {}
@@ -288,9 +290,7 @@ class EffortDisplay(HistoryDisplay):
         if not is_alive(self) or self.scene is None or text == self._text:
             return
         self._text = text
-        self.scene.load(
-            lambda _: _joints_of(text, source), lambda result: self._set_robot(text, result)
-        )
+        self._loader.load(self.scene, text, source)
 
     def _set_robot(self, text: str, result: tuple[str, dict[str, Joint]] | Error) -> None:
         if not is_alive(self) or text != self._text:

@@ -42,10 +42,18 @@ if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.resource_retriever import ResourceRetriever
+    from rosglass.scene.scene import Scene
     from rosglass.scene.triangles import MeshPart
     from rosglass.scene.urdf import Visual
 
-__all__ = ["DescriptionSource", "MeshFiles", "RobotModelDisplay", "link_drawables", "read_texture"]
+__all__ = [
+    "DescriptionLoader",
+    "DescriptionSource",
+    "MeshFiles",
+    "RobotModelDisplay",
+    "link_drawables",
+    "read_texture",
+]
 
 _T = TypeVar("_T")
 #: Milliseconds until a parameter that is not there is looked up again.
@@ -117,6 +125,43 @@ class DescriptionSource:
         """Stop receiving; safe to call twice."""
         if self._subscription is not None:
             self._subscription.close()
+
+
+class DescriptionLoader:
+    """Reads descriptions in the scene's thread: one at a time, and of those that wait the newest.
+
+    Args:
+        read: Called there with the text, its source, and what finds meshes.
+        on_read: Called in the GUI thread with the text and what `read` returned, or its error.
+    """
+
+    def __init__(
+        self,
+        read: Callable[[str, str, ResourceRetriever], Any],
+        on_read: Callable[[str, Any], None],
+    ) -> None:
+        self._read, self._on_read = read, on_read
+        #: Where one is being read.
+        self._busy: Scene | None = None
+        self._next: tuple[str, str] | None = None
+
+    def load(self, scene: Scene, text: str, source: str) -> None:
+        """Read a description from a source, for errors."""
+        if self._busy is scene:
+            self._next = (text, source)
+            return
+        self._busy = scene
+        scene.load(
+            lambda resources: self._read(text, source, resources),
+            lambda result: self._on_loaded(scene, text, result),
+        )
+
+    def _on_loaded(self, scene: Scene, text: str, result: Any) -> None:
+        self._busy = None
+        following, self._next = self._next, None
+        self._on_read(text, result)
+        if following is not None and is_alive(scene):
+            self.load(scene, *following)
 
 
 class _Loaded(NamedTuple):
@@ -456,6 +501,7 @@ class RobotModelDisplay(Display):
         self._body, self._trails = Group(), Group()
         self._root_link = ""
         self._text: str | None = None
+        self._loader = DescriptionLoader(_load, weak_callback(self._show))
         #: What the status says of the description that is shown.
         self._loaded_lines: dict[str, Status] = {}
         self._next = 0.0
@@ -525,10 +571,7 @@ class RobotModelDisplay(Display):
             return
         self._text = text
         self.set_status("URDF", "warn", "loading the robot and its meshes")
-        self.scene.load(
-            lambda resources: _load(text, source, resources),
-            lambda result: self._show(text, result),
-        )
+        self._loader.load(self.scene, text, source)
 
     def _show(self, text: str, result: _Loaded | Error) -> None:
         if not is_alive(self) or text != self._text:
