@@ -11,7 +11,9 @@ of QML above it.
 Both take turns, and a figure is the median of the ratios of the turns. CPU is that of all threads
 of a process for each frame of the 3D view; the camera turns with each frame, and both draw as fast
 as they can. `adaptive` is as users have it, fewer points while the camera moves; `all` draws all.
-GUI thread: what messages take there, uploads to OpenGL included. Exits 1 when a target is missed.
+GUI thread: what messages take there, uploads to OpenGL included. A robot's CPU is without that of
+the threads in which Mesa fills in pixels, which stand for a graphics card. Exits 1 when a target is
+missed.
 """
 
 from __future__ import annotations
