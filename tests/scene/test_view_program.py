@@ -501,8 +501,8 @@ def test_what_would_be_lost_is_asked_for(bench: SceneBench, tmp_path: Path) -> N
 
 
 @pytest.fixture
-def window(bench: SceneBench) -> Iterator[Any]:
-    """The window of the program, connected to the robot of the bench."""
+def window(bench: SceneBench, request: pytest.FixtureRequest) -> Iterator[Any]:
+    """The window of the program, connected to the robot of the bench; options as parameters."""
     from PySide6.QtCore import QObject
     from PySide6.QtQml import QQmlApplicationEngine
 
@@ -510,7 +510,7 @@ def window(bench: SceneBench) -> Iterator[Any]:
     from rosglass.qt import send_deferred_deletes
     from rosglass.scene.program import WINDOW, ViewProgram
 
-    engine, program = QQmlApplicationEngine(), ViewProgram()
+    engine, program = QQmlApplicationEngine(), ViewProgram(**getattr(request, "param", {}))
     install(engine, bench.session)
     engine.rootContext().setContextProperty("program", program)
     engine.load(str(WINDOW))
@@ -849,3 +849,43 @@ def test_the_program_follows_configs_of_overlays(
     access.save_config(str(tmp_path / "c.rviz"))
     assert window.title() == "c.rviz - rosglass"
     assert program.mayClose()
+
+
+def test_overlays_of_a_config_ask_for_the_view_alone(
+    bench: SceneBench, window: Any, tmp_path: Path
+) -> None:
+    from PySide6.QtCore import QMetaObject, QObject
+    from PySide6.QtQml import qmlContext
+
+    scene = window.findChild(QObject, "scene")
+    (tmp_path / "Panel.qml").write_text(
+        "import QtQuick 2.15\nimport RosRviz 1.0\nItem { objectName: 'panel'\n"
+        "property bool bare: rviz.isBare; function show() { rviz.isBare = false }\n"
+        "Component.onCompleted: rviz.isBare = true }"
+    )
+    file = tmp_path / "own.rviz"
+    file.write_text(
+        "Visualization Manager:\n  Displays:\n"
+        f"    - {{Class: rosglass/QmlOverlay, Name: Panel, Path: {tmp_path / 'Panel.qml'}}}\n"
+    )
+    qmlContext(window).contextProperty("program").open(str(file))
+    bench.wait(lambda: scene.property("width") == window.property("width"))
+    overlays = [inner for one in scene.childItems() for inner in (one, *one.childItems())]
+    panel = next(one for one in overlays if one.objectName() == "panel")
+    bench.wait(lambda: panel.property("bare"))
+    QMetaObject.invokeMethod(panel, "show")
+    bench.wait(lambda: scene.property("width") < window.property("width"))
+    window.setProperty("panels", False)
+    assert panel.property("bare")
+
+
+@pytest.mark.parametrize("window", [{"kiosk": True}], indirect=True)
+def test_a_kiosk_is_bare(window: Any) -> None:
+    from PySide6.QtCore import QObject
+
+    from rosglass.scene.access import access_of
+
+    access = access_of(window.findChild(QObject, "scene"))
+    assert access.bare
+    access.bare = False
+    assert window.property("panels")

@@ -73,7 +73,7 @@ class SceneAccess(Access):
     def __init__(self, view: SceneView) -> None:
         self.scene_view = view
         super().__init__(view)
-        self._bare = self._full = False
+        self._full = False
         self._window: QQuickWindow | None = None
         #: Whether the window is about to draw.
         self.is_drawing = False
@@ -81,6 +81,7 @@ class SceneAccess(Access):
         view.sceneChanged.connect(self._watch_scene)
         self._watch_scene()
         view.fixedFrameChanged.connect(self.fixed_frame_changed)
+        view.bareChanged.connect(self.bare_changed)
         view.configLoading.connect(self._on_config_loading)
         view.configLoaded.connect(self.config_loaded)
         self._on_window(window_of(view))
@@ -171,13 +172,11 @@ class SceneAccess(Access):
     @property
     def bare(self) -> bool:
         """Whether only the 3D view is to be shown; the program that shows panels follows it."""
-        return self._bare
+        return bool(self.scene_view.bare)
 
     @bare.setter
     def bare(self, bare: bool) -> None:
-        if bare != self._bare:
-            self._bare = bare
-            self.bare_changed.emit()
+        self.scene_view.setProperty("bare", bare)
 
     def load_config(self, file: str) -> None:
         """Load a ``.rviz`` file from the event loop, after the current event.

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rosglass.qml.session import Session
-    from rosglass.scene.access import SceneAccess
     from rosglass.scene.scene_view import SceneView
     from rosglass.scene.window_recorder import WindowRecorder
 
@@ -95,8 +94,6 @@ class ViewProgram(QtCore.QObject):
     #: For how long the window is being recorded; empty while it is not.
     recording = ReadOnly(str, "")
     kiosk = ReadOnly(bool, False)
-    #: Whether an overlay wants the 3D view alone.
-    bare = ReadOnly(bool, False)
     #: Whether the config hides RViz's docks, i.e. the panels on this side.
     hidesLeftDock = ReadOnly(bool, False)
     hidesRightDock = ReadOnly(bool, False)
@@ -121,7 +118,6 @@ class ViewProgram(QtCore.QObject):
         self._fixed_frame = fixed_frame
         self._overlays = list(overlays)
         self._overlay_options: dict[str, Any] = {"watch": watch, "import_paths": import_paths}
-        self._access: SceneAccess | None = None
         self._view: SceneView | None = None
         self._saved = b""
         self._discarded = False
@@ -168,7 +164,6 @@ class ViewProgram(QtCore.QObject):
         if not self._overlays:
             return
         # Slow to load; most views have none.
-        from rosglass.scene.access import access_of  # noqa: PLC0415
         from rosglass.scene.displays.qml_overlay import QmlOverlayDisplay  # noqa: PLC0415
         from rosglass.scene.overlay import add_overlay  # noqa: PLC0415
 
@@ -177,8 +172,6 @@ class ViewProgram(QtCore.QObject):
             for one in view.scene.displays
             if isinstance(one, QmlOverlayDisplay)
         }
-        self._access = access = access_of(view)
-        access.bare_changed.connect(self._on_bare)
         try:
             for file in self._overlays:
                 # The config may have it already.
@@ -188,17 +181,6 @@ class ViewProgram(QtCore.QObject):
             _log.error("%s", error)
             # The command fails, as it does over RViz; its event loop may not run yet.
             QtCore.QTimer.singleShot(0, lambda: QtCore.QCoreApplication.exit(1))
-
-    @Slot()
-    def _on_bare(self) -> None:
-        if self._access is not None:
-            report(self, bare=self._access.bare)
-
-    @Slot(bool)
-    def setBare(self, bare: bool) -> None:
-        """Tell the overlays whether the 3D view alone is shown."""
-        if self._access is not None:
-            self._access.bare = bare
 
     @Slot(bool, bool)
     def hideDocks(self, left: bool, right: bool) -> None:

@@ -82,6 +82,7 @@ class SceneView(QQuickRhiItem):
     #: The camera was moved, or the size changed.
     cameraChanged = Signal()
     sceneChanged = Signal()
+    bareChanged = Signal()
     #: A config is about to replace what is shown.
     configLoading = Signal()
     #: A config was shown: its file, if any.
@@ -93,6 +94,7 @@ class SceneView(QQuickRhiItem):
         super().__init__(parent)
         self._runtime = runtime
         self._background = QColor(_BACKGROUND)
+        self._bare = False
         self._problem = ""
         #: Whether it showed the scene of another view, which is gone.
         self._scene_is_gone = False
@@ -261,6 +263,14 @@ class SceneView(QQuickRhiItem):
 
     #: What is behind everything; where it is translucent, items below the view shine through.
     background = Property(QColor, _get_background, _set_background, notify=backgroundChanged)
+
+    def _set_bare(self, bare: bool) -> None:
+        if bare != self._bare:
+            self._bare = bare
+            self.bareChanged.emit()
+
+    #: Whether the view is to be shown alone, as overlays ask for; the program hides its panels.
+    bare = Property(bool, lambda self: self._bare, _set_bare, notify=bareChanged)
 
     #: Why nothing, or not everything, is drawn; empty without a problem.
     problem = Property(str, lambda self: self._get_problem(), notify=problemChanged)

@@ -12,13 +12,14 @@ ApplicationWindow {
     // Whether the first picture is on the screen; what is beside the 3D view is made after it.
     property bool drawn: false
     property var displays: displaysPanel.item
+    readonly property int aboveOverlays: 1000000
 
     width: 1280
     height: 800
     visible: true
     title: (program.configName || "new view") + (program.modified ? " *" : "") + " - rosglass"
 
-    Component.onCompleted: program.begin(scene)
+    Component.onCompleted: { scene.bare = !panels; program.begin(scene) }
     onFrameSwapped: drawn = true
     onClosing: close => {
         if (!program.mayClose()) {
@@ -27,11 +28,7 @@ ApplicationWindow {
         }
     }
 
-    onPanelsChanged: program.setBare(!panels)
-    Connections {
-        target: program
-        function onBareChanged() { window.panels = !program.bare }
-    }
+    onPanelsChanged: scene.bare = !panels
 
     Shortcut { sequences: [StandardKey.Save]; onActivated: window.save() }
     Shortcut { sequences: [StandardKey.Open]; onActivated: window.openOther() }
@@ -148,6 +145,8 @@ ApplicationWindow {
             SplitView.fillWidth: true
             SplitView.minimumWidth: 100
             focus: true
+            // Overlays may want it alone.
+            onBareChanged: window.panels = !bare
 
             // As in RViz, keys are the view's while the mouse is over it, except for those of a text.
             HoverHandler { onHoveredChanged: if (hovered && !(window.activeFocusItem instanceof TextInput)) scene.forceActiveFocus() }
@@ -163,6 +162,7 @@ ApplicationWindow {
             Button {
                 objectName: "cancelGoal"
                 readonly property var tool: scene.tools.all.find(one => one.goalActive === true) || null
+                z: window.aboveOverlays
                 anchors { left: parent.left; top: parent.top; margins: 8 }
                 visible: tool !== null
                 text: "Cancel goal"
@@ -172,6 +172,7 @@ ApplicationWindow {
             // Without the status bar: keys still select tools, which send something.
             Label {
                 objectName: "bareStatus"
+                z: window.aboveOverlays
                 anchors { left: parent.left; bottom: parent.bottom; margins: 8 }
                 width: Math.min(implicitWidth, parent.width - 16)
                 visible: !window.panels && text !== ""
