@@ -568,6 +568,68 @@ def test_a_fixed_frame_that_does_not_exist_is_a_problem(bench: SceneBench) -> No
     bench.wait(lambda: not view.problem)
 
 
+def test_a_problem_of_a_fixed_frame_ends_with_the_node(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    view = bench.load()
+    StaticTransformBroadcaster(bench.robot).send_transform(
+        Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "mast")
+    )
+    bench.wait(view.scene.frames)
+    view.fixedFrame = "mapp"
+    bench.wait(lambda: "does not exist" in view.problem)
+    bench.session.shutdown()
+    bench.wait(lambda: view.problem == "")
+
+
+def test_transforms_that_are_not_received_are_a_problem(
+    bench: SceneBench, monkeypatch: Any
+) -> None:
+    from rosglass.errors import Error
+
+    def refuse(*_: Any) -> None:
+        raise Error("no memory for /tf")
+
+    monkeypatch.setattr("rosglass.tf.TransformListener", refuse)
+    view = bench.load()
+    bench.wait(lambda: view.problem == "transforms are not received: no memory for /tf")
+
+
+def test_two_robots_of_one_name_are_said(bench: SceneBench) -> None:
+    import rosglass
+
+    view = bench.load('PathDisplay { topic: "/plan" } PathDisplay { topic: "/plan" }')
+    path, other = view.scene.displays
+    twin = rosglass.connect(bench.url, "robot")
+    for node in (bench.robot, twin):
+        node.create_publisher("/plan", "nav_msgs/Path")
+        node.create_publisher("/tf", "tf2_msgs/TFMessage")
+    text = "{}: 2 publishers of nodes called /robot, a name of 2 nodes, are mixed".format
+    bench.wait(lambda: text("/plan") in path.statusText, lambda: path.statusText)
+    assert path.statusLevel == "warn"
+    bench.wait(lambda: text("/tf") in view.problem)
+    other.enabled = False
+    bench.wait.settled(bench.session)
+    assert other.statusText == ""
+    twin.close()
+    bench.wait(lambda: "are mixed" not in path.statusText + view.problem)
+
+
+def test_an_error_of_a_display_is_forgotten_when_it_draws_again(
+    bench: SceneBench, monkeypatch: Any
+) -> None:
+    view = bench.load("GridDisplay {}")
+    (grid,) = view.scene.displays
+    with monkeypatch.context() as patch:
+        patch.setattr(grid, "on_fixed_frame", lambda: 1 / 0)
+        view.fixedFrame = "odom"
+        assert "Display: ZeroDivisionError" in grid.statusText
+        assert grid.statusLevel == "error"
+    view.fixedFrame = "map"
+    assert grid.statusLevel == "ok", grid.statusText
+
+
 def test_a_jump_of_time_and_reset_begin_anew(bench: SceneBench) -> None:
     from rosglass.comm.clock import ClockChange, Jump
     from rosglass.comm.qos import QoS

@@ -100,8 +100,8 @@ class TfLink:
 
     def _opened(self, result: Error | None) -> None:
         if result is not None:
-            self._failure = str(result)
-            _log.warning("transforms are not received: %s", result)
+            self._failure = f"transforms are not received: {result}"
+            _log.warning("%s", self._failure)
         elif self._listener is not None:
             # Not the static ones: nodes of the same name may publish different ones.
             self._topic = self._listener.subscriptions[0].topic

@@ -204,6 +204,14 @@ class Display(Configurable, TopicElement):
         if self.scene is not None:
             super()._run_update()
 
+    @Slot()
+    def _on_tick(self) -> None:
+        super()._on_tick()
+        if self._mixing and self.shown:
+            self.set_status("Publishers", "warn", self._mixing)
+        else:
+            self.delete_status("Publishers")
+
     def join(self, scene: Scene) -> None:
         """Start to be shown in a scene; called by the scene."""
         self.scene = scene

@@ -171,7 +171,7 @@ class Scene(Element):
         except Exception as error:
             # The others are shown all the same.
             _log.exception("%s", display.label)
-            display.set_status("Display", "error", repr(error))
+            display.set_status("Setup", "error", repr(error))
         self.displayAdded.emit(display)
         self.displaysChanged.emit()
 
@@ -355,16 +355,19 @@ class Scene(Element):
         self._ticks += 1
         if self._ticks % 5:
             return
-        self._check_fixed_frame()
+        self._check_transforms()
         for display in self._alive():
             display.check_frames()
 
-    def _check_fixed_frame(self) -> None:
-        """Say that the fixed frame is none of the robot's."""
-        buffer, frame = self.transforms, self._fixed_frame
-        names = [] if buffer is None or buffer.has_frame(frame) else buffer.frame_names()
-        hint = similar(frame, names)
-        self._set_problem(f"the fixed frame [{frame}] does not exist{hint}" if names else "")
+    def _check_transforms(self) -> None:
+        """Say that none are received, that they are mixed, or that there is no fixed frame."""
+        link, buffer, frame = self._link, self.transforms, self._fixed_frame
+        problem = "" if link is None else link.problem
+        if not problem and buffer is not None and not buffer.has_frame(frame):
+            names = buffer.frame_names()
+            if names:
+                problem = f"the fixed frame [{frame}] does not exist{similar(frame, names)}"
+        self._set_problem(problem)
 
     def load(self, work: Callable[[ResourceRetriever], Any], done: Callable[[Any], None]) -> None:
         """Run a job that takes long, such as reading meshes, in a thread of the scene.
@@ -493,6 +496,7 @@ class Scene(Element):
             if display.shown:
                 try:
                     job(display)
+                    display.delete_status("Display")
                 except TransformException as error:
                     display.set_status("Transform", "error", str(error))
                 except Exception as error:
