@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from conftest import SceneBench
 
 STAMP = {"sec": 5, "nanosec": 0}
+CLOUD = {"header": {"frame_id": "map"}, "height": 1, "is_dense": True}
 
 
 def parts(display: Any, shape: Any) -> list[Any]:
@@ -120,6 +121,58 @@ def test_each_message_of_a_history_is_shown_once_in_any_fixed_frame(
         assert np.allclose(pose, np.eye(4))
 
 
+def test_what_waits_for_its_transform_is_all_shown_later(
+    bench: SceneBench, monkeypatch: Any
+) -> None:
+    from rosglass import Time
+    from rosglass.scene import display as displays
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    view = bench.load()
+    odometry = view.scene.add("Odometry", topic="/odom", covariance=False)
+    points = view.scene.add("PointStamped", topic="/point", historyLength=3)
+    clouds = view.scene.add("PointCloud2", topic="/cloud", decayTime=60.0)
+    publishers = [
+        bench.robot.create_publisher("/odom", "nav_msgs/Odometry"),
+        bench.robot.create_publisher("/point", "geometry_msgs/PointStamped"),
+        bench.robot.create_publisher("/cloud", "sensor_msgs/PointCloud2"),
+    ]
+    bench.wait(lambda: all(one.subscription_count() for one in publishers))
+
+    header = {"frame_id": "odom"}
+    for number in range(12):
+        pose = {"position": {"x": float(number)}, "orientation": {"w": 1.0}}
+        publishers[0].publish({"header": header, "pose": {"pose": pose}})
+        publishers[1].publish({"header": header})
+        publishers[2].publish({**CLOUD, "header": header})
+        bench.wait(lambda: min(one.received for one in view.scene.displays) == number + 1)  # noqa: B023
+    bench.wait.settled(bench.session)
+    for display in (odometry, points):
+        assert "Dropped" not in display.statusText
+    StaticTransformBroadcaster(bench.robot).send_transform(
+        Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "odom")
+    )
+    bench.wait(lambda: sum(one.count for one, _ in parts(odometry, CYLINDER)) == 12)
+    assert len(parts(points, SPHERE)) == 3
+    # Of clouds, which are large, only the setting Depth are kept.
+    assert "Dropped messages: 7 while more than 5 waited for" in clouds.statusText
+    # What is more than that is said.
+    monkeypatch.setattr(displays, "MOST_WAITING", 10)
+    odometry.topic = "/odom2"
+    other = bench.robot.create_publisher("/odom2", "nav_msgs/Odometry")
+    bench.wait(other.subscription_count)
+    for number in range(12):
+        other.publish({"header": {"frame_id": "nowhere"}})
+        bench.wait(lambda: odometry.received == number + 1)  # noqa: B023
+    bench.wait(lambda: "Dropped messages: 2" in odometry.statusText, lambda: odometry.statusText)
+    # One that can be placed does not wait for them.
+    monkeypatch.setattr(displays, "_MOST_MISSES", 3)
+    other.publish({"header": header, "pose": {"pose": pose}})
+    bench.wait(lambda: sum(one.count for one, _ in parts(odometry, CYLINDER)) == 1)
+    odometry.topic = "/odom"
+    assert "Dropped" not in odometry.statusText
+
+
 def test_what_is_shown_fades_while_newer_data_waits_for_its_transform(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import Transform, TransformBroadcaster
@@ -192,7 +245,6 @@ RANGE = {
     "max_range": 5.0,
     "range": 2.0,
 }
-CLOUD = {"header": {"frame_id": "map"}, "height": 1, "is_dense": True}
 
 
 def test_obstacles_fade_when_a_sensor_sends_nothing_any_more(

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "FIXED_FRAME",
+    "MOST_WAITING",
     "OUTDATED_ALPHA",
     "Display",
     "Intake",
@@ -76,7 +77,9 @@ _DURABILITY = {
     "System Default": Durability.SYSTEM_DEFAULT,
 }
 #: Messages that wait for the GUI thread or their transforms, of displays that show each.
-_MOST_WAITING = 1000
+MOST_WAITING = 1000
+#: Lookups that may fail each time that messages are placed, from either end.
+_MOST_MISSES = 25
 #: Seconds for which data may wait for its transform before that is an error.
 _LATE_S = 1.0
 #: Seconds without a message after which data that is sent all the time is out of date.
@@ -594,6 +597,8 @@ class TopicDisplay(OneTopicDisplay):
         self._last: _Item | None = None
         #: The newest message, which may still wait for its transform.
         self._newest: _Item | None = None
+        #: How many messages were dropped while they waited, and are missed.
+        self._dropped = 0
         self._arrived = self._arrived_at = 0.0
         #: The robot's time then, nanoseconds, and seconds between the last messages.
         self._arrived_ns = 0
@@ -619,6 +624,14 @@ class TopicDisplay(OneTopicDisplay):
         """Return whether each message is shown, in order, and not only the newest."""
         return self.KEEPS_ALL
 
+    def most_waiting(self) -> int:
+        """Return how many messages may wait for their transforms; older ones are dropped."""
+        return MOST_WAITING if self.shows_all() else int(self.depth)
+
+    def _is_loss(self) -> bool:
+        """Return whether what is dropped while it waits would have been shown."""
+        return self.shows_all() and self.most_waiting() == MOST_WAITING
+
     def _on_length(self) -> None:
         """Show more or fewer messages beside each other."""
         self._restyle()
@@ -627,7 +640,7 @@ class TopicDisplay(OneTopicDisplay):
     def profile(self) -> QoS:
         """Return what is requested of publishers."""
         return QoS(
-            depth=_MOST_WAITING if self.shows_all() else self.depth,
+            depth=MOST_WAITING if self.shows_all() else self.depth,
             reliability=_RELIABILITY[self.reliability],
             durability=_DURABILITY[self.durability],
         )
@@ -662,7 +675,7 @@ class TopicDisplay(OneTopicDisplay):
             self.MESSAGES,
             self._executor,
             weak_callback(self._on_items),
-            _MOST_WAITING if self.shows_all() else max(self.depth, 1),
+            MOST_WAITING if self.shows_all() else max(self.depth, 1),
             self.EAGER,
             needs_frame=not self.HAS_FRAMES,
         )
@@ -807,8 +820,21 @@ class TopicDisplay(OneTopicDisplay):
         self._outdated = False
         self._waiting.extend(items)
         self._show_waiting()
-        while len(self._waiting) > (_MOST_WAITING if self.KEEPS_ALL else self.depth):
+        self._drop_oldest(intake)
+
+    def _drop_oldest(self, intake: Intake) -> None:
+        """Drop what waits beside newer messages, and say so if it is missed."""
+        most = self.most_waiting()
+        while len(self._waiting) > most:
             self._waiting.popleft()
+            self._dropped += self._is_loss()
+        dropped = []
+        if intake.dropped and self.shows_all():
+            dropped.append(f"{intake.dropped} that came faster than they can be shown")
+        if self._dropped:
+            dropped.append(f"{self._dropped} while more than {most} waited for their transforms")
+        if dropped:
+            self.set_status("Dropped messages", "warn", "; ".join(dropped))
 
     def _show_waiting(self) -> None:
         """Show what waits for its transform, as far as it is known now."""
@@ -826,13 +852,22 @@ class TopicDisplay(OneTopicDisplay):
         self._show_all_waiting()
 
     def _show_all_waiting(self) -> None:
-        for _ in range(len(self._waiting)):
-            item = self._waiting.popleft()
-            pose = self._place(item)
-            if pose is None:
-                self._waiting.append(item)
-            else:
-                self._show(item, pose)
+        waiting = list(self._waiting)
+        poses: dict[int, NDArray[np.float64]] = {}
+        # Lookups that fail take their time; those at one end may fail for ever.
+        for order in (range(len(waiting)), range(len(waiting) - 1, -1, -1)):
+            misses = 0
+            for at in order:
+                if at in poses or misses >= _MOST_MISSES:
+                    break
+                pose = self._place(waiting[at])
+                if pose is None:
+                    misses += 1
+                else:
+                    poses[at] = pose
+        self._waiting = deque(item for at, item in enumerate(waiting) if at not in poses)
+        for at in sorted(poses):
+            self._show(waiting[at], poses[at])
 
     def _place(self, item: _Item) -> NDArray[np.float64] | None:
         """Return the pose of a message's frame at its time; None while it is not known."""
@@ -891,6 +926,8 @@ class TopicDisplay(OneTopicDisplay):
         """Drop all messages."""
         self._waiting.clear()
         self._last = self._newest = None
+        self._dropped = 0
+        self.delete_status("Dropped messages")
         self.root.clear()
 
 

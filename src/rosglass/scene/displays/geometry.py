@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rosglass.errors import Error
-from rosglass.scene.display import TopicDisplay
+from rosglass.scene.display import MOST_WAITING, TopicDisplay
 from rosglass.scene.displays.shapes import ArrowShapes, read_columns, rotation_of_z_to
 from rosglass.scene.drawing import (
     CONE,
@@ -75,6 +75,10 @@ class HistoryDisplay(TopicDisplay):
     def shows_all(self) -> bool:
         """Return whether earlier messages are shown as well."""
         return self.length() > 1
+
+    def most_waiting(self) -> int:
+        """Return how many messages may wait: no more than are shown."""
+        return max(int(self.depth), min(self.length(), MOST_WAITING))
 
     def draw(self, data: Any, group: Group) -> None:
         """Fill a group with what a message shows, in its frame."""

@@ -474,6 +474,9 @@ class CloudDisplay(TopicDisplay):
         else:
             super()._show_waiting()
 
+    def _is_loss(self) -> bool:
+        return bool(self.decayTime)
+
     def _renew_preparer(self) -> None:
         self._colors = None
         super()._renew_preparer()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from rosglass.errors import Error
-from rosglass.scene.display import TopicDisplay, matrix_of
+from rosglass.scene.display import MOST_WAITING, TopicDisplay, matrix_of
 from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, poses_matrices, read_columns
 from rosglass.scene.drawing import CONE, CYLINDER, SPHERE, Group, Lines, Mesh, check_numbers
 from rosglass.scene.settings import Setting, rgb_of
@@ -556,6 +556,10 @@ class PathDisplay(TopicDisplay):
     def shows_all(self) -> bool:
         """Return whether earlier paths are shown as well."""
         return bool(self.bufferLength > 1)
+
+    def most_waiting(self) -> int:
+        """Return how many messages may wait: no more than are shown."""
+        return max(int(self.depth), min(int(self.bufferLength), MOST_WAITING))
 
     def preparer(self) -> Any:
         """Return the function that reads poses."""
