@@ -854,6 +854,38 @@ def test_a_declared_tool_replaces_that_of_a_file(bench: SceneBench) -> None:
     assert [(tool.TYPE, tool.saved) for tool in tools][1:] == [("SetGoal", {})] * 2
 
 
+def test_a_publisher_has_the_qos_of_the_file(bench: SceneBench) -> None:
+    from rosglass.comm.qos import Durability, QoS
+
+    tools = bench.load().tools
+    topic = {"Value": "/dock", "Depth": 3, "Durability Policy": "Transient Local"}
+    assert tools.load_configs([{"Class": "rviz_default_plugins/SetGoal", "Topic": topic}]) == []
+    goal = tools.find("SetGoal")
+    tools.select(goal)
+    bench.wait(lambda: goal._endpoint is not None)
+    goal.send_pose(1.0, 2.0, 0.0)
+    bench.wait(lambda: "has no subscriber" in goal.problem)
+    # Kept for those who come later.
+    received: list[Any] = []
+    qos = QoS(durability=Durability.TRANSIENT_LOCAL)
+    bench.robot.create_subscription("/dock", "geometry_msgs/PoseStamped", received.append, qos=qos)
+    bench.wait(lambda: received)
+
+
+def test_the_default_topic_of_the_other_rviz_is_none(bench: SceneBench) -> None:
+    tools = bench.load().tools
+    old = {"Class": "rviz/SetGoal", "Topic": "/move_base_simple/goal"}
+    own = {"Class": "rviz_default_plugins/SetGoal", "Topic": {"Value": "/move_base_simple/goal"}}
+    tools.load_configs([old, own])
+    bench.wait(lambda: bench.view.scene.node is not None)
+    for tool in tools:
+        tool.activate()
+    bench.wait(lambda: all(tool._endpoint is not None for tool in tools))
+    assert [tool._endpoint.topic for tool in tools] == ["/goal_pose", "/move_base_simple/goal"]
+    assert tools.save_configs(1)[0] == old
+    assert tools.save_configs(2)[0]["Topic"]["Value"] == "/goal_pose"
+
+
 # -- ROS 1 ---------------------------------------------------------------------------------------
 
 

@@ -22,6 +22,7 @@ from rosglass.scene.rviz_formats import (
     TopicSetting,
     read_deviations,
     read_topic,
+    ros_of,
     write_deviations,
     write_topic,
 )
@@ -45,6 +46,8 @@ __all__ = [
     "SetInitialPoseTool",
 ]
 
+#: RViz's, for what a file does not say.
+_QOS = QoS(depth=5)
 #: Seconds that a new publisher waits for the first subscriber.
 _MATCH_TIMEOUT_S = 2.0
 #: Seconds for the server of an action to answer.
@@ -76,6 +79,7 @@ class PublishingTool(Tool):
         #: What waits for the publisher and its first subscriber, and until when, monotonic.
         self._waiting: tuple[dict[str, Any], str, float] | None = None
         self._created_at = 0.0
+        self._qos = _QOS
         super().__init__(parent, runtime)
 
     # -- files -----------------------------------------------------------------------------------
@@ -84,7 +88,11 @@ class PublishingTool(Tool):
         """Take the settings of a file of either RViz."""
         refused = super().load_settings({k: v for k, v in saved.items() if k != "Topic"})
         try:
-            self.set("Topic", read_topic(saved).name)
+            found = read_topic(saved)
+            # The robot may be of the other ROS, which has another default.
+            default = self.TOPICS[(ros_of(self.class_id) or 2) - 1]
+            self.set("Topic", "" if found.name == default else found.name)
+            self._qos = found.qos(_QOS)
         except Error as error:
             refused.append(str(error))
         return refused
@@ -116,11 +124,11 @@ class PublishingTool(Tool):
         self._schedule()
 
     def _wanted(self) -> tuple[Any, ...] | None:
-        return None if self.node is None else (self.node, self.target)
+        return None if self.node is None else (self.node, self.target, self._qos)
 
     def _factory(self, *wanted: Any) -> Callable[[], Any]:
-        node, topic = wanted
-        return lambda: node.create_publisher(topic, self.MESSAGE, QoS(depth=5))
+        node, topic, qos = wanted
+        return lambda: node.create_publisher(topic, self.MESSAGE, qos)
 
     def _on_created(self, endpoint: Any) -> None:  # noqa: ARG002 - the base class's signature
         self._created_at = time.monotonic()
@@ -454,12 +462,12 @@ class SetGoalTool(PoseTool):
 
     def _wanted(self) -> tuple[Any, ...] | None:
         wanted = super()._wanted()
-        return wanted if wanted is None or not self.action else (wanted[0], "", self.action)
+        return wanted if wanted is None or not self.action else (wanted[0], self.action)
 
     def _factory(self, *wanted: Any) -> Callable[[], Any]:
-        if len(wanted) == 2:
+        if len(wanted) == 3:
             return super()._factory(*wanted)
-        node, _, action = wanted
+        node, action = wanted
         return lambda: node.create_action_client(action)
 
     def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
