@@ -535,3 +535,10 @@ def test_transforms_that_are_refused_are_named(
     monkeypatch.setattr("rosglass.scene.displays.tf._REFUSED_S", 0.0)
     robot.bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
     robot.check()
+
+
+def test_points_are_read_some_at_a_time(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rosglass.scene.displays.marker._ROWS_AT_ONCE", 4)
+    robot.show(Case("Marker", "visualization_msgs/Marker", marker(8)))
+    (points,) = [one for one, _, _ in robot.display.root.drawables()]
+    assert points.xyz().tolist() == [[float(at), 0.0, 0.0] for at in range(6)]

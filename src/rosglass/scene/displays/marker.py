@@ -11,6 +11,7 @@ from __future__ import annotations
 import logging
 import time
 from copy import copy
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
 
 import numpy as np
@@ -95,6 +96,8 @@ _ARROW_SHAPES = (CYLINDER, CONE)
 _NO_POINTS, _NO_COLORS = np.zeros((0, 3), np.float32), np.zeros((0, 4), np.float32)
 #: Directions of the scale that count, where not all do.
 _SCALED = {LINE_STRIP: "x", LINE_LIST: "x", POINTS: "xy", TEXT: "z", ARROW_STRIP: "xy"}
+#: Points that numpy converts at once: for two million, the GUI thread would wait for 0.2 s.
+_ROWS_AT_ONCE = 10_000
 #: Metres below which a scale is 0.
 _LEAST_M = 1e-18
 #: Metres that are drawn for a scale of 0: surfaces without thickness have no shade.
@@ -252,13 +255,13 @@ def _read_one(
         return MarkerRecord(key, kind, action, frame, at, problem=problem)
     points, colors = _NO_POINTS, _NO_COLORS
     if count:
-        points = np.array([(o.x, o.y, o.z) for o in message.points], np.float32)
+        points = _rows(message.points, attrgetter("x", "y", "z"), 3)
         try:
             check_numbers("points", points)
         except Error as error:
             return MarkerRecord(key, kind, action, frame, at, problem=str(error))
     if tints:
-        colors = np.array([(c.r, c.g, c.b, c.a) for c in message.colors], np.float32)
+        colors = _rows(message.colors, attrgetter("r", "g", "b", "a"), 4)
     warning = warning or _colors_warning(kind, count, colors)
     x, y, z, red, green, blue, alpha = numbers[7:]
     shapes = _SOLIDS.get(kind)
@@ -299,6 +302,16 @@ def _without_zeros(
     if (x, y, z) == size or (kind == ARROW and size[0] and size[1]):
         return (x, y, z), ""
     return (x, y, z), f"scale {size} of a {_NAMES[kind]} is 0 in a direction: drawn as {_THIN_M} m"
+
+
+def _rows(items: Sequence[Any], read: Callable[[Any], Any], width: int) -> NDArray[np.float32]:
+    """Return numbers of each item, (n, width); numpy holds the GIL for some of them at a time."""
+    rows = np.empty((len(items), width), np.float32)
+    for start in range(0, len(items), _ROWS_AT_ONCE):
+        some = items[start : start + _ROWS_AT_ONCE]
+        with np.errstate(over="ignore"):
+            rows[start : start + len(some)] = [read(item) for item in some]
+    return rows
 
 
 def _numbers_problem(numbers: list[float]) -> str:
