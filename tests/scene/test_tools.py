@@ -159,6 +159,18 @@ def test_a_text_of_the_view_stays_while_the_camera_moves(bench: SceneBench, hand
     assert not view.controller.get("Focal Shape Fixed Size")
 
 
+def test_editing_one_coordinate_keeps_the_others(bench: SceneBench) -> None:
+    view = bench.load()
+    at = (500123.4567891, 5400987.6543219, 0.1234567891)
+    view.controller.set("Focal Point", at)
+    shown = next(one["value"] for one in view.viewSettings() if one["name"] == "Focal Point")
+    assert shown == "500123.45679; 5400987.65432; 0.12346"
+    assert view.setViewSetting("Focal Point", shown) == ""
+    assert view.controller.get("Focal Point") == at
+    assert view.setViewSetting("Focal Point", shown.replace("0.12346", "2")) == ""
+    assert view.controller.get("Focal Point") == (*at[:2], 2.0)
+
+
 def test_tools_are_added_and_removed(bench: SceneBench) -> None:
     view = bench.load()
     changes: list[int] = []

@@ -906,8 +906,13 @@ def _setting_text(value: Any) -> Any:
     if isinstance(value, bool):
         return value
     if isinstance(value, dict):
-        return "; ".join(f"{number:.5g}" for number in value.values())
+        return "; ".join(_coordinate_text(number) for number in value.values())
     return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _coordinate_text(metres: float) -> str:
+    # Of UTM coordinates, too.
+    return f"{round(metres, 5):.12g}"
 
 
 def _setting_value(before: Any, text: str) -> Any:
@@ -916,7 +921,13 @@ def _setting_value(before: Any, text: str) -> Any:
         return {"true": True, "false": False}.get(text.strip().lower(), text)
     if isinstance(before, tuple):
         numbers = text.replace(";", " ").replace(",", " ").split()
-        return dict(zip("XYZ", numbers, strict=False)) if len(numbers) == 3 else text
+        if len(numbers) != 3:
+            return text
+        # Coordinates that were not edited keep the digits that are not shown.
+        return {
+            axis: old if new == _coordinate_text(old) else new
+            for axis, old, new in zip("XYZ", before, numbers, strict=True)
+        }
     return text
 
 
