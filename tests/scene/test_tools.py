@@ -685,6 +685,21 @@ def test_a_rectangle_selects(bench: SceneBench, hand: Hand) -> None:
     assert not list(view.overlay.drawables())
 
 
+def test_the_panel_follows_what_is_selected(bench: SceneBench) -> None:
+    from rosglass.scene.drawing import instance_matrix
+
+    view = bench.load("SelectionPanel { width: 200; height: 300; view: parent }")
+    box = add_box(view, owner=view.scene.add("Path", "Way"))
+    view.selection.select_between((0, 0), (400, 300))
+
+    def is_shown(text: str) -> bool:
+        return any(one.property("text") == text for one in items_of(view))
+
+    bench.wait(lambda: is_shown("Position: 0; 0; 0"))
+    box.pose = instance_matrix((0, 0, 0.5))
+    bench.wait(lambda: is_shown("Position: 0; 0; 0.5"))
+
+
 def test_selected_points_are_dropped_with_their_cloud(bench: SceneBench) -> None:
     from rosglass.scene.drawing import Points
 

@@ -212,7 +212,8 @@ class Selection(QtCore.QObject):
         corners = np.concatenate(found)
         return corners[np.isfinite(corners).all(axis=(1, 2))]
 
-    def _draw(self) -> None:
+    def _draw(self) -> bool:
+        """Draw the boxes; return whether they are others."""
         corners = self._corners()
         middle: NDArray[np.float64] = np.zeros(3)
         if len(corners):
@@ -226,6 +227,7 @@ class Selection(QtCore.QObject):
         if not same:
             self._root.pose = instance_matrix(middle.tolist())
             self._lines.set_segments(segments, _COLOR)
+        return not same
 
     @Slot()
     def on_scene(self) -> None:
@@ -246,8 +248,7 @@ class Selection(QtCore.QObject):
                 del self._marked[drawable]
             else:
                 self._marked[drawable] = _Marked(kept, drawable.geometry)
-        self._draw()
-        if len(self) != before:
+        if self._draw() or len(self) != before:
             self.changed.emit()
 
 

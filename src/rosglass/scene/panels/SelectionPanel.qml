@@ -10,6 +10,7 @@ Pane {
     // The SceneView whose selection is shown.
     property SceneView view: null
     readonly property int count: view ? view.selection.count : 0
+    readonly property var parts: view && visible ? view.selection.parts : []
 
     padding: 4
 
@@ -26,14 +27,16 @@ Pane {
             Layout.fillWidth: true
             Layout.fillHeight: true
             clip: true
-            model: panel.view ? panel.view.selection.parts : []
+            // Rows stay where they are scrolled to while what is selected moves.
+            model: panel.parts.length
             delegate: Column {
-                required property var modelData
+                required property int index
+                readonly property var part: panel.parts[index] || ({ display: "", part: "", lines: [] })
 
                 width: list.width
-                Label { width: parent.width; text: modelData.display + ": " + modelData.part; textFormat: Text.PlainText; elide: Text.ElideRight; font.bold: true; topPadding: 6 }
+                Label { width: parent.width; text: parent.part.display + ": " + parent.part.part; textFormat: Text.PlainText; elide: Text.ElideRight; font.bold: true; topPadding: 6 }
                 Repeater {
-                    model: modelData.lines
+                    model: parent.part.lines
                     Label {
                         required property var modelData
 
