@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from local_world import LocalWorld
 
-from rosglass.qml import Session, install, ros1, ros2, service_client, tf_buffer
+from rosglass.qml import Session, install, ros1, ros2, services, tf_buffer
 from rosglass.qml.log import LocationFormatter, install_message_handler
 from rosglass.qml.waiting import wait_for
 from rosglass.qt import QtCore, QtGui, QtQml, Slot, send_deferred_deletes
@@ -279,7 +279,7 @@ def main() -> None:
     logging.getLogger().handlers[0].setFormatter(LocationFormatter())
     # "Too many arguments", as meant.
     logging.getLogger("rosglass.qt").setLevel(logging.ERROR)
-    for module in (service_client, ros1, tf_buffer):
+    for module in (services, ros1, tf_buffer):
         module.wait_for = briefly  # type: ignore[attr-defined]
     app = QtGui.QGuiApplication(["fuzz"])
     fuzz = Fuzz(Host(Path(last)), url)
