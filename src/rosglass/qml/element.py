@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm.handle import Handle
     from rosglass.comm.node import Node
+    from rosglass.comm.promise import Promise
     from rosglass.messages import MessageType
     from rosglass.qml.runtime import Runtime
     from rosglass.qml.session import GuiExecutor, Session
@@ -492,10 +493,13 @@ class ClientElement(Element):
         return None if self.node is None else (self.node,)
 
     def _on_create_failed(self, error: Error) -> None:
-        self._set_problem(f"{self._name}: {error}")
+        problem = f"{self._name}: {error}"
         if isinstance(error, TypeNotFoundError) and self.node is not None:
+            # Logged if the robot does not send it, either.
+            self._set_problem(problem, logging.DEBUG)
             self._fetch_type(self.node)
         else:
+            self._set_problem(problem)
             self._fail_all(error)
 
     def _fetch_type(self, node: Node) -> None:
@@ -505,14 +509,23 @@ class ClientElement(Element):
             if is_alive(self) and self.node is node:
                 self._create_again()
 
+        def fetched(got: Promise[Any]) -> None:
+            if got.exception() is None:
+                again()
+            else:
+                missed()
+
+        def missed() -> None:
+            if is_alive(self):
+                self._log(self._problem, logging.WARNING)
+                _later(again)
+
         try:
             promise = node.fetch_type_async(self._type)
         except Error:
-            _later(again)
+            missed()
         else:
-            promise.on_done(
-                lambda got: again() if got.exception() is None else _later(again), self._executor
-            )
+            promise.on_done(fetched, self._executor)
 
     def _on_created(self, endpoint: Any) -> None:
         self._watch = endpoint.on_ready_change(weak_callback(self._on_ready), self._executor)
