@@ -103,6 +103,35 @@ def test_displays_are_added_renamed_moved_and_removed(bench: SceneBench, model: 
     assert [one.name for one in bench.view.scene.displays] == ["Grid"]
 
 
+def test_a_refresh_lists_the_topics_of_the_robot_once(
+    bench: SceneBench, model: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node, calls = bench.view.scene.node, []
+    model.active = False
+    for _ in range(3):
+        model.add("Path", "/plan")
+    topics = type(node).topics
+    monkeypatch.setattr(type(node), "topics", lambda node: calls.append(node) or topics(node))
+    model.refresh()
+    assert calls == [node]
+
+
+def test_a_panel_that_is_hidden_follows_nothing(bench: SceneBench, window: Any) -> None:
+    from PySide6.QtCore import QObject
+
+    rows = Rows(window).model
+    bench.wait(lambda: rows.active)
+    window.setProperty("panels", False)
+    assert not rows.active
+    calls: list[int] = []
+    rows.dataChanged.connect(lambda *_: calls.append(1))
+    scene = window.findChild(QObject, "scene")
+    scene.setProperty("background", "#010203")
+    bench.wait(lambda: not rows._timer.isActive())
+    window.setProperty("panels", True)
+    assert calls, "the new color"
+
+
 def test_rows_follow_the_status(bench: SceneBench, model: Any) -> None:
     model.add("Axes", "")
     model.edit(row_of(model, "Reference Frame"), "tool")

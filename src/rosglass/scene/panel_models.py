@@ -154,6 +154,8 @@ class DisplaysModel(QAbstractListModel):
         super().__init__(parent)
         self._view: SceneView | None = None
         self._rows: list[PanelRow] = []
+        #: The robot's topics; None until they are needed in this refresh.
+        self._seen_topics: list[tuple[str, list[str]]] | None = None
         self._expanded: set[tuple[Any, ...]] = {("options",)}
         self._picked: tuple[Any, ...] = ()
         self._timer = QtCore.QTimer(self)
@@ -167,17 +169,25 @@ class DisplaysModel(QAbstractListModel):
         if view is self._view or not (view is None or isinstance(view, SceneView)):
             return
         self._view = view
-        self._timer.stop()
         if view is not None:
             view.scene.displayAdded.connect(lambda _: self.refresh())
             view.scene.displayRemoved.connect(lambda _: self.refresh())
-            self._timer.start()
         self.viewChanged.emit()
+        self._follow()
+
+    def _follow(self) -> None:
+        """Follow the view by a timer, or stop that."""
+        if self._view is None or not self.active:
+            self._timer.stop()
+        else:
+            self._timer.start()
         self.refresh()
 
     #: The view that is shown.
     view = Property(QtCore.QObject, _get_view, _set_view, notify=viewChanged)
 
+    #: Whether it follows what changes by itself, e.g. the status; not needed while it is hidden.
+    active = Writable(bool, True, then="_follow")
     #: Whether rows stay as they are, while one of them is dragged.
     frozen = Writable(bool, False, then="refresh")
 
@@ -211,6 +221,7 @@ class DisplaysModel(QAbstractListModel):
         if not is_alive(self) or self.frozen:
             return
         view = self._view
+        self._seen_topics = None
         new = list(self._walk(view)) if view is not None and is_alive(view) else []
         old = self._rows
         if [row.key for row in new] != [row.key for row in old]:
@@ -348,6 +359,11 @@ class DisplaysModel(QAbstractListModel):
         return ()
 
     def _topics(self) -> list[tuple[str, list[str]]]:
+        if self._seen_topics is None:
+            self._seen_topics = self._list_topics()
+        return self._seen_topics
+
+    def _list_topics(self) -> list[tuple[str, list[str]]]:
         node = self._view.scene.node if self._view is not None else None
         if node is None:
             return []
@@ -595,7 +611,7 @@ class DisplaysModel(QAbstractListModel):
         if self._view is None:
             return []
         found = []
-        for topic, kinds in self._topics():
+        for topic, kinds in self._list_topics():
             for name, display in sorted(self._view.scene.TYPES.items()):
                 shown = set(getattr(display, "MESSAGES", ()))
                 if shown & set(kinds):

@@ -20,6 +20,7 @@ Pane {
 
     DisplaysModel {
         id: rows
+        active: panel.visible
         onRefused: text => { panel.problem = text; forget.restart() }
         onAccepted: panel.problem = ""
     }
