@@ -283,7 +283,7 @@ class View:
         from rosglass.scene.displays import marker
 
         self.costs = Costs()
-        self.costs.watch(display.Intake, "receive", "node")
+        self.costs.watch(display.MessageQueue, "receive", "node")
         self.costs.watch(display.TopicDisplay, "_on_items", "gui")
         self.costs.watch(marker.MarkerGroup, "flush", "gui")
         for kind in renderer._KINDS.values():
@@ -351,7 +351,7 @@ class View:
 
     def _messages(self) -> int:
         displays = self._view.scene.displays
-        return sum(one._intake.received for one in displays if getattr(one, "_intake", None))
+        return sum(one._queue.received for one in displays if getattr(one, "_queue", None))
 
     def move(self, seconds: float, all: bool = True) -> dict[str, float]:
         """Turn the camera with each frame, drawing as fast as it can."""

@@ -622,7 +622,7 @@ def test_markers_fade_when_their_frame_is_not_updated(
     from rosglass.scene import display as displays
     from rosglass.tf import Transform, TransformBroadcaster
 
-    monkeypatch.setattr(displays, "_SILENT_S", 0.5)
+    monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 0.5)
     broadcaster = TransformBroadcaster(bench.robot)
     sent = itertools.count(1)
 
@@ -723,7 +723,7 @@ def test_updates_that_come_before_the_markers_count_in_their_order(bench: SceneB
 
     def take(number: int, *names: str, full: bool = False, erased: tuple[str, ...] = ()) -> None:
         markers = tuple(read(name) for name in names)
-        display._take(MarkerUpdate("", number, full, False, markers, (), erased))
+        display._on_update(MarkerUpdate("", number, full, False, markers, (), erased))
 
     take(3, "c")
     take(4, erased=("a",))

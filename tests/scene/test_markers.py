@@ -233,7 +233,7 @@ def test_locked_markers_fade_when_their_frame_is_not_updated(
     from rosglass.scene import display as displays
     from rosglass.tf import Transform, TransformBroadcaster
 
-    monkeypatch.setattr(displays, "_SILENT_S", 0.5)
+    monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 0.5)
     display = show(
         marker(1, header={"frame_id": "arm"}, frame_locked=True),
         marker(2, 1, header={"frame_id": "arm"}),

@@ -497,11 +497,11 @@ class Camera:
 
     def send(self, topic: str, message: dict[str, Any], second: int = 1) -> Any:
         header = {"frame_id": "camera", "stamp": {"sec": second, "nanosec": 0}}
-        publisher, intake = self.publishers[topic], self.display._intake
-        before = intake.received
+        publisher, queue = self.publishers[topic], self.display._queue
+        before = queue.received
         self.bench.wait(publisher.subscription_count)
         publisher.publish({"header": header, **message})
-        self.bench.wait(lambda: intake.received > before)
+        self.bench.wait(lambda: queue.received > before)
         self.bench.wait.settled(self.bench.session)
         return self.display
 

@@ -330,7 +330,7 @@ def test_a_robot_whose_transforms_stop_fades(bench: SceneBench, monkeypatch: Any
     from rosglass.scene import display
     from rosglass.tf import Transform, TransformBroadcaster
 
-    monkeypatch.setattr(display, "_SILENT_S", 0.5)
+    monkeypatch.setattr(display, "_FRAME_TIMEOUT_S", 0.5)
     view = bench.load("RobotModelDisplay {}")
     (robot,) = view.scene.displays
     publish(bench, URDF)
@@ -358,7 +358,7 @@ def test_a_robot_fades_when_one_of_its_joints_is_not_updated(
     from rosglass.scene import display
     from rosglass.tf import Transform, TransformBroadcaster
 
-    monkeypatch.setattr(display, "_SILENT_S", 0.5)
+    monkeypatch.setattr(display, "_FRAME_TIMEOUT_S", 0.5)
     view = bench.load("RobotModelDisplay {}")
     (robot,) = view.scene.displays
     publish(bench, URDF)

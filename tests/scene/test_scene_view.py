@@ -473,8 +473,8 @@ def test_a_silent_link_above_the_fixed_frame_is_of_no_account(bench: SceneBench)
         broadcaster.send_transform(Transform(*still, stamp, "odom", "base"))
 
     move()
-    bench.wait(lambda: move() or view.scene.silence("map") > 1.5)
-    assert view.scene.silence("base") < 1.0
+    bench.wait(lambda: move() or view.scene.seconds_without_update("map") > 1.5)
+    assert view.scene.seconds_without_update("base") < 1.0
 
 
 def test_data_of_a_publisher_that_is_gone_stays_so_beside_another(bench: SceneBench) -> None:
@@ -534,9 +534,9 @@ def test_nothing_that_is_on_its_way_is_shown_after_a_change(bench: SceneBench, c
     (path,) = view.scene.displays
     publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
     bench.wait(lambda: path._endpoint is not None and publisher.subscription_count())
-    intake = path._intake
+    queue = path._queue
     publisher.publish({"header": {"frame_id": "map"}})
-    while not intake.received:
+    while not queue.received:
         QtCore.QThread.msleep(10)
     if change == "topic":
         path.topic = "/other"

@@ -47,7 +47,7 @@ __all__ = [
     "MOST_WAITING",
     "OUTDATED_ALPHA",
     "Display",
-    "Intake",
+    "MessageQueue",
     "OneTopicDisplay",
     "Status",
     "Subscriptions",
@@ -85,7 +85,7 @@ _LATE_S = 1.0
 #: Seconds without a message after which data that is sent all the time is out of date.
 _CONTINUOUS_S = 3.0
 #: Seconds without a transform after which a frame that is followed may be somewhere else.
-_SILENT_S = 5.0
+_FRAME_TIMEOUT_S = 5.0
 #: Letters of a line of the status: what robots name may be of any length.
 _MAX_NAME, _MAX_TEXT = 200, 1000
 #: Opacity of data whose publisher or connection is gone.
@@ -266,8 +266,12 @@ class Display(Configurable, TopicElement):
         scene, ages = self.scene, {}
         if scene is not None and self.shown:
             frames = (frame.lstrip("/") for frame in self.followed_frames())
-            ages = {one: scene.silence(one) for one in frames if one not in ("", FIXED_FRAME)}
-        self._outdated_frames = {one: age for one, age in ages.items() if age > _SILENT_S}
+            ages = {
+                one: scene.seconds_without_update(one)
+                for one in frames
+                if one not in ("", FIXED_FRAME)
+            }
+        self._outdated_frames = {one: age for one, age in ages.items() if age > _FRAME_TIMEOUT_S}
         self._report_outdated_frames()
         self._fade()
 
@@ -392,14 +396,14 @@ class _Item(NamedTuple):
     stamp: int
 
 
-class Intake:
+class MessageQueue:
     """Decodes messages in the node's thread, and hands them to the GUI thread.
 
     Args:
         prepare: Turns a message into what is shown; knows nothing of the display itself.
-        types: Names of the types that it takes.
+        types: Names of the types that it accepts.
         executor: Of the GUI thread.
-        on_ready: Called there when there is something to take.
+        on_ready: Called there when messages have arrived.
         depth: How many wait there at most; older ones are dropped and counted.
         eager: Whether all fields are decoded at once.
         needs_frame: Whether a message whose header names no frame is refused.
@@ -426,7 +430,7 @@ class Intake:
         self.publisher = b""
 
     def receive(self, sample: Sample) -> None:
-        """Take a sample, in the node's thread."""
+        """Decode and queue a sample, in the node's thread."""
 
         def decode() -> Message:
             name = sample.type.name
@@ -440,7 +444,7 @@ class Intake:
         self.put(decode, sample.type.name)
 
     def put(self, decode: Callable[[], Message], what: str) -> None:
-        """Take a message, in the node's thread.
+        """Decode and queue a message, in the node's thread.
 
         Args:
             decode: Returns it.
@@ -474,8 +478,8 @@ class Intake:
         if first or error:
             self._executor.post(self._on_ready)
 
-    def take(self) -> tuple[list[_Item], str]:
-        """Take what has arrived, and why the last message could not be used."""
+    def drain(self) -> tuple[list[_Item], str]:
+        """Return and forget what has arrived, and why the last message could not be used."""
         with self._lock:
             items, error = list(self._items), self._error
             self._items.clear()
@@ -590,7 +594,7 @@ class TopicDisplay(OneTopicDisplay):
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
-        self._intake: Intake | None = None
+        self._queue: MessageQueue | None = None
         self._waiting: deque[_Item] = deque()
         #: Whether the publisher or the connection of what is shown is gone.
         self._is_gone = False
@@ -670,7 +674,7 @@ class TopicDisplay(OneTopicDisplay):
 
     def _factory(self, *wanted: Any) -> Callable[[], Any]:
         node, topics, qos = wanted
-        intake = self._intake = Intake(
+        queue = self._queue = MessageQueue(
             self.preparer(),
             self.MESSAGES,
             self._executor,
@@ -679,14 +683,14 @@ class TopicDisplay(OneTopicDisplay):
             self.EAGER,
             needs_frame=not self.HAS_FRAMES,
         )
-        return lambda: Subscriptions(node, topics, qos, intake)
+        return lambda: Subscriptions(node, topics, qos, queue)
 
     def _on_created(self, endpoint: Any) -> None:  # noqa: ARG002 - the base class's signature
         self.set_status("Topic", "warn", "No messages received")
         self._expect_publishers()
 
     def _on_closed(self, endpoint: Any) -> None:  # noqa: ARG002 - the base class's signature
-        self._intake = None
+        self._queue = None
         self._waiting.clear()
 
     def _on_create_failed(self, error: Error) -> None:
@@ -695,8 +699,8 @@ class TopicDisplay(OneTopicDisplay):
 
     def _recheck_outdated(self) -> None:
         # The publisher that latched the message still exists and would have sent a newer one.
-        intake, node, session = self._intake, self.node, self._session
-        if intake is None or not intake.received or node is None or session is None:
+        queue, node, session = self._queue, self.node, self._session
+        if queue is None or not queue.received or node is None or session is None:
             return
         if session.state != "connected":
             return
@@ -706,8 +710,8 @@ class TopicDisplay(OneTopicDisplay):
 
     def _is_latched(self) -> bool:
         """Return whether the publisher of the last message keeps it for later subscribers."""
-        intake, node = self._intake, self.node
-        if intake is None or node is None:
+        queue, node = self._queue, self.node
+        if queue is None or node is None:
             return False
         try:
             publishers = node.publishers(self._resolved)
@@ -716,7 +720,7 @@ class TopicDisplay(OneTopicDisplay):
         known = any(one.gid for one in publishers)
         return any(
             one.qos.durability is Durability.TRANSIENT_LOCAL
-            and (one.gid == intake.publisher or not known)
+            and (one.gid == queue.publisher or not known)
             for one in publishers
         )
 
@@ -794,17 +798,17 @@ class TopicDisplay(OneTopicDisplay):
 
     def _renew_preparer(self) -> None:
         """Let further messages be decoded by changed settings, or for another renderer."""
-        if self._intake is not None:
-            self._intake.prepare = self.preparer()
+        if self._queue is not None:
+            self._queue.prepare = self.preparer()
 
     def _on_items(self) -> None:
         if not is_alive(self):  # it has no attributes then
             return
-        intake = self._intake
-        if intake is None or self.scene is None:
+        queue = self._queue
+        if queue is None or self.scene is None:
             return
-        items, error = intake.take()
-        report(self, received=intake.received)
+        items, error = queue.drain()
+        report(self, received=queue.received)
         if error:
             self.set_status("Message", "error", error)
         elif items:
@@ -816,21 +820,21 @@ class TopicDisplay(OneTopicDisplay):
         self._arrived, self._arrived_at = time.time(), now
         self._arrived_ns = self.scene.now()
         self._newest = items[-1]
-        self.set_status("Topic", "ok", f"{intake.received} messages received")
+        self.set_status("Topic", "ok", f"{queue.received} messages received")
         self._outdated = False
         self._waiting.extend(items)
         self._show_waiting()
-        self._drop_oldest(intake)
+        self._drop_oldest(queue)
 
-    def _drop_oldest(self, intake: Intake) -> None:
+    def _drop_oldest(self, queue: MessageQueue) -> None:
         """Drop what waits beside newer messages, and say so if it is missed."""
         most = self.most_waiting()
         while len(self._waiting) > most:
             self._waiting.popleft()
             self._dropped += self._is_loss()
         dropped = []
-        if intake.dropped and self.shows_all():
-            dropped.append(f"{intake.dropped} that came faster than they can be shown")
+        if queue.dropped and self.shows_all():
+            dropped.append(f"{queue.dropped} that came faster than they can be shown")
         if self._dropped:
             dropped.append(f"{self._dropped} while more than {most} waited for their transforms")
         if dropped:
@@ -932,18 +936,18 @@ class TopicDisplay(OneTopicDisplay):
 
 
 class Subscriptions:
-    """The subscriptions of a display, all of which feed the same intake.
+    """The subscriptions of a display, all of which feed the same queue.
 
     Raises:
         Error: One of them could not be made.
     """
 
-    def __init__(self, node: Node, topics: tuple[str, ...], qos: QoS, intake: Intake) -> None:
+    def __init__(self, node: Node, topics: tuple[str, ...], qos: QoS, queue: MessageQueue) -> None:
         self._open: list[Any] = []
         try:
             for topic in topics:
                 subscription = node.create_subscription(
-                    topic, None, qos=qos, raw_callback=intake.receive
+                    topic, None, qos=qos, raw_callback=queue.receive
                 )
                 self._open.append(subscription)
         except Error:

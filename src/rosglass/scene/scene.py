@@ -335,7 +335,7 @@ class Scene(Element):
         except TransformException:
             return 0
 
-    def silence(self, frame: str) -> float:
+    def seconds_without_update(self, frame: str) -> float:
         """Return for how long a frame may have been somewhere else, in seconds.
 
         That is since the last transform of whichever link between it and the fixed frame was

@@ -26,7 +26,7 @@ from rosglass.qml.image_sinks import ImageItem, Sink
 from rosglass.qml.properties import ReadOnly, Writable, report
 from rosglass.qt import Property, QtCore, QtGui, Signal, Slot, is_alive
 from rosglass.scene.camera import PinholeCamera
-from rosglass.scene.display import Intake, OneTopicDisplay, Subscriptions
+from rosglass.scene.display import MessageQueue, OneTopicDisplay, Subscriptions
 from rosglass.scene.parts import Parts
 from rosglass.scene.rviz_formats import read_number
 from rosglass.scene.scene_view import SceneView
@@ -466,7 +466,7 @@ class CameraDisplay(PictureDisplay):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         self._waiting: deque[Picture] = deque()
-        self._infos: Intake | None = None
+        self._infos: MessageQueue | None = None
         self._info_topic = ""
         self._lens: _Lens | None = None
         #: Of the camera's frame at the time of the picture, in the fixed frame.
@@ -514,7 +514,7 @@ class CameraDisplay(PictureDisplay):
         topic = self._info_topic = camera_info_topic(topic)
         self._placed_at = time.monotonic()
         self._miss_info()
-        intake = self._infos = Intake(
+        queue = self._infos = MessageQueue(
             _read_lens, (_CAMERA_INFO,), session.executor, weak_callback(self._on_info), 1
         )
         qos = QoS(
@@ -523,14 +523,14 @@ class CameraDisplay(PictureDisplay):
 
         def done(result: Any) -> None:
             if isinstance(result, Error):
-                if is_alive(self) and self._infos is intake:
+                if is_alive(self) and self._infos is queue:
                     self.set_status("Camera Info", "error", str(result))
-            elif is_alive(self) and self._infos is intake:
+            elif is_alive(self) and self._infos is queue:
                 self._cleanup["camera info"] = lambda: session.background(result.close)
             else:
                 session.background(result.close)
 
-        session.background(lambda: Subscriptions(node, (topic,), qos, intake), done)
+        session.background(lambda: Subscriptions(node, (topic,), qos, queue), done)
 
     def _miss_info(self) -> None:
         text = f"no CameraInfo received on {self._info_topic}; the picture is shown alone"
@@ -547,7 +547,7 @@ class CameraDisplay(PictureDisplay):
     def _on_info(self) -> None:
         if not is_alive(self) or self._infos is None:
             return
-        items, error = self._infos.take()
+        items, error = self._infos.drain()
         before = self._lens
         if error:
             # What is drawn by another lens would be at wrong places.

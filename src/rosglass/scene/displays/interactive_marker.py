@@ -20,7 +20,7 @@ from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import QtCore, QtQml, Signal, Slot, is_alive
-from rosglass.scene.display import OUTDATED_ALPHA, Intake, OneTopicDisplay, TopicDisplay
+from rosglass.scene.display import OUTDATED_ALPHA, MessageQueue, OneTopicDisplay, TopicDisplay
 from rosglass.scene.displays.interactive_marker_controls import (
     MENU_SELECT,
     Control,
@@ -56,7 +56,7 @@ _MAX_SERVERS, _MAX_EARLY, _MAX_LINES = 20, 100, 20
 _MAX_NAME = 80
 #: Seconds without a message after which a server that sends keep-alives, usually twice a second, is
 #: gone.
-_SILENCE_S = 3.0
+_KEEP_ALIVE_TIMEOUT_S = 3.0
 #: Milliseconds until markers that were not received are requested again.
 _RETRY_MS = 2000
 #: Milliseconds between two feedbacks of a drag.
@@ -71,7 +71,7 @@ class _Connection:
         node: The node.
         namespace: Of the server, absolute.
         qos: What is requested of the updates' publishers.
-        intake: Takes all that is received.
+        queue: Receives all that is sent.
         on_failed: Called, in any thread, with why the markers were not received.
     """
 
@@ -80,11 +80,11 @@ class _Connection:
         node: Node,
         namespace: str,
         qos: QoS,
-        intake: Intake,
+        queue: MessageQueue,
         on_failed: Callable[[str], None],
     ) -> None:
         self._node, self._namespace, self._qos = node, namespace, qos
-        self._intake, self._on_failed = intake, on_failed
+        self._queue, self._on_failed = queue, on_failed
         #: The subscription of all markers in ROS 1, while they are wanted.
         self._full: Any = None
         self._open: list[Any] = []
@@ -92,7 +92,7 @@ class _Connection:
         try:
             self._open.append(
                 node.create_subscription(
-                    f"{namespace}/update", None, qos=qos, raw_callback=intake.receive
+                    f"{namespace}/update", None, qos=qos, raw_callback=queue.receive
                 )
             )
             self.feedback = node.create_publisher(
@@ -110,14 +110,14 @@ class _Connection:
             raise
 
     def request(self) -> None:
-        """Request all markers; they go to the intake."""
+        """Request all markers; they go to the queue."""
         if self.client is None:
             self.stop_request()
             self._full = self._node.create_subscription(
                 f"{self._namespace}/update_full",
                 None,
                 qos=self._qos,
-                raw_callback=self._intake.receive,
+                raw_callback=self._queue.receive,
             )
         else:
             self.client.call_async(timeout=None).on_done(self._on_response)
@@ -125,7 +125,7 @@ class _Connection:
     def _on_response(self, call: Any) -> None:
         error = call.exception()
         if error is None:
-            self._intake.put(call.result, "visualization_msgs/GetInteractiveMarkers")
+            self._queue.put(call.result, "visualization_msgs/GetInteractiveMarkers")
         else:
             self._on_failed(str(error))
 
@@ -293,14 +293,14 @@ class InteractiveMarkersDisplay(TopicDisplay):
         node, namespace, qos = wanted
         executor, failed = self._executor, weak_callback(self._on_request_failed)
         types = (*self.MESSAGES, "visualization_msgs/InteractiveMarkerInit")
-        intake = self._intake = Intake(
+        queue = self._queue = MessageQueue(
             self.preparer(), types, executor, weak_callback(self._on_items), 1000, eager=True
         )
 
         def on_failed(text: str) -> None:
             executor.post(lambda: failed(text))
 
-        return lambda: _Connection(node, namespace, qos, intake, on_failed)
+        return lambda: _Connection(node, namespace, qos, queue, on_failed)
 
     def _on_created(self, endpoint: Any) -> None:
         super()._on_created(endpoint)
@@ -407,7 +407,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
         if not why and self._outdated:
             why = "the server is gone"
         elif not why and servers and all(one.silent for one in servers):
-            why = f"the server has given no sign of life for more than {_SILENCE_S:g} s"
+            why = f"the server has given no sign of life for more than {_KEEP_ALIVE_TIMEOUT_S:g} s"
         return f"sent on {topic}, but {why}" if why else ""
 
     def announce(self, text: str) -> None:
@@ -426,9 +426,9 @@ class InteractiveMarkersDisplay(TopicDisplay):
 
     def _show_waiting(self) -> None:
         while self._waiting:
-            self._take(self._waiting.popleft().data)
+            self._on_update(self._waiting.popleft().data)
 
-    def _take(self, update: MarkerUpdate) -> None:
+    def _on_update(self, update: MarkerUpdate) -> None:
         server = self._servers.get(update.server)
         if server is None:
             if len(self._servers) >= _MAX_SERVERS:
@@ -559,8 +559,8 @@ class InteractiveMarkersDisplay(TopicDisplay):
     def _report(self, name: str, server: _Server) -> None:
         line = f"Server {name[:_MAX_NAME]}".strip()
         if server.silent:
-            text = f"no sign of life for more than {_SILENCE_S:g} s; its markers may be out of date"
-            self.set_status(line, "warn", text)
+            text = f"no sign of life for more than {_KEEP_ALIVE_TIMEOUT_S:g} s"
+            self.set_status(line, "warn", f"{text}; its markers may be out of date")
         elif server.number is None:
             self.set_status(line, "warn", "waiting for its markers")
         else:
@@ -569,7 +569,7 @@ class InteractiveMarkersDisplay(TopicDisplay):
     def _on_tick(self) -> None:
         now = time.monotonic()
         for name, server in self._servers.items():
-            silent = server.beats and now - server.heard > _SILENCE_S
+            silent = server.beats and now - server.heard > _KEEP_ALIVE_TIMEOUT_S
             if silent != server.silent:
                 server.silent = silent
                 server.root.alpha = OUTDATED_ALPHA if silent else 1.0
