@@ -457,6 +457,45 @@ def test_what_follows_frames_fades_without_a_node(bench: SceneBench) -> None:
     assert (frames.statusLevel, axes.statusLevel) == ("ok", "ok")
 
 
+def test_no_frame_fades_while_a_simulation_is_paused(bench: SceneBench, monkeypatch: Any) -> None:
+    from rosglass import Time
+    from rosglass.scene import display as displays
+    from rosglass.scene import scene as scenes
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 1.0)
+    monkeypatch.setattr(scenes, "_PAUSED_S", 0.3)
+    view = bench.load('TFDisplay { frameTimeout: 1 } AxesDisplay { frame: "arm" }')
+    frames, axes = view.scene.displays
+    clock = bench.robot.create_publisher("/clock", "rosgraph_msgs/msg/Clock")
+    moving = TransformBroadcaster(bench.robot)
+    view.scene.node.parameters.set({"use_sim_time": True})
+    bench.wait(clock.subscription_count)
+    passed = itertools.count(1)
+
+    def run() -> None:
+        clock.publish({"clock": {"sec": 10, "nanosec": next(passed)}})
+
+    def move() -> bool:
+        stamp = Time.from_parts(10, next(passed))
+        moving.send_transform(Transform((1, 0, 0), (0, 0, 0, 1), stamp, "map", "arm"))
+        return frames.frames == ["arm", "map"] and axes.statusLevel == "ok"
+
+    run()
+    bench.wait.settled(bench.session)
+    bench.wait(move)
+    bench.wait.nothing_happens(2.5)
+    assert frames.frames == ["arm", "map"]
+    assert (axes.root.alpha, axes.statusLevel) == (1.0, "ok"), axes.statusText
+    # It goes on, without what sends the transform.
+    bench.wait(lambda: run() or axes.root.alpha < 1.0)
+    bench.wait(lambda: run() or frames.frames == ["map"])
+    bench.wait(lambda: move() and axes.root.alpha == 1.0)
+    # A simulation that is gone is not paused.
+    clock.close()
+    bench.wait(lambda: axes.root.alpha < 1.0)
+
+
 def test_a_silent_link_above_the_fixed_frame_is_of_no_account(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import Transform, TransformBroadcaster

@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import math
 import time
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.executor import Dispatcher
@@ -41,6 +42,8 @@ _log = logging.getLogger("rosglass.scene")
 #: messages a second is seen.
 _TRANSFORMS_S = 0.03
 _ORIGIN, _UPRIGHT = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
+#: Seconds without a change of the robot's time after which a simulation is paused.
+_PAUSED_S = 1.0
 #: Seconds between two resets as the time jumps back again and again.
 _RESETS_S = 1.0
 
@@ -82,6 +85,9 @@ class Scene(Element):
         self._watch: Any = None
         self._loader: Dispatcher | None = None
         self._ticks = 0
+        #: The robot's simulated time, when it has changed, and when it last stood still.
+        self._simulated_ns = 0
+        self._time_changed_at, self._paused_at = math.inf, -math.inf
         super().__init__(parent, runtime)
         self._timer = single_shot(self, self._follow)
         self._followed_at = self._reset_at = -math.inf
@@ -339,7 +345,8 @@ class Scene(Element):
         """Return for how long a frame may have been somewhere else, in seconds.
 
         That is since the last transform of whichever link between it and the fixed frame was
-        received longest ago; 0 without moving links, infinite while the connection is lost.
+        received longest ago; 0 without moving links, infinite while the connection is lost. The
+        time for which a simulation is paused does not count.
         """
         session = self._session
         if frame in ("", self._fixed_frame):
@@ -347,12 +354,31 @@ class Scene(Element):
         if session is None or session.state != "connected":
             return math.inf
         buffer = self.transforms
-        return 0.0 if buffer is None else buffer.silence(self._fixed_frame, frame)
+        if buffer is None:
+            return 0.0
+        return min(buffer.silence(self._fixed_frame, frame), self.seconds_running())
+
+    def seconds_running(self) -> float:
+        """Return for how long the robot's time runs, since a simulation was last paused."""
+        return time.monotonic() - self._paused_at
+
+    def _watch_time(self) -> None:
+        node, now = self.node, time.monotonic()
+        if node is None or not node.clock.is_simulated:
+            self._time_changed_at = math.inf
+        elif self._time_changed_at == math.inf or self._simulated_ns != self.now():
+            self._simulated_ns, self._time_changed_at = self.now(), now
+        elif now - self._time_changed_at > _PAUSED_S:
+            # Not a simulation that is gone.
+            with suppress(Error):
+                if node.publishers("/clock"):
+                    self._paused_at = now
 
     @Slot()
     def _on_tick(self) -> None:
         """Look twice a second for displays whose frames are not updated any more."""
         self._ticks += 1
+        self._watch_time()
         if self._ticks % 5:
             return
         self._check_transforms()

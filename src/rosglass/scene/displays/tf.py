@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import time
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -268,7 +269,9 @@ class TFDisplay(Display):
         """Return the opacity of a frame by its age: 1 while it is updated, 0 after the timeout."""
         if info.static or not info.parent:
             return 1.0
-        left = (self.frameTimeout - info.silence) / (self.frameTimeout * (1 - _FADE_AFTER))
+        scene = self.scene
+        seconds = min(info.silence, math.inf if scene is None else scene.seconds_running())
+        left = (self.frameTimeout - seconds) / (self.frameTimeout * (1 - _FADE_AFTER))
         return float(min(max(left, 0.0), 1.0))
 
     def _fill(self, frames: list[_Frame]) -> None:
