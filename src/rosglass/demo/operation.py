@@ -55,10 +55,12 @@ _REPEAT_PERIOD_S = 0.5
 
 
 class DriveGoal:
-    """A goal from ``/move_base_simple/goal``, and its state in ``/move_base/status``.
+    """A goal from RViz's tool, and its state in ``/move_base/status``.
+
+    RViz 1 publishes on ``/move_base_simple/goal``, RViz 2 on ``/goal_pose``.
 
     Args:
-        node: Node with both topics.
+        node: Node with the topics.
         refusal: Returns why goals are refused at present; empty if they are accepted.
     """
 
@@ -70,9 +72,11 @@ class DriveGoal:
         self._status: list[dict[str, Any]] = []
         kind = "actionlib_msgs/msg/GoalStatusArray"
         self._publisher = node.create_publisher("/move_base/status", kind, QoS.latched())
-        self._subscription = node.create_subscription(
-            "/move_base_simple/goal", "geometry_msgs/msg/PoseStamped", self._on_goal, 1
-        )
+        topics = ("/move_base_simple/goal", "/goal_pose")
+        kind = "geometry_msgs/msg/PoseStamped"
+        self._subscriptions = [
+            node.create_subscription(topic, kind, self._on_goal, 1) for topic in topics
+        ]
 
     @property
     def position(self) -> tuple[float, float] | None:
@@ -100,7 +104,8 @@ class DriveGoal:
 
     def close(self) -> None:
         """Accept no more goals; safe to call twice."""
-        self._subscription.close()
+        for subscription in self._subscriptions:
+            subscription.close()
 
     def _on_goal(self, message: Message) -> None:
         target, frame = message.pose.position, message.header.frame_id
