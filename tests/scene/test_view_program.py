@@ -576,6 +576,12 @@ class Rows:
         y = top + 24 * (row_of(self.model, label) + part)
         return self._list.mapToScene(self._pointf(x, y)).toPoint()
 
+    @property
+    def current(self) -> int:
+        """The row that is selected; -1 for none."""
+        found: int = self._list.property("currentIndex")
+        return found
+
     def bottom(self) -> Any:
         """Return a place in the lowest row that is visible."""
         return self._list.mapToScene(self._pointf(150, self._list.height() - 8)).toPoint()
@@ -918,3 +924,36 @@ def test_a_kiosk_is_bare(window: Any) -> None:
     assert access.bare
     access.bare = False
     assert window.property("panels")
+
+
+def test_delete_removes_only_what_was_selected(bench: SceneBench, window: Any) -> None:
+    """Not the display that takes the place of a setting or display that goes."""
+    rows = Rows(window)
+    rows.scene.add("Axes")
+    rows.scene.add("Path")
+    rows.model.toggle(row_of(rows.model, "Axes"))
+    window.grabWindow()  # the rows that have come are placed
+    rows.click(rows.at("Radius", x=60))
+    assert rows.current == row_of(rows.model, "Radius")
+    rows.model.toggle(row_of(rows.model, "Axes"))
+    assert rows.current == row_of(rows.model, "Axes")
+    rows.key("Delete")
+    assert outline(rows.scene) == ["Grid", "TF", "Path"]
+    rows.key("Delete")
+    assert outline(rows.scene) == ["Grid", "TF", "Path"]
+    rows.click(rows.at("TF"))
+    # A robot's overlay, say, removes it.
+    rows.scene.remove(rows.scene.find("TF"))
+    rows.model.refresh()
+    assert rows.current == -1
+
+
+def test_the_global_status_says_that_there_is_no_connection(bench: SceneBench, model: Any) -> None:
+    def status() -> Any:
+        model.refresh()
+        return model.rows[row_of(model, "Global Status")]
+
+    bench.wait(lambda: status().level == "ok")
+    bench.session.shutdown()
+    bench.wait(lambda: status().level != "ok")
+    assert status().value != "Ok"

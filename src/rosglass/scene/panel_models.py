@@ -215,6 +215,13 @@ class DisplaysModel(QAbstractListModel):
 
     # -- rows ------------------------------------------------------------------------------------
 
+    @Slot(int, result=int)
+    def collapsedInto(self, row: int) -> int:
+        """Return the row that a setting or part is about to be hidden below; -1 for a display."""
+        above, gone = self._rows[row - 1], self._rows[row]
+        hidden = row > 0 and gone.kind != "display" and above.depth < gone.depth
+        return row - 1 if hidden else -1
+
     @Slot()
     def refresh(self) -> None:
         """Show what has changed."""
@@ -266,10 +273,14 @@ class DisplaysModel(QAbstractListModel):
                 (*key, _BACKGROUND), 1, _BACKGROUND, "color",
                 view.property("background").name(), "What is behind everything.",
             )  # fmt: skip
-        problem = str(view.property("problem"))
+        problem, level = str(view.property("problem")), "error"
+        session = scene._session
+        if not problem and session is not None and session.state != "connected":
+            level = "error" if session.state == "failed" else "warn"
+            problem = ": ".join(filter(None, (session.state, session.detail)))
         yield PanelRow(
             ("status",), 0, "Global Status", "status", problem or "Ok", problem,
-            "error" if problem else "ok",
+            level if problem else "ok",
         )  # fmt: skip
         yield from self._walk_group(view, None, 0)
 

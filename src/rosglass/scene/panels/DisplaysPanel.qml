@@ -24,6 +24,14 @@ Pane {
         onRefused: text => { panel.problem = text; forget.restart() }
         onAccepted: panel.problem = ""
     }
+    Connections {
+        target: rows
+        // The list would select the row that takes the place of one that goes; Delete would remove its display.
+        function onRowsAboutToBeRemoved(parent, first, last) {
+            if (panel.current >= first && panel.current <= last)
+                panel.current = rows.collapsedInto(first)
+        }
+    }
     Timer { id: forget; interval: 8000; onTriggered: panel.problem = "" }
 
     // A display that is dragged to another place, by the mouse or by a finger that is held down.
