@@ -97,6 +97,13 @@ def test_a_panel_shows_and_changes_settings(bench: SceneBench) -> None:
     assert not bench.view.tools.find("PublishPoint").singleClick
 
 
+def test_the_panel_follows_settings_that_a_program_changes(bench: SceneBench) -> None:
+    view = bench.load("ToolsPanel { width: 200; height: 300; view: parent }")
+    bench.picture()
+    view.tools.find("SetInitialPose").xDeviation = 0.125
+    bench.wait(lambda: any(one.property("text") == "0.125" for one in items_of(view)))
+
+
 def items_of(item: Any) -> Iterator[Any]:
     yield item
     for child in item.childItems():

@@ -33,41 +33,49 @@ Pane {
                 required property var modelData
                 property var settings: modelData.settings()
 
+                function refresh() { settings = modelData.settings() }
                 function set(name, value) {
                     panel.problem = modelData.setSetting(name, String(value))
-                    settings = modelData.settings()
+                    refresh()
                 }
+
+                // Programs change them, too.
+                Timer { interval: 1000; repeat: true; triggeredOnStart: true; running: panel.visible; onTriggered: group.refresh() }
 
                 width: ListView.view.width
                 visible: settings.length > 0
                 height: visible ? implicitHeight : 0
                 Label { text: group.modelData.name; textFormat: Text.PlainText; font.bold: true; topPadding: 6 }
                 Repeater {
-                    model: group.settings
+                    // Rows stay: an editor that is open stays so.
+                    model: group.settings.length
                     RowLayout {
-                        required property var modelData
+                        id: row
+
+                        required property int index
+                        readonly property var setting: group.settings[index] || ({ name: "", kind: "", value: "", choices: [], description: "", placeholder: "" })
 
                         width: group.width
                         height: 24
                         Label {
                             Layout.fillWidth: true
                             Layout.preferredWidth: 100
-                            text: modelData.name
+                            text: row.setting.name
                             textFormat: Text.PlainText
                             elide: Text.ElideRight
                             HoverHandler { id: hover }
-                            PlainToolTip { visible: hover.hovered && modelData.description !== ""; plain: modelData.description }
+                            PlainToolTip { visible: hover.hovered && row.setting.description !== ""; plain: row.setting.description }
                         }
                         SettingEditor {
-                            kind: modelData.kind
-                            value: modelData.value
-                            choices: modelData.choices
-                            placeholder: modelData.placeholder
-                            onEdited: value => group.set(modelData.name, value)
+                            kind: row.setting.kind
+                            value: row.setting.value
+                            choices: row.setting.choices
+                            placeholder: row.setting.placeholder
+                            onEdited: value => group.set(row.setting.name, value)
                             onColorAsked: before => {
                                 chooser.group = group
-                                chooser.setting = modelData.name
-                                chooser.ask(before, modelData.name)
+                                chooser.setting = row.setting.name
+                                chooser.ask(before, row.setting.name)
                             }
                         }
                     }
