@@ -290,7 +290,7 @@ class SceneView(QQuickRhiItem):
             self.scene._refuse(f"SceneView: view: {error}")
 
     #: The type of the view: ``Orbit``, ``XYOrbit``, ``FPS``, ``TopDownOrtho``,
-    #: ``ThirdPersonFollower``.
+    #: ``ThirdPersonFollower``, ``FrameAligned``.
     view = Property(str, _get_view_name, _set_view_name, notify=viewChanged)
 
     #: What is selected.
