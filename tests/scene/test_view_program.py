@@ -957,3 +957,23 @@ def test_the_global_status_says_that_there_is_no_connection(bench: SceneBench, m
     bench.session.shutdown()
     bench.wait(lambda: status().level != "ok")
     assert status().value != "Ok"
+
+
+def test_closing_waits_for_the_name_of_a_new_file(
+    bench: SceneBench, window: Any, tmp_path: Path
+) -> None:
+    from PySide6.QtCore import QObject
+    from PySide6.QtQml import QQmlExpression, qmlContext
+
+    def run(script: str) -> None:
+        expression = QQmlExpression(qmlContext(window), window, script)
+        expression.evaluate()
+        assert not expression.hasError(), expression.error().toString()
+
+    window.findChild(QObject, "scene").scene.add("Axes")
+    window.close()
+    assert window.isVisible()
+    run("unsaved.buttonClicked(MessageDialog.Save, 0); unsaved.close()")
+    run(f"saving.close(); saving.save('{tmp_path}/new.rviz')")
+    bench.wait(lambda: not window.isVisible())
+    assert (tmp_path / "new.rviz").exists()

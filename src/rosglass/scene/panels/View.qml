@@ -45,7 +45,7 @@ ApplicationWindow {
         if (program.configName)
             program.save("")
         else
-            saving.open()
+            saving.ask(null)
     }
 
     header: ToolBar {
@@ -56,7 +56,7 @@ ApplicationWindow {
             sourceComponent: RowLayout {
                 ToolButton { text: "Open"; onClicked: window.openOther() }
                 ToolButton { text: "Save"; onClicked: window.save() }
-                ToolButton { text: "Save as"; onClicked: saving.open() }
+                ToolButton { text: "Save as"; onClicked: saving.ask(null) }
                 ToolSeparator { }
                 Repeater {
                     model: scene.tools.all
@@ -248,6 +248,13 @@ ApplicationWindow {
     }
     FileDialog {
         id: saving
+        // What waits until it is saved, e.g. closing.
+        property var then: null
+        function ask(job) { then = job; open() }
+        function save(file) {
+            program.save(file)
+            if (then && program.mayClose()) then()
+        }
         title: "Save the RViz config"
         fileMode: FileDialog.SaveFile
         defaultSuffix: "rviz"
@@ -255,7 +262,7 @@ ApplicationWindow {
         onAccepted: {
             const typed = program.typedFile(selectedFile)
             if (typed.toString() === "") {
-                program.save(selectedFile)
+                save(selectedFile)
                 return
             }
             // The dialog shows this folder the next time.
@@ -263,7 +270,7 @@ ApplicationWindow {
             if (program.exists(typed))
                 replacing.ask(typed)
             else
-                program.save(typed)
+                save(typed)
         }
     }
     MessageDialog {
@@ -274,7 +281,7 @@ ApplicationWindow {
         text: "There is such a file already. Replace it?"
         informativeText: file.toString().replace(/^file:\/\//, "")
         buttons: MessageDialog.Yes | MessageDialog.No
-        onButtonClicked: (button, role) => { if (button === MessageDialog.Yes) program.save(file) }
+        onButtonClicked: (button, role) => { if (button === MessageDialog.Yes) saving.save(file) }
     }
     MessageDialog {
         id: unsaved
@@ -289,7 +296,7 @@ ApplicationWindow {
                     program.save("")
                     if (program.mayClose()) then()
                 } else {
-                    saving.open()
+                    saving.ask(then)
                 }
             } else if (button === MessageDialog.Discard) {
                 then()
