@@ -170,6 +170,30 @@ def test_an_old_picture_fades_though_its_publisher_lives(
     assert display.statusLevel == "ok"
 
 
+def test_a_picture_does_not_fade_while_a_simulation_is_paused(
+    bench: SceneBench, load: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene import scene as scenes
+    from rosglass.scene.displays import image
+
+    monkeypatch.setattr(image, "_MAX_AGE_S", 1.0)
+    monkeypatch.setattr(scenes, "_PAUSED_S", 0.3)
+    display, robot = load(IMAGE + PANEL)
+    clock = bench.robot.create_publisher("/clock", "rosgraph_msgs/msg/Clock")
+    bench.view.scene.node.parameters.set({"use_sim_time": True})
+    bench.wait(clock.subscription_count)
+
+    def run() -> None:
+        clock.publish({"clock": {"sec": 7, "nanosec": next(NUMBERS)}})
+
+    run()
+    bench.wait.settled(bench.session)
+    robot.show(display)
+    bench.wait.nothing_happens(1.8)
+    assert not display.stale
+    bench.wait(lambda: run() or display.stale)
+
+
 def test_depths_are_shown_in_greys(bench: SceneBench, load: Callable[..., Any]) -> None:
     display, robot = load(IMAGE + PANEL)
     depths = np.tile(np.linspace(2, 6, WIDTH, dtype="<f4"), (HEIGHT, 1))

@@ -604,8 +604,7 @@ class TopicDisplay(OneTopicDisplay):
         #: How many messages were dropped while they waited, and are missed.
         self._dropped = 0
         self._arrived = self._arrived_at = 0.0
-        #: The robot's time then, nanoseconds, and seconds between the last messages.
-        self._arrived_ns = 0
+        #: Seconds between the last messages.
         self._intervals = deque((0.0, 0.0), maxlen=2)
         super().__init__(parent, runtime)
 
@@ -733,11 +732,7 @@ class TopicDisplay(OneTopicDisplay):
 
     def _seconds_without_message(self) -> float:
         seconds, scene = self._steady() - self._arrived_at, self.scene
-        node = None if scene is None else scene.node
-        if scene is None or node is None or not node.clock.is_simulated:
-            return seconds
-        # While a simulation is paused, nothing is sent, and nothing changes.
-        return min(seconds, abs(scene.now() - self._arrived_ns) * 1e-9)
+        return seconds if scene is None else min(seconds, scene.seconds_running())
 
     def _update_stale(self) -> None:
         super()._update_stale()
@@ -818,7 +813,6 @@ class TopicDisplay(OneTopicDisplay):
         now = self._steady()
         self._intervals.append(now - self._arrived_at)
         self._arrived, self._arrived_at = time.time(), now
-        self._arrived_ns = self.scene.now()
         self._newest = items[-1]
         self.set_status("Topic", "ok", f"{queue.received} messages received")
         self._outdated = False

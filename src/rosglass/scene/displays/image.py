@@ -342,7 +342,11 @@ class PictureDisplay(OneTopicDisplay):
 
     def _is_old(self) -> bool:
         picture = self._picture
-        return picture is None or self._steady() - picture.made + picture.late > _MAX_AGE_S
+        if picture is None:
+            return True
+        age_s, scene = self._steady() - picture.made + picture.late, self.scene
+        # A camera of a simulation that is paused sends nothing.
+        return (age_s if scene is None else min(age_s, scene.seconds_running())) > _MAX_AGE_S
 
     def _update_stale(self) -> None:
         super()._update_stale()
