@@ -245,6 +245,24 @@ def test_a_display_in_a_frame_follows_it(bench: SceneBench) -> None:
     assert rows.mean() < 110
 
 
+def test_what_follows_a_frame_fades_as_soon_as_nobody_publishes_it(
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass import Time
+    from rosglass.scene import display as displays
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 3600.0)
+    view = bench.load('AxesDisplay { frame: "tool" }')
+    (axes,) = view.scene.displays
+    broadcaster = TransformBroadcaster(bench.robot)
+    pose = Transform((0, 0, 2), (0, 0, 0, 1), Time.from_parts(7, 0), "map", "tool")
+    bench.wait(lambda: broadcaster.send_transform(pose) or axes.statusLevel == "ok")
+    broadcaster.close()
+    bench.wait(lambda: "[tool] may be somewhere else" in axes.statusText)
+    assert axes.root.alpha < 1.0
+
+
 def test_a_path_is_shown_and_fades_when_its_publisher_is_gone(bench: SceneBench) -> None:
     view = bench.load('PathDisplay { topic: "/plan"; lineStyle: "Billboards"; lineWidth: 0.2 }')
     (path,) = view.scene.displays

@@ -86,6 +86,8 @@ _LATE_S = 1.0
 _CONTINUOUS_S = 3.0
 #: Seconds without a transform after which a frame that is followed may be somewhere else.
 _FRAME_TIMEOUT_S = 5.0
+#: The same where transforms have no publisher any more.
+_UNPUBLISHED_TIMEOUT_S = 0.5
 #: Letters of a line of the status: what robots name may be of any length.
 _MAX_NAME, _MAX_TEXT = 200, 1000
 #: Opacity of data whose publisher or connection is gone.
@@ -271,7 +273,9 @@ class Display(Configurable, TopicElement):
                 for one in frames
                 if one not in ("", FIXED_FRAME)
             }
-        self._outdated_frames = {one: age for one, age in ages.items() if age > _FRAME_TIMEOUT_S}
+        published = scene is None or scene.has_tf_publishers
+        timeout = _FRAME_TIMEOUT_S if published else _UNPUBLISHED_TIMEOUT_S
+        self._outdated_frames = {one: age for one, age in ages.items() if age > timeout}
         self._report_outdated_frames()
         self._fade()
 

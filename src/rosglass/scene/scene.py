@@ -56,6 +56,7 @@ class Scene(Element):
     Attributes:
         root: All drawables, in the fixed frame.
         draws_in_software: Whether the processor draws, as far as is known.
+        has_tf_publishers: Whether transforms have a publisher.
     """
 
     #: The picture has changed.
@@ -77,6 +78,7 @@ class Scene(Element):
     ) -> None:
         self.root = Group()
         self.draws_in_software = False
+        self.has_tf_publishers = True
         #: What finds meshes and textures, once something has been loaded.
         self._resources: list[ResourceRetriever] = []
         self._fixed_frame = "map"
@@ -382,6 +384,8 @@ class Scene(Element):
         if self._ticks % 5:
             return
         self._check_transforms()
+        node = self.node
+        self.has_tf_publishers = node is not None and bool(node.publishers("/tf"))
         for display in self._alive():
             display.check_frames()
 
