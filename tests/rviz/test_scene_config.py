@@ -57,7 +57,7 @@ def test_rviz_loads_what_was_saved(app: Any, file: Path, tmp_path: Path) -> None
 
 def test_rviz_loads_a_new_config(app: Any, tmp_path: Path) -> None:
     new = RvizConfig(1)
-    new.fixed_frame, new.frame_rate = "odom", 20
+    new.fixed_frame, new.options["Frame Rate"] = "odom", 20
     ids = {name: ids[0] for name, ids in DISPLAYS.items() if ids[0] and ids[0] not in DOCKED}
     new.displays.extend(DisplayConfig.new(name, 1, enabled=False) for name in ids)
     new.tools.extend(ToolConfig.new(name, 1) for name, ids in TOOLS.items() if ids[0])

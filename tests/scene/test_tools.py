@@ -447,9 +447,9 @@ def test_a_goal_while_disconnected_is_not_sent(bench: SceneBench, hand: Hand) ->
     view = bench.load()
     view.tool = "SetGoal"
     goal = view.tools.current
-    bench.wait(lambda: goal.is_ready)
+    bench.wait(lambda: goal._endpoint is not None)
     bench.session.shutdown()
-    bench.wait(lambda: not goal.is_ready)
+    bench.wait(lambda: goal._endpoint is None)
     hand.drag(hand.at((0, 0, 0)), hand.at((1, 0, 0)))
     assert "not sent, for the robot is not connected" in view.statusText
     assert "not connected" in goal.problem
@@ -586,7 +586,7 @@ def test_a_goal_to_an_action_without_server_says_so(
 ) -> None:
     view = bench.load('Nav2GoalTool { name: "Go" }\ntool: "Go"')
     goal = view.tools.current
-    bench.wait(lambda: goal.is_ready)
+    bench.wait(lambda: goal._endpoint is not None)
     said: list[str] = []
     view.statusTextChanged.connect(lambda: said.append(view.statusText))
     monkeypatch.setattr("rosglass.scene.publishing_tools._MATCH_TIMEOUT_S", 0.2)

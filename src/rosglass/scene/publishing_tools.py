@@ -149,11 +149,6 @@ class PublishingTool(Tool):
 
     # -- sending ---------------------------------------------------------------------------------
 
-    @property
-    def is_ready(self) -> bool:
-        """Whether it has what it sends with: a publisher or an action client."""
-        return self._endpoint is not None
-
     def send(self, fields: dict[str, Any], text: str) -> None:
         """Send a message; the status bar says what became of it.
 

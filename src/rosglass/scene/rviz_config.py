@@ -37,7 +37,7 @@ from rosglass.scene.rviz_formats import (
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
 __all__ = ["DisplayConfig", "RvizConfig", "ToolConfig", "ViewConfig"]
 
@@ -402,19 +402,6 @@ class RvizConfig:
         self.options["Background Color"] = write_color(color, "Background Color")
 
     @property
-    def frame_rate(self) -> float:
-        """Frames per second at most."""
-        try:
-            rate = read_number(self.options.get("Frame Rate", _DEFAULT_FRAME_RATE_HZ), minimum=1)
-        except Error:
-            return _DEFAULT_FRAME_RATE_HZ
-        return rate
-
-    @frame_rate.setter
-    def frame_rate(self, rate: float) -> None:
-        self.options["Frame Rate"] = read_number(rate, "Frame Rate", minimum=1)
-
-    @property
     def panels(self) -> list[Any]:
         """The mappings of RViz's panels, each with its ``Class``, e.g. ``rviz/Displays``."""
         found = self.root.get("Panels")
@@ -430,40 +417,6 @@ class RvizConfig:
                 continue
             yield display
             stack.append(iter(display.displays))
-
-    def unknown(
-        self,
-        displays: Mapping[str, Collection[str] | None],
-        tools: Mapping[str, Collection[str] | None],
-        views: Mapping[str, Collection[str] | None],
-    ) -> list[str]:
-        """Return what the caller does not know, a line for each class and for each setting.
-
-        Args:
-            displays: Known types and ids of displays, each with the names of its settings (of
-                nested ones the first, ``Offset`` for ``Offset/X``); None if all are known.
-            tools: Likewise the tools.
-            views: Likewise the views.
-        """
-        saved = ([self.current_view] if self.current_view else []) + self.saved_views
-        groups: tuple[tuple[str, Sequence[_Entry], Any], ...] = (
-            ("display", list(self.walk()), displays),
-            ("tool", self.tools, tools),
-            ("view", saved, views),
-        )
-        lines: dict[str, None] = {}
-        for noun, entries, known in groups:
-            for entry in entries:
-                class_id = entry.class_id or "without a class"
-                name = entry.type if entry.type in known else entry.class_id
-                if name not in known:
-                    lines[f"{noun} {class_id}"] = None
-                elif known[name] is not None:
-                    own = {path.partition("/")[0] for path in known[name]} | _COMMON
-                    for key in entry.settings:
-                        if key not in own:
-                            lines[f"{noun} {class_id}: setting {key!r}"] = None
-        return list(lines)
 
     def _find_ros(self) -> int:
         """Return the RViz that wrote the file, by the packages of its plugins."""
@@ -489,10 +442,6 @@ class RvizConfig:
                     check(self.options[name], name)
                 except Error as error:
                     self.warnings.append(f"{self.source}: Global Options: {error}")
-
-
-#: Settings that every display, tool or view may have.
-_COMMON = {"Class", "Displays", "Enabled", "Name", "Value"}
 
 
 def _child(mapping: dict[str, Any], key: str, *, create: bool = True) -> dict[str, Any]:

@@ -110,7 +110,7 @@ def test_the_data_has_both_formats() -> None:
 
 def test_the_nav2_config() -> None:
     nav2 = load("ros2_nav2")
-    assert (nav2.ros, nav2.fixed_frame, nav2.frame_rate) == (2, "map", 30)
+    assert (nav2.ros, nav2.fixed_frame, nav2.options["Frame Rate"]) == (2, "map", 30)
     assert nav2.background_color == pytest.approx((48 / 255, 48 / 255, 48 / 255, 1))
     top = [(display.type, display.name) for display in nav2.displays]
     assert top[:3] == [("Grid", "Grid"), ("RobotModel", "RobotModel"), ("TF", "TF")]
@@ -198,7 +198,6 @@ def test_settings_that_a_file_leaves_out() -> None:
     assert description == DescriptionSetting(
         "topic", "/robot_description", TopicSetting("/robot_description")
     )
-    assert found.frame_rate == 30
     plain = find(load("ros2_marker_tutorial"), "Marker").settings
     assert read_topic(plain) == TopicSetting("/visualization_marker", 10, "Reliable")
 
@@ -246,35 +245,13 @@ def test_new_entries_have_the_classes_of_their_rviz() -> None:
         ToolConfig.new("SetGoal", 3)
 
 
-def test_unknown_classes_and_settings_are_named_once() -> None:
-    found = config(
-        "  Displays:\n"
-        "    - {Class: rviz/Grid, Alpha: 1, Glow: 2, Offset: {X: 1}}\n"
-        "    - {Class: rviz/Grid, Glow: 3}\n"
-        "    - {Class: a/B, Name: x}\n"
-        "    - {Class: rviz/Group, Displays: [{Class: a/B}, {Class: rviz/TF, Any: 1}]}\n"
-        "  Tools: [{Class: a/Tool}]\n"
-        "  Views: {Current: {Class: a/View}}\n"
-    )
-    displays = {"Grid": ["Alpha", "Offset/X"], "Group": [], "TF": None}
-    assert found.unknown(displays, {}, {}) == [
-        "display rviz/Grid: setting 'Glow'",
-        "display a/B",
-        "tool a/Tool",
-        "view a/View",
-    ]
-    assert found.unknown({**displays, "a/B": None}, {"a/Tool": []}, {"a/View": []}) == [
-        "display rviz/Grid: setting 'Glow'"
-    ]
-
-
 # -- writing ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("ros", [1, 2])
 def test_a_new_config(ros: int, tmp_path: Path) -> None:
     new = RvizConfig(ros)
-    new.fixed_frame, new.background_color, new.frame_rate = "odom", (1, 0.5, 0), 15
+    new.fixed_frame, new.background_color = "odom", (1, 0.5, 0)
     group = DisplayConfig.new("Group", ros, name="Sensors")
     scan = DisplayConfig.new("LaserScan", ros, enabled=False)
     write_topic(scan.settings, TopicSetting("/scan", 5, "Best Effort"), ros)
@@ -287,7 +264,6 @@ def test_a_new_config(ros: int, tmp_path: Path) -> None:
     found = RvizConfig.load(tmp_path / "new.rviz")
     assert found == new
     assert (found.fixed_frame, found.options["Background Color"]) == ("odom", "255; 128; 0")
-    assert found.frame_rate == 15
     assert find(found, "LaserScan").enabled is False
     assert read_topic(find(found, "LaserScan").settings)[:3] == ("/scan", 5, "Best Effort")
     assert found.saved_views[0].name == "1.10"
@@ -503,7 +479,7 @@ def test_single_displays_that_are_broken() -> None:
     ]
     assert [display.line for display in found.displays] == [4, 5, 6, 8]
     assert find(found, "fine").settings["Alpha"] == 0.5
-    assert (found.current_view, found.frame_rate) == (None, 30)
+    assert found.current_view is None
     # What is not understood is kept.
     assert found.displays[-1].settings["Displays"] == {"x": 1}
     assert RvizConfig.parse(found.dump()) == found
