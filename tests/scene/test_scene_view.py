@@ -427,6 +427,9 @@ def test_frames_fade_one_by_one_and_all_when_transforms_stop(bench: SceneBench) 
     StaticTransformBroadcaster(bench.robot).send_transform(
         Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "mast")
     )
+    StaticTransformBroadcaster(bench.robot).send_transform(
+        Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "arm", "hand")
+    )
     TransformBroadcaster(bench.robot).send_transform(
         Transform((2, 0, 0), (0, 0, 0, 1), Time(1), "map", "arm")
     )
@@ -436,9 +439,12 @@ def test_frames_fade_one_by_one_and_all_when_transforms_stop(bench: SceneBench) 
         alphas = meshes[0].instances["rgba"][::3, 3].tolist() if meshes else []
         return dict(zip(frames.frames, alphas, strict=True))
 
-    bench.wait(lambda: opacities() == {"arm": 1.0, "map": 1.0, "mast": 1.0})
-    bench.wait(lambda: opacities().get("arm", 1.0) < 1.0)
+    bench.wait(lambda: opacities() == {"arm": 1.0, "hand": 1.0, "map": 1.0, "mast": 1.0})
+    # What is fixed on a frame fades with it.
+    bench.wait(lambda: opacities().get("hand", 1.0) < 1.0)
+    assert opacities()["hand"] == opacities().get("arm")
     assert opacities()["mast"] == 1.0
+    assert "[arm] and 1 more may be somewhere else" in frames.statusText
     bench.wait(lambda: frames.frames == ["map", "mast"])
     # Nothing moves any more: nothing is drawn.
     bench.picture()

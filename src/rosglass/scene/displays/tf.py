@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rosglass.errors import TransformException
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
-    from rosglass.tf import FrameInfo
+    from rosglass.tf import FrameInfo, FrameTree
 
 __all__ = ["TFDisplay"]
 
@@ -242,11 +242,12 @@ class TFDisplay(Display):
         poses, unknown = scene.look_up_all(chosen)
         shown: list[_Frame] = []
         self._report_unknown(unknown)
+        shares = self._shares(tree)
+        self._report_outdated([name for name, share in shares.items() if share < 1])
         for name, pose in zip(chosen, poses, strict=True):
             if name in unknown or name not in tree:
                 continue
-            share = 1.0 if self._is_lost else self._share(tree[name])
-            shown.append(_Frame(name, pose, share, tree[name].parent))
+            shown.append(_Frame(name, pose, shares[name], tree[name].parent))
         self._moves = any(not tree[frame.name].static for frame in shown)
         shown = [frame for frame in shown if frame.share > 0]
         self._fill(shown)
@@ -264,6 +265,35 @@ class TFDisplay(Display):
         for line, text in lines.items():
             self.set_status(line, "warn", text)
         self._lines = set(lines)
+
+    def _report_outdated(self, names: list[str]) -> None:
+        if names:
+            more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+            text = f"[{names[0]}]{more} may be somewhere else: no transform has come for a while"
+            self.set_status("Updates", "warn", text)
+        else:
+            self.delete_status("Updates")
+
+    def _shares(self, tree: FrameTree) -> dict[str, float]:
+        """Return the opacity of each frame: that of the least updated one above it.
+
+        A frame that is fixed on another one is where that is. What is above the fixed frame does
+        not count.
+        """
+        shares: dict[str, float] = {}
+        fixed = "" if self.scene is None else self.scene.fixed_frame
+        if fixed in tree:
+            shares[fixed] = 1.0
+        for name in tree:
+            way, one = [], name
+            while one in tree and one not in shares:
+                way.append(one)
+                shares[one] = 1.0 if self._is_lost else self._share(tree[one])
+                one = tree[one].parent
+            share = shares.get(one, 1.0)
+            for frame in reversed(way):
+                share = shares[frame] = min(share, shares[frame])
+        return shares
 
     def _share(self, info: FrameInfo) -> float:
         """Return the opacity of a frame by its age: 1 while it is updated, 0 after the timeout."""
