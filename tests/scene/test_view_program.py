@@ -71,6 +71,10 @@ def test_what_the_user_enters_changes_settings_or_is_refused(bench: SceneBench, 
         ("Offset", "1; 2 3"),
     ):
         model.edit(row_of(model, label), text)
+    # Of UTM coordinates, too: all three are written again where one is edited.
+    model.edit(row_of(model, "Offset"), "0.1; 2; 4500000.5")
+    assert model.rows[row_of(model, "Offset")].value == "0.1; 2; 4500000.5"
+    model.edit(row_of(model, "Offset"), "1; 2 3")
     model.edit(row_of(model, "Fixed Frame"), "odom")
     model.edit(row_of(model, "Background Color"), "#010203")
     assert said == []
@@ -414,6 +418,17 @@ def view_command(*arguments: str, timeout: float = 100) -> subprocess.CompletedP
         text=True,
         timeout=timeout,
     )
+
+
+def test_the_program_loads_only_what_its_window_shows() -> None:
+    late = (
+        "{'rosglass.scene.displays.marker', 'rosglass.images', 'rosglass.qml.ros2', "
+        "'rosglass.connection', 'rosglass.interfaces.library', 'rosglass.tf.buffer', 'yaml'}"
+    )
+    code = f"import rosglass.scene.program, sys; print(sorted({late} & set(sys.modules)))"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.strip() == "[]"
 
 
 def test_the_command_shows_a_config(app: Any, tmp_path: Path) -> None:

@@ -117,15 +117,6 @@ def test_import_is_light() -> None:
     assert run(f"import rosglass, sys; print(sorted({heavy} & set(sys.modules)))") == "[]"
 
 
-def test_the_3d_view_loads_only_what_its_window_shows() -> None:
-    late = (
-        "{'rosglass.scene.displays.marker', 'rosglass.images', 'rosglass.qml.ros2', "
-        "'rosglass.connection', 'rosglass.interfaces.library', 'rosglass.tf.buffer', 'yaml'}"
-    )
-    code = f"import rosglass.scene.program, sys; print(sorted({late} & set(sys.modules)))"
-    assert run(code) == "[]"
-
-
 def test_public_names_are_all_there() -> None:
     assert [name for name in rosglass.__all__ if getattr(rosglass, name, None) is None] == []
     assert dir(rosglass) == sorted(rosglass.__all__)

@@ -6,6 +6,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
 from PySide6.QtCore import QAbstractListModel, QModelIndex, Qt
 from PySide6.QtGui import QColor
 
@@ -107,14 +108,19 @@ def _short(name: str) -> str:
     return name if len(name) <= _MAX_NAME_LENGTH else f"{name[:_MAX_NAME_LENGTH]}\u2026"
 
 
+def _shortest(number: float) -> str:
+    # Vectors have 32 bits: no digit is lost where another one is edited.
+    return np.format_float_positional(np.float32(number), trim="-")
+
+
 def _text(value: Any) -> Any:
     """Return a value as the panel shows it."""
     if isinstance(value, QColor):
         return value.name()
     if hasattr(value, "scalar"):
-        return f"{value.x():g}; {value.y():g}; {value.z():g}; {value.scalar():g}"
+        return "; ".join(map(_shortest, (value.x(), value.y(), value.z(), value.scalar())))
     if hasattr(value, "toVector4D"):
-        return f"{value.x():g}; {value.y():g}; {value.z():g}"
+        return "; ".join(map(_shortest, (value.x(), value.y(), value.z())))
     if isinstance(value, float):
         return f"{value:.6g}"
     return value

@@ -83,7 +83,12 @@ ApplicationWindow {
                         id: newTools
                         Repeater {
                             model: scene.tools.types
-                            MenuItem { required property string modelData; text: modelData; onTriggered: program.say(scene.tools.addTool(modelData)) }
+                            MenuItem {
+                                required property string modelData
+                                text: modelData
+                                contentItem: Label { text: parent.text; textFormat: Text.PlainText }
+                                onTriggered: program.say(scene.tools.addTool(modelData))
+                            }
                         }
                     }
                 }
@@ -97,7 +102,12 @@ ApplicationWindow {
                         id: oldTools
                         Repeater {
                             model: scene.tools.all
-                            MenuItem { required property var modelData; text: modelData.name; onTriggered: scene.tools.removeTool(modelData) }
+                            MenuItem {
+                                required property var modelData
+                                text: modelData.name
+                                contentItem: Label { text: parent.text; textFormat: Text.PlainText }
+                                onTriggered: scene.tools.removeTool(modelData)
+                            }
                         }
                     }
                 }

@@ -6,8 +6,6 @@ import pytest
 
 from rosglass.errors import Error
 from rosglass.scene.rviz_config import RvizConfig
-
-pytest.importorskip("PySide6", reason="settings of displays are properties of Qt 6")
 from rosglass.scene.settings import Setting
 
 
