@@ -5,11 +5,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-if TYPE_CHECKING:
-    from pathlib import Path
+from ports import free_port
 
+from rosglass.wires.zenoh.router import Router
+
+ROOT = Path(__file__).parents[2]
 #: Seconds for a busy machine to show the robot, and until the picture.
 _SHOWN_S = "12"
 
@@ -44,3 +47,30 @@ def test_it_shows_the_dashboard_over_the_robot_without_warnings(app: Any, tmp_pa
     # The robot's orange body, in the middle of the 3D view.
     assert count(lambda r, g, b: r > 110 and 30 < g < 110 and b < 40, 400, 100, 900, 520) > 100
     assert "WARNING" not in done.stderr, done.stderr
+
+
+def test_the_example_in_python_shows_a_robot(app: Any) -> None:
+    with Router(f"tcp/127.0.0.1:{free_port()}") as router:
+        robot = subprocess.Popen(
+            [sys.executable, "-m", "rosglass", "robot", "--equipped", "--url", router.url],
+            stdout=subprocess.DEVNULL,
+        )
+        example = subprocess.Popen(
+            [sys.executable, str(ROOT / "examples/view/scene.py"), router.url],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        try:
+            assert example.stdout is not None
+            lines = []
+            for line in example.stdout:
+                lines.append(line)
+                if line == "Front laser: ok\n":
+                    break
+            assert lines[-1:] == ["Front laser: ok\n"], lines
+            assert not [line for line in lines if "WARNING" in line or "ERROR" in line]
+        finally:
+            for process in (example, robot):
+                process.kill()
+                process.wait()
