@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib
 import logging
 import math
@@ -157,6 +158,8 @@ class ScriptLimit:
 _T = TypeVar("_T")
 #: Milliseconds between two updates of ages and rates.
 TICK = 100
+#: Seconds between two collections of all garbage, which take some 50 ms.
+_FULL_COLLECTION_S = 60.0
 #: Milliseconds until connecting is retried if this machine could not open a session.
 _RETRY = 1000
 #: Milliseconds that elements wait for a node before a missing init() is logged.
@@ -191,6 +194,57 @@ def _parse(arguments: Sequence[str], url: str) -> Arguments | None:
     from rosglass.ros2.ros_arguments import Arguments  # noqa: PLC0415 - few programs have arguments
 
     return Arguments.parse(arguments)
+
+
+class _GarbageCollection:
+    """Collects cyclic garbage in the GUI thread alone, while there are sessions.
+
+    Python collects in whichever thread allocates. Where garbage has Qt objects, that thread waits
+    for the GIL while it holds a lock of Qt's signals; the GUI thread may hold the GIL and wait for
+    this lock: the interface would be frozen for ever.
+    """
+
+    def __init__(self) -> None:
+        self._thresholds = gc.get_threshold()
+        self._full_at = 0.0
+        #: Makes it collect, while there are sessions.
+        self._timer: QtCore.QTimer | None = None
+        self._sessions = 0
+
+    def enter(self) -> None:
+        """Begin, with the first session."""
+        self._sessions += 1
+        if self._timer is None:
+            self._thresholds, self._full_at = gc.get_threshold(), time.monotonic()
+            gc.set_threshold(0)
+            self._timer = QtCore.QTimer(QtCore.QCoreApplication.instance())
+            self._timer.setInterval(TICK)
+            self._timer.timeout.connect(self._collect)
+            self._timer.start()
+
+    def leave(self) -> None:
+        """End with the last session: Python collects by itself again."""
+        self._sessions -= 1
+        if not self._sessions and self._timer is not None:
+            if is_alive(self._timer):
+                self._timer.stop()
+            self._timer = None
+            gc.set_threshold(*self._thresholds)
+
+    def _collect(self) -> None:
+        """Collect what Python would have collected by now."""
+        if not gc.isenabled():
+            return
+        now, counts = time.monotonic(), gc.get_count()
+        due = [count > most > 0 for count, most in zip(counts, self._thresholds, strict=True)]
+        if due[2] and now >= self._full_at:
+            self._full_at = now + _FULL_COLLECTION_S
+            gc.collect(2)
+        elif due[1] or due[0]:
+            gc.collect(1 if due[1] else 0)
+
+
+_garbage_collection = _GarbageCollection()
 
 
 class Session(QtCore.QObject):
@@ -286,8 +340,10 @@ class Session(QtCore.QObject):
             handlers = self._handlers[signal] = {}
             getattr(self, signal).connect(lambda handlers=handlers: _call_all(handlers))
         app = QtCore.QCoreApplication.instance()
+        self._collects = app is not None
         if app is not None:
             app.aboutToQuit.connect(self.close)
+            _garbage_collection.enter()
 
     @classmethod
     def default(cls) -> Session:
@@ -455,6 +511,8 @@ class Session(QtCore.QObject):
             _log.warning("the node is still closing after %.1f s", _CLOSE_TIMEOUT_S)
         self.executor.close()
         self._worker.close()
+        if self._collects:
+            _garbage_collection.leave()
         if Session._default is self:
             Session._default = None
 
