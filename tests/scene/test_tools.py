@@ -566,6 +566,40 @@ def test_escape_drops_a_goal_that_waits_for_its_server(
     assert goal.goal is None
 
 
+def test_cancel_stops_the_robot_while_another_goal_waits(
+    bench: SceneBench, hand: Hand, nav2: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rosglass.scene.publishing_tools._MATCH_TIMEOUT_S", 60.0)
+    view = bench.load('Nav2GoalTool { name: "Go" }\ntool: "Go"')
+    driver, goal = Driver(nav2), view.tools.current
+    hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
+    bench.wait(lambda: driver.goals)
+    # As over a bad connection.
+    monkeypatch.setattr(type(goal._endpoint), "ready", False)
+    view.tools.select("Go")
+    hand.drag(hand.at((1, 0, 0)), hand.at((1, 1, 0)))
+    assert "looking for a server" in view.statusText
+    goal.cancelGoal()
+    bench.wait(lambda: goal.goal.status.value == "canceled")
+    assert len(driver.goals) == 1
+
+
+def test_a_config_does_not_silently_drop_a_goal_that_waits(
+    bench: SceneBench, hand: Hand, monkeypatch: pytest.MonkeyPatch, caplog: Any
+) -> None:
+    monkeypatch.setattr("rosglass.scene.publishing_tools._MATCH_TIMEOUT_S", 60.0)
+    view = bench.load()
+    view.tools.add("GoalTool")
+    view.tools.select("GoalTool")
+    goal = view.tools.current
+    bench.wait(lambda: goal._endpoint is not None)
+    hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
+    assert "looking for a server" in view.statusText
+    view.tools.load_configs([{"Class": "rviz_default_plugins/Interact"}])
+    assert "not sent: the tool was removed" in view.statusText
+    assert "not sent: the tool was removed" in caplog.text
+
+
 def test_a_config_does_not_silently_end_the_reports_of_a_goal(
     bench: SceneBench, hand: Hand, nav2: Any, caplog: Any
 ) -> None:

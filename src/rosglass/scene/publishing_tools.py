@@ -219,6 +219,11 @@ class PublishingTool(Tool):
             self.announce(f"{waiting[1]}: not sent, for it was dropped")
         return waiting is not None
 
+    def leave(self) -> None:
+        """Belong to no view any more; what waits for a subscriber or a server is not sent."""
+        self._drop("the tool was removed")
+        super().leave()
+
     def _drop(self, why: str) -> None:
         waiting, self._waiting = self._waiting, None
         if waiting is not None:
@@ -429,13 +434,13 @@ class SetGoalTool(PoseTool):
     def cancelGoal(self) -> None:
         """Request the action's server to cancel the last goal; the status bar says what came of it.
 
-        A goal that still waits for its server is not sent.
+        A goal that still waits for its server is not sent; the one before it is canceled as well.
         """
         goal, session = self._goal, self._session
-        if self.drop_waiting():
-            return
+        was_waiting = self.drop_waiting()
         if goal is None or session is None or not self.goalActive:
-            self.announce("There is no goal to cancel.")
+            if not was_waiting:
+                self.announce("There is no goal to cancel.")
             return
         self.announce("Goal: requested to cancel it")
         on_answer = weak_callback(self._on_cancel_answer)
