@@ -831,6 +831,45 @@ def test_an_own_tool_in_python_may_fail(bench: SceneBench, hand: Hand, caplog: A
     assert view.tool == "Broken"
 
 
+def test_an_own_tool_may_fail_when_it_is_selected_or_not(
+    bench: SceneBench, hand: Hand, caplog: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene.tools import Tool
+
+    monkeypatch.setattr("rosglass.scene.tools._OUTCOME_MS", 100)
+
+    class Broken(Tool):
+        NAME = "Broken"
+
+        def activate(self) -> None:
+            raise ValueError("no start")
+
+        def deactivate(self) -> None:
+            raise ValueError("no end")
+
+        def help(self, modifiers: Any) -> str:
+            raise ValueError("no help")
+
+        def cursor(self, event: Any) -> Any:
+            raise ValueError("no cursor")
+
+        def drop_waiting(self) -> bool:
+            raise ValueError("no drop")
+
+    view = bench.load()
+    view.tools.add(Broken)
+    view.tools.select("Broken")
+    assert view.tool == "Broken"
+    assert "ValueError('no start')" in view.statusText
+    bench.wait(lambda: "ValueError('no help')" in view.statusText)
+    hand.click((200, 150))
+    hand.key(hand.keys.Key_Escape)
+    assert view.tool == "Interact"
+    assert view.tools.current.selected
+    for what in ("start", "end", "help", "cursor", "drop"):
+        assert f"ValueError: no {what}" in caplog.text
+
+
 def test_a_destroyed_tool_is_forgotten(bench: SceneBench) -> None:
     view = bench.load(
         'id: top; tool: "Mark"; property bool wanted: true\n'

@@ -658,9 +658,9 @@ class Tools(QtCore.QObject):
         self._cancel()
         self._current = tool
         if before is not None:
-            before._set_selected(False)
+            self._call(before, before._set_selected, False)
         if tool is not None:
-            tool._set_selected(True)
+            self._call(tool, tool._set_selected, True)
             tool.statusTextChanged.connect(self._show_status)
         if before is not None and is_alive(before):
             before.statusTextChanged.disconnect(self._show_status)
@@ -754,10 +754,13 @@ class Tools(QtCore.QObject):
             text = escape(self.outcome, quote=False)
         else:
             report(self, outcome="")
-            text = "" if self._current is None else self._current.help(self._modifiers)
-            if self._current is None:
+            tool = self._current
+            if tool is None:
                 text = self._view.controller.help(self._modifiers)
-        report(self, statusText=text)
+            else:
+                text = self._call(tool, tool.help, self._modifiers)
+        if text is not None:  # otherwise the tool has failed, which is shown
+            report(self, statusText=text)
 
     # -- events ----------------------------------------------------------------------------------
 
@@ -844,7 +847,7 @@ class Tools(QtCore.QObject):
         if self._grab == "tool":
             self._cancel()
             return True
-        dropped = [tool.drop_waiting() for tool in self._items]
+        dropped = [self._call(tool, tool.drop_waiting) for tool in self._items]
         if any(dropped):
             return True
         if self._current is not self.default:
@@ -888,7 +891,7 @@ class Tools(QtCore.QObject):
         if self._grab == "camera" or tool is None:
             cursor = _CURSORS[controller.action(event.buttons, event.modifiers)]
         else:
-            cursor = tool.cursor(event)
+            cursor = self._call(tool, tool.cursor, event) or _Cursor.ArrowCursor
         if self._view.cursor().shape() != cursor:
             self._view.setCursor(cursor)
 
