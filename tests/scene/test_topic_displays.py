@@ -355,3 +355,29 @@ def test_nothing_is_late_while_the_robots_time_stands_still(bench: SceneBench) -
     assert (display.root.alpha, display.statusLevel) == (1.0, "ok"), display.statusText
     set_time(12.5)
     bench.wait(lambda: display.root.alpha < 1.0 and display.statusLevel == "error")
+
+
+def test_messages_wait_for_the_gui_thread_as_one_job() -> None:
+    from rosglass.comm.handle import Executor
+    from rosglass.scene.display import MessageQueue
+
+    class Waiting(Executor):
+        jobs = 0
+
+        def post(self, job: Any) -> None:
+            self.jobs += 1
+
+    def refuse(message: Any) -> None:
+        raise ValueError(message)
+
+    gui = Waiting()
+    broken = MessageQueue(refuse, (), gui, lambda: None, depth=5)
+    empty = MessageQueue(lambda _: None, (), gui, lambda: None, depth=5)
+    for count in (2, 4):
+        for number in range(100):
+            for queue in (broken, empty):
+                queue.put(lambda number=number: number, "nav_msgs/Path")  # type: ignore[misc]
+        assert gui.jobs == count
+        assert broken.drain() == ([], "this message could not be shown: ValueError(99)")
+        assert empty.drain() == ([], "")
+    assert broken.received == empty.received == 200

@@ -429,6 +429,8 @@ class MessageQueue:
         self._lock = threading.Lock()
         self._items: deque[_Item] = deque(maxlen=depth)
         self._error = ""
+        #: Whether the GUI thread is about to drain it: however much a robot sends, one job waits.
+        self._is_posted = False
         self.received = self.dropped = 0
         #: Identity of the publisher of the last message; empty if the wire has none.
         self.publisher = b""
@@ -471,7 +473,7 @@ class MessageQueue:
             _log.exception("a %s", what)
             error = f"this message could not be shown: {reason!r}"
         with self._lock:
-            first = not self._items and not self._error
+            is_posted, self._is_posted = self._is_posted, True
             self.received += 1
             self._error = error
             if item is not None:
@@ -479,7 +481,7 @@ class MessageQueue:
                     self._items.clear()
                 self.dropped += len(self._items) == self._items.maxlen
                 self._items.append(item)
-        if first or error:
+        if not is_posted:
             self._executor.post(self._on_ready)
 
     def drain(self) -> tuple[list[_Item], str]:
@@ -487,7 +489,7 @@ class MessageQueue:
         with self._lock:
             items, error = list(self._items), self._error
             self._items.clear()
-            self._error = ""
+            self._error, self._is_posted = "", False
         return items, error
 
 
