@@ -8,6 +8,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from rosglass.comm.handle import check_flag
+from rosglass.comm.names import similar
 from rosglass.errors import ArgumentError, UnsupportedError
 from rosglass.interfaces import Library
 from rosglass.ros2.ros_arguments import Arguments
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["connect", "default_url", "explain_missing"]
 
+_SCHEMES = ("dds", "zenoh", "ros1", "local")
 _EXAMPLE = "zenoh://127.0.0.1:7447"
 _EXAMPLES = "zenoh://127.0.0.1:7447, dds://?domain=0 or ros1://robot:11311"
 _KNOWN = (
@@ -144,10 +146,14 @@ def connect(
         from rosglass.bags.replay_node import connect_replay  # noqa: PLC0415 - few play any
 
         return connect_replay(url, *_resolve_name(name, namespace, arguments))
-    if scheme not in ("dds", "zenoh", "ros1", "local") or not separator:
+    if scheme not in _SCHEMES or not separator:
         reason = f"unknown scheme {scheme!r}" if separator else "no scheme"
+        hint = similar(scheme, _SCHEMES) if separator else ""
+        if scheme == "http":  # as in ROS_MASTER_URI
+            hint = f"; did you mean ros1://{rest}?"
+        known = f"{hint} Known" if hint else "; known"
         raise UnsupportedError(
-            f"cannot connect to {url!r}: {reason}; known: {_KNOWN}, e.g. {_EXAMPLES}"
+            f"cannot connect to {url!r}: {reason}{known}: {_KNOWN}, e.g. {_EXAMPLES}"
         )
     if scheme == "ros1":
         from rosglass.ros1.node import connect_ros1  # noqa: PLC0415 - a program uses one ROS

@@ -455,6 +455,10 @@ def test_the_command_shows_a_config(app: Any, tmp_path: Path) -> None:
         (["nosuch.rviz"], "nosuch.rviz: there is no such file"),
         (["--renderer", "software"], "draws no 3D: use --renderer opengl"),
         (["{empty}"], "empty.rviz:1: the file must be a mapping"),
+        (
+            ["--url", "zenho://robot", "--after", "1", "--screenshot", "{picture}"],
+            "unknown scheme 'zenho'; did you mean zenoh?",
+        ),
     ],
 )
 def test_the_command_says_what_is_wrong(
@@ -462,7 +466,8 @@ def test_the_command_says_what_is_wrong(
 ) -> None:
     empty = tmp_path / "empty.rviz"
     empty.write_text("- 1\n")
-    done = view_command(*(one.format(empty=empty) for one in arguments))
+    files = {"empty": empty, "picture": tmp_path / "view.png"}
+    done = view_command(*(one.format(**files) for one in arguments))
     assert done.returncode == 1
     assert text in done.stderr
     assert "Traceback" not in done.stderr

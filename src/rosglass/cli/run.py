@@ -146,7 +146,7 @@ def _show(
         if recorder is not None and app.window is not None:
             recorder.start(app.window)
         if picture is not None:
-            picture.take(app.quit, lambda target: _save(app, target))
+            picture.take(app.quit, lambda target: _save_connected(app, target))
 
     _call_later(0.0, shown)
     if recorder is not None:
@@ -214,6 +214,13 @@ class Picture:
             )
             return 1
         return code
+
+
+def _save_connected(app: Application, target: Path) -> None:
+    """Save a picture; raise Error as well if there is no connection, as for a mistake in --url."""
+    _save(app, target)
+    if app.session.state == "failed":
+        raise Error(f"{target} shows no robot: {app.session.detail}")
 
 
 def _save(app: Application, target: Path) -> None:

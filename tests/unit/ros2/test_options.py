@@ -122,6 +122,8 @@ def test_without_a_choice_the_user_is_told_the_choices(env, told):
     ("url", "told"),
     [
         ("mqtt://robot", "unknown scheme 'mqtt'; known: dds://"),
+        ("zenho://robot", "unknown scheme 'zenho'; did you mean zenoh? Known: dds://"),
+        ("http://robot:11311", "unknown scheme 'http'; did you mean ros1://robot:11311? Known:"),
         ("robot:7447", "no scheme; known: dds://"),
         ("dds", "no scheme"),
         ("", "no scheme"),
