@@ -34,3 +34,9 @@ def test_colors_are_written_as_rviz_does() -> None:
         assert setting.saved(setting.restore(value(text))) == "255; 128; 0"
     with pytest.raises(Error, match=r"Max Color: expected a colour, .*, got '1; 2'"):
         setting.restore("1; 2")
+
+
+def test_an_empty_choice_is_named_beside_the_others() -> None:
+    setting = Setting("Color Transformer", "enum", "", choices=["", "AxisColor", "RGB8"])
+    with pytest.raises(Error, match="expected one of '', AxisColor, RGB8, got 'AxisColour'; did y"):
+        setting.kind.read("AxisColour")

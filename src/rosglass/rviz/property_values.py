@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from rosglass.comm.names import similar
 from rosglass.errors import ConversionError, Error
 from rosglass.qt import QtCore, QtGui
 
@@ -272,7 +273,10 @@ class _Enum(_String):
 
     def read(self, value: Any) -> str:
         if value not in self.choices:
-            raise Error(f"expected one of {', '.join(self.choices)}, got {shown(value)}")
+            # A choice may be empty.
+            choices = ", ".join(choice or "''" for choice in self.choices)
+            hint = similar(value, self.choices) if isinstance(value, str) else ""
+            raise Error(f"expected one of {choices}, got {shown(value)}{hint}")
         return str(value)
 
 
