@@ -70,8 +70,37 @@ def test_a_topic_that_is_none_is_a_status_until_it_is_one(bench: SceneBench) -> 
     assert wrong.statusText.startswith("Topic: ")
     assert "~plan" in wrong.statusText
     wrong.topic = "/plan"
-    bench.wait(lambda: wrong.statusText == "Topic: No messages received")
+    bench.wait(lambda: wrong.statusText == "Topic: No messages received on /plan")
     assert wrong.problem == ""
+
+
+def test_the_status_says_why_nothing_was_received(
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.qml import element
+    from rosglass.scene.display import OneTopicDisplay
+
+    monkeypatch.setattr(element, "NO_PEER_MS", 50)
+    scene = bench.load("ImagePanels { view: parent }").scene
+    kinds = [name for name, kind in scene.TYPES.items() if issubclass(kind, OneTopicDisplay)]
+    assert len(kinds) > 20
+    for name in kinds:
+        scene.add(name, topic="/skan")
+    for display in scene.displays:
+        end = "/update" * (display.TYPE == "InteractiveMarkers")
+        wanted = f"Topic: No messages received on /skan{end}: it has no publisher"
+        bench.wait(lambda: wanted in display.statusText, lambda: (display, display.statusText))  # noqa: B023
+    publisher = bench.robot.create_publisher("/scan", "sensor_msgs/LaserScan")
+    scan, path = scene.find("LaserScan"), scene.find("Path")
+    bench.wait(lambda: scan.statusText.endswith("no publisher; did you mean /scan?"))
+    path.topic = scan.topic = "/scan"
+    bench.wait(lambda: path.statusLevel == "error")
+    wrong = "Topic: the topic's type is sensor_msgs/msg/LaserScan, not nav_msgs/Path"
+    assert path.statusText == wrong
+    bench.wait(lambda: scan.statusText == "Topic: No messages received on /scan")
+    bench.wait(publisher.subscription_count)
+    publisher.publish({"header": {"frame_id": "map"}, "ranges": [1.0], "range_max": 2.0})
+    bench.wait(lambda: "1 messages received" in scan.statusText, lambda: scan.statusText)
 
 
 @pytest.mark.parametrize(

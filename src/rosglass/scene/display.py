@@ -13,10 +13,12 @@ import math
 import threading
 import time
 from collections import deque
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from rosglass.comm.names import similar
 from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.errors import Error, TransformException
 from rosglass.interfaces.names import ros1_name
@@ -510,6 +512,8 @@ class OneTopicDisplay(Display):
 
     #: How many messages were received.
     received = ReadOnly(int, 0)
+    #: Whether the topic has had the time to be found.
+    _is_searched = False
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
         """Take the settings of a file of either RViz, which write topics differently."""
@@ -560,6 +564,51 @@ class OneTopicDisplay(Display):
         if not self._resolved:
             self.set_status("Topic", "error", self._problem)
         return self._resolved
+
+    def _begin_to_wait(self) -> None:
+        """Say that nothing was received, and after a while that there is no publisher."""
+        self._is_searched = False
+        self.delete_status("Topic")
+        self._report_waiting()
+        self._expect_publishers()
+
+    def _is_waiting(self) -> bool:
+        """Return whether nothing was received yet."""
+        line = self.status_lines.get("Topic")
+        return self._endpoint is not None and (line is None or line.level != "ok")
+
+    def _report_waiting(self) -> None:
+        """Say in the status what is received, as long as that is nothing, and why."""
+        if self._is_waiting():
+            self.set_status("Topic", *self._find_reason())
+
+    def _find_reason(self) -> tuple[str, str]:
+        """Return why nothing was received: level and text."""
+        node, session, topic = self.node, self._session, self._resolved
+        text = f"No messages received on {topic}"
+        if node is None or session is None or session.state != "connected":
+            return "warn", text
+        # The node may just have been closed.
+        with suppress(Error):
+            topics = node.topics()
+            types = topics.get(topic, ())
+            if types and self.MESSAGES and not set(map(ros1_name, types)) & set(self.MESSAGES):
+                wanted = " or ".join(self.MESSAGES)
+                return "error", f"the topic's type is {', '.join(types)}, not {wanted}"
+            if self._is_searched and not self._count_publishers():
+                text = f"{text}: it has no publisher{similar(topic, topics)}"
+        return "warn", text
+
+    @Slot()
+    def _log_no_publisher(self) -> None:
+        super()._log_no_publisher()
+        self._is_searched = True
+        self._report_waiting()
+
+    @Slot()
+    def _on_graph(self) -> None:
+        super()._on_graph()
+        self._report_waiting()
 
     def _on_topic(self) -> None:
         self._topic = self.topic
@@ -691,8 +740,11 @@ class TopicDisplay(OneTopicDisplay):
         return lambda: Subscriptions(node, topics, qos, queue)
 
     def _on_created(self, endpoint: Any) -> None:  # noqa: ARG002 - the base class's signature
-        self.set_status("Topic", "warn", "No messages received")
-        self._expect_publishers()
+        self._begin_to_wait()
+
+    def _is_waiting(self) -> bool:
+        queue = self._queue
+        return super()._is_waiting() and queue is not None and not queue.received
 
     def _on_closed(self, endpoint: Any) -> None:  # noqa: ARG002 - the base class's signature
         self._queue = None

@@ -220,9 +220,8 @@ class PictureDisplay(OneTopicDisplay):
         endpoint.leave(self)
 
     def _on_created(self, endpoint: SharedStream) -> None:
-        self.set_status("Topic", "warn", "No picture received")
         self._publishers = self._count_publishers()
-        self._expect_publishers()
+        self._begin_to_wait()
         channel = endpoint.channel(self)
         if channel is not None and channel.last is not None:
             self.show_picture(channel.last)
