@@ -78,7 +78,8 @@ def test_a_robot_is_shown_where_tf_has_its_links(bench: SceneBench) -> None:
     assert shapes(robot) == {BOX}
     middle = view.camera().project((0, 0, 0.25))
     hit = view.pick(middle.x, middle.y)
-    assert hit.drawable.owner.describe() == [("Link", "base_link"), ("Robot", "rover")]
+    (position, _), *_, (_, name) = hit.drawable.owner.describe()
+    assert (position, name) == ("Position", "rover")
 
 
 def test_a_prefix_names_the_frames(bench: SceneBench) -> None:

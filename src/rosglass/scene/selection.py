@@ -68,10 +68,12 @@ class _Marked(NamedTuple):
     Attributes:
         indices: Numbers of its points, lines, instances or cells, in order.
         geometry: Its data when it was selected: new points are others.
+        whole: Whose only part all of it is, e.g. a link of a robot; None where each number is one.
     """
 
     indices: NDArray[np.intp]
     geometry: int
+    whole: Any
 
 
 class Selection(QtCore.QObject):
@@ -107,7 +109,9 @@ class Selection(QtCore.QObject):
         self._timer = single_shot(self, self._follow)
 
     def __len__(self) -> int:
-        return sum(len(one.indices) for one in self._marked.values())
+        marked = self._marked.values()
+        wholes = {id(one.whole) for one in marked if one.whole is not None}
+        return len(wholes) + sum(len(one.indices) for one in marked if one.whole is None)
 
     # -- changing it -----------------------------------------------------------------------------
 
@@ -150,7 +154,7 @@ class Selection(QtCore.QObject):
             flags[indices] = change != "remove"
             new = np.flatnonzero(flags)
             if len(new):
-                self._marked[drawable] = _Marked(new, drawable.geometry)
+                self._marked[drawable] = _Marked(new, drawable.geometry, _find_whole(drawable))
         self._draw()
         self.changed.emit()
 
@@ -165,8 +169,12 @@ class Selection(QtCore.QObject):
         """Return what is selected, at most 200 parts."""
         poses = {drawable: pose for drawable, pose, _ in self._drawables()}
         found: list[SelectedPart] = []
+        wholes: set[int] = set()
         for drawable, marked in self._marked.items():
             indices = marked.indices[: _MAX_DESCRIBED - len(found)]
+            if marked.whole is not None:
+                indices = indices[: id(marked.whole) not in wholes]
+                wholes.add(id(marked.whole))
             found += [_describe(drawable, int(n), poses.get(drawable)) for n in indices]
         return found
 
@@ -247,7 +255,7 @@ class Selection(QtCore.QObject):
             if drawable not in drawn or _is_outdated(drawable, marked) or not len(kept):
                 del self._marked[drawable]
             else:
-                self._marked[drawable] = _Marked(kept, drawable.geometry)
+                self._marked[drawable] = _Marked(kept, drawable.geometry, marked.whole)
         if self._draw() or len(self) != before:
             self.changed.emit()
 
@@ -311,20 +319,31 @@ def _owner_names(drawable: Drawable, index: int) -> tuple[str, str]:
     return str(getattr(display, "name", display)), part or str(index)
 
 
-def _describe(drawable: Drawable, index: int, pose: NDArray[np.float64] | None) -> SelectedPart:
-    display, part = _owner_names(drawable, index)
-    lines: list[tuple[str, str]] = []
-    if pose is not None:
-        box = _boxes(drawable, np.array([index]))
-        if len(box):
-            middle = pose[:3, :3] @ box[0].mean(axis=0) + pose[:3, 3]
-            lines.append(("Position", "; ".join(f"{number:.6g}" for number in middle)))
+def _find_description(drawable: Drawable) -> tuple[Any, bool]:
+    """Return what describes a drawable's parts, None for nothing; and whether by their numbers."""
     owner = drawable.owner
     # The describe() of a display itself lists its settings.
     describe = None if isinstance(owner, Configurable) else getattr(owner, "describe", None)
+    return describe, describe is not None and bool(inspect.signature(describe).parameters)
+
+
+def _find_whole(drawable: Drawable) -> Any:
+    """Return the owner of a drawable if all that it draws is one part; None otherwise."""
+    describe, is_numbered = _find_description(drawable)
+    return None if describe is None or is_numbered else drawable.owner
+
+
+def _describe(drawable: Drawable, index: int, pose: NDArray[np.float64] | None) -> SelectedPart:
+    display, part = _owner_names(drawable, index)
+    lines: list[tuple[str, str]] = []
+    describe, is_numbered = _find_description(drawable)
     if describe is not None:
-        numbered = bool(inspect.signature(describe).parameters)
-        lines += [(str(name), str(value)) for name, value in _called(describe, index, numbered)]
+        lines = [(str(name), str(value)) for name, value in _called(describe, index, is_numbered)]
+    if pose is not None and not any(name == "Position" for name, _ in lines):
+        box = _boxes(drawable, np.array([index]))
+        if len(box):
+            middle = pose[:3, :3] @ box[0].mean(axis=0) + pose[:3, 3]
+            lines.insert(0, ("Position", "; ".join(f"{number:.6g}" for number in middle)))
     return SelectedPart(display, part, lines)
 
 

@@ -450,7 +450,10 @@ class _Part:
 
     def describe(self) -> list[tuple[str, str]]:
         """Return the lines of the Selection panel."""
-        return [("Link", self.name), ("Robot", self.display.robotName)]
+        display = self.display
+        # Its frame, and not the middle of what is drawn.
+        place = display.describe_frame(display._frame_of(self.name))
+        return [*place, ("Robot", display.robotName)]
 
 
 class RobotModelDisplay(Display):

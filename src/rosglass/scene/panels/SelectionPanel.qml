@@ -3,7 +3,7 @@ import QtQuick.Controls.Fusion
 import QtQuick.Layouts
 import RosScene 1.0
 
-// What is selected, and its descriptions.
+// What is selected, by display, and its descriptions.
 Pane {
     id: panel
 
@@ -11,8 +11,36 @@ Pane {
     property SceneView view: null
     readonly property int count: view ? view.selection.count : 0
     readonly property var parts: view && visible ? view.selection.parts : []
+    // Rows that the user has expanded or collapsed, by display and part.
+    property var toggled: ({})
+    readonly property var rows: lines(parts, toggled)
 
     padding: 4
+
+    function toggle(key) { toggled = Object.assign({}, toggled, { [key]: !toggled[key] }) }
+    // The rows: each display, its parts, and what there is to say about those that are expanded.
+    function lines(parts, toggled) {
+        const displays = new Map()
+        for (const part of parts) {
+            if (!displays.has(part.display))
+                displays.set(part.display, [])
+            displays.get(part.display).push(part)
+        }
+        const found = []
+        for (const [display, inside] of displays) {
+            const shown = !toggled[display]
+            found.push({ depth: 0, key: display, expanded: shown, text: display + (inside.length > 1 ? " (" + inside.length + ")" : "") })
+            for (const part of shown ? inside : []) {
+                const key = display + "\n" + part.part
+                // One alone is what the user wants to read; of many, which they are.
+                const expanded = (inside.length === 1) !== (toggled[key] === true)
+                found.push({ depth: 1, key: key, expanded: expanded, text: part.part })
+                for (const line of expanded ? part.lines : [])
+                    found.push({ depth: 2, key: "", expanded: false, text: line.name + ": " + line.value })
+            }
+        }
+        return found
+    }
 
     ColumnLayout {
         anchors.fill: parent
@@ -27,29 +55,38 @@ Pane {
             Layout.fillWidth: true
             Layout.fillHeight: true
             clip: true
+            boundsBehavior: Flickable.StopAtBounds
+            ScrollBar.vertical: ScrollBar { }
             // Rows stay where they are scrolled to while what is selected moves.
-            model: panel.parts.length
-            delegate: Column {
+            model: panel.rows.length
+            delegate: RowLayout {
+                id: row
+
                 required property int index
-                readonly property var part: panel.parts[index] || ({ display: "", part: "", lines: [] })
+                readonly property var line: panel.rows[index] || ({ depth: 0, key: "", expanded: false, text: "" })
 
                 width: list.width
-                Label { width: parent.width; text: parent.part.display + ": " + parent.part.part; textFormat: Text.PlainText; elide: Text.ElideRight; font.bold: true; topPadding: 6 }
-                Repeater {
-                    model: parent.part.lines
-                    Label {
-                        required property var modelData
-
-                        width: list.width
-                        text: modelData.name + ": " + modelData.value
-                        textFormat: Text.PlainText
-                        wrapMode: Text.Wrap
-                        maximumLineCount: 5
-                        elide: Text.ElideRight
-                    }
+                spacing: 2
+                Label {
+                    Layout.leftMargin: 12 * row.line.depth
+                    Layout.preferredWidth: 12
+                    Layout.alignment: Qt.AlignTop
+                    text: row.line.key === "" ? "" : row.line.expanded ? "\u25be" : "\u25b8"
+                    textFormat: Text.PlainText
                 }
+                Label {
+                    Layout.fillWidth: true
+                    Layout.rightMargin: 10
+                    text: row.line.text
+                    textFormat: Text.PlainText
+                    wrapMode: Text.Wrap
+                    maximumLineCount: 5
+                    elide: Text.ElideRight
+                    font.bold: row.line.depth === 0
+                }
+                TapHandler { enabled: row.line.key !== ""; onTapped: panel.toggle(row.line.key) }
             }
         }
-        Label { visible: panel.count > list.count; text: "and " + (panel.count - list.count) + " more"; textFormat: Text.PlainText }
+        Label { visible: panel.count > panel.parts.length; text: "and " + (panel.count - panel.parts.length) + " more"; textFormat: Text.PlainText }
     }
 }
