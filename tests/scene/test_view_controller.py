@@ -265,6 +265,34 @@ def test_a_view_of_hector_rviz_plugins_becomes_an_orbit(bench: SceneBench, tmp_p
     assert near(view.camera().focus, (1, 2, 0), 0.1)
 
 
+def test_saved_views_of_hector_rviz_plugins_are_named_and_kept(
+    bench: SceneBench, tmp_path: Path
+) -> None:
+    from rosglass.scene.rviz_config import RvizConfig
+
+    file = tmp_path / "saved.rviz"
+    current = HECTOR.partition("    Current:\n")[2]
+    saved = "".join(f"  {line}\n" for line in current.splitlines()).replace("Current View", "dock")
+    start = HECTOR.partition("    Current:")[0]
+    other = "      - {Class: a/B, Name: b}\n"
+    file.write_text(f"{start}    Saved:\n      - {saved.strip()}\n{other}")
+    kind = "hector_rviz_plugins/HectorViewController"
+    view = bench.load()
+    assert view.load_config(file) == [
+        f"saved view 'dock': rosglass has no {kind}; it is kept as it is and shown as an Orbit",
+        "saved view 'b': rosglass has no a/B; it is kept as it is",
+    ]
+    assert view.savedViewTypes == ["HectorViewController", "B"]
+    assert view.showSavedView(1) == "rosglass has no a/B, the type of the saved view 'b'"
+    assert "shown as an Orbit with the display View Controller" in view.showSavedView(0)
+    assert near(view.camera().eye, (1, 2, 8), 0.1)
+    bench.wait(lambda: control(bench).view.tracked_frame == "map")
+    view.save_config(file)
+    kept = RvizConfig.load(file).saved_views
+    assert [one.class_id for one in kept] == [kind, "a/B"]
+    assert kept[0].settings["Movement speed (m/s)"] == 2.5
+
+
 def test_displays_of_a_view_show_the_same(bench: SceneBench) -> None:
     first = show(bench, 'namespace: "/first"')
     second = bench.view.scene.add("rosglass/ViewController")

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 __all__ = [
     "GroupDisplay",
     "UnknownDisplay",
+    "add_controller",
+    "check_saved_views",
     "collect_displays",
     "create_saved_view",
     "duplicate_display",
@@ -101,14 +103,18 @@ def show_displays(scene: Scene, config: RvizConfig) -> list[str]:
         notes.append(f"Fixed Frame: {error}")
     for one in config.displays:
         _add(scene, one, None, notes)
-    view = config.current_view
-    if view is not None and view.class_id == _HECTOR_VIEW:
-        _add_controller(scene, view, notes)
+    if config.current_view is not None:
+        add_controller(scene, config.current_view, notes)
     return notes
 
 
-def _add_controller(scene: Scene, view: ViewConfig, notes: list[str]) -> None:
-    """Add the display View Controller for hector_rviz_plugins' view, unless there is one."""
+def add_controller(scene: Scene, view: ViewConfig, notes: list[str]) -> None:
+    """Show the settings of hector_rviz_plugins' view in a display View Controller.
+
+    It is added unless there is one; nothing is done for other views.
+    """
+    if view.class_id != _HECTOR_VIEW:
+        return
     found: Any = next((one for one in scene.displays if one.TYPE == CONTROLLER_CLASS), None)
     if found is None:
         own = {"Class": CONTROLLER_CLASS, "Name": "View Controller", "Enabled": True}
@@ -148,6 +154,22 @@ def _add(scene: Scene, one: DisplayConfig, group: Display | None, notes: list[st
         for inner in one.displays:
             _add(scene, inner, display, notes)
     return display
+
+
+def check_saved_views(config: RvizConfig) -> list[str]:
+    """Return which saved views of a config are of types that rosglass does not have, a line each.
+
+    They are kept as they are; those of hector_rviz_plugins are shown as an Orbit.
+    """
+    notes = []
+    for saved in config.saved_views:
+        if view_type(saved.class_id) not in VIEWS:
+            instead = " and shown as an Orbit" if saved.class_id == _HECTOR_VIEW else ""
+            notes.append(
+                f"saved view {saved.name!r}: rosglass has no {saved.class_id}; "
+                f"it is kept as it is{instead}"
+            )
+    return notes
 
 
 def create_saved_view(saved: ViewConfig, notes: list[str]) -> ViewController | None:

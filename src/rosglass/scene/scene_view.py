@@ -19,6 +19,8 @@ from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.rviz.orbit import ease
 from rosglass.scene.camera import interpolate
 from rosglass.scene.display_configs import (
+    add_controller,
+    check_saved_views,
     collect_displays,
     create_saved_view,
     show_displays,
@@ -418,6 +420,13 @@ class SceneView(QQuickRhiItem):
         list, lambda self: [one.name for one in self._saved_views()], notify=savedViewsChanged
     )
 
+    #: The type of each, e.g. ``Orbit``.
+    savedViewTypes = Property(
+        list,
+        lambda self: [one.class_id.rpartition("/")[2] for one in self._saved_views()],
+        notify=savedViewsChanged,
+    )
+
     def save_view(self, name: str) -> None:
         """Save where the camera is, as the last of the saved views."""
         if self.config is None:
@@ -452,7 +461,10 @@ class SceneView(QQuickRhiItem):
         notes: list[str] = []
         made = create_saved_view(saved, notes)
         if made is None:
-            raise Error(f"the saved view {saved.name!r} is of a type that does not exist here")
+            raise Error(
+                f"rosglass has no {saved.class_id}, the type of the saved view {saved.name!r}"
+            )
+        add_controller(self.scene, saved, notes)
         self.show_view(made)
         return notes
 
@@ -528,6 +540,7 @@ class SceneView(QQuickRhiItem):
         made = None if saved is None else create_saved_view(saved, notes)
         if made is not None:
             self.show_view(made)
+        notes += check_saved_views(config)
         self.config = config
         self.savedViewsChanged.emit()
         self.configLoaded.emit(config.source)

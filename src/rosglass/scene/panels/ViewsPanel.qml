@@ -86,15 +86,22 @@ Pane {
             clip: true
             model: panel.view ? panel.view.savedViews : []
             delegate: RowLayout {
+                id: saved
+
                 required property int index
                 required property string modelData
+                readonly property string type: panel.view ? panel.view.savedViewTypes[index] || "" : ""
 
                 width: ListView.view.width
                 spacing: 0
                 ItemDelegate {
                     Layout.fillWidth: true
                     text: modelData
-                    contentItem: Label { text: modelData; textFormat: Text.PlainText; elide: Text.ElideRight }
+                    contentItem: RowLayout {
+                        Label { Layout.fillWidth: true; text: saved.modelData; textFormat: Text.PlainText; elide: Text.ElideRight }
+                        // As RViz does, unless it is the name as well.
+                        Label { visible: text !== saved.modelData; text: saved.type; textFormat: Text.PlainText; elide: Text.ElideRight; opacity: 0.6 }
+                    }
                     onClicked: panel.problem = panel.view.showSavedView(index)
                     PlainToolTip { visible: parent.hovered; plain: "Look from there" }
                 }
