@@ -901,9 +901,11 @@ def test_the_program_follows_configs_of_overlays(
     assert "Window Geometry" not in RvizConfig.load(second).root
     access.scene_view.scene.add("Axes")
     bench.wait(lambda: program.modified)
+    program.hideDocks(True, False)
     access.save_config(str(tmp_path / "c.rviz"))
     assert window.title() == "c.rviz - rosglass"
     assert program.mayClose()
+    assert RvizConfig.load(tmp_path / "c.rviz").root["Window Geometry"] == {"Hide Left Dock": True}
 
 
 def test_overlays_of_a_config_ask_for_the_view_alone(

@@ -186,6 +186,19 @@ class ViewProgram(QtCore.QObject):
     def hideDocks(self, left: bool, right: bool) -> None:
         """Hide or show the panels on both sides; saved with the config, as RViz does."""
         report(self, hidesLeftDock=left, hidesRightDock=right)
+        self._keep_docks()
+
+    def _keep_docks(self) -> None:
+        """Let the view write the hidden docks into configs, also where an overlay saves them."""
+        view = self._view
+        if view is None:
+            return
+        known = {} if view.config is None else _geometry(view.config)
+        docks = {_LEFT_DOCK: self.hidesLeftDock, _RIGHT_DOCK: self.hidesRightDock}
+        # A config without them stays so while none is hidden.
+        view.window_geometry = {
+            name: hidden for name, hidden in docks.items() if hidden or name in known
+        }
 
     def _show(self, config: RvizConfig) -> None:
         assert self._view is not None
@@ -206,6 +219,7 @@ class ViewProgram(QtCore.QObject):
             hidesLeftDock=geometry.get(_LEFT_DOCK) is True,
             hidesRightDock=geometry.get(_RIGHT_DOCK) is True,
         )
+        self._keep_docks()
         self._on_config_saved(source)
 
     @Slot(str)
@@ -275,18 +289,13 @@ class ViewProgram(QtCore.QObject):
         """Save the config; where it was opened for an empty place."""
         if self._view is None:
             return
-        config = self._view.config = self._view.collect_config()
-        docks = {_LEFT_DOCK: self.hidesLeftDock, _RIGHT_DOCK: self.hidesRightDock}
-        geometry = _geometry(config)
-        docks = {name: hidden for name, hidden in docks.items() if hidden or name in geometry}
-        if docks:
-            config.root["Window Geometry"] = {**geometry, **docks}
         try:
             self._view.save_config(_local(place))
         except Error as error:
             _log.error("%s", error)
             self.say(str(error))
             return
+        assert self._view.config is not None
         self.say(f"saved to {self._view.config.source}")
         self._refresh()
 

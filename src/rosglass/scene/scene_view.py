@@ -124,6 +124,8 @@ class SceneView(QQuickRhiItem):
         self._painted = 0
         #: The config that was loaded; None before.
         self.config: RvizConfig | None = None
+        #: What the program around it keeps in ``Window Geometry`` of configs.
+        self.window_geometry: dict[str, Any] = {}
         self._view: ViewController = create_view("Orbit")
         self._view.on_change = self.camera_moved
         self._moved_at = -1.0
@@ -557,6 +559,10 @@ class SceneView(QQuickRhiItem):
         config.background_color = cast("tuple[float, ...]", self._background.getRgbF())
         config.displays[:] = collect_displays(self.scene, config.ros)
         config.tools[:] = [ToolConfig(one) for one in self.tools.save_configs(config.ros)]
+        if self.window_geometry:
+            before = config.root.get("Window Geometry")
+            geometry = before if isinstance(before, dict) else {}
+            config.root["Window Geometry"] = {**geometry, **self.window_geometry}
         current = config.current_view
         before = {} if current is None else current.settings
         state = self._view_config(self._view.name, config.ros).settings
