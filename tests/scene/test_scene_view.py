@@ -402,6 +402,18 @@ def test_data_that_is_ahead_of_its_transform_is_no_error_for_a_second(bench: Sce
     bench.wait(lambda: path.statusLevel == "ok")
 
 
+def test_a_display_that_qml_destroys_leaves_the_list(bench: SceneBench) -> None:
+    from PySide6.QtCore import QObject
+
+    view = bench.load(
+        "property int count: scene.displayList.length\n"
+        'Instantiator { objectName: "grids"; model: 2; GridDisplay { } }'
+    )
+    bench.wait(lambda: view.property("count") == 2)
+    view.findChild(QObject, "grids").setProperty("model", 1)
+    bench.wait(lambda: view.property("count") == 1)
+
+
 def test_python_keeps_the_items_around_a_view_that_is_destroyed(bench: SceneBench) -> None:
     from rosglass.qt import is_alive, send_deferred_deletes
 

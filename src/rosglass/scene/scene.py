@@ -17,7 +17,7 @@ from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import Element, single_shot
 from rosglass.qml.runtime import runtime_of
 from rosglass.qml.tf_buffer import TfLink
-from rosglass.qt import Property, Signal, Slot, is_alive
+from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.rviz.property_values import shown
 from rosglass.scene.displays.shapes import poses_matrices
 from rosglass.scene.drawing import Group, instance_matrix
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     from rosglass.comm.clock import Jump
     from rosglass.qml.runtime import Runtime
-    from rosglass.qt import QtCore
     from rosglass.scene.display import Display
     from rosglass.scene.resource_retriever import ResourceRetriever
     from rosglass.tf import TransformBuffer
@@ -172,6 +171,9 @@ class Scene(Element):
             root.remove()
             if display in displays:
                 displays.remove(display)
+                if is_alive(self):
+                    # Later: all of a view may be about to be destroyed.
+                    QtCore.QTimer.singleShot(0, self, self.displaysChanged.emit)
 
         display.destroyed.connect(forget)
         try:
