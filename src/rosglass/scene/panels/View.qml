@@ -82,12 +82,13 @@ ApplicationWindow {
                     Menu {
                         id: newTools
                         Repeater {
-                            model: scene.tools.types
+                            model: scene.tools.choices
                             MenuItem {
-                                required property string modelData
-                                text: modelData
+                                required property var modelData
+                                text: modelData.name
                                 contentItem: Label { text: parent.text; textFormat: Text.PlainText }
-                                onTriggered: program.say(scene.tools.addTool(modelData))
+                                onTriggered: program.say(scene.tools.addTool(modelData.type))
+                                PlainToolTip { visible: parent.hovered; plain: parent.modelData.description }
                             }
                         }
                     }
