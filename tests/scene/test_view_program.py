@@ -758,6 +758,61 @@ def test_a_typed_frame_counts_when_the_user_goes_on(bench: SceneBench, window: A
     assert field.property("text") == "odom"
 
 
+def test_a_display_is_chosen_from_a_list_that_is_filtered(bench: SceneBench, window: Any) -> None:
+    from PySide6.QtCore import QMetaObject, QObject, Qt
+    from PySide6.QtTest import QTest
+
+    rows = Rows(window)
+    publishers = [bench.robot.create_publisher(f"/plan{n}", "nav_msgs/Path") for n in range(2)]
+    bench.wait(lambda: len(rows.model.suggestions()) == len(publishers))
+    dialog, choices, button = (
+        window.findChild(QObject, name) for name in ("addDialog", "addChoices", "addChosen")
+    )
+
+    def open_dialog() -> None:
+        QMetaObject.invokeMethod(window.findChild(QObject, "addDisplay"), "click")
+        bench.wait(lambda: dialog.property("opened"))
+
+    def middle_of(number: int) -> Any:
+        rows_of_it = choices.property("contentItem").childItems()
+        item = next(one for one in rows_of_it if one.property("index") == number)
+        return item.mapToScene(item.boundingRect().center()).toPoint()
+
+    # A click selects, which adds nothing yet.
+    open_dialog()
+    assert not button.property("enabled")
+    bench.wait(lambda: choices.property("count") == 2)
+    window.grabWindow()
+    rows.click(middle_of(1))
+    assert button.property("enabled")
+    assert outline(rows.scene) == ["Grid", "TF"]
+    QMetaObject.invokeMethod(button, "click")
+    assert [one.topic for one in rows.scene.displays[2:]] == ["/plan1"]
+    bench.wait(lambda: not dialog.property("visible"))
+    # The new one is selected, for the keyboard as well.
+    assert rows.model.rows[rows.current].label == "Path"
+    rows.key("Delete")
+    assert outline(rows.scene) == ["Grid", "TF"]
+    open_dialog()
+    window.grabWindow()
+    QTest.mouseDClick(window, Qt.MouseButton.LeftButton, pos=middle_of(0))
+    assert [one.topic for one in rows.scene.displays[2:]] == ["/plan0"]
+    bench.wait(lambda: not dialog.property("visible"))
+    # Words of a filter, in any order; Enter adds what is selected.
+    open_dialog()
+    for letter in "path 1":
+        QTest.keyClick(window, letter)
+    assert choices.property("count") == 1
+    rows.key("Return")
+    assert [one.topic for one in rows.scene.displays[2:]] == ["/plan0", "/plan1"]
+    bench.wait(lambda: not dialog.property("visible"))
+    open_dialog()
+    assert choices.property("count") == 2
+    rows.key("Escape")
+    bench.wait(lambda: not dialog.property("visible"))
+    assert len(rows.scene.displays) == 4
+
+
 def test_reset_in_the_tool_bar_drops_what_was_received(bench: SceneBench, window: Any) -> None:
     from PySide6.QtCore import QObject
 

@@ -635,16 +635,17 @@ class DisplaysModel(QAbstractListModel):
                     found.append({"topic": topic, "type": kinds[0], "display": name})
         return found
 
-    @Slot(str, str)
-    def add(self, kind: str, topic: str = "") -> None:
-        """Add a display of a type, for a topic if there is one."""
+    @Slot(str, str, result=int)
+    def add(self, kind: str, topic: str = "") -> int:
+        """Add a display of a type, for a topic if there is one; return its row, -1 for none."""
         if self._view is None:
-            return
+            return -1
         try:
             settings = {"topic": topic} if topic else {}
             display = self._view.scene.add(kind, "", **settings)
         except Error as error:
             self.refused.emit(str(error))
-            return
+            return -1
         self._expanded.add(("display", id(display)))
         self.refresh()
+        return self._row_of(display)

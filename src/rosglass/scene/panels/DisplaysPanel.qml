@@ -297,15 +297,38 @@ Pane {
     }
     Dialog {
         id: adding
+
+        // What can be added: the display of each, and its topic.
+        property var topics: []
+        property var types: []
+        readonly property var words: filter.text.toLowerCase().split(" ")
+        readonly property var found: (tabs.currentIndex === 0 ? topics : types)
+            .filter(one => words.every(word => (one.topic + " " + one.display).toLowerCase().includes(word)))
+        readonly property var chosen: found[choices.currentIndex] || null
+
         objectName: "addDialog"
         title: "Add a display"
         modal: true
         width: 420
-        height: 420
+        height: parent ? Math.min(480, parent.height - 20) : 480
         parent: Overlay.overlay
         anchors.centerIn: parent
-        standardButtons: Dialog.Cancel
-        onOpened: { byType.model = rows.types(); byTopic.model = rows.suggestions() }
+        onOpened: {
+            topics = rows.suggestions()
+            types = rows.types().map(name => ({ topic: "", display: name }))
+            filter.clear()
+            filter.forceActiveFocus()
+        }
+        onAccepted: {
+            const row = rows.add(chosen.display, chosen.topic)
+            if (row >= 0)
+                panel.current = row
+        }
+        onClosed: keys.forceActiveFocus()
+        footer: DialogButtonBox {
+            Button { objectName: "addChosen"; text: "OK"; enabled: adding.chosen !== null; DialogButtonBox.buttonRole: DialogButtonBox.AcceptRole }
+            Button { text: "Cancel"; DialogButtonBox.buttonRole: DialogButtonBox.RejectRole }
+        }
         ColumnLayout {
             anchors.fill: parent
             TabBar {
@@ -314,31 +337,45 @@ Pane {
                 TabButton { text: "By topic" }
                 TabButton { text: "By type" }
             }
-            StackLayout {
-                currentIndex: tabs.currentIndex
-                ListView {
-                    id: byTopic
-                    clip: true
-                    delegate: ItemDelegate {
-                        width: ListView.view.width
-                        contentItem: Text { text: modelData.topic + "   " + modelData.display; textFormat: Text.PlainText; color: palette.text }
-                        onClicked: { rows.add(modelData.display, modelData.topic); adding.close() }
+            TextField {
+                id: filter
+                objectName: "addFilter"
+                Layout.fillWidth: true
+                placeholderText: "Filter"
+                onAccepted: if (adding.chosen) adding.accept()
+                Keys.onUpPressed: choices.decrementCurrentIndex()
+                Keys.onDownPressed: choices.incrementCurrentIndex()
+            }
+            ListView {
+                id: choices
+                objectName: "addChoices"
+                Layout.fillWidth: true
+                Layout.fillHeight: true
+                clip: true
+                model: adding.found
+                // The first match of a filter: Enter adds it.
+                onModelChanged: currentIndex = filter.text && adding.found.length > 0 ? 0 : -1
+                ScrollBar.vertical: ScrollBar { }
+                delegate: ItemDelegate {
+                    id: choice
+
+                    required property int index
+                    required property var modelData
+
+                    width: ListView.view.width
+                    highlighted: ListView.isCurrentItem
+                    contentItem: RowLayout {
+                        readonly property color tint: choice.highlighted ? palette.highlightedText : palette.text
+                        Label { Layout.fillWidth: true; text: choice.modelData.topic || choice.modelData.display; textFormat: Text.PlainText; elide: Text.ElideRight; color: parent.tint }
+                        Label { visible: choice.modelData.topic !== ""; text: choice.modelData.display; textFormat: Text.PlainText; color: parent.tint }
                     }
-                    Label {
-                        anchors.centerIn: parent
-                        visible: byTopic.count === 0
-                        text: "The robot publishes nothing that a display shows."
-                    }
+                    onClicked: choices.currentIndex = index
+                    onDoubleClicked: { choices.currentIndex = index; adding.accept() }
                 }
-                ListView {
-                    id: byType
-                    objectName: "typeList"
-                    clip: true
-                    delegate: ItemDelegate {
-                        width: ListView.view.width
-                        contentItem: Text { text: modelData; textFormat: Text.PlainText; color: palette.text }
-                        onClicked: { rows.add(modelData, ""); adding.close() }
-                    }
+                Label {
+                    anchors.centerIn: parent
+                    visible: choices.count === 0
+                    text: adding.topics.length > 0 || tabs.currentIndex === 1 ? "Nothing has these words." : "The robot publishes nothing that a display shows."
                 }
             }
         }
