@@ -446,6 +446,36 @@ def test_frames_without_a_transform_are_counted(robot: Robot) -> None:
     robot.check()
 
 
+def test_filters_do_not_take_long_whatever_the_names_are(robot: Robot) -> None:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    display, bench = robot.view.scene.add("TF"), robot.bench
+    # Python's re would need 2^60 steps for the second one.
+    names = ["arm", "a" * 60 + "!", "b" * 201, "tool"]
+    StaticTransformBroadcaster(robot._node).send_transform(
+        [Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "odom", name) for name in names]
+    )
+    bench.wait(lambda: len(display.frames) == 6)
+    display.whitelist = "^(a+)+$|^[artm]{3}$"
+    bench.wait(lambda: len(display.frames) == 3, lambda: display.frames)
+    assert set(display.frames) == set(names[:3])
+    text = display.status_lines["Filter (whitelist)"].text
+    assert text == (
+        f"it takes too long with [{names[1]}] and 1 more, which it is not used for; write a "
+        "simpler expression"
+    )
+    display.whitelist, display.blacklist = "", "^a|map"
+    bench.wait(lambda: set(display.frames) == {*names[2:], "odom"}, lambda: display.frames)
+    assert "Filter (whitelist)" not in display.status_lines
+    display.blacklist = "a("
+    bench.wait(lambda: len(display.frames) == 6)
+    text = display.status_lines["Filter (blacklist)"].text
+    assert text.startswith("this is no regular expression: ")
+    assert text.endswith(", at letter 3")
+    robot.check()
+
+
 def test_all_interactive_markers_are_bounded(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     robot.show(next(case for case in CASES if case.display == "InteractiveMarkers"))
     monkeypatch.setattr("rosglass.scene.displays.interactive_marker.MAX_PARTS", 10)

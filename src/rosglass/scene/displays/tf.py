@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 import math
-import re
 import time
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
+from rosglass.errors import Error
 from rosglass.qml.properties import ReadOnly, report
-from rosglass.qt import Signal, Slot
+from rosglass.qt import QtCore, Signal, Slot
 from rosglass.scene.display import OUTDATED_ALPHA, Display
 from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, stack_poses
 from rosglass.scene.drawing import Labels
@@ -19,19 +20,21 @@ from rosglass.scene.parts import Parts
 from rosglass.scene.settings import Setting
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
     from rosglass.errors import TransformException
     from rosglass.qml.runtime import Runtime
-    from rosglass.qt import QtCore
     from rosglass.tf import FrameInfo, FrameTree
 
 __all__ = ["TFDisplay"]
 
 #: Frames that are shown, frames of which these are chosen, and lines of the status about them.
 _MAX_FRAMES, _MAX_NAMES, _MAX_LINES = 2000, 10_000, 20
+#: Steps after which a filter is given up for a name, and letters of names that it is for.
+_MAX_STEPS, _MAX_LETTERS = 10_000, 200
+_FILTERS = ("Filter (whitelist)", "Filter (blacklist)")
 #: Sizes in RViz at a marker scale of 1, metres.
 _AXIS_M, _AXIS_RADIUS_M, _NAME_M = 0.2, 0.02, 0.1
 _SHAFT_M, _HEAD_M, _HEAD_WIDTH_M = 0.01, 0.1, 0.04
@@ -58,6 +61,31 @@ class _Frame(NamedTuple):
     pose: NDArray[np.float64]
     share: float
     parent: str
+
+
+def _filter_of(pattern: str) -> Callable[[str], bool | None]:
+    """Return a function that says whether a name of a frame has a match; None if that takes long.
+
+    By Qt's regular expressions, whose steps can be limited: the names are the robot's, and with
+    some expressions a name of 30 letters keeps Python's ``re`` busy for hours.
+
+    Raises:
+        Error: The pattern is no regular expression.
+    """
+    limit = f"(*LIMIT_MATCH={_MAX_STEPS})"
+    regex = QtCore.QRegularExpression(limit + pattern)
+    if not regex.isValid():
+        at = regex.patternErrorOffset() - len(limit)
+        raise Error(f"this is no regular expression: {regex.errorString()}, at letter {at + 1}")
+
+    @lru_cache(2 * _MAX_NAMES)
+    def matches(name: str) -> bool | None:
+        if len(name) > _MAX_LETTERS:
+            return None
+        found = regex.match(name)
+        return found.hasMatch() if found.isValid() else None
+
+    return matches
 
 
 class TFDisplay(Display):
@@ -100,6 +128,9 @@ class TFDisplay(Display):
         #: Whether the robot is not connected: all fade then.
         self._is_lost = False
         self._next_look = 0.0
+        #: Those that are set, and the names that take them too long.
+        self._filters: dict[str, Callable[[str], bool | None]] = {}
+        self._undecided: dict[str, list[str]] = {}
         #: What is drawn, to draw nothing anew while nothing changes.
         self._drawn: Any = None
         #: How many transforms were refused, and when the last one was.
@@ -159,12 +190,15 @@ class TFDisplay(Display):
         return kept
 
     def _restyle(self) -> None:
-        for path in ("Filter (whitelist)", "Filter (blacklist)"):
+        self._filters.clear()
+        for path in _FILTERS:
+            pattern = self.get(path)
+            self.delete_status(path)
             try:
-                re.compile(self.get(path))
-                self.delete_status(path)
-            except re.error as error:  # noqa: PERF203 - two of them
-                self.set_status(path, "error", f"this is no regular expression: {error}")
+                if pattern:
+                    self._filters[path] = _filter_of(pattern)
+            except Error as error:
+                self.set_status(path, "error", str(error))
         self._draw()
 
     def on_transforms(self) -> None:
@@ -214,15 +248,28 @@ class TFDisplay(Display):
             self.delete_status("Refused")
 
     def _is_chosen(self, name: str) -> bool:
-        if self.parts.is_enabled(name):
-            try:
-                return bool(
-                    (not self.whitelist or re.search(self.whitelist, name))
-                    and not (self.blacklist and re.search(self.blacklist, name))
-                )
-            except re.error:
-                return True
-        return False
+        if not self.parts.is_enabled(name):
+            return False
+        whitelist, blacklist = (self._matches(path, name) for path in _FILTERS)
+        return whitelist is not False and not blacklist
+
+    def _matches(self, path: str, name: str) -> bool | None:
+        """Return whether a filter has a match in a name; None if it is not known, or not set."""
+        matches = self._filters.get(path)
+        found = None if matches is None else matches(name)
+        if matches is not None and found is None:
+            self._undecided.setdefault(path, []).append(name)
+        return found
+
+    def _report_undecided(self) -> None:
+        for path in self._filters:
+            names = self._undecided.get(path)
+            if names:
+                more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+                text = f"it takes too long with [{names[0]}]{more}, which it is not used for"
+                self.set_status(path, "warn", f"{text}; write a simpler expression")
+            else:
+                self.delete_status(path)
 
     def _draw(self) -> None:
         scene = self.scene
@@ -231,7 +278,9 @@ class TFDisplay(Display):
             return
         self._rest = buffer.rest()
         names = buffer.frame_names()
+        self._undecided.clear()
         chosen = [name for name in sorted(names[:_MAX_NAMES]) if self._is_chosen(name)]
+        self._report_undecided()
         if len(chosen) > _MAX_FRAMES or len(names) > _MAX_NAMES:
             del chosen[_MAX_FRAMES:]
             text = f"only {len(chosen)} of {len(names)} frames are shown"
