@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Labels, Lines, Mesh, Points
+from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Labels, Lines, Mesh, Points, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -571,3 +571,69 @@ def test_meshes_that_are_kept_are_bounded() -> None:
     assert len(meshes._files) == 200
     of(1000)
     assert len(waiting) == 1001
+
+
+def mesh_file(triangles: int) -> Any:
+    from rosglass.scene.displays.marker import _MeshFile
+
+    corners = np.arange(9 * triangles, dtype=np.float32).reshape(-1, 3)
+    return _MeshFile([(Mesh(Shape(corners)), None)], "")
+
+
+def test_bytes_of_meshes_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    from rosglass.scene.displays import marker as markers
+
+    size = mesh_file(100).size
+    assert size == 300 * 36 + 300 * 4
+    monkeypatch.setattr(markers, "_MAX_KEPT_BYTES", 2 * size)
+    monkeypatch.setattr(markers, "_MAX_MESH_BYTES", 4 * size)
+    done: dict[str, Any] = {}
+    problems: dict[str, str] = {}
+    meshes: Any = None
+
+    def start(_: Any, then: Any) -> None:
+        done[uri] = then
+
+    meshes = markers.MarkerMeshes(start, problems.__setitem__)
+
+    def draw(name: str, triangles: int = 100) -> list[Any]:
+        nonlocal uri
+        uri = name
+        record = markers.MarkerRecord(("", 1), markers.MESH, ADD, resource=name)
+        assert list(meshes.of(record)) == []
+        done[name](mesh_file(triangles))
+        return list(meshes.of(record))
+
+    uri = ""
+    # What is shown stays, and counts; of the others two are kept.
+    shown = [draw("1"), draw("2")]
+    for name in "3456":
+        draw(name)
+    assert list(meshes._files) == ["5", "6"]
+    assert set(problems.values()) == {""}
+    draw("large", 300)
+    assert problems.pop("large") == (
+        f"large: with its {3 * size} bytes, all meshes have more than {4 * size}; reduce them"
+    )
+    assert all(shown)
+
+
+def test_markers_have_bytes_at_most(
+    bench: SceneBench, show: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rosglass.scene.displays.marker._MAX_SHOWN_BYTES", 100)
+    monkeypatch.setattr("rosglass.scene.displays.marker._MAX_LATE_BYTES", 100)
+    points = [{"x": float(at)} for at in range(6)]  # 72 bytes
+    display = show(marker(8, 1, points=points), marker(8, 2, points=points[:2]))
+    assert len(drawables(display)) == 2
+    show(marker(8, 2, points=points))
+    assert "shapes/2: it is not shown: all markers have more than 0 MiB" in display.statusText
+    assert len(drawables(display)) == 1
+    show(marker(8, 1, points=points[:2]), marker(8, 2, points=points[:2]))
+    assert len(drawables(display)) == 2
+    assert display.statusLevel == "ok", display.statusText
+    late = [marker(8, at, points=points, header={"frame_id": "nowhere"}) for at in (3, 4)]
+    show(*late)
+    text = "shapes/3: it was dropped: more than 1000 markers, or 0 MiB, wait for transforms"
+    assert text in display.statusText
+    assert [key for _, key in display._late] == [4]

@@ -185,7 +185,7 @@ def test_what_waits_for_its_transform_is_all_shown_later(
     bench.wait(lambda: sum(one.count for one, _ in parts(odometry, CYLINDER)) == 12)
     assert len(parts(points, SPHERE)) == 3
     # Of clouds, which are large, only the setting Depth are kept.
-    assert "Dropped messages: 7 while more than 5 waited for" in clouds.statusText
+    assert "Dropped messages: 7 while more than 5, or 256 MiB, waited for" in clouds.statusText
     # What is more than that is said.
     monkeypatch.setattr(displays, "MOST_WAITING", 10)
     odometry.topic = "/odom2"
@@ -201,6 +201,38 @@ def test_what_waits_for_its_transform_is_all_shown_later(
     bench.wait(lambda: sum(one.count for one, _ in parts(odometry, CYLINDER)) == 1)
     odometry.topic = "/odom"
     assert "Dropped" not in odometry.statusText
+
+
+def test_bytes_of_what_waits_are_bounded(bench: SceneBench, monkeypatch: Any) -> None:
+    from rosglass.scene import display as displays
+
+    view = bench.load()
+    display = view.scene.add("PointCloud2", topic="/cloud", decayTime=60.0, depth=100)
+    publisher = bench.robot.create_publisher("/cloud", "sensor_msgs/PointCloud2")
+    bench.wait(publisher.subscription_count)
+    cloud = {**CLOUD, "header": {"frame_id": "odom"}}
+    publisher.publish(cloud)
+    bench.wait(lambda: display._waiting)
+    size = display._waiting[0].size
+    assert 30 < size < 200
+    # Never the newest one.
+    for limit, kept in ((3 * size, 3), (size - 1, 1)):
+        monkeypatch.setattr(displays, "_MAX_WAITING_BYTES", limit)
+        for _ in range(5):
+            publisher.publish(cloud)
+        bench.wait(lambda kept=kept: len(display._waiting) == kept)
+    bench.wait(lambda: display.received == 11)
+    assert "while more than 100, or 0 MiB, waited for their transforms" in display.statusText
+    # Nor do more of them wait for the GUI thread.
+    (queue, sample) = display._queue, display._waiting[-1]
+    drained, _ = queue.drain()
+    assert drained == []
+    monkeypatch.setattr(queue, "_executor", type("", (), {"post": lambda *_: None})())
+    for _ in range(5):
+        publisher.publish(cloud)
+    bench.wait(lambda: queue.received == 16)
+    assert len(queue.drain()[0]) == 1
+    assert sample.size == size
 
 
 def test_what_is_shown_fades_while_newer_data_waits_for_its_transform(bench: SceneBench) -> None:

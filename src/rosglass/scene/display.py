@@ -14,7 +14,7 @@ import threading
 import time
 from collections import deque
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -54,11 +54,13 @@ __all__ = [
     "Status",
     "Subscriptions",
     "TopicDisplay",
+    "drop_oldest",
     "frame_and_stamp",
     "matrix_of",
 ]
 
 _log = logging.getLogger("rosglass.scene")
+_T = TypeVar("_T")
 
 #: RViz's word for the fixed frame in settings that name a frame.
 FIXED_FRAME = "<Fixed Frame>"
@@ -80,6 +82,8 @@ _DURABILITY = {
 }
 #: Messages that wait for the GUI thread or their transforms, of displays that show each.
 MOST_WAITING = 1000
+#: Bytes of what waits there: 1000 clouds may be 10 GB. The newest one waits in any case.
+_MAX_WAITING_BYTES = 256 << 20
 #: Lookups that may fail each time that messages are placed, from either end.
 _MOST_MISSES = 25
 #: Seconds for which data may wait for its transform before that is an error.
@@ -395,11 +399,35 @@ class _Item(NamedTuple):
         data: What :meth:`TopicDisplay.preparer` has made of it.
         frame: Its frame.
         stamp: Its time in nanoseconds; 0 for the newest.
+        size: Bytes of it as it was received.
     """
 
     data: Any
     frame: str
     stamp: int
+    size: int = 0
+
+
+def drop_oldest(waiting: deque[_T], most: int, size_of: Callable[[_T], int]) -> int:
+    """Drop the oldest of what waits beyond a number, or beyond 256 MiB, but never the newest.
+
+    Args:
+        waiting: The newest at the end.
+        most: How many may wait.
+        size_of: Returns the bytes of one.
+
+    Returns:
+        How many were dropped.
+    """
+    dropped, size = 0, sum(map(size_of, waiting))
+    while len(waiting) > most or (len(waiting) > 1 and size > _MAX_WAITING_BYTES):
+        size -= size_of(waiting.popleft())
+        dropped += 1
+    return dropped
+
+
+def _size_of(item: _Item) -> int:
+    return item.size
 
 
 class MessageQueue:
@@ -410,7 +438,8 @@ class MessageQueue:
         types: Names of the types that it accepts.
         executor: Of the GUI thread.
         on_ready: Called there when messages have arrived.
-        depth: How many wait there at most; older ones are dropped and counted.
+        depth: How many wait there at most; older ones, and those beyond 256 MiB, are dropped and
+            counted.
         eager: Whether all fields are decoded at once.
         needs_frame: Whether a message whose header names no frame is refused.
     """
@@ -429,7 +458,8 @@ class MessageQueue:
         self._needs_frame = needs_frame
         self._executor, self._on_ready = executor, on_ready
         self._lock = threading.Lock()
-        self._items: deque[_Item] = deque(maxlen=depth)
+        self._depth = depth
+        self._items: deque[_Item] = deque()
         self._error = ""
         #: Whether the GUI thread is about to drain it: however much a robot sends, one job waits.
         self._is_posted = False
@@ -449,14 +479,15 @@ class MessageQueue:
             return sample.message()
 
         self.publisher = sample.publisher
-        self.put(decode, sample.type.name)
+        self.put(decode, sample.type.name, len(sample.data))
 
-    def put(self, decode: Callable[[], Message], what: str) -> None:
+    def put(self, decode: Callable[[], Message], what: str, size: int = 0) -> None:
         """Decode and queue a message, in the node's thread.
 
         Args:
             decode: Returns it.
             what: The name of its type.
+            size: Its bytes.
         """
         item, error = None, ""
         try:
@@ -465,7 +496,7 @@ class MessageQueue:
             if data is not None:
                 whole = getattr(data, "source", None)
                 whole = message if whole is None else whole
-                item = _Item(data, *frame_and_stamp(whole))
+                item = _Item(data, *frame_and_stamp(whole), size)
                 if self._needs_frame and not item.frame and "header" in whole:
                     item = None
                     raise Error("header.frame_id is empty: the publisher has to name the frame")
@@ -481,8 +512,8 @@ class MessageQueue:
             if item is not None:
                 if getattr(item.data, "replaces_all", False):
                     self._items.clear()
-                self.dropped += len(self._items) == self._items.maxlen
                 self._items.append(item)
+                self.dropped += drop_oldest(self._items, self._depth, _size_of)
         if not is_posted:
             self._executor.post(self._on_ready)
 
@@ -683,7 +714,10 @@ class TopicDisplay(OneTopicDisplay):
         return self.KEEPS_ALL
 
     def most_waiting(self) -> int:
-        """Return how many messages may wait for their transforms; older ones are dropped."""
+        """Return how many messages may wait for their transforms; older ones are dropped.
+
+        So are those beyond 256 MiB.
+        """
         return MOST_WAITING if self.shows_all() else int(self.depth)
 
     def _is_loss(self) -> bool:
@@ -880,15 +914,16 @@ class TopicDisplay(OneTopicDisplay):
 
     def _drop_oldest(self, queue: MessageQueue) -> None:
         """Drop what waits beside newer messages, and say so if it is missed."""
-        most = self.most_waiting()
-        while len(self._waiting) > most:
-            self._waiting.popleft()
-            self._dropped += self._is_loss()
+        most, before = self.most_waiting(), len(self._waiting)
+        count = drop_oldest(self._waiting, most, _size_of)
+        if self._is_loss() or (self.shows_all() and before <= most):
+            self._dropped += count
         dropped = []
         if queue.dropped and self.shows_all():
             dropped.append(f"{queue.dropped} that came faster than they can be shown")
         if self._dropped:
-            dropped.append(f"{self._dropped} while more than {most} waited for their transforms")
+            limit = f"{most}, or {_MAX_WAITING_BYTES >> 20} MiB,"
+            dropped.append(f"{self._dropped} while more than {limit} waited for their transforms")
         if dropped:
             self.set_status("Dropped messages", "warn", "; ".join(dropped))
 

@@ -621,12 +621,20 @@ class Shape:
         used = np.zeros(len(at), bool)
         used[faces] = True
         self.box = _box_of(at[used])
+        self._mirrored: Shape | None = None
+
+    @property
+    def size(self) -> int:
+        """How many bytes it takes."""
+        return self.rows.nbytes + self.faces.nbytes
 
     def mirrored(self) -> Shape:
         """Return the same shape with its triangles turned, to be seen from the other side."""
-        other = copy(self)
-        other.faces = np.ascontiguousarray(self.faces[:, ::-1])
-        return other
+        if self._mirrored is None:
+            other = copy(self)
+            other.faces = np.ascontiguousarray(self.faces[:, ::-1])
+            self._mirrored = other
+        return self._mirrored
 
 
 def _fitting(name: str, given: ArrayLike, at: NDArray[Any], width: int) -> NDArray[np.float32]:

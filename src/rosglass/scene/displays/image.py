@@ -26,7 +26,7 @@ from rosglass.qml.image_sinks import ImageItem, Sink
 from rosglass.qml.properties import ReadOnly, Writable, report
 from rosglass.qt import Property, QtCore, QtGui, Signal, Slot, is_alive
 from rosglass.scene.camera import PinholeCamera
-from rosglass.scene.display import MessageQueue, OneTopicDisplay, Subscriptions
+from rosglass.scene.display import MessageQueue, OneTopicDisplay, Subscriptions, drop_oldest
 from rosglass.scene.parts import Parts
 from rosglass.scene.rviz_formats import read_number
 from rosglass.scene.scene_view import SceneView
@@ -567,8 +567,7 @@ class CameraDisplay(PictureDisplay):
 
     def _take_picture(self, picture: Picture) -> None:
         self._waiting.append(picture)
-        while len(self._waiting) > self.depth:
-            self._waiting.popleft()
+        drop_oldest(self._waiting, self.depth, _size_of)
         self._place_waiting()
 
     def _place_waiting(self) -> None:
@@ -766,6 +765,13 @@ class PictureItem(ImageItem):
             seen.width() * across,
             seen.height() * down,
         )
+
+
+def _size_of(picture: Picture) -> int:
+    """Return about how many bytes a picture takes."""
+    whole = picture.whole
+    received = 0 if whole is None else whole.height * whole.step
+    return received + sum(plane.nbytes for plane in picture.frame.planes)
 
 
 class CameraView(SceneView):

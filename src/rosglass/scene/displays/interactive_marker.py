@@ -20,7 +20,13 @@ from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import QtCore, QtQml, Signal, Slot, is_alive
-from rosglass.scene.display import OUTDATED_ALPHA, MessageQueue, OneTopicDisplay, TopicDisplay
+from rosglass.scene.display import (
+    OUTDATED_ALPHA,
+    MessageQueue,
+    OneTopicDisplay,
+    TopicDisplay,
+    drop_oldest,
+)
 from rosglass.scene.displays.interactive_marker_controls import (
     MENU_SELECT,
     Control,
@@ -156,7 +162,7 @@ class _Server:
 
     def __init__(self) -> None:
         self.number: int | None = None
-        self.early: deque[MarkerUpdate] = deque(maxlen=_MAX_EARLY)
+        self.early: deque[MarkerUpdate] = deque()
         self.beats = self.silent = False
         self.heard = time.monotonic()
         self.root = Group()
@@ -426,7 +432,8 @@ class InteractiveMarkersDisplay(TopicDisplay):
 
     def _show_waiting(self) -> None:
         while self._waiting:
-            self._on_update(self._waiting.popleft().data)
+            item = self._waiting.popleft()
+            self._on_update(item.data._replace(size=item.size))
 
     def _on_update(self, update: MarkerUpdate) -> None:
         server = self._servers.get(update.server)
@@ -444,7 +451,9 @@ class InteractiveMarkersDisplay(TopicDisplay):
             self._begin(server, update)
         elif server.number is None:
             if not update.alive:
+                # What is dropped is a gap: all are requested again.
                 server.early.append(update)
+                drop_oldest(server.early, _MAX_EARLY, lambda one: one.size)
             self._request()
         elif update.number != server.number + (not update.alive):
             self._on_gap(server, update)

@@ -329,6 +329,7 @@ class MarkerUpdate(NamedTuple):
         markers: Markers that are new, or that have changed.
         poses: Markers that were moved: name, frame, time in nanoseconds, pose or what is wrong.
         erased: Names of markers that are gone.
+        size: Bytes of it as it was received.
     """
 
     server: str
@@ -338,6 +339,7 @@ class MarkerUpdate(NamedTuple):
     markers: tuple[InteractiveMarkerRecord, ...] = ()
     poses: tuple[tuple[str, str, int, Matrix | str], ...] = ()
     erased: tuple[str, ...] = ()
+    size: int = 0
 
 
 def read_update(message: Any, *, named: bool) -> MarkerUpdate:

@@ -13,6 +13,7 @@ import time
 from copy import copy
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -102,8 +103,10 @@ _ROWS_AT_ONCE = 10_000
 _LEAST_M = 1e-18
 #: Metres that are drawn for a scale of 0: surfaces without thickness have no shade.
 _THIN_M = 1e-4
-#: Markers that wait for a transform, of which the oldest make room.
-_MAX_LATE = 1000
+#: Markers that wait for a transform, of which the oldest make room, and their bytes.
+_MAX_LATE, _MAX_LATE_BYTES = 1000, 256 << 20
+#: Bytes of the points, colors and texts of all markers that are shown.
+_MAX_SHOWN_BYTES = 1 << 30
 #: Seconds after which no transform of a marker's time will come any more.
 _MAX_WAIT_S = 60.0
 #: Seconds for which a marker may wait for the transform of its time before that is an error.
@@ -112,8 +115,10 @@ _LATE_S = 1.0
 _MAX_MISSES = 50
 #: Namespaces of a topic, each drawn on its own, for each frame that markers are locked to.
 _MAX_NAMESPACES = 2000
-#: Meshes that are kept for further markers, and that are being read.
-_MAX_MESHES, _MAX_READING = 200, 1000
+#: Meshes that are kept for further markers, their bytes, and meshes that are being read.
+_MAX_MESHES, _MAX_KEPT_BYTES, _MAX_READING = 200, 256 << 20, 1000
+#: Bytes of the meshes and textures of all markers of a display.
+_MAX_MESH_BYTES = 2 << 30
 #: Lines of the status, and markers whose problems are known.
 _MAX_LINES, _MAX_PROBLEMS = 50, 1000
 
@@ -164,6 +169,12 @@ class MarkerRecord(NamedTuple):
     warning: str = ""
     instances: _Instances | None = None
     triangles: Shape | None = None
+
+    @property
+    def size(self) -> int:
+        """About how many bytes it takes."""
+        shape = 0 if self.triangles is None else self.triangles.size
+        return self.points.nbytes + self.colors.nbytes + len(self.text) + shape
 
 
 def read_marker(message: Any, part: tuple[str, int] | None = None) -> MarkerRecord:
@@ -491,6 +502,7 @@ class MarkerGroup:
         if group is not None:
             self._looks.pop(key, None)
             group.remove()
+            group.clear()  # a group and its items know each other, and would stay in memory
         for shape in self._solids.pop(key, ()):
             self._batches[shape].discard(key)
 
@@ -635,6 +647,15 @@ class _MeshFile(NamedTuple):
     parts: list[tuple[Mesh, tuple[float, ...] | None]]
     problem: str
 
+    @property
+    def size(self) -> int:
+        """How many bytes it takes."""
+        return sum(_size_of(mesh) for mesh, _ in self.parts)
+
+
+def _size_of(mesh: Mesh) -> int:
+    return mesh.shape.size + (0 if mesh.texture is None else mesh.texture.nbytes)
+
 
 def _read_mesh(uri: str, resources: ResourceRetriever) -> _MeshFile:
     """Read a mesh and its textures; takes seconds for large ones."""
@@ -689,6 +710,8 @@ class MarkerMeshes:
         #: By URI, those used last at the end; None while it is being read.
         self._files: dict[str, _MeshFile | None] = {}
         self._reading = 0
+        #: Bytes of each part that is kept or drawn.
+        self._sizes: WeakKeyDictionary[Shape, int] = WeakKeyDictionary()
 
     def of(self, marker: MarkerRecord) -> Iterable[Mesh]:
         """Return the drawables of a mesh marker; begin to load it if need be.
@@ -726,12 +749,25 @@ class MarkerMeshes:
     def _loaded(self, uri: str, result: Any) -> None:
         self._reading -= 1
         file = result if isinstance(result, _MeshFile) else _MeshFile([], str(result))
+        self._files.pop(uri, None)
         self._files[uri] = file
-        # The drawables of markers that are shown keep theirs.
-        old = [one for one, found in self._files.items() if found is not None][:-_MAX_MESHES]
-        for one in old:
-            del self._files[one]
+        self._drop_unused()
+        if sum(self._sizes.values()) + file.size > _MAX_MESH_BYTES:
+            text = f"with its {file.size} bytes, all meshes have more than {_MAX_MESH_BYTES}"
+            file = self._files[uri] = _MeshFile([], f"{uri}: {text}; reduce them")
+        self._sizes.update((mesh.shape, _size_of(mesh)) for mesh, _ in file.parts)
         self._on_loaded(uri, "" if file.parts else file.problem)
+
+    def _drop_unused(self) -> None:
+        """Forget the files that were used longest ago; markers that are shown keep theirs."""
+        kept = {uri: file.size for uri, file in self._files.items() if file is not None}
+        size = sum(kept.values())
+        # Not the last one, which is asked for again as soon as it is there.
+        for uri in list(kept)[:-1]:
+            if len(kept) <= _MAX_MESHES and size <= _MAX_KEPT_BYTES:
+                return
+            size -= kept.pop(uri)
+            del self._files[uri]
 
 
 class _Late(NamedTuple):
@@ -815,6 +851,8 @@ class Markers(TopicDisplay):
         #: Those without markers, which make room for new ones.
         self._empty: dict[tuple[str, str], None] = {}
         self._late: dict[tuple[str, int], _Late] = {}
+        #: Bytes of all that are shown.
+        self._size = 0
         self._problems: dict[tuple[str, int], Status] = {}
         #: Names of the lines of the status that are about markers.
         self._lines: set[str] = set()
@@ -859,6 +897,7 @@ class Markers(TopicDisplay):
             self._last = item._replace(data=None)
             for marker in item.data:
                 self._apply(marker, poses)
+        self._drop_late()
         self._show_age()
         self._flush_later()
 
@@ -944,19 +983,32 @@ class Markers(TopicDisplay):
             return
         is_known = not isinstance(poses.at(marker.frame), str)
         self._late[key] = _Late(marker, time.monotonic(), pose, is_known)
-        if len(self._late) > _MAX_LATE:
+
+    def _drop_late(self) -> None:
+        """Drop the oldest of too many markers that wait."""
+        size = sum(late.marker.size for late in self._late.values())
+        while len(self._late) > _MAX_LATE or (len(self._late) > 1 and size > _MAX_LATE_BYTES):
             oldest = next(iter(self._late))
-            del self._late[oldest]
-            text = f"it was dropped: more than {_MAX_LATE} markers wait for transforms"
-            self._note_problem(oldest, "error", text)
+            size -= self._late.pop(oldest).marker.size
+            limit = f"{_MAX_LATE} markers, or {_MAX_LATE_BYTES >> 20} MiB,"
+            self._note_problem(
+                oldest, "error", f"it was dropped: more than {limit} wait for transforms"
+            )
 
     def _show_marker(self, marker: MarkerRecord, pose: NDArray[np.float64]) -> None:
         """Show a marker that is new, with its frame at a pose in the fixed frame."""
         key = marker.key
         before = self._shown.get(key)
+        size = self._size + marker.size - (0 if before is None else before.size)
+        if size > _MAX_SHOWN_BYTES:
+            self._remove(key)
+            text = f"it is not shown: all markers have more than {_MAX_SHOWN_BYTES >> 20} MiB"
+            self._note_problem(key, "error", text)
+            return
         if before is not None and self._group_key(before) == self._group_key(marker):
             # Its group replaces it, or moves it if nothing else has changed.
             del self._shown[key]
+            self._size -= before.size
             self._forget_hidden(before)
             self._problems.pop(key, None)
             self._expires.pop(key, None)
@@ -966,6 +1018,7 @@ class Markers(TopicDisplay):
             self._note_problem(key, "error", f"only {_MAX_MARKERS} markers are shown")
             return
         self._shown[key] = marker
+        self._size += marker.size
         if marker.warning:
             self._note_problem(key, "warn", marker.warning)
         if marker.lifetime:
@@ -1040,6 +1093,7 @@ class Markers(TopicDisplay):
         self._expires.pop(key, None)
         marker = self._shown.pop(key, None)
         if marker is not None:
+            self._size -= marker.size
             self._forget_hidden(marker)
             group = self._group_of(marker)
             if group is not None:
@@ -1059,6 +1113,7 @@ class Markers(TopicDisplay):
         super().reset()
         for held in (self._shown, self._expires, self._groups, self._hidden, self._lost):
             held.clear()
+        self._size = 0
         self._empty.clear()
         self._late.clear()
         self._problems.clear()

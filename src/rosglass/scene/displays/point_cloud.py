@@ -28,7 +28,7 @@ from rosglass.scene.cloud_sources import (
     cloud_from_laser_scan,
     cloud_from_point_cloud,
 )
-from rosglass.scene.display import TopicDisplay, frame_and_stamp
+from rosglass.scene.display import TopicDisplay, drop_oldest, frame_and_stamp
 from rosglass.scene.drawing import Points
 from rosglass.scene.point_clouds import Cloud, CloudHistory, is_ordered, order_points
 from rosglass.scene.point_colors import (
@@ -621,8 +621,9 @@ class _DepthMatcher:
         self._info_topic, self._color_topic = info_topic, color_topic
         self._lock = threading.Lock()
         self._info: Any = None
-        self._depths: deque[Any] = deque(maxlen=size)
-        self._colors: deque[Any] = deque(maxlen=size)
+        self._size = size
+        self._depths: deque[Any] = deque()
+        self._colors: deque[Any] = deque()
 
     def match(self, message: Any) -> tuple[Any, Any, Any] | None:
         """Take a message, and return a depth image, its calibration and color once all are there.
@@ -641,7 +642,9 @@ class _DepthMatcher:
             if not is_depth and not self._color_topic:
                 known = ", ".join((*_DEPTH_ENCODINGS, _COMPRESSED_DEPTH))
                 raise Error(f"encoding: a depth image is {known}, got {kind[:60]!r}")
-            (self._depths if is_depth else self._colors).append(message)
+            images = self._depths if is_depth else self._colors
+            images.append(message)
+            drop_oldest(images, self._size, lambda one: len(one.data))
             if self._info is None:
                 raise Error(f"no camera info received; publish it on {self._info_topic}")
             if not self._color_topic:
@@ -652,7 +655,7 @@ class _DepthMatcher:
         """Return the newest depth image whose color is known: that of the nearest time."""
         colors = [(frame_and_stamp(color)[1], color) for color in self._colors]
         if not colors:
-            if len(self._depths) == self._depths.maxlen:
+            if len(self._depths) == self._size:
                 raise Error(f"no color image received; publish it on {self._color_topic}")
             return None
         for at in range(len(self._depths) - 1, -1, -1):
