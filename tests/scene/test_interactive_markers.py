@@ -803,6 +803,33 @@ def test_a_bad_marker_says_what_is_wrong_and_the_others_are_shown(
     assert display.markers == ["arm", "bad"]
 
 
+def test_a_mesh_that_was_missing_is_read_again(
+    bench: SceneBench,
+    show: Callable[..., Any],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from web_server import WebServer
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr("rosglass.scene.scene._ASK_AGAIN_S", 0.1)
+    with WebServer() as web:
+        uri = f"{web.url}/flat.obj"
+        mesh = {**BOX, "type": 10, "mesh_resource": uri}
+        display = show(marker(control(BUTTON) | {"markers": [mesh]}))
+        bench.wait(lambda: "Mesh" in display.status_lines)
+        assert display.status_lines["Mesh"].text == f"{uri}: the server answers 404 Not Found"
+        # Reset reads everything that is missing, and a server that is down is asked again.
+        web.files["/flat.obj"] = lambda request: request.send_error(503)
+        bench.view.scene._ask_again_s = 0.1
+        bench.view.reset()
+        bench.wait(lambda: "503" in display.statusText)
+        assert drawn(display) == []
+        web.files["/flat.obj"] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+        bench.wait(lambda: drawn(display))
+        bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
+
+
 def test_both_rviz_write_the_namespace_differently(bench: SceneBench) -> None:
     view = bench.load("InteractiveMarkersDisplay { }")
     (display,) = view.scene.displays

@@ -128,6 +128,39 @@ def test_what_has_failed_can_be_tried_again(web: WebServer) -> None:
     assert retriever.find(uri) == b"mesh"
 
 
+def test_servers_that_answer_later_are_asked_for_one_file_each(web: WebServer) -> None:
+    def is_down(request: BaseHTTPRequestHandler) -> None:
+        request.send_error(503)
+
+    names = ("/a.stl", "/b.stl", "/c.stl")
+    for name in names:
+        web.files[name] = is_down
+    uris, retriever = [f"{web.url}{name}" for name in names], ResourceRetriever()
+    refused = "http://127.0.0.1:1/d.stl"
+    for uri in (*uris, refused):
+        with pytest.raises(ResourceError, match="it is asked again later, by Reset at once"):
+            retriever.find(uri)
+    with pytest.raises(ResourceError, match=r"404 Not Found$"):
+        retriever.find(f"{web.url}/gone.stl")
+    assert retriever.is_waiting
+    web.requests.clear()
+    assert retriever.ask_again() == []
+    assert [path for path, _ in web.requests] == ["/a.stl"]
+    for name in names:
+        web.files[name] = b"mesh"
+    assert retriever.ask_again() == uris
+    assert [retriever.find(uri) for uri in uris] == [b"mesh"] * 3
+    # The other server is still asked, and nothing else.
+    web.requests.clear()
+    assert retriever.is_waiting
+    assert retriever.ask_again() == []
+    assert web.requests == []
+    # Reset forgets what is not wanted any more.
+    retriever.retry()
+    assert retriever.find(uris[0]) == b"mesh"
+    assert not retriever.is_waiting
+
+
 def test_a_body_without_an_end_is_cut_off(web: WebServer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(resource_retriever, "_MAX_BYTES", 100_000)
     sent = []
@@ -281,6 +314,25 @@ def test_a_robot_without_the_service_is_asked_once(
         with pytest.raises(ResourceError, match=f"no node offers the service {SERVICE}"):
             robot.retriever.find(f"package://my_arm/{number}.stl")
     assert time.monotonic() - started < 5
+
+
+def test_a_robot_that_serves_files_later_is_asked_again(
+    make_robot: Callable[..., Robot], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(resource_retriever, "_APPEAR_TIMEOUT_S", 0.2)
+    robot = make_robot("/other", "std_srvs/srv/Trigger")
+    uris = [f"package://my_arm/{number}.stl" for number in range(3)]
+    for uri in uris:
+        with pytest.raises(ResourceError, match=f"no node offers the service {SERVICE}; it is"):
+            robot.retriever.find(uri)
+    assert robot.retriever.ask_again() == []
+    robot.node.create_service_server(SERVICE, TYPE, robot._answer)
+    # The first one is not there, but the robot answers.
+    monkeypatch.setattr(resource_retriever, "_APPEAR_TIMEOUT_S", 10.0)
+    assert robot.retriever.ask_again() == uris
+    robot.response = ok(b"mesh")
+    assert robot.retriever.find(uris[1]) == b"mesh"
+    assert not robot.retriever.is_waiting
 
 
 def test_a_service_can_be_named(make_robot: Callable[..., Robot]) -> None:

@@ -232,6 +232,37 @@ def test_meshes_come_from_web_servers(bench: SceneBench) -> None:
 
 
 @pytest.mark.usefixtures("cache")
+def test_a_web_server_that_was_down_is_asked_again(
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from web_server import WebServer
+
+    monkeypatch.setattr("rosglass.scene.scene._ASK_AGAIN_S", 0.1)
+    with WebServer() as web:
+        web.files["/arm.stl"] = web.files["/hand.stl"] = lambda request: request.send_error(503)
+        view = bench.load("RobotModelDisplay {}")
+        view.scene._ask_again_s = 0.1
+        (robot,) = view.scene.displays
+        publish(bench, with_meshes(f"{web.url}/arm.stl", f"{web.url}/hand.stl"))
+        send = send_transforms(bench, "base_link")
+        bench.wait(lambda: len(web.requests) >= 4)
+        line = robot.status_lines["Mesh arm.stl"]
+        assert line.level == "error"
+        assert line.text == (
+            f"{web.url}/arm.stl: the server answers 503 Service Unavailable; it is asked again "
+            "later, by Reset at once"
+        )
+        # Less and less often, and for one file only.
+        assert view.scene._ask_again_s >= 0.4
+        assert [path for path, _ in web.requests].count("/hand.stl") == 1
+        web.files["/arm.stl"] = web.files["/hand.stl"] = STL
+        bench.wait(lambda: len(list(robot.root.drawables())) == 2)
+        bench.wait(lambda: robot.statusLevel == "ok", lambda: robot.statusText)
+        assert view.scene._ask_again_s == 0.1
+        send.close()
+
+
+@pytest.mark.usefixtures("cache")
 def test_missing_meshes_of_the_same_name_are_all_in_the_status(bench: SceneBench) -> None:
     view = bench.load("RobotModelDisplay {}")
     (robot,) = view.scene.displays

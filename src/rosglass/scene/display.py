@@ -31,7 +31,7 @@ from rosglass.scene.rviz_formats import TopicSetting, read_topic, write_topic
 from rosglass.scene.settings import Configurable, Setting
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -301,6 +301,9 @@ class Display(Configurable, TopicElement):
     def _fade(self) -> None:
         """Draw what may be out of date as such."""
         self.root.alpha = OUTDATED_ALPHA if self._outdated_frames else 1.0
+
+    def on_files(self, uris: Collection[str]) -> None:
+        """Read files again that could not be fetched: their servers answer now."""
 
     def reset(self) -> None:
         """Drop all data that was received, e.g. as time has jumped back."""

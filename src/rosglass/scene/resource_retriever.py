@@ -55,10 +55,16 @@ _MAX_FAILURES, _FAILURES_S, _SLOW_S = 3, 60.0, 1.0
 _MAX_KEPT_BYTES = 64 << 20
 _MAX_CLIENTS = 8
 _CHUNK_BYTES = 1 << 16
+#: End of the reason where a server may answer later.
+_LATER = "; it is asked again later, by Reset at once"
 
 
 class _Unanswered(Exception):  # noqa: N818 - never leaves this file
-    """A server did not answer in time."""
+    """A server did not answer, or not completely."""
+
+
+class _NotOffered(_Unanswered):
+    """No node offers the robot's service; few robots do, so that it counts as no failure."""
 
 
 class _Outcome(NamedTuple):
@@ -136,7 +142,7 @@ class ResourceRetriever:
 
     A file has 256 MiB at most and arrives within 60 s. The outcome is remembered for a minute, and
     after three servers without an answer no other is tried for a minute: all of them wait for each
-    other in the scene's thread.
+    other in the scene's thread. :meth:`ask_again` asks those that have not answered.
 
     Args:
         node: Node whose graph has the services; None for no node.
@@ -148,6 +154,8 @@ class ResourceRetriever:
         self._clients: OrderedDict[str, ServiceClient] = OrderedDict()
         self._outcomes: OrderedDict[str, _Outcome] = OrderedDict()
         self._failures: deque[float] = deque(maxlen=_MAX_FAILURES)
+        #: URIs whose servers have not answered.
+        self._unanswered: OrderedDict[str, None] = OrderedDict()
         #: Until when the robot's service is known to be missing, by :func:`time.monotonic`.
         self._missing_until = 0.0
         self._closed = self._retries = False
@@ -168,7 +176,7 @@ class ResourceRetriever:
         """
         text = uri.strip() if isinstance(uri, str) else ""
         scheme = text.partition(":")[0].lower()
-        if scheme in {"http", "https"}:
+        if _is_web(text):
             if is_network_closed():
                 raise UnsupportedError(f"{text}: it is not fetched{NETWORK_HINT}")
             return self._remembered(text, self._fetch)
@@ -191,8 +199,38 @@ class ResourceRetriever:
         return found if isinstance(found, bytes) else read_mesh_file(os.fspath(found), uri)
 
     def retry(self) -> None:
-        """Ask again for what could not be fetched; from any thread."""
+        """Ask again for what could not be fetched, once it is wanted again; from any thread."""
         self._retries = True
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether there are servers that have not answered."""
+        return bool(self._unanswered)
+
+    def ask_again(self) -> list[str]:
+        """Ask each server that has not answered for one of its files again.
+
+        Waits for servers: not for the GUI thread.
+
+        Returns:
+            The URIs of all files of servers that answer now; they can be read again.
+        """
+        servers: dict[str, list[str]] = {}
+        for uri in self._unanswered:
+            servers.setdefault(_server_of(uri), []).append(uri)
+        self._missing_until = 0.0
+        found = []
+        for uris in servers.values():
+            first = uris[0]
+            self._outcomes.pop(first, None)
+            with suppress(ResourceError):
+                self._remembered(first, self._fetch if _is_web(first) else self._call)
+            if first not in self._unanswered:
+                for uri in uris[1:]:
+                    self._unanswered.pop(uri, None)
+                    self._outcomes.pop(uri, None)
+                found += uris
+        return found
 
     def close(self) -> None:
         """Stop asking services; safe to call twice."""
@@ -207,6 +245,7 @@ class ResourceRetriever:
         now = time.monotonic()
         if self._retries:
             self._retries, self._missing_until = False, 0.0
+            self._unanswered.clear()
             for one in [one for one, found in self._outcomes.items() if found.data is None]:
                 del self._outcomes[one]
         known = self._outcomes.get(uri)
@@ -222,20 +261,24 @@ class ResourceRetriever:
     def _attempt(self, uri: str, fetch: Callable[[str], bytes]) -> _Outcome:
         data, error = None, ""
         now = time.monotonic()
+        self._unanswered[uri] = None
+        if len(self._unanswered) > _MAX_REMEMBERED:
+            self._unanswered.popitem(last=False)
         if len(self._failures) == _MAX_FAILURES and now - self._failures[0] < _FAILURES_S:
             error = (
                 f"it is not asked for: {_MAX_FAILURES} servers have not answered within the last "
-                f"{_FAILURES_S:g} s"
+                f"{_FAILURES_S:g} s{_LATER}"
             )
             return _Outcome(self._failures[0] + _FAILURES_S, None, error)
         try:
             data = fetch(uri)
         except _Unanswered as reason:
-            if time.monotonic() - now > _SLOW_S:
+            if time.monotonic() - now > _SLOW_S and not isinstance(reason, _NotOffered):
                 self._failures.append(time.monotonic())
-            error = str(reason)
+            return _Outcome(time.monotonic() + _REMEMBER_S, None, f"{reason}{_LATER}")
         except Error as reason:
             error = _plain(reason, uri)
+        self._unanswered.pop(uri, None)
         return _Outcome(time.monotonic() + _REMEMBER_S, data, error)
 
     def _forget(self) -> None:
@@ -265,11 +308,16 @@ class ResourceRetriever:
             kept = self._copies.get(uri) if error.code == http.HTTPStatus.NOT_MODIFIED else None
             if kept is not None:
                 return kept
-            raise ResourceError(f"the server answers {error.code} {error.reason}") from None
+            answer = f"the server answers {error.code} {error.reason}"
+            if error.code >= http.HTTPStatus.INTERNAL_SERVER_ERROR:
+                raise _Unanswered(answer) from None
+            raise ResourceError(answer) from None
         except (TimeoutError, urllib.error.URLError) as error:
             reason = getattr(error, "reason", error)
             raise _Unanswered(f"the server cannot be reached: {reason}") from None
-        except (OSError, ValueError, http.client.HTTPException) as error:
+        except OSError as error:
+            raise _Unanswered(f"the connection was lost: {error}") from None
+        except (ValueError, http.client.HTTPException) as error:
             raise ResourceError(f"it cannot be fetched: {type(error).__name__}: {error}") from None
 
     def _receive(self, response: Any) -> bytes:
@@ -288,7 +336,7 @@ class ResourceRetriever:
                 )
             chunks.append(chunk)
         if received < size:
-            raise ResourceError(f"the server sent {received} of {size} bytes")
+            raise _Unanswered(f"the server sent {received} of {size} bytes")
         return b"".join(chunks)
 
     # -- services --------------------------------------------------------------------------------
@@ -335,7 +383,7 @@ class ResourceRetriever:
         assert self._node is not None
         missing = f"no node offers the service {service}"
         if service == _SERVICE and time.monotonic() < self._missing_until:
-            raise ResourceError(missing)
+            raise _NotOffered(missing)
         client = self._clients.get(service)
         if client is None:
             client = self._node.create_service_client(service, kind or None)
@@ -346,9 +394,19 @@ class ResourceRetriever:
             return client
         if service != _SERVICE:
             raise _Unanswered(missing)
-        # Few robots have it: that is no failure.
         self._missing_until = time.monotonic() + _REMEMBER_S
-        raise ResourceError(missing)
+        raise _NotOffered(missing)
+
+
+def _is_web(uri: str) -> bool:
+    return uri.lower().startswith(("http:", "https:"))
+
+
+def _server_of(uri: str) -> str:
+    """Return a name of the server that a file is asked of."""
+    if _is_web(uri):
+        return uri.partition("://")[2].partition("/")[0]
+    return uri.split(":")[1] if uri.lower().startswith("service:") else _SERVICE
 
 
 def _check_size(size: int) -> None:

@@ -45,6 +45,8 @@ _ORIGIN, _UPRIGHT = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 _PAUSED_S = 1.0
 #: Seconds between two resets as the time jumps back again and again.
 _RESETS_S = 1.0
+#: Seconds until servers of files that have not answered are asked again, and at most then.
+_ASK_AGAIN_S, _MAX_ASK_AGAIN_S = 10.0, 300.0
 
 
 class Scene(Element):
@@ -93,6 +95,8 @@ class Scene(Element):
         self._timer = single_shot(self, self._follow)
         self._followed_at = self._reset_at = -math.inf
         self._resets = single_shot(self, self._begin_anew)
+        self._ask_timer = single_shot(self, self._ask_again)
+        self._ask_again_s = _ASK_AGAIN_S
         self.root.on_change = self.changed.emit
         root = self.root
 
@@ -417,6 +421,7 @@ class Scene(Element):
             self._loader = Dispatcher("rosglass-scene")
             self._cleanup["loader"] = self._loader.close
         executor, resources = self._executor, self._retriever()
+        ask_later = weak_callback(self._ask_later)
 
         def run() -> None:
             try:
@@ -427,8 +432,26 @@ class Scene(Element):
                 _log.exception("loading failed")
                 result = Error(f"internal error: {error!r}")
             executor.post(lambda: done(result))
+            if resources.is_waiting:
+                executor.post(ask_later)
 
         self._loader.post(run)
+
+    def _ask_later(self) -> None:
+        """Ask servers of files again that have not answered, less and less often."""
+        if is_alive(self) and not self._ask_timer.isActive():
+            self._ask_timer.start(int(self._ask_again_s * 1000))
+            self._ask_again_s = min(2 * self._ask_again_s, _MAX_ASK_AGAIN_S)
+
+    @Slot()
+    def _ask_again(self) -> None:
+        self.load(lambda resources: resources.ask_again(), weak_callback(self._on_asked_again))
+
+    def _on_asked_again(self, uris: list[str] | Error) -> None:
+        if is_alive(self) and uris and not isinstance(uris, Error):
+            self._ask_again_s = _ASK_AGAIN_S
+            for display in self._alive():
+                display.on_files(uris)
 
     def _retriever(self) -> ResourceRetriever:
         if not self._resources:
@@ -521,6 +544,8 @@ class Scene(Element):
         self._reset_at = time.monotonic()
         for one in self._resources:
             one.retry()
+        self._ask_timer.stop()
+        self._ask_again_s = _ASK_AGAIN_S
         self._each(restart)
 
     def _each(self, job: Callable[[Display], None]) -> None:

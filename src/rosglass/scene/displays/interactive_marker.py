@@ -43,7 +43,7 @@ from rosglass.scene.rviz_formats import read_marker_namespace, write_marker_name
 from rosglass.scene.settings import Setting
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Collection, Mapping
 
     from rosglass.comm.node import Node
     from rosglass.comm.qos import QoS
@@ -550,6 +550,8 @@ class InteractiveMarkersDisplay(TopicDisplay):
         """Drop all markers, and request them again."""
         self._waiting.clear()
         self._drop_markers()
+        self.meshes.forget_failed()
+        self.delete_status("Mesh")
         self._asked = None
         if self._endpoint is not None and self.shown:
             self._requested = False
@@ -702,12 +704,23 @@ class InteractiveMarkersDisplay(TopicDisplay):
         if not is_alive(self):
             return
         if problem:
-            self.set_status("Mesh", "error", f"{uri}: {problem}")
+            self.set_status("Mesh", "error", problem)
             return
+        self._draw_mesh(uri)
+
+    def _draw_mesh(self, uri: str) -> None:
         for marker in self._all():
             for control in marker.controls.values():
                 if control.uses_mesh(uri):
                     control.draw()
+
+    def on_files(self, uris: Collection[str]) -> None:
+        """Read meshes again that were missing."""
+        failed = self.meshes.forget_failed(uris)
+        if failed:
+            self.delete_status("Mesh")
+        for uri in failed:
+            self._draw_mesh(uri)
 
     # -- files -----------------------------------------------------------------------------------
 

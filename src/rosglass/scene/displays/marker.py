@@ -44,7 +44,7 @@ from rosglass.scene.meshes import ending_of
 from rosglass.scene.parts import Parts
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Collection, Iterable, Sequence
     from typing import TypeAlias
 
     from numpy.typing import NDArray
@@ -769,6 +769,22 @@ class MarkerMeshes:
             size -= kept.pop(uri)
             del self._files[uri]
 
+    def forget_failed(self, uris: Collection[str] | None = None) -> set[str]:
+        """Forget files that could not be read, so that they are read again.
+
+        Args:
+            uris: The files, of meshes and of their textures, that may be there now; None for all.
+
+        Returns:
+            The URIs of the meshes.
+        """
+        failed = {uri: file.problem for uri, file in self._files.items() if file and file.problem}
+        if uris is not None:
+            failed = {k: text for k, text in failed.items() if any(one in text for one in uris)}
+        for uri in failed:
+            del self._files[uri]
+        return set(failed)
+
 
 class _Late(NamedTuple):
     """A marker that waits for its transform.
@@ -1116,6 +1132,7 @@ class Markers(TopicDisplay):
         self._size = 0
         self._empty.clear()
         self._late.clear()
+        self._meshes.forget_failed()
         self._problems.clear()
         self._flush_later()
 
@@ -1194,6 +1211,23 @@ class Markers(TopicDisplay):
         poses = _Poses(self.scene)
         for marker in list(self._shown.values()):
             if marker.kind == MESH and marker.resource == uri:
+                self._place_anew(marker, poses)
+        self._flush_later()
+
+    def on_files(self, uris: Collection[str]) -> None:
+        """Read meshes again that were missing."""
+        failed = self._meshes.forget_failed(uris)
+        if not failed or self.scene is None:
+            return
+        poses = _Poses(self.scene)
+        for marker in list(self._shown.values()):
+            if marker.kind == MESH and marker.resource in failed:
+                group = self._group_of(marker)
+                if group is not None:
+                    group.remove(marker.key)  # it may be drawn without its texture
+                self._problems.pop(marker.key, None)
+                if marker.warning:
+                    self._note_problem(marker.key, "warn", marker.warning)
                 self._place_anew(marker, poses)
         self._flush_later()
 

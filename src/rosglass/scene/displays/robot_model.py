@@ -33,7 +33,7 @@ from rosglass.scene.triangles import MAX_TRIANGLES, moved
 from rosglass.scene.urdf import Box, Capsule, Cylinder, MeshFile, Robot, Sphere, parse_urdf
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Collection, Mapping
 
     from numpy.typing import NDArray
 
@@ -504,6 +504,9 @@ class RobotModelDisplay(Display):
         self._body, self._trails = Group(), Group()
         self._root_link = ""
         self._text: str | None = None
+        self._source = ""
+        #: Why meshes and textures of the robot that is shown could not be loaded.
+        self._missing: list[str] = []
         self._loader = DescriptionLoader(_load, weak_callback(self._show))
         #: What the status says of the description that is shown.
         self._loaded_lines: dict[str, Status] = {}
@@ -572,7 +575,7 @@ class RobotModelDisplay(Display):
     def _take_text(self, text: str, source: str) -> None:
         if not is_alive(self) or self.scene is None or text == self._text:
             return
-        self._text = text
+        self._text, self._source = text, source
         self.set_status("URDF", "warn", "loading the robot and its meshes")
         self._loader.load(self.scene, text, source)
 
@@ -589,6 +592,7 @@ class RobotModelDisplay(Display):
             link = self._bodies[name] = _Link(result.visuals[name], result.collisions[name], part)
             self._body.add(link.root)
         self._root_link = result.robot.root
+        self._missing = list(result.problems.values())
         report(self, links=sorted(self._bodies), robotName=result.robot.name)
         lines = {"URDF": Status("ok", "URDF parsed OK")}
         for number, warning in enumerate(result.robot.warnings[:_MAX_LINK_LINES]):
@@ -610,6 +614,7 @@ class RobotModelDisplay(Display):
         self._body.clear()
         self._trails.clear()
         self._loaded_lines = {}
+        self._missing = []
         self.root.add(self._body, self._trails)
         self.clear_status()
         report(self, links=[], robotName="")
@@ -617,8 +622,15 @@ class RobotModelDisplay(Display):
     def reset(self) -> None:
         """Begin the trails anew; load the robot again if a mesh is missing: it may be there now."""
         self._clear_trails()
-        if any(line.startswith("Mesh ") for line in self._loaded_lines):
+        if self._missing:
             self._text = None
+
+    def on_files(self, uris: Collection[str]) -> None:
+        """Load the robot again, if it has a mesh or texture that was missing."""
+        text, is_missing = self._text, any(uri in one for one in self._missing for uri in uris)
+        if text is not None and is_missing:
+            self._text = None
+            self._take_text(text, self._source)
 
     def followed_frames(self) -> list[str]:
         """Return the frames of the links that are shown, the root link's first."""
