@@ -465,6 +465,29 @@ def test_frames_fade_one_by_one_and_all_when_transforms_stop(bench: SceneBench) 
     assert bench.drawn() == before
 
 
+def test_frames_that_do_not_move_follow_another_fixed_frame(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.scene.drawing import Mesh
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    view = bench.load("TFDisplay { showArrows: false }")
+    (frames,) = view.scene.displays
+    StaticTransformBroadcaster(bench.robot).send_transform(
+        Transform((3, 0, 0), (0, 0, 0, 1), Time(1), "map", "mast")
+    )
+
+    def places() -> dict[str, float]:
+        (axes,) = (one for one, _, _ in frames.root.drawables() if isinstance(one, Mesh))
+        # The second of three cylinders stands on the origin, along y.
+        xs = axes.instances["matrix"].reshape(-1, 4, 4)[1::3, 3, 0].tolist()
+        return dict(zip(frames.frames, xs, strict=True))
+
+    bench.wait(lambda: frames.frames == ["map", "mast"])
+    assert places() == {"map": 0.0, "mast": 3.0}
+    view.fixedFrame = "mast"
+    assert places() == {"map": -3.0, "mast": 0.0}
+
+
 def test_what_follows_frames_fades_without_a_node(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import Transform, TransformBroadcaster

@@ -211,6 +211,10 @@ class TFDisplay(Display):
             self._next = now + self.updateInterval
             self._draw()
 
+    def on_fixed_frame(self) -> None:
+        """Place the frames in the new fixed frame, also while none moves."""
+        self._draw()
+
     def check_frames(self) -> None:
         """Fade all frames while the robot is not connected, and say what was refused."""
         self._report_refused()
