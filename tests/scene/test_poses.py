@@ -111,6 +111,34 @@ def test_covariances_are_ellipsoids_and_cones(show: Callable[..., Any]) -> None:
     assert len(parts(display, CONE)) == 1
 
 
+def ellipsoids(display: Any) -> dict[float, float]:
+    """Return how long the ellipsoids of covariances are, by where they are along x."""
+    found = [one for mesh in parts(display, SPHERE) for one in mesh.instances["matrix"]]
+    lengths = [np.linalg.norm(one.reshape(4, 4)[:3], axis=1).max() for one in found]
+    return {place(one)[0]: round(float(far), 3) for one, far in zip(found, lengths, strict=True)}
+
+
+def test_a_covariance_is_that_of_the_newest_pose(show: Callable[..., Any]) -> None:
+    poses = [{"pose": {"pose": pose(), "covariance": covariance(x=x)}} for x in (4.0, 9.0)]
+    display = show("PoseWithCovariance", "geometry_msgs/PoseWithCovarianceStamped", *poses)
+    assert ellipsoids(display) == {0.0: 6.0}
+    display.positionScale = 2.0
+    assert ellipsoids(display) == {0.0: 12.0}
+
+
+def test_each_pose_of_an_odometry_keeps_its_covariance(
+    bench: SceneBench, show: Callable[..., Any]
+) -> None:
+    way = [{"pose": {"pose": pose(x), "covariance": covariance(x=x * x)}} for x in range(1, 6)]
+    display = show("Odometry", "nav_msgs/Odometry", *way, keep=3)
+    assert ellipsoids(display) == {3.0: 6.0, 4.0: 8.0, 5.0: 10.0}
+    # As after a jump of the robot's time.
+    display.reset()
+    publisher = bench.robot.create_publisher("/shown", "nav_msgs/Odometry")
+    bench.wait(lambda: publisher.publish({"header": HEADER, **way[0]}) or ellipsoids(display))
+    assert ellipsoids(display) == {1.0: 2.0}
+
+
 def test_odometry_keeps_poses_that_are_apart(show: Callable[..., Any]) -> None:
     way = [
         {"pose": {"pose": pose(x), "covariance": covariance()}} for x in (0.0, 0.05, 1.0, 2.0, 3.0)

@@ -857,6 +857,8 @@ def test_an_image_beyond_the_limit_keeps_the_walls_of_a_map() -> None:
     cells = np.zeros((101, 60), np.int8)
     cells[:, 31] = 100
     cells[:4] = -1
+    # Unknown cells beside a wall, and beside free ones.
+    cells[50, 30] = cells[50, 10] = -1
     small = _reduced(cells.view(np.uint8), 51).view(np.int8)
     assert small.shape == (51, 30)
     assert (small[2:, 15] == 100).all()
