@@ -64,15 +64,58 @@ def test_a_map_is_drawn_in_rviz_colors(bench: SceneBench, show: Callable[..., An
     assert middle(bench) == (0x70, 0x89, 0x86)
 
 
+PART = {"header": {"frame_id": "map"}, "x": 10, "y": 4, "width": 2, "height": 2}
+
+
+def test_updates_come_from_any_publisher_whatever_the_policies_of_the_map(
+    bench: SceneBench,
+) -> None:
+    from rosglass.comm.qos import QoS, Reliability
+
+    # As in Nav2's config of RViz.
+    view = bench.load(
+        'MapDisplay { topic: "/map"; durability: "Transient Local"; reliability: "Reliable" }'
+    )
+    (display,) = view.scene.displays
+    bench.robot.create_publisher("/map", "nav_msgs/OccupancyGrid", QoS.latched()).publish(
+        grid(20, 10, 0)
+    )
+    updates = bench.robot.create_publisher(
+        "/map_updates",
+        "map_msgs/OccupancyGridUpdate",
+        QoS(reliability=Reliability.BEST_EFFORT),
+    )
+    bench.wait(lambda: display.cells is not None)
+    part = {**PART, "data": np.full(4, 100, np.int8)}
+    bench.wait(lambda: updates.publish(part) or bool((display.cells == 100).any()))
+    assert display.statusLevel == "ok", display.statusText
+
+
+def test_an_update_that_is_older_than_the_map_is_not_used(bench: SceneBench) -> None:
+    from rosglass.comm.qos import QoS
+
+    latched = QoS.latched()
+    updates = bench.robot.create_publisher("/map_updates", "map_msgs/OccupancyGridUpdate", latched)
+    updates.publish({**PART, "data": np.full(4, 100, np.int8)})
+    bench.robot.create_publisher("/map", "nav_msgs/OccupancyGrid", latched).publish(grid(20, 10, 0))
+    view = bench.load('MapDisplay { topic: "/map" }')
+    (display,) = view.scene.displays
+    bench.wait(lambda: display.cells is not None)
+    bench.wait.settled(bench.session)
+    assert not display.cells.any()
+    assert display.statusLevel == "ok", display.statusText
+    updates.publish({**PART, "data": np.full(4, 100, np.int8)})
+    bench.wait(lambda: bool(display.cells.any()))
+
+
 def test_an_update_changes_a_part(bench: SceneBench, show: Callable[..., Any]) -> None:
     show(grid(20, 10, 0))
     assert middle(bench) == (255, 255, 255)
-    part = {"header": {"frame_id": "map"}, "x": 10, "y": 4, "width": 2, "height": 2}
-    display = show({**part, "data": np.full(4, 100, np.int8)}, "/map_updates")
+    display = show({**PART, "data": np.full(4, 100, np.int8)}, "/map_updates")
     assert display.statusLevel == "ok", display.statusText
     assert display.cells[4:6, 10:12].tolist() == [[100, 100], [100, 100]]
     assert int((display.cells == 100).sum()) == 4
-    display = show({**part, "x": 19, "data": np.full(4, 100, np.int8)}, "/map_updates")
+    display = show({**PART, "x": 19, "data": np.full(4, 100, np.int8)}, "/map_updates")
     assert "x 19, y 4, 2 x 2 cells: beyond the map of 20 x 10 cells" in display.statusText
     assert int((display.cells == 100).sum()) == 4
 

@@ -670,6 +670,10 @@ class TopicDisplay(OneTopicDisplay):
     #: Whether parts of a message have frames of their own, as markers do.
     HAS_FRAMES: ClassVar[bool] = False
     EAGER: ClassVar[bool] = False
+    #: What is requested of the publishers of further topics: the settings are of the topic alone.
+    FURTHER_QOS: ClassVar[QoS] = QoS(
+        reliability=Reliability.BEST_AVAILABLE, durability=Durability.BEST_AVAILABLE
+    )
 
     reliability = Setting(
         "Topic/Reliability Policy", "enum", BEST_AVAILABLE, "What publishers have to offer.",
@@ -764,7 +768,8 @@ class TopicDisplay(OneTopicDisplay):
         return (found,) if found else ()
 
     def _factory(self, *wanted: Any) -> Callable[[], Any]:
-        node, topics, qos = wanted
+        node, (topic, *others), qos = wanted
+        profiles = {**dict.fromkeys(others, self.FURTHER_QOS.with_depth(qos.depth)), topic: qos}
         queue = self._queue = MessageQueue(
             self.preparer(),
             self.MESSAGES,
@@ -774,7 +779,7 @@ class TopicDisplay(OneTopicDisplay):
             self.EAGER,
             needs_frame=not self.HAS_FRAMES,
         )
-        return lambda: Subscriptions(node, topics, qos, queue)
+        return lambda: Subscriptions(node, profiles, queue)
 
     def _on_created(self, endpoint: Any) -> None:  # noqa: ARG002 - the base class's signature
         self._begin_to_wait()
@@ -1028,14 +1033,19 @@ class TopicDisplay(OneTopicDisplay):
 class Subscriptions:
     """The subscriptions of a display, all of which feed the same queue.
 
+    Args:
+        node: The node.
+        profiles: What is requested of publishers, by the absolute name of their topic.
+        queue: Receives all messages.
+
     Raises:
         Error: One of them could not be made.
     """
 
-    def __init__(self, node: Node, topics: tuple[str, ...], qos: QoS, queue: MessageQueue) -> None:
+    def __init__(self, node: Node, profiles: Mapping[str, QoS], queue: MessageQueue) -> None:
         self._open: list[Any] = []
         try:
-            for topic in topics:
+            for topic, qos in profiles.items():
                 subscription = node.create_subscription(
                     topic, None, qos=qos, raw_callback=queue.receive
                 )

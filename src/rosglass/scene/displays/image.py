@@ -533,7 +533,7 @@ class CameraDisplay(PictureDisplay):
             else:
                 session.background(result.close)
 
-        session.background(lambda: Subscriptions(node, (topic,), qos, queue), done)
+        session.background(lambda: Subscriptions(node, {topic: qos}, queue), done)
 
     def _miss_info(self) -> None:
         text = f"no CameraInfo received on {self._info_topic}; the picture is shown alone"

@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from rosglass.comm.qos import QoS, Reliability
 from rosglass.errors import Error
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.scene.display import TopicDisplay, matrix_of
@@ -116,6 +117,8 @@ class MapDisplay(TopicDisplay):
     TYPE = "Map"
     MESSAGES = ("nav_msgs/OccupancyGrid", "map_msgs/OccupancyGridUpdate")
     KEEPS_ALL = True
+    #: A kept update may be older than the map.
+    FURTHER_QOS: ClassVar[QoS] = QoS(reliability=Reliability.BEST_AVAILABLE)
 
     alpha = Setting("Alpha", "float", 0.7, "Opacity.", min=0.0, max=1.0)
     colorScheme = Setting(
