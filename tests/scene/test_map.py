@@ -108,6 +108,26 @@ def test_an_update_that_is_older_than_the_map_is_not_used(bench: SceneBench) -> 
     bench.wait(lambda: bool(display.cells.any()))
 
 
+def test_updates_follow_the_topic_of_the_map(bench: SceneBench) -> None:
+    view = bench.load()
+    display = view.scene.add("Map")
+    # As RViz 2 writes it.
+    saved = {
+        "Topic": {"Value": "/map"},
+        "Update Topic": {"Depth": 5, "Durability Policy": "Volatile", "Value": "/map_updates"},
+    }
+    assert display.load_settings(saved) == []
+    display.topic = "/costmap"
+    bench.wait(lambda: display._endpoint is not None)
+    assert display._wanted()[1] == ("/costmap", "/costmap_updates")
+    kept = display.save_settings(saved)["Update Topic"]
+    assert kept == {"Depth": 5, "Durability Policy": "Volatile", "Value": "/costmap_updates"}
+    assert display.save_settings()["Update Topic"] == "/costmap_updates"
+    display.load_settings({**saved, "Update Topic": {"Value": "/changes"}})
+    display.topic = "/costmap"
+    assert display.save_settings(saved)["Update Topic"]["Value"] == "/changes"
+
+
 def test_an_update_changes_a_part(bench: SceneBench, show: Callable[..., Any]) -> None:
     show(grid(20, 10, 0))
     assert middle(bench) == (255, 255, 255)

@@ -17,7 +17,7 @@ from rosglass.scene.drawing import MapImage, Points, check_numbers
 from rosglass.scene.settings import Setting, rgb_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -155,6 +155,23 @@ class MapDisplay(TopicDisplay):
     def cells(self) -> NDArray[np.uint8] | None:
         """The map with its updates, (rows, columns) bytes; None before the first one."""
         return self._cells
+
+    def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
+        """Take the settings of a file, in which RViz 2 has chosen the topic of updates."""
+        refused = super().load_settings(saved)
+        if self.updateTopic == f"{self.topic}_updates":
+            self.updateTopic = ""  # it follows the topic
+        return refused
+
+    def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
+        """Return the settings for a file, with the topic of updates, which RViz 2 needs."""
+        kept = super().save_settings(older, ros)
+        if self.topic and not self.updateTopic:
+            before, updates = kept["Update Topic"], f"{self.topic}_updates"
+            kept["Update Topic"] = (
+                {**before, "Value": updates} if isinstance(before, dict) else updates
+            )
+        return kept
 
     def further_topics(self, topic: str) -> tuple[str, ...]:
         """Return the topic of updates."""
