@@ -488,6 +488,38 @@ def test_frames_that_do_not_move_follow_another_fixed_frame(bench: SceneBench) -
     assert places() == {"map": -3.0, "mast": 0.0}
 
 
+def test_frames_are_updated_at_the_interval_and_at_once_after_it_is_0(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.scene.drawing import Mesh
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    view = bench.load("TFDisplay { updateInterval: 1000; showArrows: false }")
+    (frames,) = view.scene.displays
+    moving = TransformBroadcaster(bench.robot)
+    sent = itertools.count(1)
+
+    def move(x: float) -> list[str]:
+        stamp = Time.from_parts(next(sent), 0)
+        moving.send_transform(Transform((x, 0, 0), (0, 0, 0, 1), stamp, "map", "arm"))
+        return frames.frames
+
+    def places() -> list[float]:
+        (axes,) = (one for one, _, _ in frames.root.drawables() if isinstance(one, Mesh))
+        return axes.instances["matrix"].reshape(-1, 4, 4)[1::3, 3, 0].tolist()
+
+    frames.updateInterval = 0
+    bench.wait(lambda: move(1.0) == ["arm", "map"])
+    frames.updateInterval = 1000
+    bench.wait(lambda: places() == [1.0, 0.0])
+    move(2.0)
+    # Longer than between two looks at frames that fade.
+    bench.wait.nothing_happens(1.2)
+    assert places() == [1.0, 0.0]
+    frames.updateInterval = 0
+    assert places() == [2.0, 0.0]
+    bench.wait(lambda: move(3.0) and places() == [3.0, 0.0])
+
+
 def test_what_follows_frames_fades_without_a_node(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import Transform, TransformBroadcaster

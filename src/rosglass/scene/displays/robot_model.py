@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
@@ -510,7 +511,7 @@ class RobotModelDisplay(Display):
         self._loader = DescriptionLoader(_load, weak_callback(self._show))
         #: What the status says of the description that is shown.
         self._loaded_lines: dict[str, Status] = {}
-        self._next = 0.0
+        self._followed_at = -math.inf
         super().__init__(parent, runtime)
         self.parts: Parts = Parts(
             "Links",
@@ -668,9 +669,7 @@ class RobotModelDisplay(Display):
         """Move the links."""
         if self._rest is not None and self._rest == self._find_rest():
             return
-        now = time.monotonic()
-        if now >= self._next:
-            self._next = now + self.updateInterval
+        if time.monotonic() - self._followed_at >= self.updateInterval:
             self._follow()
 
     def _find_rest(self) -> object:
@@ -690,7 +689,7 @@ class RobotModelDisplay(Display):
         scene = self.scene
         if scene is None or not self._bodies or not self.shown:
             return
-        self._rest = self._find_rest()
+        self._rest, self._followed_at = self._find_rest(), time.monotonic()
         poses, unknown = scene.look_up_all([self._frame_of(name) for name in self._bodies])
         before, self._poses = self._poses, poses
         # Links are moved one by one, which takes longer than finding out which have moved.

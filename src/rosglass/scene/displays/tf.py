@@ -122,12 +122,12 @@ class TFDisplay(Display):
     ) -> None:
         self._axes, self._arrows = AxesShapes(self), ArrowShapes(self)
         self._names = Labels(align="below")
-        self._next = 0.0
-        #: Whether a frame is not static, and when they are looked at without a transform.
+        #: When frames were looked at last.
+        self._looked_at = -math.inf
+        #: Whether a frame is not static: it fades without a transform.
         self._moves = False
         #: Whether the robot is not connected: all fade then.
         self._is_lost = False
-        self._next_look = 0.0
         #: Those that are set, and the names that take them too long.
         self._filters: dict[str, Callable[[str], bool | None]] = {}
         self._undecided: dict[str, list[str]] = {}
@@ -206,9 +206,11 @@ class TFDisplay(Display):
         buffer = None if self.scene is None else self.scene.transforms
         if buffer is not None and self._rest is not None and self._rest == buffer.rest():
             return  # what fades is looked at without a transform
-        now = time.monotonic()
-        if now >= self._next:
-            self._next = now + self.updateInterval
+        self._draw_after(0.0)
+
+    def _draw_after(self, seconds: float) -> None:
+        """Draw the frames, unless that was done less than so long or the Update Interval ago."""
+        if time.monotonic() - self._looked_at >= max(seconds, self.updateInterval):
             self._draw()
 
     def on_fixed_frame(self) -> None:
@@ -231,10 +233,8 @@ class TFDisplay(Display):
     def _on_tick(self) -> None:
         # Frames that are not updated any more fade without a transform.
         super()._on_tick()
-        now = time.monotonic()
-        if self.shown and self._moves and now >= self._next_look:
-            self._next_look = now + _LOOK_S
-            self._draw()
+        if self.shown and self._moves:
+            self._draw_after(_LOOK_S)
 
     def _report_refused(self) -> None:
         """Say which transform was refused last, while there are any."""
@@ -280,7 +280,7 @@ class TFDisplay(Display):
         buffer = scene.transforms if scene is not None else None
         if scene is None or buffer is None or not self.shown:
             return
-        self._rest = buffer.rest()
+        self._rest, self._looked_at = buffer.rest(), time.monotonic()
         names = buffer.frame_names()
         self._undecided.clear()
         chosen = [name for name in sorted(names[:_MAX_NAMES]) if self._is_chosen(name)]
