@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm import ConnectionState
 from rosglass.comm.executor import IMMEDIATE
 from rosglass.comm.handle import Handle
+from rosglass.comm.names import hidden
 from rosglass.comm.qos import QoS
 from rosglass.errors import Error, InvalidArgumentException, InvalidNameError, NodeClosedError
 from rosglass.tf.buffer import TransformBuffer
@@ -184,7 +185,8 @@ class _Origin:
         return hash(self._publisher)
 
     def __str__(self) -> str:
-        if self._name:
+        # Over DDS, names of nodes arrive after their publishers; until then, they are hidden ones.
+        if self._name and not hidden(self._name):
             return self._name
         try:
             for endpoint in self._node.publishers(self._topic):

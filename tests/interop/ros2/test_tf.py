@@ -42,8 +42,9 @@ def test_two_robots(node: Any, start: Any) -> None:
     buffer = listener.buffer
     buffer.wait_for_transform("gripper", "camera", timeout=30)
     buffer.wait_for_transform("gripper", "lidar", timeout=30)
-    eventually(lambda: buffer.tree()["camera"].authority == "/left")
-    eventually(lambda: buffer.tree()["gripper"].authority == "/right")
+    tree = buffer.tree
+    eventually(lambda: tree()["camera"].authority == "/left", lambda: tree()["camera"])
+    eventually(lambda: tree()["gripper"].authority == "/right", lambda: tree()["gripper"])
 
     told: list[None] = []
     buffer.on_change("map", "camera", lambda: told.append(None))

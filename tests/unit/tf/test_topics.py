@@ -203,9 +203,11 @@ def test_the_name_of_a_publisher_is_asked_for_once() -> None:
     node.deliver(0)
     assert node.asked == 0, "who receives has other things to do"
     assert listener.buffer.tree()["base"].authority == UNKNOWN_PUBLISHER
-    name = SimpleNamespace(full="/robot/driver")
-    node.known = [SimpleNamespace(gid=b"other"), SimpleNamespace(gid=b"gid", node=name)]
-    assert listener.buffer.tree()["base"].authority == "/robot/driver"
+    # Over DDS, names of nodes arrive after their publishers.
+    for full in ("/_dds/driver_4711_robot", "/robot/driver"):
+        publisher = SimpleNamespace(gid=b"gid", node=SimpleNamespace(full=full))
+        node.known = [SimpleNamespace(gid=b"other"), publisher]
+        assert listener.buffer.tree()["base"].authority == full
     node.known = []
     assert listener.buffer.tree()["base"].authority == "/robot/driver"
 
