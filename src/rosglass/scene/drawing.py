@@ -39,6 +39,7 @@ __all__ = [
     "are_drawable",
     "check_numbers",
     "instance_matrix",
+    "move_items",
     "rgba_bytes",
 ]
 
@@ -103,6 +104,26 @@ class Item:
         """Take it out of its group; safe to call twice."""
         if self.parent is not None:
             self.parent.discard(self)
+
+
+def move_items(items: Sequence[Item], poses: NDArray[np.float64]) -> None:
+    """Move items of one group, and request one new picture for all of them.
+
+    Args:
+        items: The items.
+        poses: The pose of each in the group, (n, 4, 4); not copied.
+
+    Raises:
+        Error: A pose is not finite, or there are more or fewer poses than items.
+    """
+    if poses.shape != (len(items), 4, 4) or not np.isfinite(poses).all():
+        raise Error(f"expected finite matrices, ({len(items)}, 4, 4), got {poses.shape}")
+    shown = None
+    for item, pose in zip(items, poses, strict=True):
+        item._pose = pose
+        shown = item if item._visible else shown
+    if shown is not None:
+        shown.touch()
 
 
 class Group(Item):

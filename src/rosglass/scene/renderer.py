@@ -68,9 +68,7 @@ _STAGES = (
     | QRhiShaderResourceBinding.StageFlag.FragmentStage
 )
 _FRAGMENT = QRhiShaderResourceBinding.StageFlag.FragmentStage
-_Format = QRhiVertexInputAttribute.Format
 _PerInstance = QRhiVertexInputBinding.Classification.PerInstance
-_Topology = QRhiGraphicsPipeline.Topology
 #: In the names of drivers that draw with the processor.
 _SOFTWARE = ("llvmpipe", "lavapipe", "softpipe", "swiftshader", "basic render")
 #: Bytes of the blocks in shaders/frame.glsl.
@@ -116,7 +114,8 @@ def _shader(name: str) -> QShader:
 
 def _pointer(array: NDArray[Any]) -> Any:
     pointer: Any = Shiboken.VoidPtr
-    return pointer(array.ctypes.data, array.nbytes)
+    # Not array.ctypes, which runs an import statement each time.
+    return pointer(array.__array_interface__["data"][0], array.nbytes)
 
 
 class _Device:
@@ -268,8 +267,8 @@ class _Device:
     def pipeline(
         self,
         shaders: tuple[str, str],
-        layout: tuple[tuple[tuple[int, bool], ...], tuple[tuple[int, int, Any, int], ...]],
-        topology: Any,
+        layout: tuple[tuple[tuple[int, bool], ...], tuple[tuple[int, int, str, int], ...]],
+        topology: str,
         blend: bool,
         bindings: Any,
         cull: bool = False,
@@ -279,8 +278,8 @@ class _Device:
         Args:
             shaders: Names of the vertex and the fragment shader.
             layout: Stride and "per instance" of each buffer; buffer, location, format and offset of
-                each attribute.
-            topology: What the vertices are.
+                each attribute. Formats are named, for Python hashes strings much faster than enums.
+            topology: Name of what the vertices are.
             blend: Whether it is translucent; it does not hide what is behind it then.
             bindings: Of any drawable of this kind.
             cull: Whether triangles are drawn from their outer side only.
@@ -309,9 +308,15 @@ class _Device:
                 for stride, each in buffers
             ]
         )
-        inputs.setAttributes([QRhiVertexInputAttribute(*attribute) for attribute in attributes])
+        formats = QRhiVertexInputAttribute.Format
+        inputs.setAttributes(
+            [
+                QRhiVertexInputAttribute(buffer, location, formats[name], offset)
+                for buffer, location, name, offset in attributes
+            ]
+        )
         made.setVertexInputLayout(inputs)
-        made.setTopology(topology)
+        made.setTopology(QRhiGraphicsPipeline.Topology[topology])
         if cull:
             made.setCullMode(QRhiGraphicsPipeline.CullMode.Back)
         made.setDepthTest(True)
@@ -369,13 +374,13 @@ class _SharedImage:
         self.users = 0
 
 
-_QUAD = _Topology.TriangleStrip
+_QUAD = "TriangleStrip"
 _SHAPE_LAYOUT = (
-    (0, 0, _Format.Float3, 0),
-    (0, 1, _Format.Float3, 12),
-    (0, 2, _Format.Float2, 24),
-    (0, 3, _Format.UNormByte4, 32),
-    *((1, 4 + column, _Format.Float4, 16 * column) for column in range(5)),
+    (0, 0, "Float3", 0),
+    (0, 1, "Float3", 12),
+    (0, 2, "Float2", 24),
+    (0, 3, "UNormByte4", 32),
+    *((1, 4 + column, "Float4", 16 * column) for column in range(5)),
 )
 
 
@@ -531,11 +536,11 @@ class _PointsOnDevice(_OnDevice):
         layout = (
             ((points.stride * thin, each > 1),),
             (
-                (0, 0, _Format.Float3, points.position),
-                (0, 1, _Format.UNormByte4 if points.channel_is_bytes else _Format.Float, channel),
+                (0, 0, "Float3", points.position),
+                (0, 1, "UNormByte4" if points.channel_is_bytes else "Float", channel),
             ),
         )
-        topology = {"quads": _QUAD, "boxes": _Topology.Triangles}.get(vertex, _Topology.Points)
+        topology = {"quads": _QUAD, "boxes": "Triangles"}.get(vertex, "Points")
         shaders = (f"{vertex}.vert", f"{fragment}.frag")
         pipeline = self.device.pipeline(
             shaders, layout, topology, blend, self.bound, vertex == "boxes"
@@ -557,12 +562,12 @@ class _LinesOnDevice(_OnDevice):
     _LAYOUT = (
         ((Lines.ROW.itemsize, True),),
         (
-            (0, 0, _Format.Float3, 0),
-            (0, 1, _Format.Float3, 12),
-            (0, 2, _Format.UNormByte4, 24),
-            (0, 3, _Format.UNormByte4, 28),
-            (0, 4, _Format.Float3, 32),
-            (0, 5, _Format.Float3, 44),
+            (0, 0, "Float3", 0),
+            (0, 1, "Float3", 12),
+            (0, 2, "UNormByte4", 24),
+            (0, 3, "UNormByte4", 28),
+            (0, 4, "Float3", 32),
+            (0, 5, "Float3", 44),
         ),
     )
 
@@ -642,7 +647,7 @@ class _MeshOnDevice(_OnDevice):
         pipeline = self.device.pipeline(
             ("mesh.vert", "mesh.frag"),
             (((36, False), (80, True)), _SHAPE_LAYOUT),
-            _Topology.Triangles,
+            "Triangles",
             blend,
             self.bound,
             self._shape.one_sided,
@@ -705,10 +710,10 @@ class _LabelsOnDevice(_OnDevice):
     _LAYOUT = (
         ((ROW.itemsize, True),),
         (
-            (0, 0, _Format.Float3, 0),
-            (0, 1, _Format.Float2, 12),
-            (0, 2, _Format.Float4, 20),
-            (0, 3, _Format.UNormByte4, 36),
+            (0, 0, "Float3", 0),
+            (0, 1, "Float2", 12),
+            (0, 2, "Float4", 20),
+            (0, 3, "UNormByte4", 36),
         ),
     )
 

@@ -496,9 +496,12 @@ class TransformBuffer(Handle):
         found: dict[str, tuple[Vector, Quaternion] | TransformException] = {}
         known: list[str] = []
         with self._lock:
+            try:
+                self._check_name(target, "target")
+            except TransformException as error:
+                return dict.fromkeys(sources, error)
             for source in sources:
                 try:
-                    self._check_name(target, "target")
                     self._check_name(source, "source")
                     known.append(source)
                 except TransformException as error:  # noqa: PERF203 - the others are looked up

@@ -19,7 +19,7 @@ from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import QtGui, Signal, Slot, is_alive
 from rosglass.scene.display import Display, Status
 from rosglass.scene.displays.shapes import AxesShapes
-from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Group, Lines, Mesh, Shape
+from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Group, Lines, Mesh, Shape, move_items
 from rosglass.scene.meshes import ending_of, load_mesh_cached
 from rosglass.scene.parts import Parts
 from rosglass.scene.resources import check_texture, locate_resource
@@ -34,7 +34,7 @@ from rosglass.scene.triangles import MAX_TRIANGLES, moved
 from rosglass.scene.urdf import Box, Capsule, Cylinder, MeshFile, Robot, Sphere, parse_urdf
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
+    from collections.abc import Callable, Collection, Iterable, Mapping
 
     from numpy.typing import NDArray
 
@@ -421,12 +421,11 @@ class _Link:
         """Forget where it was."""
         self._way.clear()
 
-    def follow(self, pose: NDArray[np.float64]) -> None:
-        """Move to a pose in the fixed frame."""
-        self.root.pose = pose
+    def extend_trail(self) -> None:
+        """Draw the trail up to where the link is."""
         if self.trail is None:
             return
-        at = pose[:3, 3]
+        at = self.root.pose[:3, 3]
         if not self._way or np.linalg.norm(at - self._way[-1]) >= _TRAIL_STEP_M:
             self._way.append(at)
         elif self.trail.count and (at == self._end).all():
@@ -520,7 +519,7 @@ class RobotModelDisplay(Display):
             default=lambda: self.allLinksEnabled,
             can_switch=lambda name: name in self._bodies and self._bodies[name].has_shape,
             details=_LINK_DETAILS,
-            describe=lambda name: self.describe_frame(self._frame_of(name)),
+            describe=lambda name: self.describe_frame(*self._frames_of([name])),
             as_mapping=True,
         )
         self._again = single_shot(self, self._create_again)
@@ -639,11 +638,11 @@ class RobotModelDisplay(Display):
             name for name, link in self._bodies.items() if link.root.visible and link.has_shape
         ]
         shown.sort(key=lambda name: name != self._root_link)
-        return [self._frame_of(name) for name in shown]
+        return self._frames_of(shown)
 
-    def _frame_of(self, link: str) -> str:
+    def _frames_of(self, links: Iterable[str]) -> list[str]:
         prefix = self.tfPrefix.strip("/")
-        return f"{prefix}/{link}" if prefix else link
+        return [f"{prefix}/{link}" if prefix else link for link in links]
 
     # -- the links -------------------------------------------------------------------------------
 
@@ -690,21 +689,25 @@ class RobotModelDisplay(Display):
         if scene is None or not self._bodies or not self.shown:
             return
         self._rest, self._followed_at = self._find_rest(), time.monotonic()
-        poses, unknown = scene.look_up_all([self._frame_of(name) for name in self._bodies])
+        frames = self._frames_of(self._bodies)
+        poses, unknown = scene.look_up_all(frames)
         before, self._poses = self._poses, poses
         # Links are moved one by one, which takes longer than finding out which have moved.
         is_same = poses.shape == before.shape
         moved = (poses != before).any(axis=(1, 2)) if is_same else np.ones(len(poses), bool)
+        if unknown:
+            lost = [frame in unknown for frame in frames]
+            poses[lost] = np.nan  # wherever they are found again, they have moved
+            moved[lost] = False
+        links = list(self._bodies.values())
+        move_items([links[at].root for at in np.flatnonzero(moved)], poses[moved])
         missing: list[tuple[str, str]] = []
-        for number, (name, link) in enumerate(self._bodies.items()):
-            error = unknown.get(self._frame_of(name))
-            if error is not None:
-                missing.append((name, str(error)))
+        for (name, link), frame in zip(self._bodies.items(), frames, strict=True):
+            if frame in unknown:
+                missing.append((name, str(unknown[frame])))
                 link.root.visible = False
-                poses[number] = np.nan  # wherever it is found again, it has moved
                 continue
-            if moved[number] or link.trail is not None:
-                link.follow(poses[number])
+            link.extend_trail()
             link.root.visible = self.parts.is_enabled(name) or not link.has_shape
         self._report_missing(missing)
 
