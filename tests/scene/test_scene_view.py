@@ -6,6 +6,7 @@ import itertools
 import os
 import subprocess
 import sys
+import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,6 +55,22 @@ def test_nothing_is_drawn_while_nothing_changes(bench: SceneBench) -> None:
     bench.wait(lambda: bench.drawn() > before)
 
 
+def test_the_window_is_drawn_once_with_a_new_picture(bench: SceneBench) -> None:
+    view = bench.load("AxesDisplay {}")
+    (axes,) = view.scene.displays
+    frames: list[int] = []
+    bench.wait(lambda: bench.drawn() > 0)
+    bench.picture()
+    bench.window.frameSwapped.connect(lambda: frames.append(bench.drawn()))
+    for length in (2, 3, 4):
+        before = bench.drawn()
+        axes.length = length
+        bench.wait(lambda before=before: bench.drawn() > before)
+        bench.wait.nothing_happens(0.1)
+    assert frames == sorted(set(frames))
+    assert len(frames) == 3
+
+
 _SOFTWARE = """
 import sys
 from PySide6.QtGui import QGuiApplication
@@ -82,8 +99,20 @@ def test_without_a_graphics_interface_it_says_so(tmp_path: Path) -> None:
     assert "Unset QT_QUICK_BACKEND; without a graphics card, Mesa's llvmpipe" in ended.stdout
 
 
-def test_a_scene_that_changes_all_the_time_leaves_frames_to_qml(bench: SceneBench) -> None:
+def test_a_scene_that_changes_all_the_time_leaves_frames_to_qml(
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from scene_mouse import Hand
+
+    from rosglass.scene.renderer import SceneRenderer
+
+    draw = SceneRenderer.render
+
+    def draw_slowly(renderer: SceneRenderer, commands: Any) -> None:
+        time.sleep(0.05)  # as long as three frames of QML
+        draw(renderer, commands)
+
+    monkeypatch.setattr(SceneRenderer, "render", draw_slowly)
 
     view = bench.load(
         "AxesDisplay {}\n"

@@ -286,6 +286,28 @@ def test_f_and_focus_camera_turn_the_camera(
     assert np.array(view.camera().focus) == pytest.approx(np.array((1, 1, 0)), abs=0.9)
 
 
+def test_what_comes_under_a_mouse_that_stands_still_is_found(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load()
+    view.tool = "FocusCamera"
+    hand.move((5, 5))  # Qt drops a move to where the last test has left it
+    hand.move(hand.at((1, 1, 0)))
+    assert "Look in this direction" in view.statusText
+    box = add_box(view, (1, 1, 0))
+    bench.wait(lambda: "Focus on this point. [" in view.statusText)
+    box.remove()
+    bench.wait(lambda: "Look in this direction" in view.statusText)
+    # What a tool draws there is no reason to draw again and again.
+    view.tool = "Measure"
+    add_box(view, (1, 1, 0))
+    hand.press(hand.at((1, 1, 0)))
+    hand.release(hand.at((1, 1, 0)))
+    hand.move(hand.at((1.1, 1, 0)))
+    bench.wait.nothing_happens(0.3)
+    before = bench.drawn()
+    bench.wait.nothing_happens(0.3)
+    assert bench.drawn() == before
+
+
 # -- poses ---------------------------------------------------------------------------------------
 
 

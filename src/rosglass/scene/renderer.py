@@ -841,6 +841,8 @@ class SceneRenderer(QQuickRhiItemRenderer):
         self._on_device: dict[Drawable, _OnDevice] = {}
         self._origin = np.zeros(3)
         self._problem = ""
+        #: Whether the frame is taken while drawing, as the GUI thread draws and took none before.
+        self._takes_late = False
         #: Why there is no newer frame than the last one.
         self._failure = ""
         #: How many pictures were drawn.
@@ -867,9 +869,21 @@ class SceneRenderer(QQuickRhiItemRenderer):
         """Whether the processor draws; False before the first picture."""
         return self._device is not None and self._device.is_software
 
+    def draw_again(self) -> None:
+        """Draw a new frame with the next one of the window; only where the GUI thread draws.
+
+        After ``QQuickRhiItem.update()``, Qt draws the window twice: its ``updatePaintNode()`` asks
+        for one more frame while the first is under way.
+        """
+        self._takes_late = True
+        self.update()
+
     def synchronize(self, item: QQuickRhiItem) -> None:  # noqa: ARG002 - Qt's signature
         """Take the next frame; the GUI thread waits."""
-        self._failure = ""
+        self._take()
+
+    def _take(self) -> None:
+        self._takes_late, self._failure = False, ""
         try:
             self._frame = self._take_frame()
         except Exception as error:
@@ -879,6 +893,8 @@ class SceneRenderer(QQuickRhiItemRenderer):
 
     def render(self, commands: QRhiCommandBuffer) -> None:
         """Draw the frame."""
+        if self._takes_late:
+            self._take()
         device, frame = self._device, self._frame
         if device is None or frame is None:
             return

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor, QEventPoint
+from PySide6.QtGui import QColor, QEventPoint, QGuiApplication
 from PySide6.QtQuick import QQuickRhiItem, QQuickWindow, QSGRendererInterface
 from shiboken6 import Shiboken
 
@@ -60,6 +60,8 @@ NO_GPU = (
 _STILL_S = 0.2
 #: Seconds that the camera takes to what it is to look at, and milliseconds between two pictures.
 _TURN_S, _TURN_MS = 0.4, 16
+#: Milliseconds from a change of the scene to a look at what is under the mouse now: RViz's.
+_HOVER_MS = 33
 #: The longest pause after a picture, in seconds.
 _MAX_PAUSE_S = 0.5
 _SCENE_GONE = "The scene was that of another view, which is gone: nothing is shown."
@@ -102,6 +104,8 @@ class SceneView(QQuickRhiItem):
         self._scene_is_gone = False
         #: The renderers that C++ still has: letting go of one too early frees it twice.
         self._renderers: list[SceneRenderer] = []
+        #: The one that draws in the GUI thread, as Qt's basic render loop does; None elsewhere.
+        self._drawing: SceneRenderer | None = None
         #: When the window began its frame, whether a picture of this view is part of it, and before
         #: when no other one is drawn: all by the clock of :func:`time.monotonic`.
         self._frame_began = self._next_picture = 0.0
@@ -113,6 +117,12 @@ class SceneView(QQuickRhiItem):
         self._later = QtCore.QTimer(self)
         self._later.setSingleShot(True)
         self._later.timeout.connect(self._draw_late)
+        #: Whether the mouse is in the view, and when something has moved under it.
+        self._is_hovered = False
+        self._hover = QtCore.QTimer(self)
+        self._hover.setSingleShot(True)
+        self._hover.setInterval(_HOVER_MS)
+        self._hover.timeout.connect(self._hover_again)
         self._frames: list[Any] = []
         #: What the view itself draws into the scene: its tools, the marks of what is selected.
         self.overlay = Group()
@@ -132,7 +142,7 @@ class SceneView(QQuickRhiItem):
         self._still = QtCore.QTimer(self)
         self._still.setSingleShot(True)
         self._still.setInterval(int(_STILL_S * 1000))
-        self._still.timeout.connect(self.update)
+        self._still.timeout.connect(self._draw)
         self.setAcceptedMouseButtons(Qt.MouseButton.AllButtons)
         self.setAcceptHoverEvents(True)
         self.setFlag(QQuickRhiItem.Flag.ItemAcceptsInputMethod, False)
@@ -155,6 +165,8 @@ class SceneView(QQuickRhiItem):
         #: The tools, and the one that has the mouse.
         self._tools = Tools(self, runtime)
         self._tools.currentChanged.connect(self.toolChanged)
+        self.cameraChanged.connect(self._hover_later)
+        self.toolChanged.connect(self._hover_later)
         self._tools.statusTextChanged.connect(self.statusTextChanged)
         #: The tool that QML wants, which may be declared further down.
         self._wanted_tool = ""
@@ -186,6 +198,7 @@ class SceneView(QQuickRhiItem):
     def _on_scene(self) -> None:
         self._request_picture()
         self._selection.on_scene()
+        self._hover_later()
 
     def _watch_scene(self) -> None:
         self._scene.changed.connect(self._on_scene)
@@ -686,6 +699,7 @@ class SceneView(QQuickRhiItem):
         """Return what draws; called by Qt in the render thread."""
         made = SceneRenderer(self._take_frame, self._on_problem)
         self._renderers.append(made)
+        self._drawing = made if QtCore.QThread.currentThread() == self.thread() else None
         # C++ deletes the one of the window before later.
         QtCore.QTimer.singleShot(0, self, self._drop_renderers)
         return made
@@ -719,11 +733,20 @@ class SceneView(QQuickRhiItem):
         """
         now = time.monotonic()
         if now >= self._next_picture or self._is_moved_by_user(now):
-            self.update()
+            self._draw()
             return
         self._is_late = True
         if not self._later.isActive():
             self._later.start(math.ceil(1000 * (self._next_picture - now)))
+
+    @Slot()
+    def _draw(self) -> None:
+        """Draw the next picture; the window once with it, where the GUI thread draws."""
+        renderer = self._drawing
+        if renderer is not None and Shiboken.isValid(renderer) and self.isVisible():
+            renderer.draw_again()
+        else:
+            self.update()
 
     def _is_moved_by_user(self, now: float) -> bool:
         is_touched = self._tools.holds_mouse or now - self._touched_at < _STILL_S
@@ -766,6 +789,7 @@ class SceneView(QQuickRhiItem):
     def _on_window(self, window: QQuickWindow | None) -> None:
         while self._frames:
             QtCore.QObject.disconnect(self._frames.pop())
+        self._drawing = None
         if window is None:
             return
         self._frames.append(window.afterAnimating.connect(self._on_frame))
@@ -822,15 +846,36 @@ class SceneView(QQuickRhiItem):
             self._tools.cancel()
             self._show_focal_shape()
 
+    def hoverEnterEvent(self, event: Any) -> None:
+        """Show what is under the mouse, which may not move again."""
+        self.hoverMoveEvent(event)
+
     def hoverMoveEvent(self, event: Any) -> None:
         """Show what is under the mouse."""
+        self._is_hovered = True
         self._tools.on_move(self._event_at(event.position(), event))
 
     def hoverLeaveEvent(self, event: Any) -> None:
         """Show nothing any more of what was under the mouse."""
         super().hoverLeaveEvent(event)
         if is_alive(self):
+            self._is_hovered = False
             self._tools.on_leave()
+
+    @Slot()
+    def _hover_later(self) -> None:
+        if self._is_hovered and not self._hover.isActive():
+            self._hover.start()
+
+    @Slot()
+    def _hover_again(self) -> None:
+        """Show what is under the mouse, which has stayed where it is."""
+        if self._is_hovered and not self._tools.holds_mouse:
+            modifiers = Modifier(QGuiApplication.keyboardModifiers().value & _MODIFIERS)
+            at = (self._pointed.x(), self._pointed.y())
+            self._tools.on_move(PointerEvent(self, at, modifiers=modifiers))
+            # What a tool shows of it is no reason to look once more.
+            self._hover.stop()
 
     def wheelEvent(self, event: Any) -> None:
         """Zoom."""

@@ -452,7 +452,7 @@ class _Part:
         """Return the lines of the Selection panel."""
         display = self.display
         # Its frame, and not the middle of what is drawn.
-        place = display.describe_frame(display._frame_of(self.name))
+        place = display.describe_frame(*display._frames_of([self.name]))
         return [*place, ("Robot", display.robotName)]
 
 
