@@ -1039,21 +1039,49 @@ def test_the_global_status_says_that_there_is_no_connection(bench: SceneBench, m
     assert status().value != "Ok"
 
 
+def run_in(window: Any, script: str) -> Any:
+    """Return the result of JavaScript in the program's window."""
+    from PySide6.QtQml import QQmlExpression, qmlContext
+
+    expression = QQmlExpression(qmlContext(window), window, script)
+    result, _ = expression.evaluate()
+    assert not expression.hasError(), expression.error().toString()
+    return result
+
+
+def test_return_accepts_the_name_of_a_file(bench: SceneBench, window: Any, tmp_path: Path) -> None:
+    from PySide6.QtCore import Qt
+    from PySide6.QtTest import QTest
+
+    def enter(name: str) -> None:
+        run_in(window, f"saving.currentFolder = 'file://{tmp_path}'; saving.ask(null)")
+        bench.wait(lambda: run_in(window, "saving.nameField && saving.nameField.activeFocus"))
+        field = run_in(window, "saving.nameField")
+        for letter in name:
+            QTest.keyClick(field.window(), letter)
+        QTest.keyClick(field.window(), Qt.Key.Key_Return)
+        bench.wait(lambda: not run_in(window, "saving.visible"))
+
+    enter("new")
+    file = tmp_path / "new.rviz"
+    assert file.exists()
+    assert not run_in(window, "replacing.visible")
+    file.write_text("kept")
+    enter("new")
+    assert run_in(window, "replacing.visible")
+    assert file.read_text() == "kept"
+    run_in(window, "replacing.close()")
+
+
 def test_closing_waits_for_the_name_of_a_new_file(
     bench: SceneBench, window: Any, tmp_path: Path
 ) -> None:
     from PySide6.QtCore import QObject
-    from PySide6.QtQml import QQmlExpression, qmlContext
-
-    def run(script: str) -> None:
-        expression = QQmlExpression(qmlContext(window), window, script)
-        expression.evaluate()
-        assert not expression.hasError(), expression.error().toString()
 
     window.findChild(QObject, "scene").scene.add("Axes")
     window.close()
     assert window.isVisible()
-    run("unsaved.buttonClicked(MessageDialog.Save, 0); unsaved.close()")
-    run(f"saving.close(); saving.save('{tmp_path}/new.rviz')")
+    run_in(window, "unsaved.buttonClicked(MessageDialog.Save, 0); unsaved.close()")
+    run_in(window, f"saving.close(); saving.save('{tmp_path}/new.rviz')")
     bench.wait(lambda: not window.isVisible())
     assert (tmp_path / "new.rviz").exists()

@@ -278,6 +278,12 @@ class ViewProgram(QtCore.QObject):
             return QtCore.QUrl.fromLocalFile(str(Path.home() / typed)) if found else QtCore.QUrl()
         return QtCore.QUrl.fromLocalFile("/" + typed.lstrip("/"))
 
+    @Slot(QtCore.QObject, result=QtCore.QObject)
+    def findNameField(self, window: QtCore.QObject) -> QtCore.QObject | None:
+        """Return where the name is typed in Qt's own file dialog; None in those of the system."""
+        found = window.findChildren(QtCore.QObject, "fileNameTextField")
+        return next((one for one in found if one.property("visible")), None)
+
     @Slot(QtCore.QUrl, result=bool)
     def exists(self, file: QtCore.QUrl) -> bool:
         """Return whether there is a file."""

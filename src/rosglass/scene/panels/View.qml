@@ -261,7 +261,25 @@ ApplicationWindow {
         id: saving
         // What waits until it is saved, e.g. closing.
         property var then: null
-        function ask(job) { then = job; open() }
+        // Where the name is typed: Qt's own dialog neither has it focused nor accepts it by Return.
+        property QtObject nameField: null
+        property bool byReturn: false
+        function ask(job) { then = job; byReturn = false; open(); Qt.callLater(focusName) }
+        function focusName() {
+            const field = program.findNameField(window)
+            if (field === null) return  // a dialog of the system
+            if (field !== nameField) {
+                nameField = field
+                field.accepted.connect(acceptName)
+            }
+            field.forceActiveFocus()
+            field.selectAll()
+        }
+        function acceptName() {
+            if (nameField.text.trim() === "") return
+            byReturn = true
+            accept()
+        }
         function save(file) {
             program.save(file)
             if (then && program.mayClose()) then()
@@ -272,16 +290,15 @@ ApplicationWindow {
         nameFilters: ["RViz configs (*.rviz)"]
         onAccepted: {
             const typed = program.typedFile(selectedFile)
-            if (typed.toString() === "") {
-                save(selectedFile)
-                return
-            }
+            const isPath = typed.toString() !== ""
             // The dialog shows this folder the next time.
-            selectedFile = typed
-            if (program.exists(typed))
-                replacing.ask(typed)
+            if (isPath)
+                selectedFile = typed
+            // Its button has asked, for a file in the folder.
+            if ((isPath || byReturn) && program.exists(selectedFile))
+                replacing.ask(selectedFile)
             else
-                save(typed)
+                save(selectedFile)
         }
     }
     MessageDialog {
