@@ -682,7 +682,7 @@ def test_a_clicked_point_is_published(bench: SceneBench, hand: Hand) -> None:
 
 
 def test_a_distance_is_measured(bench: SceneBench, hand: Hand) -> None:
-    view = bench.load('tool: "Measure"')
+    view = bench.load('tool: "Measure"; background: "white"')
     add_box(view, (-2, 0, -0.5))
     add_box(view, (2, 0, -0.5))
     measure = view.tools.current
@@ -695,6 +695,8 @@ def test_a_distance_is_measured(bench: SceneBench, hand: Hand) -> None:
     assert measured == [pytest.approx(4, abs=0.1)]
     assert measure.length == measured[0]
     assert has_color(bench.picture(), 255, 213, 0) > 100
+    # Its white letters have dark edges.
+    assert has_color(bench.picture(), 0, 0, 0) > 20
     hand.click((200, 150), hand.RIGHT)
     assert measure.length == -1
     assert has_color(bench.picture(), 255, 213, 0) == 0

@@ -871,18 +871,22 @@ class Labels(Drawable):
         colors: (n, 4) RGBA bytes.
         in_pixels: Whether `heights` are pixels.
         align: ``centre``, ``left`` or ``below``.
+        outlined: Whether letters have dark edges, to be read on anything.
     """
 
     MAX_LENGTH = 1000
     MAX_COUNT = 2000
 
-    def __init__(self, *, in_pixels: bool = False, align: str = "centre") -> None:
+    def __init__(
+        self, *, in_pixels: bool = False, align: str = "centre", outlined: bool = False
+    ) -> None:
         super().__init__()
         self.texts: tuple[str, ...] = ()
         self.positions: NDArray[np.float32] = np.zeros((0, 3), np.float32)
         self.heights: NDArray[np.float32] = np.zeros(0, np.float32)
         self.colors: NDArray[np.uint8] = np.zeros((0, 4), np.uint8)
         self.in_pixels, self.align, self.alpha = in_pixels, align, 1.0
+        self.outlined = outlined
         #: Counts changes of the texts, which are painted anew.
         self.texts_changed = 0
 

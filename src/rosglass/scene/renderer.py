@@ -25,6 +25,8 @@ from PySide6.QtGui import (
     QFontMetricsF,
     QImage,
     QPainter,
+    QPainterPath,
+    QPen,
     QRhi,
     QRhiBuffer,
     QRhiCommandBuffer,
@@ -89,6 +91,8 @@ _MAX_STRIDE = 2048
 _LINE_PX = 32
 #: Pixels from the top of a line to its baseline: letters are as high up as RViz's.
 _BASELINE_PX = 26.5
+#: Width of the pen that paints the edges of letters: half of it is outside.
+_EDGE_PX = 5.0
 
 
 class Frame(NamedTuple):
@@ -722,6 +726,7 @@ class _LabelsOnDevice(_OnDevice):
         self._buffer: Any = None
         self._texture: QRhiTexture | None = None
         self._painted = -1
+        self._rows = 0
         self._places: NDArray[np.float32] = np.zeros((0, 4), np.float32)
         self._shapes: NDArray[np.float32] = np.zeros((0, 2), np.float32)
 
@@ -729,19 +734,28 @@ class _LabelsOnDevice(_OnDevice):
         labels = self.drawable
         if self._painted != labels.texts_changed:
             self._painted = labels.texts_changed
+            # Edges are texts of their own, below the letters.
+            edges = labels.texts if labels.outlined else ()
             pixels, self._places, self._shapes = _paint_texts(
-                labels.texts, min(self.device.largest_texture, 4096)
+                [*edges, *labels.texts], min(self.device.largest_texture, 4096), len(edges)
             )
             self._texture = self.device.texture(batch, pixels, self._texture)
             self.bind((self._texture, self.device.smooth))
-            left_out = np.count_nonzero(self._shapes[:, 1] == 0)
+            left_out = np.count_nonzero(self._shapes[len(edges) :, 1] == 0)
             self.problem = f"{left_out} of {labels.count} texts have no room" if left_out else ""
         rows = np.zeros(labels.count, self.ROW)
         rows["position"] = np.nan_to_num(labels.positions, nan=0.0, posinf=0.0, neginf=0.0)
+        rows["rgba"] = labels.colors
         # One that has no place is not shown.
         shown = np.isfinite(labels.positions).all(axis=1)
-        rows["size"] = self._shapes * labels.heights[:, np.newaxis] * shown[:, np.newaxis]
-        rows["place"], rows["rgba"] = self._places, labels.colors
+        rows["size"] = labels.heights[:, np.newaxis] * shown[:, np.newaxis]
+        if labels.outlined:
+            edge = rows.copy()
+            edge["rgba"][:, :3] = 0
+            rows = np.concatenate([edge, rows])
+        rows["size"] *= self._shapes
+        rows["place"] = self._places
+        self._rows = len(rows)
         self._buffer = self.device.fill(batch, self._buffer, rows)
 
     def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
@@ -755,7 +769,7 @@ class _LabelsOnDevice(_OnDevice):
         )
         self.begin(run, pipeline)
         run.commands.setVertexInput(0, [(self._buffer, 0)])
-        run.commands.draw(4, self.drawable.count)
+        run.commands.draw(4, self._rows)
 
     def close(self) -> None:
         super().close()
@@ -763,13 +777,14 @@ class _LabelsOnDevice(_OnDevice):
 
 
 def _paint_texts(
-    texts: Sequence[str], limit: int
+    texts: Sequence[str], limit: int, edges: int = 0
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.float32]]:
     """Paint texts into one image.
 
     Args:
         texts: The texts.
         limit: Largest width and height of the image, in pixels.
+        edges: How many of the first ones are painted with their edges.
 
     Returns:
         The image (h, w), one byte for each pixel; place of each text as shares of it (left, top,
@@ -797,10 +812,20 @@ def _paint_texts(
     painter = QPainter(image)
     painter.setFont(font)
     painter.setPen(Qt.GlobalColor.white)
-    for text, (left, top), (wide, high) in zip(texts, places, boxes, strict=True):
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    pen = QPen(Qt.GlobalColor.white, _EDGE_PX)
+    for index, (text, (left, top), (wide, high)) in enumerate(
+        zip(texts, places, boxes, strict=True)
+    ):
         painter.setClipRect(left, top, wide, high)
         for number, line in enumerate(text.split("\n")):
-            painter.drawText(QPointF(left + 2, top + number * _LINE_PX + _BASELINE_PX), line)
+            at = QPointF(left + 2, top + number * _LINE_PX + _BASELINE_PX)
+            if index < edges:
+                path = QPainterPath()
+                path.addText(at, font, line)
+                painter.strokePath(path, pen)
+            else:
+                painter.drawText(at, line)
     painter.end()
     view = np.frombuffer(image.constBits(), np.uint8).reshape(height, image.bytesPerLine())
     sizes = np.array(boxes, np.float32).reshape(-1, 2)

@@ -192,7 +192,7 @@ class MeasureTool(Tool):
     DESCRIPTION = "Two clicks measure the distance between two points."
     _HELP = "Click on two points to measure their distance. Right-click to reset."
     #: Pixels of the screen.
-    _LINE_WIDTH, _TEXT_HEIGHT = 3.0, 18.0
+    _LINE_WIDTH, _TEXT_HEIGHT = 3.0, 22.0
 
     #: A distance was measured: metres.
     measured = Signal(float)
@@ -204,7 +204,8 @@ class MeasureTool(Tool):
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
-        self._line, self._text = Lines(self._LINE_WIDTH), Labels(in_pixels=True)
+        self._line = Lines(self._LINE_WIDTH)
+        self._text = Labels(in_pixels=True, align="below", outlined=True)
         self._start: Point | None = None
         #: Whether the second point follows the mouse.
         self._open = False
