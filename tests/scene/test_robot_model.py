@@ -513,3 +513,24 @@ def test_of_descriptions_that_wait_the_newest_is_read(
     may_read.set()
     bench.wait(lambda: robot.robotName == "rover5", lambda: robot.statusText)
     assert read == [texts[0], texts[-1]]
+
+
+def test_a_link_that_does_not_exist_is_an_error_with_its_line(
+    bench: SceneBench, caplog: pytest.LogCaptureFixture
+) -> None:
+    view = bench.load(
+        'RobotModelDisplay {\nComponent.onCompleted: setLinkEnabled("mats", false)\n}'
+    )
+    (robot,) = view.scene.displays
+
+    def errors() -> list[str]:
+        return [f"{r.lineno}: {r.getMessage()}" for r in caplog.records if r.levelno >= 40]
+
+    publish(bench, URDF)
+    bench.wait(errors)
+    end = "Links of display 'RobotModel': there is no 'mats'; there are: base_link, mast"
+    assert errors() == [f"6: {end}"]
+    robot.setLinkEnabled("mats", True)
+    assert errors()[1].endswith(end)
+    robot.setLinkEnabled("mast", False)
+    assert len(errors()) == 2

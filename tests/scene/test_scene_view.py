@@ -940,3 +940,54 @@ def test_a_depth_that_a_config_may_not_have_is_named(bench: SceneBench) -> None:
     assert notes == ["Depth: 5000 is out of range; 1000 is used"]
     assert display.depth == 1000
     assert display.load_settings({"Topic": {"Value": "/path", "Depth": 20}}) == []
+
+
+def test_mistakes_in_qml_are_errors_that_name_the_line(
+    bench: SceneBench,
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    from PySide6.QtCore import QUrl
+
+    from rosglass.scene import declared
+    from rosglass.scene.displays import image
+
+    monkeypatch.setattr(declared, "_PLACED_MS", 50)
+    monkeypatch.setattr(image, "_HIDDEN_CHECK_MS", 50)
+    file = tmp_path / "Mistakes.qml"
+    file.write_text(
+        "import QtQuick\n"
+        "import RosScene 1.0\n"
+        "Item {\n"
+        '    GridDisplay { name: "Floor" }\n'
+        "    MeasureTool { }\n"
+        '    SceneOverlay { source: "none.qml" }\n'
+        "    ImagePanel { display: path }\n"
+        "    PathDisplay { id: path }\n"
+        "    SceneView {\n"
+        '        view: "Orbital"; tool: "Mesure"\n'
+        '        CameraDisplay { hiddenDisplays: ["Robt"] }\n'
+        '        AxesDisplay { name: "Robot" }\n'
+        '        PoseDisplay { id: pose; shape: "Arow" }\n'
+        "        PoseDisplay { }\n"
+        "    }\n"
+        "}\n"
+    )
+    bench.window.setSource(QUrl.fromLocalFile(str(file)))
+
+    def said() -> str:
+        return "\n".join(f"{r.lineno}: {r.getMessage()}" for r in caplog.records if r.levelno >= 40)
+
+    for text in (
+        "4: display 'Floor' is in no view, and has no effect: put it into a SceneView { }",
+        "5: tool 'Measure' is in no view",
+        "6: SceneOverlay is in no view",
+        "7: display: expected an ImageDisplay or a CameraDisplay, got ",
+        "8: display 'Path' is in no view",
+        "9: SceneView: view: there is no view",
+        "9: SceneView: tool: there is no tool 'Mesure' in this view; did you mean Measure?",
+        "11: display 'Camera': hiddenDisplays: there is no display 'Robt'; did you mean Robot?",
+        "13: display 'Pose': shape: expected one of Arrow, Axes, got 'Arow'; did you mean Arrow?",
+    ):
+        bench.wait(lambda text=text: text in said(), said)

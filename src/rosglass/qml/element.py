@@ -13,10 +13,10 @@ from rosglass.errors import Error, TypeNotFoundError
 from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.dialect import Dialect, resolve_namespace, within_namespace
 from rosglass.qml.from_js import fields_from_js
-from rosglass.qml.log import Caller, RateLimit, log_from_qml, plain_path
+from rosglass.qml.log import Caller, RateLimit, declared_at, log_from_qml
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qml.runtime import UNPREPARED, runtime_of
-from rosglass.qt import QtCore, QtQml, Signal, Slot, is_alive
+from rosglass.qt import QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -301,21 +301,20 @@ class Element(QtCore.QObject):
             self.problemChanged.emit()
 
     def _log(self, text: str, level: int) -> None:
-        """Log a message without a QML line of its own, with the file that declares the object."""
-        if not text or not self._limit.allows((text, level)):
-            return
-        origin = self._origin
-        if origin is None:
-            context = QtQml.QQmlEngine.contextForObject(self)
-            file = context.baseUrl().toString() if context is not None else ""
-            origin = Caller(plain_path(file) or "<python>", 0, "")
-        log_from_qml("", level, text, origin)
+        """Log a message without a QML line of its own, with the place that declares the object."""
+        if text and self._limit.allows((text, level)):
+            log_from_qml("", level, text, self._origin or declared_at(self))
 
     def _refuse(self, message: str) -> None:
         """Log that a property was set to an invalid value, with the QML line."""
+        log_from_qml("", logging.ERROR, message, self._caller())
+
+    def _caller(self) -> Caller:
+        """Return the QML line that is running; where the object is declared if there is none."""
         runtime = self._find_runtime()
-        caller = runtime.caller() if runtime is not None else Caller("<unknown>", 0, "")
-        log_from_qml("", logging.ERROR, message, caller)
+        caller = runtime.caller() if runtime is not None else None
+        # A property that is set to a constant runs no JavaScript.
+        return caller if caller is not None and caller.line else declared_at(self)
 
 
 class TopicElement(Element):

@@ -8,6 +8,7 @@ import math
 import re
 import threading
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.log import RosoutHandler
@@ -27,6 +28,7 @@ __all__ = [
     "LocationFormatter",
     "QmlRosout",
     "RateLimit",
+    "declared_at",
     "explain",
     "forget_repeats",
     "install_message_handler",
@@ -63,6 +65,34 @@ def plain_path(url: str) -> str:
     """Return a file URL's path; other URLs unchanged."""
     local = QtCore.QUrl(url)
     return local.toLocalFile() if local.isLocalFile() else url
+
+
+def declared_at(item: QtCore.QObject) -> Caller:
+    """Return where QML declares an object, or the first one around it that QML has made.
+
+    QML does not say the line. It is found in the file: by the type, if only one object is of it, or
+    by its id; 0 otherwise.
+    """
+    while (context := QtQml.QQmlEngine.contextForObject(item)) is None:
+        above = item.parent()
+        if above is None:
+            return Caller("<python>", 0, "")
+        item = above
+    file, name = plain_path(context.baseUrl().toString()), context.nameForObject(item)
+    # Types that are QML files have a suffix, and so have objects with properties of their own.
+    made = item.metaObject().className().partition("_QML")[0]
+    kind = getattr(type(item), "QML_NAME", made)
+    try:
+        text = Path(file).read_text(encoding="utf-8")
+    except (OSError, ValueError):  # a file that is compiled in, or of a web server
+        return Caller(file, 0, "")
+    lines = [line.partition("//")[0] for line in text.splitlines()]
+    starts = [n for n, line in enumerate(lines, 1) if re.search(rf"\b{kind}\s*\{{", line)]
+    if len(starts) > 1 and name:
+        found = re.compile(rf"\bid\s*:\s*{name}\b")
+        at = next((n for n, line in enumerate(lines, 1) if found.search(line)), 0)
+        starts = [n for n in starts if n <= at][-1:]
+    return Caller(file, starts[0] if len(starts) == 1 else 0, "")
 
 
 def logger_name(name: str) -> str:

@@ -24,8 +24,10 @@ from rosglass.errors import Error, TransformException
 from rosglass.interfaces.names import ros1_name
 from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import TopicElement
+from rosglass.qml.log import log_from_qml
 from rosglass.qml.properties import ReadOnly, Writable, report
 from rosglass.qt import Signal, Slot, is_alive
+from rosglass.scene.declared import expect_view, find_view
 from rosglass.scene.drawing import Group, check_numbers, instance_matrix
 from rosglass.scene.rviz_formats import TopicSetting, read_topic, write_topic
 from rosglass.scene.settings import Configurable, Setting
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
     from rosglass.comm.inbox import Sample
     from rosglass.comm.node import Node
     from rosglass.messages import Message
+    from rosglass.qml.log import Caller
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.parts import Parts
@@ -96,6 +99,8 @@ _FRAME_TIMEOUT_S = 5.0
 _UNPUBLISHED_TIMEOUT_S = 0.5
 #: Letters of a line of the status: what robots name may be of any length.
 _MAX_NAME, _MAX_TEXT = 200, 1000
+#: Names of parts in an error.
+_MAX_NAMES = 20
 #: Opacity of data whose publisher or connection is gone.
 OUTDATED_ALPHA = 0.35
 
@@ -176,6 +181,8 @@ class Display(Configurable, TopicElement):
         self._outdated_frames: dict[str, float] = {}
         #: What of it is shown and hidden one by one; None for nothing.
         self.parts: Parts | None = None
+        #: Parts that QML has switched before they were known, and where.
+        self._switched_parts: dict[str, Caller] = {}
         #: The group that it is in; None for none.
         self.group: Display | None = None
         super().__init__(parent, runtime)
@@ -207,11 +214,11 @@ class Display(Configurable, TopicElement):
             return
         if self.scene is None:
             # Declared in QML inside a view; objects that Python makes are added by it.
-            view = self.parent()
-            while view is not None and not hasattr(view, "adopt_display"):
-                view = view.parent()
+            view = find_view(self)
             if view is not None:
                 view.adopt_display(self)
+            else:
+                expect_view(self, "scene")
         if self.scene is not None:
             super()._run_update()
 
@@ -313,6 +320,27 @@ class Display(Configurable, TopicElement):
 
     def _is_old(self) -> bool:
         return False
+
+    # -- parts -----------------------------------------------------------------------------------
+
+    def switch_part(self, name: str, enabled: bool) -> None:
+        """Show or hide a part for QML; logged if there is none of this name once they are known."""
+        if self.parts is not None:
+            self._switched_parts[name] = self._caller()
+            self.parts.set_enabled(name, enabled)
+            self.check_parts()
+
+    def check_parts(self) -> None:
+        """Log parts that QML has switched and that do not exist, once there are any."""
+        names = list(self.parts.names()) if self.parts is not None else []
+        if self.parts is None or not names:
+            return
+        for name, caller in self._switched_parts.items():
+            if name not in names:
+                hint = similar(name, names) or f"; there are: {', '.join(names[:_MAX_NAMES])}"
+                text = f"{self.parts.title} of {self.label}: there is no {name!r}{hint}"
+                log_from_qml("", logging.ERROR, text, caller)
+        self._switched_parts.clear()
 
     # -- status ----------------------------------------------------------------------------------
 

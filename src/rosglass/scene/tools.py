@@ -23,6 +23,7 @@ from rosglass.qml.runtime import runtime_of
 from rosglass.qt import Property, QtCore, QtGui, Signal, Slot, is_alive
 from rosglass.rviz.orbit import Point
 from rosglass.rviz.property_values import shown
+from rosglass.scene.declared import expect_view, find_view
 from rosglass.scene.drawing import Group
 from rosglass.scene.events import Action, Button, Drag, Modifier, Touch, Wheel
 from rosglass.scene.rviz_formats import TOOLS, ros_of, tool_type
@@ -308,11 +309,11 @@ class Tool(Configurable, Element):
     def _run_update(self) -> None:
         if is_alive(self) and self.view is None:
             # Declared in QML inside a view; the view adds the tools that Python makes.
-            view = self.parent()
-            while view is not None and not hasattr(view, "adopt_tool"):
-                view = view.parent()
+            view = find_view(self)
             if view is not None:
                 view.adopt_tool(self)
+            else:
+                expect_view(self, "view")
         self._scheduled = False
         if self._uses_node:
             super()._run_update()

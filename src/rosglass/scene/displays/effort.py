@@ -304,6 +304,7 @@ class EffortDisplay(HistoryDisplay):
         self._robot_name, self._turning = result
         limited = sorted(name for name in self._turning if self._limit_of(name) is not None)
         report(self, joints=limited)
+        self.check_parts()
         text = f"Robot model parsed Ok: {len(limited)} joints with a limit of their effort"
         self._set_urdf("ok" if limited else "warn", text)
         self._restyle()
@@ -321,7 +322,7 @@ class EffortDisplay(HistoryDisplay):
     @Slot(str, bool)
     def setJointEnabled(self, joint: str, enabled: bool) -> None:
         """Show or hide the effort of a joint."""
-        self.parts.set_enabled(joint, enabled)
+        self.switch_part(joint, enabled)
 
     @Slot(str, result=bool)
     def isJointEnabled(self, joint: str) -> bool:

@@ -7,6 +7,7 @@ They are shown by ``ImagePanel`` (``panels/ImagePanel.qml``), whose items are he
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import deque
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -15,6 +16,7 @@ import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 
+from rosglass.comm.names import similar
 from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.errors import Error
 from rosglass.images import TRANSPORTS
@@ -23,8 +25,9 @@ from rosglass.interfaces.names import ros1_name
 from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import DEFAULT_TIMEOUT_MS
 from rosglass.qml.image_sinks import ImageItem, Sink
+from rosglass.qml.log import declared_at, log_from_qml
 from rosglass.qml.properties import ReadOnly, Writable, report
-from rosglass.qt import Property, QtCore, QtGui, Signal, Slot, is_alive
+from rosglass.qt import Property, QtCore, QtGui, QtQml, Signal, Slot, is_alive
 from rosglass.scene.camera import PinholeCamera
 from rosglass.scene.display import MessageQueue, OneTopicDisplay, Subscriptions, drop_oldest
 from rosglass.scene.parts import Parts
@@ -61,6 +64,8 @@ _CAMERA_INFO = "sensor_msgs/CameraInfo"
 _MAX_AGE_S = DEFAULT_TIMEOUT_MS / 1000
 #: Seconds for which a camera's pictures wait for their transform; then they are shown alone.
 _TRANSFORM_WAIT_S = 1.0
+#: Milliseconds until displays that a camera hides have to be there.
+_HIDDEN_CHECK_MS = 1000
 #: Largest factor by which pictures are kept larger than a panel, for a zoom.
 _MOST_ZOOM = 8.0
 #: What numbers of a CameraInfo can be; beyond, places on the screen would not be finite.
@@ -461,7 +466,7 @@ class CameraDisplay(PictureDisplay):
         min=1e-5, max=1e5, then="_emit_changed",
     )  # fmt: skip
     #: Names of displays that are not drawn from the camera.
-    hiddenDisplays = Writable(list, [], then="_emit_changed")
+    hiddenDisplays = Writable(list, [], then="_on_hidden")
 
     isCamera = Property(bool, lambda _: True, constant=True)
 
@@ -618,6 +623,24 @@ class CameraDisplay(PictureDisplay):
 
     # -- the camera ------------------------------------------------------------------------------
 
+    def _on_hidden(self) -> None:
+        self._emit_changed()
+        # Files may name displays that are gone; QML may declare them further down.
+        if QtQml.QQmlEngine.contextForObject(self) is not None:
+            QtCore.QTimer.singleShot(_HIDDEN_CHECK_MS, self, self._check_hidden)
+
+    @Slot()
+    def _check_hidden(self) -> None:
+        """Log hidden displays that do not exist."""
+        if not is_alive(self) or self.scene is None:
+            return
+        names = [one.name for one in self.scene.displays]
+        for name in self.hiddenDisplays:
+            if name not in names:
+                hint = similar(str(name), names)
+                text = f"{self.label}: hiddenDisplays: there is no display {name!r}{hint}"
+                self._log(text, logging.ERROR)
+
     def _emit_changed(self) -> None:
         self._update_look()
         self.pictureChanged.emit()
@@ -733,7 +756,11 @@ class PictureItem(ImageItem):
 
     def _set_display(self, display: Any) -> None:
         before = self._display
-        if display is before or not (display is None or isinstance(display, PictureDisplay)):
+        if display is before:
+            return
+        if not (display is None or isinstance(display, PictureDisplay)):
+            text = f"display: expected an ImageDisplay or a CameraDisplay, got {display!r}"
+            log_from_qml("", logging.ERROR, text, declared_at(self.parent() or self))
             return
         if before is not None and is_alive(before):
             before.remove_sink(self)

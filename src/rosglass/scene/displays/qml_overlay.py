@@ -11,6 +11,7 @@ from rosglass.qml.element import Element
 from rosglass.qml.properties import ReadOnly, Writable, report
 from rosglass.qt import QtCore, Slot, is_alive
 from rosglass.rviz.property_values import from_plain, to_plain
+from rosglass.scene.declared import expect_view, find_view
 from rosglass.scene.display import Display
 from rosglass.scene.settings import Setting
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
     from rosglass.qml.runtime import Runtime
     from rosglass.scene.overlay import SceneOverlay
-    from rosglass.scene.scene_view import SceneView
 
 __all__ = ["OverlayElement", "QmlOverlayDisplay"]
 
@@ -153,6 +153,8 @@ def _as_text(value: Any) -> Any:
 class OverlayElement(Element):
     """``SceneOverlay`` in QML: an overlay declared inside a ``SceneView``."""
 
+    QML_NAME = "SceneOverlay"
+
     #: The QML file.
     source = Writable(QtCore.QUrl, QtCore.QUrl())
     #: Its name; by default that of the file.
@@ -189,17 +191,12 @@ class OverlayElement(Element):
         elif self.overlay is not None:
             self.overlay.watch = self.watch
 
-    def _find_view(self) -> SceneView | None:
-        view: Any = self.parent()
-        while view is not None and not hasattr(view, "adopt_display"):
-            view = view.parent()
-        return view  # type: ignore[no-any-return]
-
     def _show(self) -> None:
         self._close()
-        view = self._find_view()
+        view = find_view(self)
         if view is None:
-            self._refuse("SceneOverlay: put it into a SceneView { }")
+            self._shown = QtCore.QUrl()
+            expect_view(self, "overlay")
             return
         if self.source.isEmpty():
             return

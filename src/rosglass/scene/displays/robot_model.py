@@ -594,6 +594,7 @@ class RobotModelDisplay(Display):
         self._root_link = result.robot.root
         self._missing = list(result.problems.values())
         report(self, links=sorted(self._bodies), robotName=result.robot.name)
+        self.check_parts()
         lines = {"URDF": Status("ok", "URDF parsed OK")}
         for number, warning in enumerate(result.robot.warnings[:_MAX_LINK_LINES]):
             lines[f"URDF {number + 1}"] = Status("warn", warning)
@@ -649,7 +650,7 @@ class RobotModelDisplay(Display):
     @Slot(str, bool)
     def setLinkEnabled(self, link: str, enabled: bool) -> None:
         """Show or hide a link."""
-        self.parts.set_enabled(link, enabled)
+        self.switch_part(link, enabled)
 
     def _on_all_links_enabled(self) -> None:
         self.parts.follow_default()

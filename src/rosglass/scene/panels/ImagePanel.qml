@@ -14,28 +14,30 @@ Rectangle {
     signal dragged(real x, real y)
     signal resized(real x, real y)
 
-    readonly property bool bad: display !== null && display.statusLevel !== "ok"
-    readonly property real fade: display !== null && display.stale ? 0.35 : 1
+    // PictureItem says what is wrong with another display.
+    readonly property bool has: display !== null && display.isPicture === true
+    readonly property bool bad: has && display.statusLevel !== "ok"
+    readonly property real fade: has && display.stale ? 0.35 : 1
 
     color: "black"
     clip: true
-    visible: display !== null && display.active
+    visible: has && display.active
 
     PictureItem {
         objectName: "behind"
         anchors.fill: parent
         display: panel.display
         opacity: panel.fade
-        visible: panel.display !== null && panel.display.behind
+        visible: panel.has && panel.display.behind
     }
     Loader {
         anchors.fill: parent
-        active: panel.display !== null && panel.display.isCamera
+        active: panel.has && panel.display.isCamera
         sourceComponent: CameraView { objectName: "cameraView"; display: panel.display; opacity: panel.fade }
     }
     Loader {
         anchors.fill: parent
-        active: panel.display !== null && panel.display.overlay > 0
+        active: panel.has && panel.display.overlay > 0
         sourceComponent: PictureItem { display: panel.display; opacity: panel.display.overlay * panel.fade }
     }
 
@@ -50,7 +52,7 @@ Rectangle {
         Text {
             id: title
             anchors { left: parent.left; right: parent.right; top: parent.top; margins: 3 }
-            text: panel.display === null ? "" : panel.display.name + (panel.bad ? "\n" + panel.display.statusText : "")
+            text: !panel.has ? "" : panel.display.name + (panel.bad ? "\n" + panel.display.statusText : "")
             textFormat: Text.PlainText
             wrapMode: Text.Wrap
             maximumLineCount: 6
