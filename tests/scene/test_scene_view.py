@@ -619,6 +619,32 @@ def test_no_frame_fades_while_a_simulation_is_paused(bench: SceneBench, monkeypa
     bench.wait(lambda: axes.root.alpha < 1.0)
 
 
+def test_the_camera_follows_a_frame_that_stands_still(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    view = bench.load("TFDisplay {}")
+    StaticTransformBroadcaster(bench.robot).send_transform(
+        Transform((3, 0, 0), (0, 0, 0, 1), Time(1), "map", "mast")
+    )
+    bench.wait(lambda: view.scene.displays[0].frames == ["map", "mast"])
+    bench.wait.settled(bench.session)
+    # With the slash of RViz 1.
+    assert view.setViewSetting("Target Frame", "/mast") == ""
+    assert view.controller.get("Target Frame") == "mast"
+    assert view.controller.get("Focal Point") == pytest.approx((-3, 0, 0))
+    assert view.camera().focus == pytest.approx((0, 0, 0))
+    view.resetView()
+    assert view.camera().focus == pytest.approx((3, 0, 0))
+    assert view.problem == ""
+    view.controller.target_frame = "mats"
+    assert "Target Frame: " in view.problem
+    assert "mats" in view.problem
+    assert view.camera().focus == pytest.approx((3, 0, 0))
+    view.controller.target_frame = "<Fixed Frame>"
+    assert view.problem == ""
+
+
 def test_a_silent_link_above_the_fixed_frame_is_of_no_account(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import Transform, TransformBroadcaster

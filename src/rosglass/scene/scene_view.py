@@ -137,7 +137,9 @@ class SceneView(QQuickRhiItem):
         #: What the program around it keeps in ``Window Geometry`` of configs.
         self.window_geometry: dict[str, Any] = {}
         self._view: ViewController = create_view("Orbit")
-        self._view.on_change = self.camera_moved
+        self._view.on_change, self._view.on_target = self.camera_moved, self._on_placed
+        #: Why the camera does not follow its target frame.
+        self._view_problem = ""
         self._moved_at = -1.0
         self._still = QtCore.QTimer(self)
         self._still.setSingleShot(True)
@@ -289,13 +291,14 @@ class SceneView(QQuickRhiItem):
     #: Whether the view is to be shown alone, as overlays ask for; the program hides its panels.
     bare = Property(bool, lambda self: self._bare, _set_bare, notify=bareChanged)
 
-    #: Why nothing, or not everything, is drawn; empty without a problem.
+    #: Why nothing, or not everything, is drawn, or the camera does not follow its target frame;
+    #: empty without a problem.
     problem = Property(str, lambda self: self._get_problem(), notify=problemChanged)
 
     def _get_problem(self) -> str:
         if self._scene_is_gone or not is_alive(self._scene):
             return _SCENE_GONE
-        return self._problem or self._scene.problem
+        return self._problem or self._scene.problem or self._view_problem
 
     def _get_view_name(self) -> str:
         return self._view.TYPE
@@ -380,9 +383,9 @@ class SceneView(QQuickRhiItem):
 
     def show_view(self, view: ViewController) -> None:
         """Look through another view."""
-        self._view.on_change = None
+        self._view.on_change = self._view.on_target = None
         self._view = view
-        view.on_change = self.camera_moved
+        view.on_change, view.on_target = self.camera_moved, self._on_placed
         self._on_placed()
         self.viewChanged.emit()
         self.camera_moved()
@@ -651,17 +654,23 @@ class SceneView(QQuickRhiItem):
     @Slot()
     def _on_placed(self) -> None:
         """Let the camera follow its target frame."""
-        frame = self._view.target_frame
-        if not frame or frame == "<Fixed Frame>":
-            return
-        pose, reason = None, ""
-        try:
-            pose = self.scene.look_up(frame)
-        except Error as error:
-            reason = str(error)
-        if self._view.update_target(pose, reason):
-            self.cameraChanged.emit()
-            self._request_picture()
+        scene, view = self.scene, self._view
+        if view.target_frame != FIXED_FRAME:
+            pose, reason = None, ""
+            try:
+                pose = scene.look_up(view.target_frame)
+            except Error as error:
+                reason = str(error)
+            if view.update_target(pose, reason):
+                self.cameraChanged.emit()
+                self._request_picture()
+        # Without transforms, displays say so.
+        buffer = scene.transforms
+        is_connected = buffer is not None and buffer.has_frame(scene.fixed_frame)
+        problem = view.problem if is_connected else ""
+        if problem != self._view_problem:
+            self._view_problem = problem
+            self.problemChanged.emit()
 
     @property
     def is_moving(self) -> bool:

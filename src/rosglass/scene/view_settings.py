@@ -144,7 +144,9 @@ class FrameSetting(ViewSetting[str]):
     KIND = "frame"
 
     def read(self, value: Any) -> str:
-        """Return a name."""
+        """Return a name, without the slash in front that files of RViz 1 may have."""
+        if isinstance(value, str) and value.startswith("/"):
+            value = value[1:]
         if not isinstance(value, str) or not 0 < len(value) <= MAX_NAME_LENGTH:
             raise ArgumentError(
                 self.name, value, f"a frame's name of 1 to {MAX_NAME_LENGTH} characters"

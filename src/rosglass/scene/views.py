@@ -106,6 +106,7 @@ class ViewController:
         name: Of the view, as saved views have one.
         problem: Why the target frame cannot be followed; empty if it can.
         on_change: Called after each change of a setting.
+        on_target: Called after another target frame was chosen.
     """
 
     #: Of the type, as in RViz's Views panel.
@@ -138,6 +139,7 @@ class ViewController:
         self.name = "Current View"
         self.problem = ""
         self.on_change: Callable[[], None] | None = None
+        self.on_target: Callable[[], None] | None = None
         self._values: dict[str, Any] = {s.name: s.default for s in self.settings()}
         self._unknown: dict[str, Any] = {}
         #: The target frame's pose in the fixed frame, and as much of it as the view follows.
@@ -435,6 +437,8 @@ class ViewController:
             self._target_chosen = self._was_shown
             if self.target_frame == FIXED_FRAME:
                 self.update_target(np.eye(4))
+            if self.on_target is not None:
+                self.on_target()
 
     def _to_target(self, point: Sequence[float] | Matrix) -> Matrix:
         """Return a point of the fixed frame in the target frame."""
