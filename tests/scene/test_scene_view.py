@@ -292,6 +292,27 @@ def test_what_follows_a_frame_fades_as_soon_as_nobody_publishes_it(
     assert axes.root.alpha < 1.0
 
 
+def test_transforms_in_the_namespace_of_the_node_have_publishers(
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass import Time
+    from rosglass.scene import display as displays
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    monkeypatch.setattr(displays, "_UNPUBLISHED_TIMEOUT_S", -1.0)
+    view = bench.load('AxesDisplay { frame: "tool" }')
+    (axes,) = view.scene.displays
+    bench.session.shutdown()
+    bench.session.init("view", "/robot1")
+    broadcaster = TransformBroadcaster(bench.robot, "/robot1")
+    pose = Transform((0, 0, 2), (0, 0, 0, 1), Time.from_parts(7, 0), "map", "tool")
+    bench.wait(lambda: broadcaster.send_transform(pose) or axes.statusLevel == "ok")
+    bench.wait.nothing_happens(1.2)
+    assert (axes.root.alpha, axes.statusLevel) == (1.0, "ok"), axes.statusText
+    broadcaster.close()
+    bench.wait(lambda: "[tool] may be somewhere else" in axes.statusText)
+
+
 def test_a_path_is_shown_and_fades_when_its_publisher_is_gone(bench: SceneBench) -> None:
     view = bench.load('PathDisplay { topic: "/plan"; lineStyle: "Billboards"; lineWidth: 0.2 }')
     (path,) = view.scene.displays

@@ -391,7 +391,7 @@ class Scene(Element):
             return
         self._check_transforms()
         node = self.node
-        self.has_tf_publishers = node is not None and bool(node.publishers("/tf"))
+        self.has_tf_publishers = node is not None and bool(node.publishers("tf"))
         for display in self._alive():
             display.check_frames()
 
