@@ -6,6 +6,7 @@ import itertools
 import os
 import subprocess
 import sys
+import threading
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -249,6 +250,37 @@ def test_a_destroyed_view_frees_what_it_made_on_the_device(bench: SceneBench) ->
     bench.picture()
     send_deferred_deletes()
     bench.wait(lambda: renderer._device is None, timeout=5)
+
+
+def test_a_view_that_is_destroyed_does_not_wait_for_a_file_that_is_read(
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from PySide6.QtCore import QObject
+
+    from rosglass.qt import is_alive, send_deferred_deletes
+
+    monkeypatch.setattr("rosglass.comm.executor._CLOSE_TIMEOUT_S", 20.0)
+    view = bench.load('Loader { objectName: "loader"; sourceComponent: SceneView {} }')
+    loader = view.findChild(QObject, "loader")
+    scene = loader.property("item").scene
+    bench.wait(lambda: scene.node is not None)
+    reads, gone = threading.Event(), threading.Event()
+    was_gone: list[bool] = []
+    shown: list[Any] = []
+
+    def read(_: Any) -> None:
+        reads.set()
+        was_gone.append(gone.wait(10))
+
+    scene.load(read, shown.append)
+    assert reads.wait(10)
+    loader.setProperty("active", False)
+    send_deferred_deletes()
+    assert not is_alive(scene)
+    gone.set()
+    bench.wait(lambda: was_gone)
+    bench.wait.settled(bench.session)
+    assert (was_gone, shown) == ([True], [])
 
 
 def test_a_display_in_a_frame_follows_it(bench: SceneBench) -> None:

@@ -7,6 +7,7 @@ import logging
 import math
 import time
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.executor import Dispatcher
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm.clock import Jump
     from rosglass.qml.runtime import Runtime
+    from rosglass.qml.session import Session
     from rosglass.scene.display import Display
     from rosglass.scene.resource_retriever import ResourceRetriever
     from rosglass.tf import TransformBuffer
@@ -87,6 +89,8 @@ class Scene(Element):
         self._link: TfLink | None = None
         self._watch: Any = None
         self._loader: Dispatcher | None = None
+        #: What takes the results of the jobs in its thread, which must not hold displays.
+        self._takers: dict[object, Callable[[Any], None]] = {}
         self._ticks = 0
         #: The robot's simulated time, when it has changed, and when it last stood still.
         self._simulated_ns = 0
@@ -412,15 +416,23 @@ class Scene(Element):
 
         Args:
             work: The job, called with what finds meshes and textures.
-            done: Called in the GUI thread with its result, or with the error that it raised.
+            done: Called in the GUI thread with its result, or with the error that it raised; not
+                once the scene is gone.
         """
-        if self._session is None:
+        session, takers = self._session, self._takers
+        if session is None:
             done(Error("not connected yet"))
             return
         if self._loader is None:
             self._loader = Dispatcher("rosglass-scene")
-            self._cleanup["loader"] = self._loader.close
-        executor, resources = self._executor, self._retriever()
+            self._cleanup["loader"] = partial(_end_loader, session, self._loader, takers)
+        executor, resources, job = self._executor, self._retriever(), object()
+        takers[job] = done
+
+        def take(result: Any) -> None:
+            if job in takers:
+                takers.pop(job)(result)
+
         ask_later = weak_callback(self._ask_later)
 
         def run() -> None:
@@ -431,7 +443,7 @@ class Scene(Element):
             except Exception as error:
                 _log.exception("loading failed")
                 result = Error(f"internal error: {error!r}")
-            executor.post(lambda: done(result))
+            executor.post(lambda: take(result))
             if resources.is_waiting:
                 executor.post(ask_later)
 
@@ -562,3 +574,9 @@ class Scene(Element):
 
     def _alive(self) -> Iterator[Display]:
         return (display for display in self.displays if is_alive(display))
+
+
+def _end_loader(session: Session, loader: Dispatcher, takers: dict[object, Any]) -> None:
+    takers.clear()
+    # Not in the GUI thread: it waits for the file that is being read.
+    session.background(loader.close)
