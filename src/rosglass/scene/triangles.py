@@ -137,7 +137,8 @@ def assemble(
     for array, index in ((normals, at_normal), (uv, at_uv)):
         if array is not None and index is not None and index is not at:
             key = key * len(array) + index
-    if key is at:  # one index for all
+    # One index for all. A file may have many small parts of the same large arrays.
+    if key is at and 8 * len(at) >= len(positions):
         used = np.zeros(len(positions), bool)
         used[at] = True
         first = np.flatnonzero(used)
@@ -173,8 +174,9 @@ def triangulate(counts: Integers, points: Floats) -> Integers:
     budget = _MAX_COMPARISONS
     starts = np.cumsum(counts) - counts
     fans = np.maximum(counts - 2, 0)
+    firsts = np.cumsum(fans) - fans
     start = starts.repeat(fans)
-    step = np.arange(len(start)) - (np.cumsum(fans) - fans).repeat(fans) + 1
+    step = np.arange(len(start)) - firsts.repeat(fans) + 1
     triangles = np.stack((start, start + step, start + step + 1), axis=1)
     for polygon in _dented(counts, starts, points):
         count, at = int(counts[polygon]), int(starts[polygon])
@@ -183,7 +185,7 @@ def triangulate(counts: Integers, points: Floats) -> Integers:
             break  # the rest are fans: a hostile file has millions
         ears, tests = _ears(points[at : at + count], budget)
         budget -= tests
-        first = int(fans[:polygon].sum())
+        first = int(firsts[polygon])
         triangles[first : first + len(ears)] = np.array(ears) + at
     return triangles.reshape(-1)
 

@@ -791,3 +791,26 @@ def test_damaged_files_raise_mesh_errors_only(name: str) -> None:
             assert np.isfinite(part.positions).all()
             assert np.isfinite(part.normals).all()
             assert part.indices is None or part.indices.max() < len(part.positions)
+
+
+@pytest.mark.parametrize("count", [10, 1000])
+def test_vertices_of_other_parts_are_left_out(count: int) -> None:
+    positions = np.arange(3 * count, dtype=np.float32).reshape(-1, 3)
+    normals = np.tile(np.array((0, 1, 0), np.float32), (count, 1))
+    corners = np.array([7, 5, 9, 5, 7, 8])
+    part = triangles.assemble(positions, normals, positions[:, :2], (corners,) * 3)
+    assert part.positions.tolist() == positions[[5, 7, 8, 9]].tolist()
+    assert part.indices is not None
+    assert part.uv is not None
+    assert part.indices.tolist() == [1, 0, 3, 0, 1, 2]
+    assert part.uv.tolist() == positions[[5, 7, 8, 9], :2].tolist()
+
+
+def test_polygons_that_are_not_convex_are_cut_in_their_place() -> None:
+    square, arrow = [[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 0], [2, 0], [0.5, 0.5], [0, 2]]
+    points = np.zeros((12, 3), np.float32)
+    points[:, :2] = [*square, *arrow, *square]
+    cut = triangles.triangulate(np.array([4, 4, 4]), points).reshape(-1, 3)
+    assert cut[[0, 1, 4, 5]].tolist() == [[0, 1, 2], [0, 2, 3], [8, 9, 10], [8, 10, 11]]
+    # Along the diagonal that is inside.
+    assert {6, 4} <= set(cut[2].tolist()) & set(cut[3].tolist())
