@@ -48,6 +48,21 @@ def test_files_of_this_machine_are_paths(tmp_path: Path) -> None:
         ResourceRetriever().find("package://x/a.stl")
 
 
+def test_a_package_that_was_added_is_found_by_reset(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    retriever = ResourceRetriever()
+    with pytest.raises(ResourceError, match="there is no package 'my_arm'"):
+        retriever.find("package://my_arm/arm.stl")
+    package = tmp_path / "my_arm"
+    package.mkdir()
+    (package / "package.xml").write_text("<package><name>my_arm</name></package>")
+    (package / "arm.stl").write_bytes(b"mesh")
+    retriever.retry()
+    assert retriever.find("package://my_arm/arm.stl") == package / "arm.stl"
+
+
 def test_a_file_of_a_web_server_is_fetched_once_and_then_checked(
     web: WebServer, cache: Path
 ) -> None:

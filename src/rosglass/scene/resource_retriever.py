@@ -26,7 +26,7 @@ from rosglass.errors import Error, UnsupportedError
 from rosglass.interfaces.type_descriptions import system_cache_folder
 from rosglass.qml.process import NETWORK_HINT, is_network_closed
 from rosglass.scene.meshes import read_mesh_file
-from rosglass.scene.resources import ResourceError, locate_resource, make_room
+from rosglass.scene.resources import ResourceError, forget_packages, locate_resource, make_room
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -199,8 +199,9 @@ class ResourceRetriever:
         return found if isinstance(found, bytes) else read_mesh_file(os.fspath(found), uri)
 
     def retry(self) -> None:
-        """Ask again for what could not be fetched, once it is wanted again; from any thread."""
+        """Look again for what was not found or fetched, once it is wanted; from any thread."""
         self._retries = True
+        forget_packages()
 
     @property
     def is_waiting(self) -> bool:

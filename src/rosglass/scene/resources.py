@@ -21,7 +21,7 @@ from rosglass.interfaces.provider import workspace, workspace_variables
 if TYPE_CHECKING:
     from rosglass.interfaces.provider import Folders
 
-__all__ = ["ResourceError", "check_texture", "locate_resource", "make_room"]
+__all__ = ["ResourceError", "check_texture", "forget_packages", "locate_resource", "make_room"]
 
 #: Longest side of a texture that graphics cards take everywhere.
 _MAX_SIDE = 16_384
@@ -98,6 +98,11 @@ def _in_package(uri: str) -> Path:
 def _workspace(_variables: tuple[str | None, ...]) -> Folders:
     """Return the packages, whose folders are searched once for all meshes of a robot."""
     return workspace(os.environ)
+
+
+def forget_packages() -> None:
+    """Search the folders of packages anew, for those that were added in the meantime."""
+    _workspace.cache_clear()
 
 
 def _existing(path: Path, uri: str) -> Path:
