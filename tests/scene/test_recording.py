@@ -84,6 +84,17 @@ def test_a_window_at_rest_costs_nothing(bench: SceneBench, recorder: Any) -> Non
     assert times[-1] > 0.7
 
 
+def test_a_picture_too_many_is_none_that_was_dropped(
+    bench: SceneBench, recorder: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rosglass.scene.window_recorder._MAX_RATE_HZ", 0.01)
+    monkeypatch.setattr(type(recorder._writer), "is_full", True)
+    recorder.start(bench.window)
+    for _ in range(5):
+        bench.picture()
+    assert recorder.status().dropped == 1
+
+
 def test_the_command_records_until_ctrl_c(app: Any, tmp_path: Path) -> None:
     video = tmp_path / "out.mp4"
     process = start_view("--record", str(video))

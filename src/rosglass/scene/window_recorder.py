@@ -50,6 +50,7 @@ class WindowRecorder(QtCore.QObject):
         self.path = self._writer.path
         self._window: Any = None
         self._started = 0.0
+        #: When a picture was last taken or dropped, by :func:`time.monotonic`.
         self._taken = -1.0
         #: The picture that the GPU is reading back.
         self._reading: QRhiReadbackResult | None = None
@@ -99,9 +100,9 @@ class WindowRecorder(QtCore.QObject):
         self._take()  # of a window that was grabbed, and not shown
         now = time.monotonic()
         wait = self._taken + 1 / _MAX_RATE_HZ - now
-        if self._writer.is_full:
+        if wait <= _EARLY_S and self._writer.is_full:
             self._writer.count_dropped()
-            wait = 1 / _MAX_RATE_HZ
+            self._taken, wait = now, 1 / _MAX_RATE_HZ
         if wait > _EARLY_S:
             if not self._later.isActive():
                 self._later.start(max(int(wait * 1000), 1))
