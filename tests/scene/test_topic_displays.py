@@ -151,6 +151,31 @@ def test_each_message_of_a_history_is_shown_once_in_any_fixed_frame(
         assert np.allclose(pose, np.eye(4))
 
 
+@pytest.mark.parametrize("length", [1, 5])
+def test_a_kept_message_is_shown_once_a_new_fixed_frame_exists(
+    bench: SceneBench, length: int
+) -> None:
+    from rosglass import Time
+    from rosglass.comm.qos import QoS
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    view = bench.load()
+    display = view.scene.add("PointStamped", topic="/point", historyLength=length)
+    points = bench.robot.create_publisher("/point", "geometry_msgs/PointStamped", QoS.latched())
+    points.publish({"header": {"frame_id": "map", "stamp": STAMP}})
+    bench.wait(lambda: len(parts(display, SPHERE)) == 1)
+    view.fixedFrame = "odom"
+    assert parts(display, SPHERE) == []
+    assert display.statusLevel == "error"
+    StaticTransformBroadcaster(bench.robot).send_transform(
+        Transform((3, 0, 0), (0, 0, 0, 1), Time(1), "odom", "map")
+    )
+    bench.wait(lambda: len(parts(display, SPHERE)) == 1)
+    ((_, pose),) = parts(display, SPHERE)
+    assert pose[0, 3] == 3.0
+    assert display.statusLevel == "ok", display.statusText
+
+
 def test_what_waits_for_its_transform_is_all_shown_later(
     bench: SceneBench, monkeypatch: Any
 ) -> None:

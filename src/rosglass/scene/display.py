@@ -1027,7 +1027,9 @@ class TopicDisplay(OneTopicDisplay):
         raise NotImplementedError
 
     def on_transforms(self) -> None:
-        """Show what has waited for transforms."""
+        """Show what has waited for transforms, and what another fixed frame has hidden."""
+        if self.enabled and not self.root.visible:
+            self._place_last()
         if self._waiting:
             self._show_waiting()
 
@@ -1039,15 +1041,21 @@ class TopicDisplay(OneTopicDisplay):
             self.reset()
             self._last, self._newest = last, newest
             self._waiting.extend(waiting)
-        if self._last is not None:
-            pose = self._place(self._last)
-            if pose is None:
-                # At its time it is not known any more: rather the newest than a wrong place.
-                pose = self.place_of(self._last.frame, 0)
-            self.root.visible = self.enabled and pose is not None
-            if pose is not None:
-                self._show(self._last, pose)
+        self._place_last()
         self._show_waiting()
+
+    def _place_last(self) -> None:
+        """Show the last message in this fixed frame; hide it while its frame is not known there."""
+        last = self._last
+        if last is None:
+            return
+        pose = self._place(last)
+        if pose is None:
+            # At its time it is not known any more: rather the newest than a wrong place.
+            pose = self.place_of(last.frame, 0)
+        self.root.visible = self.enabled and pose is not None
+        if pose is not None:
+            self._show(last, pose)
 
     def reset(self) -> None:
         """Drop all messages."""
