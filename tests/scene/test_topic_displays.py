@@ -405,6 +405,62 @@ def test_a_sensor_may_send_nothing_while_a_simulation_is_paused(
     bench.wait(lambda: set_time(next(seconds)) or display.root.alpha < 1.0)
 
 
+def test_lifetimes_and_the_decay_time_are_of_the_robots_time(bench: SceneBench) -> None:
+    view = bench.load(
+        'MarkerDisplay { topic: "/marker" } PointCloud2Display { topic: "/cloud"; decayTime: 0.5 }'
+    )
+    markers, clouds = view.scene.displays
+    clock = bench.robot.create_publisher("/clock", "rosgraph_msgs/msg/Clock")
+    marker = {
+        "header": {"frame_id": "map"},
+        "type": 1,
+        "pose": {"orientation": {"w": 1.0}},
+        "scale": {"x": 1.0, "y": 1.0, "z": 1.0},
+        "lifetime": {"sec": 0, "nanosec": 500_000_000},
+    }
+    field = {"name": "x", "offset": 0, "datatype": 7, "count": 1}
+    cloud = {
+        **CLOUD,
+        "fields": [{**field, "name": name, "offset": 4 * at} for at, name in enumerate("xyz")],
+        "width": 1,
+        "point_step": 12,
+        "row_step": 12,
+        "data": np.ones(12, np.uint8),
+    }
+    publishers = [
+        (bench.robot.create_publisher("/marker", "visualization_msgs/Marker"), marker),
+        (bench.robot.create_publisher("/cloud", "sensor_msgs/PointCloud2"), cloud),
+    ]
+    view.scene.node.parameters.set({"use_sim_time": True})
+    bench.wait(clock.subscription_count)
+
+    def set_time(seconds: float) -> None:
+        clock.publish({"clock": {"sec": int(seconds), "nanosec": round(seconds % 1 * 1e9)}})
+        bench.wait(lambda: view.scene.now() == round(seconds * 1e9))
+
+    def count() -> list[int]:
+        return [len(list(one.root.drawables())) for one in view.scene.displays]
+
+    def send() -> bool:
+        for publisher, message in publishers:
+            publisher.publish(message)
+        return bool(markers.received and clouds.received)
+
+    set_time(10.0)
+    # The change of time makes them subscribe anew.
+    bench.wait.settled(bench.session)
+    bench.wait(send)
+    bench.wait.settled(bench.session)
+    shown = count()
+    assert shown[0] == 1
+    assert shown[1] > 0
+    # A simulation that is slow, or paused.
+    bench.wait.nothing_happens(0.8)
+    assert count() == shown
+    set_time(10.6)
+    bench.wait(lambda: count() == [0, 0])
+
+
 def test_nothing_is_late_while_the_robots_time_stands_still(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import Transform, TransformBroadcaster

@@ -479,6 +479,16 @@ class Scene(Element):
         node = self.node
         return 0 if node is None else node.now().nanoseconds
 
+    def time_s(self) -> float:
+        """Return the time in seconds that ends what is shown for a while, as in RViz.
+
+        It is the robot's time where that is simulated, and stands still with it.
+        """
+        node = self.node
+        if node is None or not node.clock.is_simulated:
+            return self._steady()
+        return node.now().seconds
+
     # -- following the robot ---------------------------------------------------------------------
 
     def _wanted(self) -> tuple[Any, ...] | None:

@@ -9,6 +9,7 @@ thousand of them are drawn at once.
 from __future__ import annotations
 
 import logging
+import math
 import time
 from copy import copy
 from operator import attrgetter
@@ -856,8 +857,9 @@ class Markers(TopicDisplay):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         self._shown: dict[tuple[str, int], MarkerRecord] = {}
-        #: When markers end, by the clock of :func:`time.monotonic`.
+        #: When markers end, by :meth:`Scene.time_s`, and when the first one does.
         self._expires: dict[tuple[str, int], float] = {}
+        self._first_end = math.inf
         #: By namespace and, for markers that are locked to one, frame: its pose is the group's.
         self._groups: dict[tuple[str, str], MarkerGroup] = {}
         #: Markers that cannot be placed in this fixed frame, by their frames.
@@ -875,7 +877,6 @@ class Markers(TopicDisplay):
         self._meshes = MarkerMeshes(self._in_background, self._on_mesh)
         super().__init__(parent, runtime)
         self.parts: Parts = Parts("Namespaces", lambda: self.namespaces, self._switch_groups)
-        self._expiry = single_shot(self, self._expire)
         self._flush_timer = single_shot(self, self._flush)
 
     def preparer(self) -> Callable[[Any], list[MarkerRecord]]:
@@ -1037,8 +1038,8 @@ class Markers(TopicDisplay):
         self._size += marker.size
         if marker.warning:
             self._note_problem(key, "warn", marker.warning)
-        if marker.lifetime:
-            self._expires[key] = time.monotonic() + marker.lifetime
+        if marker.lifetime and self.scene is not None:
+            self._expires[key] = self.scene.time_s() + marker.lifetime
         self._draw(marker, pose)
 
     def _draw(self, marker: MarkerRecord, pose: NDArray[np.float64]) -> None:
@@ -1148,7 +1149,7 @@ class Markers(TopicDisplay):
             group.flush()
         report(self, namespaces=sorted({namespace for namespace, _ in self._groups}))
         self._report_problems()
-        self._schedule_expiry()
+        self._first_end = min(self._expires.values(), default=math.inf)
 
     def _note_problem(self, key: tuple[str, int], level: str, text: str) -> None:
         self._problems[key] = Status(level, text)
@@ -1184,18 +1185,14 @@ class Markers(TopicDisplay):
 
     # -- lifetimes -------------------------------------------------------------------------------
 
-    def _schedule_expiry(self) -> None:
-        if self._expires:
-            first = min(self._expires.values()) - time.monotonic()
-            # A day is enough at once: Qt counts milliseconds in 32 bits.
-            self._expiry.start(max(int(min(first, 86_400.0) * 1000) + 1, 1))
-
     @Slot()
-    def _expire(self) -> None:
-        now = time.monotonic()
-        for key in [key for key, end in self._expires.items() if end <= now]:
-            self._remove(key)
-        self._flush_later()
+    def _on_tick(self) -> None:
+        super()._on_tick()
+        now = math.nan if self.scene is None else self.scene.time_s()
+        if now >= self._first_end:
+            for key in [key for key, end in self._expires.items() if end <= now]:
+                self._remove(key)
+            self._flush_later()
 
     # -- meshes ----------------------------------------------------------------------------------
 

@@ -388,7 +388,8 @@ class CloudDisplay(TopicDisplay):
 
     def show(self, data: Any, pose: NDArray[np.float64], frame: str, stamp: int) -> None:  # noqa: ARG002
         """Show a cloud, beside the earlier ones of the Decay Time."""
-        entry, removed = self._history.add(data.cloud, pose, self._steady())
+        assert self.scene is not None
+        entry, removed = self._history.add(data.cloud, pose, self.scene.time_s())
         # One that is not shown any more lends its buffer.
         shown = self._take_out(removed) or _ShownCloud(self)
         self._shown[entry] = shown
@@ -500,7 +501,8 @@ class CloudDisplay(TopicDisplay):
 
     def _expire(self) -> None:
         """Remove clouds older than the Decay Time."""
-        removed = self._history.expire(self._steady())
+        scene = self.scene
+        removed = self._history.expire(scene.time_s()) if scene is not None else []
         if removed:
             self._take_out(removed)
             self._count_points()
