@@ -732,6 +732,7 @@ def test_occlusion_compensation_is_kept_in_files() -> None:
 
 @pytest.mark.parametrize("ros", [1, 2])
 def test_a_depth_image_of_either_ros_is_a_cloud(ros: int) -> None:
+    from rosglass.errors import Error
     from rosglass.messages import load
     from rosglass.scene.displays.point_cloud import DepthCloudDisplay
 
@@ -741,8 +742,14 @@ def test_a_depth_image_of_either_ros_is_a_cloud(ros: int) -> None:
 
     prepare = DepthCloudDisplay().preparer()
     camera = {"P" if ros == 1 and name == "p" else name: value for name, value in CAMERA.items()}
-    assert prepare(received("CameraInfo", {**camera, "binning_x": 2})) is None
+    # A region of 4 x 2 pixels of a sensor with 8 x 6, of which 2 x 1 become one.
+    sensor = {**camera, "width": 8, "height": 6, "binning_x": 2}
+    region = {"x_offset": 2, "y_offset": 4, "width": 4, "height": 2}
+    assert prepare(received("CameraInfo", {**sensor, "roi": region})) is None
     data = np.array([1000, 0, 0, 2000], "<u2").tobytes()
     found = prepare(received("Image", {**DEPTH, "data": data}))
     assert found.cloud.point_count == 2
     assert found.pixel_m == 2.0
+    assert prepare(received("CameraInfo", sensor)) is None
+    with pytest.raises(Error, match=r"2x2 pixels, the camera info 4x6; use the camera"):
+        prepare(received("Image", {**DEPTH, "data": data}))

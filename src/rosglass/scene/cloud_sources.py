@@ -343,7 +343,7 @@ def _raw_image(message: Any) -> RawImage:
 
 
 def _projection(camera_info: Any) -> tuple[float, float, float, float]:
-    """Return focal lengths and center of the rectified image, in pixels, as RViz computes them."""
+    """Return focal lengths and center of the rectified image, in its own pixels."""
     p = _numbers(read_field(camera_info, _CAMERA, "p", "P"), _CAMERA, "p")
     if len(p) != 12 or not np.isfinite(p).all():
         raise DecodeError(_CAMERA, f"expected 12 finite numbers, got {shown(p.tolist())}", "p")
@@ -351,10 +351,10 @@ def _projection(camera_info: Any) -> tuple[float, float, float, float]:
     focal, center = [], []
     for index, axis in ((0, "x"), (5, "y")):
         binning = max(1, read_integer(camera_info, _CAMERA, f"binning_{axis}"))
+        offset = read_integer(roi, _CAMERA, f"{axis}_offset")
         focal.append(float(p[index]) / binning)
-        center.append(
-            float(p[2 if index == 0 else 6]) - read_integer(roi, _CAMERA, f"{axis}_offset")
-        )
+        # RViz does not divide it, and so draws binned images beside where they are.
+        center.append((float(p[2 if index == 0 else 6]) - offset) / binning)
         if not focal[-1]:
             raise DecodeError(
                 _CAMERA, "the focal length is 0: the camera is not calibrated", f"p[{index}]"

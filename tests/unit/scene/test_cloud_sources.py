@@ -210,8 +210,8 @@ def test_depths_in_metres() -> None:
 def test_binning_and_region_of_the_calibration() -> None:
     roi = {"x_offset": 1, "y_offset": 2}
     cloud = cloud_from_depth_image(image(DEPTH, "16UC1"), camera(roi=roi, binning_x=2, binning_y=1))
-    # fx 50, fy 50, cx 1, cy -1
-    assert np.allclose(cloud.positions()[0], (-1 / 50, 1 / 50, 1.0))
+    # fx 50, fy 50, cx 0.5, cy -1: pixels are twice as wide
+    assert np.allclose(cloud.positions()[0], (-0.5 / 50, 1 / 50, 1.0))
 
 
 @pytest.mark.parametrize(

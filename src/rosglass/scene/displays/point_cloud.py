@@ -688,10 +688,11 @@ def _prepare_depth(
         return None
     depth, info, color = found
     image = _decompress(depth)
-    if info.width and (info.width, info.height) != (image.width, image.height):
+    size = _image_size(info)
+    if all(size) and size != (image.width, image.height):
         raise Error(
             f"the depth image is {image.width}x{image.height} pixels, the camera info "
-            f"{info.width}x{info.height}; use the camera info of the depth image"
+            f"{size[0]}x{size[1]}; use the camera info of the depth image"
         )
     colors = None if color is None else _decompress(color)
     hidden = 0
@@ -711,6 +712,15 @@ def _prepare_depth(
     focal_px = float(info["p" if "p" in info else "P"][0]) / max(info.binning_x, 1)
     pixel_m = min(1 / abs(focal_px), _MAX_SIZE_M)
     return settings.prepare(cloud)._replace(source=depth, pixel_m=pixel_m, hidden=hidden)
+
+
+def _image_size(info: Any) -> tuple[int, int]:
+    """Return width and height of a camera's images: of its region of interest, binned."""
+    roi = info.roi
+    return (
+        (roi.width or info.width) // max(info.binning_x, 1),
+        (roi.height or info.height) // max(info.binning_y, 1),
+    )
 
 
 def _has_moved(pose: NDArray[np.float64], before: NDArray[np.float64]) -> bool:
