@@ -313,6 +313,20 @@ def test_the_right_camera_of_a_pair_is_beside_its_frame(
     assert middle_of_ball(bench) == pytest.approx(expected(p=right), abs=2)
 
 
+def test_a_picture_may_be_of_a_region_of_the_sensor(
+    bench: SceneBench, camera: tuple[Any, Robot]
+) -> None:
+    display, robot = camera
+    display.imageRendering = "background"
+    region = {"x_offset": 60, "y_offset": 40, "width": WIDTH, "height": HEIGHT}
+    p = [*P[:2], P[2] + 60, *P[3:6], P[6] + 40, *P[7:]]
+    info = {"width": 400, "height": 300, "p": p, "roi": region}
+    before = display._infos.received
+    bench.wait(lambda: robot.infos.publish(info) or display._infos.received > before)
+    bench.wait.settled(bench.session)
+    assert middle_of_ball(bench) == pytest.approx(expected(), abs=2)
+
+
 def test_the_picture_is_behind_over_or_both(bench: SceneBench, camera: tuple[Any, Robot]) -> None:
     display, _ = camera
     x, y = (round(part) for part in expected())

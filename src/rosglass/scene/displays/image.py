@@ -444,7 +444,10 @@ def _read_lens(message: Any) -> _Lens:
             f"CameraInfo/{name}: expected focal lengths above 0 pixels, got fx {fx:g} and fy "
             f"{fy:g}; calibrate the camera"
         )
-    return _Lens(message.width, message.height, fx, fy, cx, cy, -tx / fx, -ty / fy)
+    # Pictures are of the region of interest; where they are binned, their pixels are larger.
+    roi = message.roi
+    size = (roi.width or message.width, roi.height or message.height)
+    return _Lens(*size, fx, fy, cx - roi.x_offset, cy - roi.y_offset, -tx / fx, -ty / fy)
 
 
 class CameraDisplay(PictureDisplay):
