@@ -327,6 +327,23 @@ def test_a_picture_may_be_of_a_region_of_the_sensor(
     assert middle_of_ball(bench) == pytest.approx(expected(), abs=2)
 
 
+def test_a_single_picture_is_shown_alone_until_its_transform_is_known(
+    bench: SceneBench, load: Callable[..., Any]
+) -> None:
+    display, robot = load(CAMERA + PANEL)
+    robot.send_info(display)
+    bench.wait(robot.images.subscription_count)
+    robot.images.publish(picture_of((0, 0, 255), seconds=7))
+    # Nothing else is received, and no transform.
+    bench.wait(lambda: display._picture is not None)
+    assert pixel(bench) == (0, 0, 255)
+    assert "Transform: no transform from [camera]" in display.statusText
+    robot.place(7)
+    robot.place(8)
+    bench.wait(lambda: display._pose is not None)
+    assert "Transform: Transform OK" in display.statusText
+
+
 def test_the_picture_is_behind_over_or_both(bench: SceneBench, camera: tuple[Any, Robot]) -> None:
     display, _ = camera
     x, y = (round(part) for part in expected())

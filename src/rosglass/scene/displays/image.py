@@ -602,9 +602,19 @@ class CameraDisplay(PictureDisplay):
         return self.place_of(frame, 0 if stamp is None else stamp.nanoseconds)
 
     def on_transforms(self) -> None:
-        """Show what has waited for transforms."""
+        """Show what has waited for transforms, also the scene in a picture that is shown alone."""
         if self._waiting:
             self._place_waiting()
+        elif self._picture is not None and self._pose is None:
+            self._pose = self._pose_of(self._picture)
+            if self._pose is not None:
+                self.pictureChanged.emit()
+
+    def check_frames(self) -> None:
+        """Show a picture alone that has waited for long, also if no transform is received."""
+        if self._waiting:
+            self._place_waiting()
+        super().check_frames()
 
     def on_fixed_frame(self) -> None:
         """Look at the scene from the camera's place in the new fixed frame."""
