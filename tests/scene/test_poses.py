@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -168,12 +169,22 @@ def test_a_polygon_is_closed(show: Callable[..., Any]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "base"), [(2.0, 2.0), (9.0, None), (float("inf"), None), (float("nan"), None)]
+    ("value", "low", "base"),
+    [
+        (2.0, 0.1, 2.0),
+        (9.0, 0.1, None),
+        (math.inf, 0.1, None),
+        (math.nan, 0.1, None),
+        # Of a sensor of one fixed distance, infinity says whether something is there.
+        (-math.inf, 5.0, 5.0),
+        (5.0, 5.0, 5.0),
+        (math.inf, 5.0, None),
+    ],
 )
 def test_a_range_is_a_cone_within_its_limits(
-    show: Callable[..., Any], value: float, base: float | None
+    show: Callable[..., Any], value: float, low: float, base: float | None
 ) -> None:
-    about = {"field_of_view": 0.5, "min_range": 0.1, "max_range": 5.0, "range": value}
+    about = {"field_of_view": 0.5, "min_range": low, "max_range": 5.0, "range": value}
     display = show("Range", "sensor_msgs/Range", about)
     cones = parts(display, CONE)
     if base is None:

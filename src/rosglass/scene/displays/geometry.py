@@ -220,9 +220,8 @@ def _read_range(message: Any) -> tuple[float, float]:
         if not math.isfinite(number):
             raise Error(f"{name}: {number} is not finite")
     value = float(message.range)
-    if low == high:
-        # A sensor of one fixed distance: infinity says whether something is there (REP 117).
-        value = low if value == -math.inf else 0.0
+    if low == high and value == -math.inf:
+        value = low  # a sensor of one fixed distance, where something is (REP 117)
     inside = math.isfinite(value) and low <= value <= high
     check_numbers("range", value if inside else 0.0)
     return (value if inside else 0.0), abs(angle)
