@@ -375,6 +375,7 @@ Pane {
                 Label {
                     anchors.centerIn: parent
                     visible: choices.count === 0
+                    textFormat: Text.PlainText
                     text: adding.topics.length > 0 || tabs.currentIndex === 1 ? "Nothing has these words." : "The robot publishes nothing that a display shows."
                 }
             }
