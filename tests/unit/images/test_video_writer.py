@@ -97,7 +97,10 @@ def test_no_pictures_no_file(tmp_path: Path) -> None:
     assert not writer.add(picture(RED), 0.0)
 
 
-def test_pictures_are_dropped_and_counted_while_the_encoder_is_busy(tmp_path: Path) -> None:
+def test_pictures_are_dropped_and_counted_while_the_encoder_is_busy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(video_writer, "_CLOSE_TIMEOUT_S", 60.0)
     writer = VideoWriter(tmp_path / "video.mp4")
     large = np.zeros((2160, 3840, 4), np.uint8)
     sent = 100
