@@ -29,8 +29,12 @@ def decode(path: Path) -> list[tuple[float, Any]]:
 
 
 def start_view(*arguments: str, **environment: str) -> subprocess.Popen[str]:
+    return start("view", "--url", "local://video", *arguments, **environment)
+
+
+def start(*arguments: str, **environment: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "rosglass", "view", "--url", "local://video", *arguments],
+        [sys.executable, "-m", "rosglass", *arguments],
         env={**os.environ, "QT_QUICK_BACKEND": "", **environment},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -107,6 +111,25 @@ def test_the_command_records_until_ctrl_c(app: Any, tmp_path: Path) -> None:
     assert "Traceback" not in said
     frames = decode(video)
     assert frames[0][1].shape == (800, 1280, 3)
+
+
+def test_interfaces_are_recorded_as_well(app: Any, tmp_path: Path) -> None:
+    file, video = tmp_path / "panel.qml", tmp_path / "out.mp4"
+    file.write_text(
+        "import QtQuick\nWindow { visible: true; width: 200; height: 100; color: '#c02020'\n"
+        "Timer { running: true; interval: 500; onTriggered: Qt.quit() } }"
+    )
+    process = start("run", str(file), "--kiosk", "--record", str(video))
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 0, said
+    assert f"recording to {video}" in said
+    assert "out.mp4: " in said
+    picture = decode(video)[0][1]
+    assert np.abs(picture[10, 10].astype(int) - (0xC0, 0x20, 0x20)).max() < 12
+    process = start("run", str(file), "--renderer", "software", "--record", str(video))
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert "--record: Qt's software renderer cannot be recorded" in said
 
 
 @pytest.mark.parametrize("interface", ["opengl", "vulkan"])

@@ -176,6 +176,15 @@ def _add_3d_view(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fullscreen", action="store_true", help="fill the screen")
 
 
+def _add_video(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--record",
+        metavar="VIDEO",
+        help="record the window as a video (.mp4, .mkv, .webm) until it is closed; needs Qt 6 and "
+        '"rosglass[video]"',
+    )
+
+
 def _run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "file",
@@ -200,6 +209,7 @@ def _run(parser: argparse.ArgumentParser) -> None:
         help="fill the screen, ignore attempts to close the window (Alt-F4), and hide an idle "
         "pointer; Ctrl-C, SIGTERM and Qt.quit() end it",
     )
+    _add_video(parser)
     _add_interface_options(parser, "the interface", "the window", after=2.0)
     parser.set_defaults(arguments=[], ros_arguments=[], looks_nearby=True)
     parser.epilog = (
@@ -276,12 +286,7 @@ def _view(parser: argparse.ArgumentParser) -> None:
         help="fill the screen with the 3D view alone, without panels; ignore attempts to close "
         "the window (Alt-F4); Ctrl-C and SIGTERM end it",
     )
-    parser.add_argument(
-        "--record",
-        metavar="VIDEO",
-        help="record the window as a video (.mp4, .mkv, .webm) until it is closed; needs "
-        '"rosglass[video]"',
-    )
+    _add_video(parser)
     _add_interface_options(parser, "the window", "the window", after=3.0)
     parser.set_defaults(arguments=[], ros_arguments=[], looks_nearby=True)
     parser.epilog = (

@@ -19,17 +19,61 @@ if TYPE_CHECKING:
     from rosglass.qml.application import Application
     from rosglass.scene.window_recorder import WindowRecorder
 
-__all__ = ["QUIET_MEDIA", "Picture", "format_log", "quiet_media", "run", "show", "show_interface"]
+__all__ = [
+    "QUIET_MEDIA",
+    "Picture",
+    "format_log",
+    "make_recorder",
+    "quiet_media",
+    "run",
+    "show",
+    "show_interface",
+]
 
 #: Rules for messages of Qt that are of no use to users of an interface.
 QUIET_MEDIA = "qt.multimedia.symbolsresolver=false;qt.multimedia.ffmpeg*=false;qt.qpa.theme*=false"
 
 
 def run(args: argparse.Namespace) -> int:
-    """Show the interface until it is closed; returns the exit code."""
-    return show_interface(
-        args, args.file, name=args.name, import_paths=args.import_paths, watch=args.watch
-    )
+    """Show the interface until it is closed; returns the exit code.
+
+    Raises:
+        UnsupportedError: It is to be recorded by Qt 5, or without a graphics interface.
+    """
+    quiet_media()
+    recorder = make_recorder(args)
+    if recorder is not None:
+        # Not the software renderer, which may be the faster one.
+        args.renderer = "opengl"
+    options = {"name": args.name, "import_paths": args.import_paths, "watch": args.watch}
+    return show_interface(args, args.file, recorder=recorder, **options)
+
+
+def make_recorder(args: argparse.Namespace) -> WindowRecorder | None:
+    """Return what records the window as the command line says; None for nothing.
+
+    Raises:
+        Error: The video cannot be written.
+        UnsupportedError: It cannot be recorded by this Qt, or its renderer; or PyAV is missing.
+    """
+    if args.record is None:
+        return None
+    if args.renderer == "software" or os.environ.get("QT_QUICK_BACKEND") == "software":
+        raise UnsupportedError(
+            "--record: Qt's software renderer cannot be recorded: use --renderer opengl, unset "
+            "QT_QUICK_BACKEND; without a graphics card, Mesa's llvmpipe will do"
+        )
+    try:
+        # Not all programs need numpy and PyAV.
+        from rosglass.scene.window_recorder import WindowRecorder  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        if not str(error.name).startswith("PySide6"):
+            raise
+        raise UnsupportedError('--record needs Qt 6: pip install "rosglass[qml]"') from None
+    recorder = WindowRecorder(args.record)
+    # What the window shows is in the video: a kiosk has no mark of it.
+    note(f"recording to {recorder.path}")
+    return recorder
 
 
 def show_interface(args: argparse.Namespace, file: str, **options: Any) -> int:

@@ -6,7 +6,7 @@ import gc
 import os
 from typing import TYPE_CHECKING
 
-from rosglass.cli.run import quiet_media, show_interface
+from rosglass.cli.run import make_recorder, quiet_media, show_interface
 from rosglass.errors import UnsupportedError
 
 if TYPE_CHECKING:
@@ -49,12 +49,7 @@ def _run(args: argparse.Namespace) -> int:
             'the 3D view needs Qt 6: pip install "rosglass[qml]" (inside RViz\'s Python there is '
             "Qt 5; use another virtual environment)"
         ) from None
-    recorder = None
-    if args.record is not None:
-        # Not all programs need numpy and PyAV.
-        from rosglass.scene.window_recorder import WindowRecorder  # noqa: PLC0415
-
-        recorder = WindowRecorder(args.record)
+    recorder = make_recorder(args)
     program = ViewProgram(
         args.config,
         args.fixed_frame,
