@@ -34,7 +34,9 @@ Item {
                 ViewControls { live: contact.live; Layout.fillWidth: true; Layout.preferredHeight: 98 }
                 EmergencyStop { Layout.fillWidth: true; Layout.fillHeight: true }
             }
+            // Beside panels there is room for what drives the robot, and one camera.
             ColumnLayout {
+                visible: dashboard.width >= 800
                 Layout.preferredWidth: 216; Layout.fillWidth: false; Layout.fillHeight: true
                 spacing: Theme.gap
                 Posture { Layout.fillWidth: true; Layout.fillHeight: true }
@@ -50,6 +52,7 @@ Item {
                 selected: 0
             }
             MultiCamera {
+                visible: dashboard.width >= 1000
                 Layout.fillWidth: true; Layout.preferredWidth: 300; Layout.fillHeight: true
                 selected: 1
             }

@@ -109,6 +109,18 @@ def test_all_elements_show_that_the_robot_is_silent(
         wait(lambda: live(dashboard))
 
 
+def test_beside_panels_there_is_one_camera(dashboard: Dashboard, wait: Any) -> None:
+    def titles() -> set[str]:
+        names = {"POSTURE", "BATTERY", "FRONT CAMERA", "REAR CAMERA"}
+        return names & {text.upper() for text in dashboard.seen()}
+
+    assert len(titles()) == 4
+    dashboard.root.setWidth(900)
+    wait(lambda: titles() == {"POSTURE", "BATTERY", "FRONT CAMERA"})
+    dashboard.root.setWidth(700)
+    wait(lambda: titles() == {"FRONT CAMERA"})
+
+
 def test_the_stop_is_operated_by_keyboard_and_shows_the_focus(
     dashboard: Dashboard, hand: Any, wait: Any
 ) -> None:
