@@ -95,6 +95,9 @@ def test_displays_are_added_renamed_moved_and_removed(bench: SceneBench, model: 
     publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
     bench.wait(model.suggestions)
     assert {"topic": "/plan", "type": "nav_msgs/Path", "display": "Path"} in model.suggestions()
+    bench.robot.create_publisher("/camera_info", "sensor_msgs/CameraInfo")
+    bench.wait(lambda: "/camera_info" in bench.view.scene.node.topics())
+    assert [one["topic"] for one in model.suggestions()] == ["/plan"]
     model.add("Path", "/plan")
     assert bench.view.scene.displays[1].topic == "/plan"
     bench.wait(publisher.subscription_count)
@@ -142,7 +145,13 @@ def test_rows_follow_the_status(bench: SceneBench, model: Any) -> None:
     row = row_of(model, "Axes")
     assert model.rows[row].level == "error"
     assert "no transform from [tool]" in model.rows[row].description
-    assert "Transform" in labels(model)
+    assert labels(model)[row + 1 : row + 3] == ["Status: Error", "Transform"]
+    # What is right is one row, until the user wants to know.
+    model.edit(row_of(model, "Reference Frame"), "map")
+    assert labels(model)[row + 1] == "Status: Ok"
+    assert "Transform" not in labels(model)
+    model.toggle(row + 1)
+    assert labels(model)[row + 2] == "Transform"
 
 
 def outline(scene: Any, group: Any = None) -> list[Any]:

@@ -562,9 +562,11 @@ class OneTopicDisplay(Display):
 
     Attributes:
         MESSAGES: Names of the types that it shows, without ``msg/``.
+        SUGGESTED: Those of topics that panels suggest, if these are fewer.
     """
 
     MESSAGES: ClassVar[tuple[str, ...]] = ()
+    SUGGESTED: ClassVar[tuple[str, ...]] = ()
 
     topic = Setting("Topic", "topic", "", "Topic to subscribe to.", then="_on_topic")
     depth = Setting(

@@ -306,10 +306,18 @@ class DisplaysModel(QAbstractListModel):
                     yield from self._walk_group(view, display, depth + 1)
 
     def _walk_display(self, display: Display, key: Any, depth: int) -> Iterator[PanelRow]:
-        for name, line in display.status_lines.items():
+        if display.status_lines:
+            own, level = (*key, "status"), display.statusLevel
+            # What is wrong is not hidden.
+            expanded = level != "ok" or own in self._expanded
             yield PanelRow(
-                (*key, "status", name), depth, name, "status", line.text, line.text, line.level
-            )
+                own, depth, f"Status: {level.title()}", "status", "", display.statusText, level,
+                expandable=level == "ok", expanded=expanded,
+            )  # fmt: skip
+            for name, line in display.status_lines.items() if expanded else ():
+                yield PanelRow(
+                    (*own, name), depth + 1, name, "status", line.text, line.text, line.level
+                )
         yield from self._walk_settings(display, key, depth, "")
 
     def _walk_settings(
@@ -371,7 +379,7 @@ class DisplaysModel(QAbstractListModel):
         if setting.kind.NAME == "frame" and display.scene is not None:
             return ("<Fixed Frame>", *display.scene.frames())
         if setting.kind.NAME == "topic" and isinstance(display, OneTopicDisplay):
-            wanted = display.MESSAGES
+            wanted = display.SUGGESTED or display.MESSAGES
             return tuple(name for name, kinds in self._topics() if set(kinds) & set(wanted))
         return ()
 
@@ -630,7 +638,7 @@ class DisplaysModel(QAbstractListModel):
         found = []
         for topic, kinds in self._list_topics():
             for name, display in sorted(self._view.scene.TYPES.items()):
-                shown = set(getattr(display, "MESSAGES", ()))
+                shown = set(getattr(display, "SUGGESTED", ()) or getattr(display, "MESSAGES", ()))
                 if shown & set(kinds):
                     found.append({"topic": topic, "type": kinds[0], "display": name})
         return found

@@ -744,6 +744,7 @@ class DepthCloudDisplay(CloudDisplay):
 
     TYPE = "DepthCloud"
     MESSAGES = ("sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/CameraInfo")
+    SUGGESTED = ("sensor_msgs/Image",)
     IS_CONTINUOUS = True
 
     transport = Setting(

@@ -175,13 +175,15 @@ Pane {
                 required property bool expanded
                 required property var choices
                 readonly property bool ofDisplay: kind === "display"
-                readonly property color tint: level === "error" ? "#c62818" : level === "warn" ? "#9a5b00"
-                                               : index === panel.current ? palette.highlightedText : palette.text
+                readonly property bool current: index === panel.current
+                readonly property color tint: level === "error" ? (current ? "#ffc8c0" : "#c62818")
+                                            : level === "warn" ? (current ? "#ffe0a0" : "#9a5b00")
+                                            : current ? palette.highlightedText : palette.text
 
                 width: list.width
                 height: panel.rowHeight
                 opacity: dragging.active && index === dragging.source ? 0.5 : 1
-                color: index === panel.current ? palette.highlight
+                color: current ? palette.highlight
                      : ofDisplay || kind === "options" ? palette.alternateBase : "transparent"
 
                 MouseArea {

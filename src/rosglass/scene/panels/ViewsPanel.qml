@@ -36,7 +36,7 @@ Pane {
                 currentIndex: panel.view ? model.indexOf(panel.view.view) : -1
                 onActivated: panel.view.view = currentText
             }
-            Button { text: "Zero"; onClicked: panel.view.resetView() }
+            Button { Layout.preferredWidth: 48; text: "Zero"; onClicked: panel.view.resetView() }
         }
         ListView {
             Layout.fillWidth: true
