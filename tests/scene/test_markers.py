@@ -132,10 +132,71 @@ def test_boxes_of_one_message_move_go_and_become_others(show: Callable[..., Any]
     assert colors == {13: [0, 0, 1, 1], 14: [1, 0, 0, 1]}
 
 
+def test_texts_and_lines_are_drawn_together(show: Callable[..., Any]) -> None:
+    line = points((0, 0, 0), (1, 0, 0), (1, 1, 0))
+    lines = [marker(4, number, points=line, scale={"x": 0.1}) for number in range(50)]
+    texts = [marker(9, number, text=f"{number}", scale={"z": 1.0}) for number in range(50, 100)]
+    display = show(*lines, *texts)
+    strips, labels = drawables(display)
+    assert (type(strips), strips.count, type(labels), labels.count) == (Lines, 100, Labels, 50)
+    # One of another width, one that becomes a box, and one that goes.
+    show({**lines[0], "scale": {"x": 0.2}}, marker(1, 1), marker(9, 99, action=DELETE))
+    assert (strips.count, labels.count) == (96, 49)
+    assert sorted(type(one).__name__ for one in drawables(display)) == [
+        *("Labels", "Lines", "Lines", "Mesh"),
+    ]
+    show(*(marker(4, number, action=DELETE) for number in range(99)))
+    assert drawables(display) == []
+    assert len(display.root) == 1
+    ((group,),) = [display.root]
+    assert not any(isinstance(one, (Lines, Labels)) for one in group)
+
+
+def test_lines_together_look_like_each_alone(
+    bench: SceneBench, show: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene.displays.marker_batches import LineBatch
+
+    two = [RED, {"r": 0.0, "g": 1.0, "b": 0.0, "a": 0.2}]
+    turned = {"position": {"x": 1.0}, "orientation": {"z": 0.38, "w": 0.92}}
+    line = points((-2, 0, 0), (2, 0, 0), (2, 2, 0), (0, 1, 1))
+    markers = [
+        marker(4, 0, points=line, scale={"x": 0.1}, colors=two * 2),
+        marker(4, 1, points=line, scale={"x": 0.1}, pose=turned),
+        marker(5, 2, points=line, scale={"x": 0.1}, pose=turned, colors=two * 2),
+    ]
+    display = show(*markers)
+    assert len(drawables(display)) == 1
+    together = bench.picture()
+    monkeypatch.setattr(LineBatch, "MAX_MARKER_POINTS", 0)
+    show(*markers)
+    assert len(drawables(display)) == 3
+    assert np.abs(bench.picture().astype(int) - together).max() < 3
+
+
+def test_translucent_lines_are_sorted_while_there_are_few(
+    show: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene.displays import marker as module
+
+    monkeypatch.setattr(module, "_MAX_SORTED", 3)
+    line = points((0, 0, 0), (1, 0, 0))
+    color = {**RED, "a": 0.5}
+    strips = [marker(4, n, points=line, scale={"x": 0.1}, color=color) for n in range(10)]
+    display = show(*strips)
+    assert sorted(one.count for one in drawables(display)) == [1, 1, 1, 7]
+    assert not any(one.opaque for one in drawables(display))
+    show(*strips)
+    assert sorted(one.count for one in drawables(display)) == [1, 1, 1, 7]
+    show(*({**one, "color": RED} for one in strips))
+    assert [(one.count, one.opaque) for one in drawables(display)] == [(10, True)]
+
+
 def test_a_marker_replaces_the_one_of_its_id(show: Callable[..., Any]) -> None:
     display = show(marker(1), marker(9, 1, text="a", scale={"z": 1.0}))
     show(marker(9, text="b", scale={"z": 1.0}))
-    assert [one.texts for one in drawables(display)] == [("a",), ("b",)]
+    (labels,) = drawables(display)
+    assert sorted(labels.texts) == ["a", "b"]
 
 
 def test_colors_of_points_count(show: Callable[..., Any]) -> None:

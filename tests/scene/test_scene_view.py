@@ -981,6 +981,27 @@ def test_a_view_that_leaves_its_window_frees_what_it_made_there(bench: SceneBenc
     bench.picture()
 
 
+def test_texts_are_drawn_between_what_is_translucent_by_their_distance(bench: SceneBench) -> None:
+    from rosglass.scene.drawing import BOX, Labels, Mesh, instance_matrix
+
+    view = bench.load('view: "TopDownOrtho"')
+    red, green, labels = (1.0, 0.0, 0.0, 0.5), (0.0, 1.0, 0.0), Labels()
+    sheets = [Mesh(BOX, red, lit=False), Mesh(BOX, red, lit=False)]
+    for x, sheet in zip((-2.0, 2.0), sheets, strict=True):
+        sheet.set_instances(instance_matrix((x, 0, 1), scale=(3.5, 3.5, 0.01))[np.newaxis])
+    view.scene.root.add(labels, *sheets)
+    labels.set_texts(["HHH", "HHH"], [(-2, 0, 2), (2, 0, 0)], 1.0, green)
+    picture = bench.picture().astype(int)
+    left, right = np.split(picture, 2, axis=1)
+    # Above the sheet, and below it.
+    assert left[..., 1].max() == 255
+    assert 100 < right[..., 1].max() < 160
+    labels.set_texts(["HHH", "HHH"], [(-2, 0, 0), (2, 0, 2)], 1.0, green)
+    left, right = np.split(bench.picture().astype(int), 2, axis=1)
+    assert right[..., 1].max() == 255
+    assert 100 < left[..., 1].max() < 160
+
+
 def test_texts_without_room_are_a_problem(bench: SceneBench) -> None:
     from rosglass.scene.drawing import Labels
 

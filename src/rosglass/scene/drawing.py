@@ -866,6 +866,7 @@ class Labels(Drawable):
 
     Attributes:
         texts: One for each; several lines are allowed.
+        extents: (n, 2), letters of the longest line of each, and how many lines it has.
         positions: (n, 3), metres; where the middle of each is, or of its left or upper edge.
         heights: Of a line, in metres, or in pixels of the screen.
         colors: (n, 4) RGBA bytes.
@@ -882,6 +883,7 @@ class Labels(Drawable):
     ) -> None:
         super().__init__()
         self.texts: tuple[str, ...] = ()
+        self.extents = np.zeros((0, 2))
         self.positions: NDArray[np.float32] = np.zeros((0, 3), np.float32)
         self.heights: NDArray[np.float32] = np.zeros(0, np.float32)
         self.colors: NDArray[np.uint8] = np.zeros((0, 4), np.uint8)
@@ -911,6 +913,9 @@ class Labels(Drawable):
         cut = tuple(text[: self.MAX_LENGTH] for text in texts)
         if cut != self.texts:
             self.texts = cut
+            lines = [text.split("\n") for text in cut]
+            extents = [(max(map(len, one)), len(one)) for one in lines]
+            self.extents = np.array(extents, np.float64).reshape(-1, 2)
             self.texts_changed += 1
         self.positions = at
         self.heights = np.broadcast_to(np.asarray(heights, np.float32), len(at)).copy()

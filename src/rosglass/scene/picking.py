@@ -287,21 +287,16 @@ def _pick_map(
 def _pick_labels(
     labels: Labels, pose: NDArray[np.float64], camera: Camera, x: float, y: float
 ) -> tuple[int, NDArray[np.float64]] | None:
-    places = labels.positions @ pose[:3, :3].T + pose[:3, 3]
-    best: tuple[int, NDArray[np.float64]] | None = None
-    nearest = np.inf
-    for number, (text, place) in enumerate(zip(labels.texts, places, strict=True)):
-        seen = camera.project(tuple(place))
-        if not seen.depth < nearest:
-            continue
-        height = float(labels.heights[number])
-        if not labels.in_pixels:
-            above = camera.project(tuple(place + camera.pose[:3, 1] * height))
-            height = abs(above.y - seen.y)
-        lines = text.split("\n")
-        # Only the renderer knows the letters; on average they are half as wide as a line is high.
-        width = 0.5 * height * max(len(line) for line in lines)
-        left = seen.x - (0 if labels.align == "left" else width / 2)
-        if left <= x <= left + width and abs(y - seen.y) <= height * len(lines) / 2:
-            best, nearest = (number, place), seen.depth
-    return best
+    seen, far = _project(labels.positions, pose, camera)
+    heights = labels.heights * (1 if labels.in_pixels else _units_per_metre(camera, far))
+    # Only the renderer knows the letters; on average they are half as wide as a line is high.
+    width, height = (labels.extents * (0.5, 1)).T * heights
+    with np.errstate(invalid="ignore"):
+        right = x - seen[:, 0] + (0 if labels.align == "left" else width / 2)
+        near = (far > 0) & (right >= 0) & (right <= width)
+        near &= np.abs(y - seen[:, 1]) <= height / 2
+    numbers = np.flatnonzero(near)
+    if not len(numbers):
+        return None
+    number = int(numbers[np.argmin(far[numbers])])
+    return number, (pose @ np.append(labels.positions[number].astype(np.float64), 1.0))[:3]

@@ -13,20 +13,14 @@ from __future__ import annotations
 
 import logging
 from functools import cache
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from PySide6.QtCore import QByteArray, QPointF, QSize, Qt
+from PySide6.QtCore import QByteArray, QPoint, QSize
 from PySide6.QtGui import (
     QColor,
-    QFont,
-    QFontMetricsF,
-    QImage,
-    QPainter,
-    QPainterPath,
-    QPen,
     QRhi,
     QRhiBuffer,
     QRhiCommandBuffer,
@@ -49,9 +43,11 @@ from PySide6.QtQuick import QQuickRhiItemRenderer
 from shiboken6 import Shiboken
 
 from rosglass.scene.drawing import Labels, Lines, MapImage, Mesh, Points
+from rosglass.scene.text_images import TextImage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
+    from typing import TypeAlias
 
     from numpy.typing import NDArray
     from PySide6.QtGui import QRhiResourceUpdateBatch
@@ -59,6 +55,8 @@ if TYPE_CHECKING:
 
     from rosglass.scene.camera import Camera
     from rosglass.scene.drawing import Drawable, Shape
+
+    _Drawn: TypeAlias = "_OnDevice | _LabelsPart"
 
 __all__ = ["Frame", "SceneRenderer"]
 
@@ -87,12 +85,8 @@ _INDEX_UINT32 = QRhiCommandBuffer.IndexFormat.IndexUInt32
 _MOST_PIPELINES = 64
 #: Bytes from one vertex to the next that every graphics interface takes.
 _MAX_STRIDE = 2048
-#: Pixels of a line of text in the image of labels.
-_LINE_PX = 32
-#: Pixels from the top of a line to its baseline: letters are as high up as RViz's.
-_BASELINE_PX = 26.5
-#: Width of the pen that paints the edges of letters: half of it is outside.
-_EDGE_PX = 5.0
+#: Largest width and height of an image of texts, in pixels.
+_MAX_TEXTS_PX = 4096
 
 
 class Frame(NamedTuple):
@@ -146,6 +140,8 @@ class _Device:
         self.smooth = self._sampler(QRhiSampler.Filter.Linear, QRhiSampler.AddressMode.Repeat)
         self.sharp = self._sampler(QRhiSampler.Filter.Nearest, QRhiSampler.AddressMode.ClampToEdge)
         self.white: QRhiTexture | None = None
+        #: Where the camera is, from the renderer's origin.
+        self.eye = np.zeros(3)
         self.shapes: dict[Shape, _ShapeBuffers] = {}
         #: The images of meshes by the id of their pixels.
         self.images: dict[int, _SharedImage] = {}
@@ -206,9 +202,20 @@ class _Device:
         return buffer
 
     def texture(
-        self, batch: QRhiResourceUpdateBatch, pixels: NDArray[np.uint8], old: QRhiTexture | None
+        self,
+        batch: QRhiResourceUpdateBatch,
+        pixels: NDArray[np.uint8],
+        old: QRhiTexture | None,
+        rows: tuple[int, int] | None = None,
     ) -> QRhiTexture:
-        """Upload an image of (h, w) or (h, w, 4) bytes; one that is too large is reduced."""
+        """Upload an image of (h, w) or (h, w, 4) bytes; one that is too large is reduced.
+
+        Args:
+            batch: What uploads it.
+            pixels: The image.
+            old: Its texture, which another one replaces if it has another size; None for none.
+            rows: The first row that has changed, and the one after the last; None for all.
+        """
         pixels = _reduced(pixels, self.largest_texture)
         height, width = pixels.shape[:2]
         kind = QRhiTexture.Format.R8 if pixels.ndim == 2 else QRhiTexture.Format.RGBA8
@@ -216,10 +223,13 @@ class _Device:
         if old is None or old.pixelSize() != size or old.format() != kind:
             made = self.keep(self.rhi.newTexture(kind, size))
             self.free(old)
-            old = made
+            old, rows = made, None
         assert old is not None
-        part = QRhiTextureSubresourceUploadDescription(QByteArray(pixels.tobytes()))
+        top, bottom = rows or (0, height)
+        part = QRhiTextureSubresourceUploadDescription(QByteArray(pixels[top:bottom].tobytes()))
         part.setDataStride(pixels.strides[0])
+        part.setDestinationTopLeft(QPoint(0, top))
+        part.setSourceSize(QSize(width, bottom - top))
         entry = QRhiTextureUploadEntry(0, 0, part)
         batch.uploadTexture(old, QRhiTextureUploadDescription(entry))
         return old
@@ -726,118 +736,107 @@ class _LabelsOnDevice(_OnDevice):
         self._buffer: Any = None
         self._texture: QRhiTexture | None = None
         self._painted = -1
-        self._rows = 0
-        self._places: NDArray[np.float32] = np.zeros((0, 4), np.float32)
-        self._shapes: NDArray[np.float32] = np.zeros((0, 2), np.float32)
+        self._image = TextImage(min(device.largest_texture, _MAX_TEXTS_PX))
+        self._rows = np.zeros(0, self.ROW)
+        #: Their numbers in the order in which they are drawn; None before they were uploaded.
+        self._order: NDArray[np.intp] | None = None
+        #: Squared metres from the eye, in this order.
+        self._far = np.zeros(0)
+
+    def prepare(
+        self, batch: QRhiResourceUpdateBatch, place: NDArray[np.float64], alpha: float
+    ) -> None:
+        super().prepare(batch, place, alpha)
+        # Their edges are soft: those that are far away are drawn first.
+        away = self._rows["position"] @ place[:3, :3].T + place[:3, 3] - self.device.eye
+        far = np.einsum("ij,ij->i", away, away)
+        order = np.argsort(-far, kind="stable")
+        if self._order is None or not np.array_equal(order, self._order):
+            self._buffer = self.device.fill(batch, self._buffer, self._rows[order])
+            self._order = order
+        self._far = far[order]
 
     def upload(self, batch: QRhiResourceUpdateBatch) -> None:
-        labels = self.drawable
+        labels, device = self.drawable, self.device
         if self._painted != labels.texts_changed:
             self._painted = labels.texts_changed
-            # Edges are texts of their own, below the letters.
-            edges = labels.texts if labels.outlined else ()
-            pixels, self._places, self._shapes = _paint_texts(
-                [*edges, *labels.texts], min(self.device.largest_texture, 4096), len(edges)
-            )
-            self._texture = self.device.texture(batch, pixels, self._texture)
-            self.bind((self._texture, self.device.smooth))
-            left_out = np.count_nonzero(self._shapes[len(edges) :, 1] == 0)
-            self.problem = f"{left_out} of {labels.count} texts have no room" if left_out else ""
+            top, bottom = self._image.set_texts(labels.texts, labels.outlined)
+            if top < bottom:
+                pixels = self._image.pixels
+                self._texture = device.texture(batch, pixels, self._texture, (top, bottom))
+                self.bind((self._texture, device.smooth))
+        places, shapes = self._image.places(labels.texts)
+        left_out = np.count_nonzero(shapes[:, 1] == 0)
+        self.problem = f"{left_out} of {labels.count} texts have no room" if left_out else ""
         rows = np.zeros(labels.count, self.ROW)
         rows["position"] = np.nan_to_num(labels.positions, nan=0.0, posinf=0.0, neginf=0.0)
-        rows["rgba"] = labels.colors
         # One that has no place is not shown.
         shown = np.isfinite(labels.positions).all(axis=1)
-        rows["size"] = labels.heights[:, np.newaxis] * shown[:, np.newaxis]
+        rows["size"] = shapes * labels.heights[:, np.newaxis] * shown[:, np.newaxis]
+        rows["place"], rows["rgba"] = places, labels.colors
         if labels.outlined:
-            edge = rows.copy()
-            edge["rgba"][:, :3] = 0
-            rows = np.concatenate([edge, rows])
-        rows["size"] *= self._shapes
-        rows["place"] = self._places
-        self._rows = len(rows)
-        self._buffer = self.device.fill(batch, self._buffer, rows)
+            # Edges are texts of their own, drawn before the letters, which are as far away.
+            edges = rows.copy()
+            edges["place"], _ = self._image.places(labels.texts, edges=True)
+            edges["rgba"][:, :3] = 0
+            rows = np.concatenate([edges, rows])
+        self._rows, self._order = rows, None
 
     def fill_block(self, block: NDArray[np.float32], alpha: float) -> None:
         block[0] = (1, 1, 1, self.drawable.alpha * alpha)
         align = self.drawable.align
         block[1, :3] = (self.drawable.in_pixels, align == "left", align == "below")
 
+    def parts(self, others: NDArray[np.float64]) -> Iterator[tuple[float, _LabelsPart]]:
+        """Iterate over the texts between other drawables, each with the distance of the first.
+
+        Args:
+            others: Squared metres from the eye.
+        """
+        cuts = np.searchsorted(-self._far, -others)
+        ends = np.unique(np.concatenate([[0], cuts, [len(self._far)]])).tolist()
+        for first, end in pairwise(ends):
+            yield float(self._far[first]), _LabelsPart(self, first, end - first)
+
     def draw(self, run: _Pass, blend: bool) -> None:
+        self.draw_some(run, blend, 0, len(self._rows))
+
+    def draw_some(self, run: _Pass, blend: bool, first: int, count: int) -> None:
+        """Draw those from one number to another, in their order."""
         pipeline = self.device.pipeline(
             ("labels.vert", "labels.frag"), self._LAYOUT, _QUAD, blend, self.bound
         )
         self.begin(run, pipeline)
-        run.commands.setVertexInput(0, [(self._buffer, 0)])
-        run.commands.draw(4, self._rows)
+        run.commands.setVertexInput(0, [(self._buffer, first * self.ROW.itemsize)])
+        run.commands.draw(4, count)
 
     def close(self) -> None:
         super().close()
         self.device.free(self._buffer, self._texture)
 
 
-def _paint_texts(
-    texts: Sequence[str], limit: int, edges: int = 0
-) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.float32]]:
-    """Paint texts into one image.
+class _LabelsPart(NamedTuple):
+    """Texts that are drawn one after the other, between other translucent drawables.
 
-    Args:
-        texts: The texts.
-        limit: Largest width and height of the image, in pixels.
-        edges: How many of the first ones are painted with their edges.
-
-    Returns:
-        The image (h, w), one byte for each pixel; place of each text as shares of it (left, top,
-        width, height); width and height of each in lines, 0 for texts for which there is no room.
+    Attributes:
+        labels: All texts.
+        first: Number of the first one, in the order in which they are drawn.
+        size: How many.
     """
-    font = QFont("DejaVu Sans")
-    font.setPixelSize(int(_LINE_PX * 0.75))
-    metrics = QFontMetricsF(font)
-    boxes = []
-    for text in texts:
-        lines = text.split("\n") or [""]
-        wide = max(metrics.horizontalAdvance(line) for line in lines)
-        boxes.append((min(int(wide) + 5, limit - 2), min(len(lines) * _LINE_PX, limit - 2)))
-    places, x, y, row, width = [], 0, 0, 0, 1
-    for wide, high in boxes:
-        if x and x + wide > limit // 2:
-            x, y, row = 0, y + row, 0
-        places.append((x, y))
-        # A gap: pixels between two texts are a mix of both.
-        x, row, width = x + wide + 2, max(row, high + 2), max(width, x + wide)
-    height = min(max(y + row, 1), limit)
-    width = min(width, limit)
-    image = QImage(width, height, QImage.Format.Format_Alpha8)
-    image.fill(0)
-    painter = QPainter(image)
-    painter.setFont(font)
-    painter.setPen(Qt.GlobalColor.white)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    pen = QPen(Qt.GlobalColor.white, _EDGE_PX)
-    for index, (text, (left, top), (wide, high)) in enumerate(
-        zip(texts, places, boxes, strict=True)
-    ):
-        painter.setClipRect(left, top, wide, high)
-        for number, line in enumerate(text.split("\n")):
-            at = QPointF(left + 2, top + number * _LINE_PX + _BASELINE_PX)
-            if index < edges:
-                path = QPainterPath()
-                path.addText(at, font, line)
-                painter.strokePath(path, pen)
-            else:
-                painter.drawText(at, line)
-    painter.end()
-    view = np.frombuffer(image.constBits(), np.uint8).reshape(height, image.bytesPerLine())
-    sizes = np.array(boxes, np.float32).reshape(-1, 2)
-    # What does not fit into the image is not shown.
-    bottom = np.array(places, np.float32).reshape(-1, 2)[:, 1] + sizes[:, 1]
-    sizes[bottom > height] = 0
-    shares: NDArray[np.float32] = np.concatenate(
-        [np.array(places, np.float32).reshape(-1, 2), sizes], axis=1
-    )
-    shares /= np.array([width, height, width, height], np.float32)
-    # A copy: the image frees its pixels.
-    return view[:, :width].copy(), shares, sizes / np.float32(_LINE_PX)
+
+    labels: _LabelsOnDevice
+    first: int
+    size: int
+
+    @property
+    def drawable(self) -> Labels:
+        """What they are part of."""
+        drawable: Labels = self.labels.drawable
+        return drawable
+
+    def draw(self, run: _Pass, blend: bool) -> None:
+        """Draw them."""
+        self.labels.draw_some(run, blend, self.first, self.size)
 
 
 _KINDS: dict[type, type[_OnDevice]] = {
@@ -939,12 +938,12 @@ class SceneRenderer(QQuickRhiItemRenderer):
             depth = camera.projection[3] @ self._view_of(camera)
             pixels = abs(float(camera.projection[1, 1])) * size.height() / 2
             run = _Pass(commands, viewport, self._thinning(device, frame), depth, pixels)
-            for on_device, blend in ready:
+            for one, blend in ready:
                 try:
-                    on_device.draw(run, blend)
+                    one.draw(run, blend)
                 except Exception as error:  # noqa: PERF203 - the others are drawn all the same
                     _log.exception("the 3D view")
-                    problem = f"{type(on_device.drawable).__name__} cannot be drawn: {error}"
+                    problem = f"{type(one.drawable).__name__} cannot be drawn: {error}"
         except Exception as error:
             _log.exception("the 3D view")
             problem = f"the 3D view cannot draw: {error}"
@@ -962,15 +961,17 @@ class SceneRenderer(QQuickRhiItemRenderer):
 
     def _prepare(
         self, device: _Device, frame: Frame, batch: QRhiResourceUpdateBatch
-    ) -> tuple[list[tuple[_OnDevice, bool]], str]:
+    ) -> tuple[list[tuple[_Drawn, bool]], str]:
         """Upload what has changed; return what to draw in which order, and what cannot be drawn."""
         eye = np.array(frame.camera.eye)
         if np.abs(eye - self._origin).max() > _ORIGIN_STEP_M:
             self._origin = np.round(eye)
         origin = self._origin
+        device.eye = eye - origin
         self._send_camera(device, frame, batch)
-        opaque: list[tuple[_OnDevice, bool]] = []
-        blended: list[tuple[int, float, int, _OnDevice]] = []
+        opaque: list[tuple[_Drawn, bool]] = []
+        blended: list[tuple[int, float, int, _Drawn]] = []
+        texts: list[tuple[int, _LabelsOnDevice]] = []
         problem = ""
         for one in self._on_device.values():
             one.seen = False
@@ -991,6 +992,8 @@ class SceneRenderer(QQuickRhiItemRenderer):
                 continue
             if drawable.opaque and alpha >= 0.9998:
                 opaque.append((on_device, False))
+            elif isinstance(on_device, _LabelsOnDevice):
+                texts.append((drawable.layer, on_device))
             else:
                 box = drawable.bounds() if isinstance(drawable, Mesh) else None
                 middle = (
@@ -1002,6 +1005,10 @@ class SceneRenderer(QQuickRhiItemRenderer):
             if not one.seen:
                 one.close()
                 del self._on_device[drawable]
+        others = np.array([-far for _, far, _, _ in blended])
+        for layer, labels in texts:
+            for far, part in labels.parts(others):
+                blended.append((layer, -far, len(blended), part))
         return [*opaque, *((one, True) for *_, one in sorted(blended))], problem
 
     def _view_of(self, camera: Camera) -> NDArray[np.float64]:

@@ -1,8 +1,8 @@
 """The displays Marker and MarkerArray: shapes, lines, points, meshes and texts that robots send.
 
 Messages are turned into records of numpy arrays in the node's thread, all markers of one at once.
-Boxes, spheres, cylinders and arrows of one namespace are instances of one mesh, so that ten
-thousand of them are drawn at once.
+Those of one namespace are drawn together (:mod:`rosglass.scene.displays.marker_batches`), except
+for meshes, lists of points and triangles, and lines that are long or translucent.
 """
 # ruff: noqa: N815 - the names of properties are QML's
 
@@ -13,7 +13,7 @@ import math
 import time
 from copy import copy
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar, cast
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -23,6 +23,7 @@ from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot, is_alive
 from rosglass.scene.display import OUTDATED_ALPHA, Status, TopicDisplay
+from rosglass.scene.displays.marker_batches import LineBatch, SolidBatch, TextBatch
 from rosglass.scene.displays.robot_model import STL_ENDINGS, MeshFiles, material_of
 from rosglass.scene.displays.shapes import poses_matrices
 from rosglass.scene.drawing import (
@@ -120,6 +121,9 @@ _MAX_NAMESPACES = 2000
 _MAX_MESHES, _MAX_KEPT_BYTES, _MAX_READING = 200, 256 << 20, 1000
 #: Bytes of the meshes and textures of all markers of a display.
 _MAX_MESH_BYTES = 2 << 30
+#: Markers of a group that are drawn on their own, up to which translucent lines are, too: these are
+#: sorted by their distance.
+_MAX_SORTED = 100
 #: Lines of the status, and markers whose problems are known.
 _MAX_LINES, _MAX_PROBLEMS = 50, 1000
 
@@ -361,83 +365,7 @@ def _points_problem(kind: int, count: int) -> str:
     return ""
 
 
-class _Batch:
-    """Shapes of one kind in one namespace: instances of one mesh, with a slot for each marker."""
-
-    def __init__(self, shape: Shape, owner: Any) -> None:
-        self.mesh = Mesh(shape)
-        self.mesh.owner = owner
-        self._slots: dict[tuple[str, int], int] = {}
-        self._keys: list[tuple[str, int]] = []
-        self._matrices = np.zeros((16, 4, 4), np.float32)
-        self._colors = np.zeros((16, 4), np.float32)
-        #: What was put since the last flush, by slot: pose of its frame, matrix there, color.
-        self._changed: dict[int, tuple[Matrix, Matrix, tuple[float, ...]]] = {}
-        self._dirty = True
-
-    def put(
-        self, key: tuple[str, int], pose: Matrix, place: Matrix, color: tuple[float, ...]
-    ) -> None:
-        """Draw a marker, in place of the one of the same key.
-
-        Args:
-            key: Its namespace and id.
-            pose: Of its frame.
-            place: Pose and size in this frame.
-            color: RGBA.
-        """
-        slot = self._slots.get(key)
-        if slot is None:
-            slot = self._slots[key] = len(self._keys)
-            self._keys.append(key)
-        self._changed[slot] = (pose, place, color)
-
-    def discard(self, key: tuple[str, int]) -> None:
-        """Do not draw a marker any more."""
-        slot = self._slots.pop(key, None)
-        if slot is None:
-            return
-        # The last one takes its place.
-        last, end = self._keys.pop(), len(self._keys)
-        changed = self._changed.pop(end, None)
-        if slot != end:
-            self._keys[slot] = last
-            self._slots[last] = slot
-            if changed is not None:
-                self._changed[slot] = changed
-            else:
-                self._changed.pop(slot, None)
-                self._matrices[slot], self._colors[slot] = self._matrices[end], self._colors[end]
-        self._dirty = True
-
-    def key_of(self, index: int) -> tuple[str, int]:
-        """Return the marker of an instance."""
-        return self._keys[index]
-
-    def flush(self) -> None:
-        """Give the mesh what has changed."""
-        count = len(self._keys)
-        if self._changed:
-            while count > len(self._matrices):
-                self._matrices = np.concatenate([self._matrices, np.zeros_like(self._matrices)])
-                self._colors = np.concatenate([self._colors, np.zeros_like(self._colors)])
-            slots = list(self._changed)
-            poses, places, colors = zip(*self._changed.values(), strict=True)
-            first = poses[0]
-            if all(pose is first for pose in poses):
-                at = first
-            else:
-                at = np.concatenate(poses).reshape(-1, 4, 4)
-            with np.errstate(over="ignore", invalid="ignore"):
-                self._matrices[slots] = at @ np.concatenate(places).reshape(-1, 4, 4)
-            self._colors[slots] = colors
-        elif not self._dirty:
-            return
-        self._changed.clear()
-        self._dirty = False
-        self.mesh.set_instances(
-            self._matrices[:count].copy(), self._colors[:count].copy() if count else (1,) * 4
-        )
+_B = TypeVar("_B", LineBatch, TextBatch)
 
 
 class MarkerGroup:
@@ -450,18 +378,24 @@ class MarkerGroup:
     def __init__(self, owner: Any) -> None:
         self.root = Group()
         self._owner = owner
-        self._batches: dict[Shape, _Batch] = {}
+        self._batches: dict[Shape, SolidBatch] = {}
         #: What those that are instances consist of.
         self._solids: dict[tuple[str, int], tuple[Shape, ...]] = {}
-        #: Drawables of markers that are not instances.
+        #: Batches of lines by their width and whether they are opaque, and of texts; the last one
+        #: takes further markers.
+        self._lines: dict[tuple[float, bool], list[LineBatch]] = {}
+        self._texts: list[TextBatch] = []
+        #: Those of markers that are lines or texts.
+        self._batch_of: dict[tuple[str, int], LineBatch | TextBatch] = {}
+        #: Drawables of markers that are drawn on their own.
         self._own: dict[tuple[str, int], Group] = {}
-        #: What those of texts and meshes look like.
+        #: What those of meshes look like.
         self._looks: dict[tuple[str, int], tuple[Any, ...]] = {}
 
-    def _batch(self, shape: Shape) -> _Batch:
+    def _batch(self, shape: Shape) -> SolidBatch:
         found = self._batches.get(shape)
         if found is None:
-            found = self._batches[shape] = _Batch(shape, self._owner)
+            found = self._batches[shape] = SolidBatch(shape, self._owner)
             self.root.add(found.mesh)
         return found
 
@@ -477,11 +411,16 @@ class MarkerGroup:
                 self._batch(shape).put(key, pose, local, marker.color)
             return
         place = pose @ marker.pose
-        # Textures and texts are uploaded again only if they changed; a mesh that is read is empty.
+        if marker.kind == TEXT:
+            self._put_text(marker, place[:3, 3])
+            return
+        if self._are_joined(marker):
+            self._put_lines(marker, place)
+            return
+        # Textures are uploaded again only if they changed; a mesh that is read is empty.
         look: tuple[Any, ...] = ()
-        if marker.kind in (TEXT, MESH):
-            look = (marker.kind, marker.scale, marker.color, marker.text)
-            look += (marker.resource, marker.embedded)
+        if marker.kind == MESH:
+            look = (marker.scale, marker.color, marker.resource, marker.embedded)
         own = self._own.get(key)
         if own and look and self._looks.get(key) == look:
             own.pose = place
@@ -497,6 +436,43 @@ class MarkerGroup:
             self._looks[key] = look
         self.root.add(group)
 
+    def _put_text(self, marker: MarkerRecord, position: NDArray[np.float64]) -> None:
+        text = marker.text[: Labels.MAX_LENGTH]
+        batch = self._join(marker.key, self._texts, text, lambda: TextBatch(self._owner))
+        batch.put(marker.key, text, position, abs(marker.scale[2]), marker.color)
+
+    def _are_joined(self, marker: MarkerRecord) -> bool:
+        """Return whether a marker is lines that are drawn together with others."""
+        if marker.kind not in (LINE_STRIP, LINE_LIST):
+            return False
+        if not 2 <= len(marker.points) <= LineBatch.MAX_MARKER_POINTS:
+            return False
+        is_sorted = len(self._own) < _MAX_SORTED or marker.key in self._own
+        return marker.color[3] >= OPAQUE or not is_sorted
+
+    def _put_lines(self, marker: MarkerRecord, pose: NDArray[np.float64]) -> None:
+        width, is_opaque = abs(marker.scale[0]), marker.color[3] >= OPAQUE
+        batches = self._lines.setdefault((width, is_opaque), [])
+        batch = self._join(
+            marker.key, batches, marker.points, lambda: LineBatch(width, self._owner)
+        )
+        batch.put(marker.key, pose, marker.points, _line_colors(marker), marker.kind == LINE_STRIP)
+
+    def _join(
+        self, key: tuple[str, int], batches: list[_B], data: Any, create: Callable[[], _B]
+    ) -> _B:
+        """Return the batch that a marker is in, or that it comes into."""
+        batch = self._batch_of.get(key)
+        for one in batches:
+            if one is batch and one.has_room(key, data):
+                return one
+        self.remove(key)
+        if not batches or not batches[-1].has_room(key, data):
+            batches.append(create())
+            self.root.add(batches[-1].drawable)
+        self._batch_of[key] = batches[-1]
+        return batches[-1]
+
     def remove(self, key: tuple[str, int]) -> None:
         """Do not draw a marker any more."""
         group = self._own.pop(key, None)
@@ -506,16 +482,31 @@ class MarkerGroup:
             group.clear()  # a group and its items know each other, and would stay in memory
         for shape in self._solids.pop(key, ()):
             self._batches[shape].discard(key)
+        batch = self._batch_of.pop(key, None)
+        if batch is not None:
+            batch.discard(key)
 
     @property
     def is_empty(self) -> bool:
         """Whether it has no marker."""
-        return not self._own and not self._solids
+        return not (self._own or self._solids or self._batch_of)
 
     def flush(self) -> None:
         """Draw what has changed since the last call."""
-        for batch in self._batches.values():
-            batch.flush()
+        for solids in self._batches.values():
+            solids.flush()
+        self._texts = _flushed(self._texts)
+        lines = {look: _flushed(batches) for look, batches in self._lines.items()}
+        self._lines = {look: batches for look, batches in lines.items() if batches}
+
+
+def _flushed(batches: list[_B]) -> list[_B]:
+    """Draw what has changed in batches; return those that are not empty."""
+    for batch in batches:
+        batch.flush()
+        if not len(batch):
+            batch.drawable.remove()
+    return [batch for batch in batches if len(batch)]
 
 
 def _scaled(x: float, y: float, z: float, along: float = 0.0) -> NDArray[np.float64]:
@@ -566,13 +557,11 @@ def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]
     each = marker.colors if len(marker.colors) == len(points) else marker.color
     if kind in (LINE_STRIP, LINE_LIST):
         lines = Lines(abs(x), in_metres=True)
-        if not isinstance(each, tuple) and marker.color[3] >= OPAQUE:
-            # As in RViz, points are translucent only if the marker is.
-            each = np.column_stack([each[:, :3], np.ones(len(each), np.float32)])
+        tints = _line_colors(marker)
         if kind == LINE_STRIP:
-            lines.set_strip(points, each)
+            lines.set_strip(points, tints)
         else:
-            colors = each if isinstance(each, tuple) else each.reshape(-1, 2, 4)
+            colors = tints if isinstance(tints, tuple) else tints.reshape(-1, 2, 4)
             lines.set_segments(points.reshape(-1, 2, 3), colors)
         yield lines
     elif kind in _POINT_STYLES:
@@ -583,10 +572,6 @@ def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]
         cloud.pose = np.diag([*sides, 1.0])
         cloud.set_look(style=_POINT_STYLES[kind], size=abs(x))
         yield cloud
-    elif kind == TEXT:
-        labels = Labels()
-        labels.set_texts([marker.text], [[0, 0, 0]], abs(z), marker.color)
-        yield labels
     elif kind == TRIANGLE_LIST:
         # RViz does not light what has colors of its own.
         own = len(marker.colors) in (len(marker.points), len(marker.points) // 3)
@@ -596,6 +581,16 @@ def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]
         yield from _arrow_strip(marker)
     elif kind == MESH:
         yield from meshes.of(marker)
+
+
+def _line_colors(marker: MarkerRecord) -> NDArray[np.float32] | tuple[float, ...]:
+    """Return the colours of lines, of all points or for each."""
+    if len(marker.colors) != len(marker.points):
+        return marker.color
+    if marker.color[3] < OPAQUE:
+        return marker.colors
+    # As in RViz, points are translucent only if the marker is.
+    return np.column_stack([marker.colors[:, :3], np.ones(len(marker.colors), np.float32)])
 
 
 def _list_colors(colors: Any) -> NDArray[np.float32]:

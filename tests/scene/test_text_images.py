@@ -1,0 +1,83 @@
+"""The image of texts that the 3D view draws."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.usefixtures("app")
+
+
+def part(image: Any, text: str, edges: bool = False) -> Any:
+    """Return the pixels of a text."""
+    left, top, wide, high = image._boxes[text, edges]
+    return image.pixels[top : top + high, left : left + wide]
+
+
+def test_only_texts_that_are_new_are_painted() -> None:
+    from rosglass.scene.text_images import TextImage
+
+    image = TextImage(4096)
+    assert image.set_texts(["one", "two"]) == (0, len(image.pixels))
+    one = part(image, "one").copy()
+    assert one.max() == 255
+    assert not np.array_equal(one, part(image, "two"))
+    assert image.set_texts(["two", "one", "one"]) == (0, 0)
+    # Without room, all that are there are painted anew, with room for further ones.
+    assert image.set_texts(["one", "three"]) == (0, len(image.pixels))
+    assert ("two", False) not in image._boxes
+    assert np.array_equal(part(image, "one"), one)
+    pixels = image.pixels
+    top, bottom = image.set_texts(["one", "four"])
+    assert image.pixels is pixels
+    assert 0 <= top < bottom <= len(pixels)
+    assert part(image, "four").max() == 255
+    assert np.array_equal(part(image, "one"), one)
+
+
+def test_an_image_of_ever_other_texts_stays_small() -> None:
+    from rosglass.scene.text_images import TextImage
+
+    image = TextImage(4096)
+    kept = [f"label {number}" for number in range(50)]
+    sizes = set()
+    for number in range(500):
+        image.set_texts([*kept, f"{number} m/s"])
+        sizes.add(image.pixels.size)
+    assert len(sizes) < 10
+    assert max(sizes) < 4 * min(sizes)
+    assert len(image._boxes) < 200
+
+
+def test_texts_have_places_and_sizes_in_lines_or_no_room() -> None:
+    from rosglass.scene.text_images import TextImage
+
+    image = TextImage(256)
+    texts = ["a", "b\nc", "", "wide " * 100]
+    image.set_texts(texts)
+    places, sizes = image.places(texts)
+    assert sizes[:, 1].tolist() == [1, 2, 1, 1]
+    assert (sizes[3, 0], places.min(), places.max()) == (254 / 32, 0, 1)
+    many = [f"text {number}" for number in range(100)]
+    image.set_texts(many)
+    _, sizes = image.places(many)
+    assert 0 < np.count_nonzero(sizes[:, 1]) < 100
+    assert max(image.pixels.shape) <= 256
+    image.set_texts(many[-3:])
+    _, sizes = image.places(many[-3:])
+    assert sizes[:, 1].tolist() == [1, 1, 1]
+
+
+def test_edges_are_texts_of_their_own_around_the_letters() -> None:
+    from rosglass.scene.text_images import TextImage
+
+    image = TextImage(4096)
+    image.set_texts(["one"], outlined=True)
+    letters, edges = part(image, "one"), part(image, "one", edges=True)
+    assert edges.shape == letters.shape
+    assert np.count_nonzero(edges) > 1.5 * np.count_nonzero(letters)
+    inner, outer = image.places(["one"]), image.places(["one"], edges=True)
+    assert not np.array_equal(inner[0], outer[0])
+    assert np.array_equal(inner[1], outer[1])
