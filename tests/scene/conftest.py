@@ -110,10 +110,12 @@ class SceneBench:
         import numpy as np
         from PySide6.QtGui import QImage
 
+        from rosglass.qml.image_sinks import grab
+
         # What has changed is drawn after a pause, in which the last picture would be grabbed.
         for view in (self.view, *self.view.findChildren(type(self.view))):
             view.update()
-        image = self.window.grabWindow().convertToFormat(QImage.Format.Format_RGB888)
+        image = grab(self.window).convertToFormat(QImage.Format.Format_RGB888)
         rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
         return rows[:, : image.width() * 3].reshape(image.height(), image.width(), 3).copy()
 

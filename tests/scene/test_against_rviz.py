@@ -160,8 +160,10 @@ class Pair:
         """Return our picture."""
         from PySide6.QtCore import QCoreApplication
 
+        from rosglass.qml.image_sinks import grab
+
         QCoreApplication.processEvents()
-        return _pixels(self.window.grabWindow())
+        return _pixels(grab(self.window))
 
     def close(self) -> None:
         from rosglass.qt import send_deferred_deletes

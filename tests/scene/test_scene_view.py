@@ -981,6 +981,79 @@ def test_a_view_that_leaves_its_window_frees_what_it_made_there(bench: SceneBenc
     bench.picture()
 
 
+def boxes_in_a_row(count: int) -> list[Any]:
+    """Return red boxes beside each other, as drawables of their own."""
+    from rosglass.scene.drawing import BOX, Mesh, instance_matrix
+
+    made = [Mesh(BOX, (1.0, 0.0, 0.0, 1.0), lit=False) for _ in range(count)]
+    for number, box in enumerate(made):
+        box.pose = instance_matrix((0.0, 1.5 * (number - count // 2), 0.0))
+    return made
+
+
+def test_what_is_new_is_uploaded_over_several_pictures(
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene import renderer as module
+
+    view = bench.load()
+    bench.picture()
+    (renderer,) = view._renderers
+    shown: list[tuple[int, bool]] = []
+    prepare = renderer._prepare
+
+    def watched(*args: Any) -> Any:
+        found = prepare(*args)
+        shown.append((len(renderer._on_device), renderer.is_complete))
+        return found
+
+    clock = itertools.count()
+    monkeypatch.setattr(renderer, "_prepare", watched)
+    # Each upload takes as long as the budget.
+    monkeypatch.setattr(module.time, "perf_counter", lambda: float(next(clock)))
+    before = len(renderer._on_device)
+    boxes = boxes_in_a_row(4)
+    view.scene.root.add(*boxes)
+    assert view.is_complete
+    bench.wait(lambda: shown and view.is_complete)
+    assert shown == [(before + n, n == 4) for n in (1, 2, 3, 4)]
+    # What is there is uploaded at once when it changes.
+    for box in boxes:
+        box.set_instances(np.eye(4)[np.newaxis])
+    drawn = view.pictures_drawn()
+    bench.wait(lambda: view.pictures_drawn() > drawn)
+    assert view.is_complete
+
+
+def test_a_grabbed_picture_shows_all(bench: SceneBench, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rosglass.scene import renderer as module
+
+    view = bench.load()
+    bench.picture()
+    boxes = boxes_in_a_row(4)
+    view.scene.root.add(*boxes)
+    expected = bench.picture()
+    clock = itertools.count()
+    monkeypatch.setattr(module.time, "perf_counter", lambda: float(next(clock)))
+    for box in boxes:
+        box.remove()
+    bench.picture()
+    view.scene.root.add(*boxes)
+    view.update()
+    bench.window.grabWindow()
+    assert not view.is_complete
+    assert np.array_equal(bench.picture(), expected)
+    # One that is hidden does not wait for more.
+    for box in boxes:
+        box.remove()
+    bench.picture()
+    view.scene.root.add(*boxes)
+    view.update()
+    bench.window.grabWindow()
+    view.setProperty("visible", False)
+    bench.picture()
+
+
 def test_texts_are_drawn_between_what_is_translucent_by_their_distance(bench: SceneBench) -> None:
     from rosglass.scene.drawing import BOX, Labels, Mesh, instance_matrix
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rosglass.qml.image_rendering import Picture
 
 
-__all__ = ["ImageItem", "Sink", "all_items", "is_painted", "window_of"]
+__all__ = ["ImageItem", "Sink", "all_items", "grab", "is_painted", "window_of"]
 
 
 def window_of(item: QtQuick.QQuickItem) -> QtQuick.QQuickWindow | None:
@@ -37,11 +37,32 @@ def window_of(item: QtQuick.QQuickItem) -> QtQuick.QQuickWindow | None:
 def all_items() -> Iterator[QtQuick.QQuickItem]:
     """Yield the items of all windows."""
     for window in QtGui.QGuiApplication.allWindows():
-        items = [window.contentItem()] if isinstance(window, QtQuick.QQuickWindow) else []
-        while items:
-            item = items.pop()
-            yield item
-            items += item.childItems()
+        if isinstance(window, QtQuick.QQuickWindow):
+            yield from _items_of(window)
+
+
+def _items_of(window: QtQuick.QQuickWindow) -> Iterator[QtQuick.QQuickItem]:
+    items = [window.contentItem()]
+    while items:
+        item = items.pop()
+        yield item
+        items += item.childItems()
+
+
+def grab(window: QtQuick.QQuickWindow) -> QtGui.QImage:
+    """Return a picture of a window that shows all that there is.
+
+    A ``SceneView`` (``is_complete``) uploads large data over several pictures.
+    """
+    drawn = -1
+    while True:
+        image = window.grabWindow()
+        views: list[Any] = [
+            item for item in _items_of(window) if not getattr(item, "is_complete", True)
+        ]
+        before, drawn = drawn, sum(view.pictures_drawn() for view in views)
+        if not views or drawn == before:  # such as a view that is hidden
+            return image
 
 
 def is_painted(window: QtQuick.QQuickWindow) -> bool:

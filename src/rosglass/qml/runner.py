@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import QmlError
+from rosglass.qml.image_sinks import grab
 from rosglass.qml.live_file import (
     ERRORS,
     ERRORS_BELOW,
@@ -252,7 +253,7 @@ class Runner(QtCore.QObject):
     def grab(self) -> QtGui.QImage:
         """Return an image of the window; a null image if there is no window."""
         window = self.window
-        return QtGui.QImage() if window is None else window.grabWindow()
+        return QtGui.QImage() if window is None else grab(window)
 
     def exit(self, code: int) -> None:
         """End the program; may be called before the event loop runs."""

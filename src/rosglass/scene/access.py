@@ -15,7 +15,7 @@ from PySide6.QtQuick import QQuickWindow
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error
-from rosglass.qml.image_sinks import window_of
+from rosglass.qml.image_sinks import grab, window_of
 from rosglass.qml.modules import locate
 from rosglass.qml.runtime import runtime_of
 from rosglass.qt import QtCore, QtGui, Slot, is_alive
@@ -431,7 +431,7 @@ class ScenePicker(Picker):
         if self._access.is_drawing:
             raise Error("this cannot be called while the view is being drawn; use Qt.callLater()")
         self._view.update()  # a change may wait for its picture
-        return window.grabWindow()
+        return grab(window)
 
 
 class SceneTool(tools.Tool):

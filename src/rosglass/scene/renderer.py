@@ -12,6 +12,7 @@ or a pass open.
 from __future__ import annotations
 
 import logging
+import time
 from functools import cache
 from itertools import pairwise, product
 from pathlib import Path
@@ -85,6 +86,8 @@ _INDEX_UINT32 = QRhiCommandBuffer.IndexFormat.IndexUInt32
 _MOST_PIPELINES = 64
 #: Bytes from one vertex to the next that every graphics interface takes.
 _MAX_STRIDE = 2048
+#: Seconds of a picture in which drawables are uploaded that are new; the others follow in the next.
+_UPLOAD_S = 0.03
 #: Largest width and height of an image of texts, in pixels.
 _MAX_TEXTS_PX = 4096
 
@@ -871,6 +874,10 @@ class SceneRenderer(QQuickRhiItemRenderer):
         self._failure = ""
         #: How many pictures were drawn.
         self.count = 0
+        #: Whether the last picture shows all; otherwise, the next ones upload the rest.
+        self.is_complete = True
+        #: Seconds that drawing the last picture took.
+        self._drawn_s = 0.0
 
     def initialize(self, commands: QRhiCommandBuffer) -> None:  # noqa: ARG002 - Qt's signature
         """Start using a graphics interface, or a target of other samples."""
@@ -929,6 +936,7 @@ class SceneRenderer(QQuickRhiItemRenderer):
         except Exception as error:
             _log.exception("the 3D view")
             ready, problem = [], f"the 3D view cannot draw: {error}"
+        began = time.perf_counter()
         target = self.renderTarget()
         commands.beginPass(target, frame.background, QRhiDepthStencilClearValue(1.0, 0), batch)
         try:
@@ -949,6 +957,9 @@ class SceneRenderer(QQuickRhiItemRenderer):
             problem = f"the 3D view cannot draw: {error}"
         finally:
             commands.endPass()
+        self._drawn_s = time.perf_counter() - began
+        if not self.is_complete:
+            self.update()
         self.count += 1
         self._report(self._failure or problem)
 
@@ -975,8 +986,15 @@ class SceneRenderer(QQuickRhiItemRenderer):
         problem = ""
         for one in self._on_device.values():
             one.seen = False
+        self.is_complete = True
+        # As long as drawing takes: with many drawables, there would be too many pictures else.
+        left_s = max(_UPLOAD_S, self._drawn_s)
         for drawable, pose, alpha in frame.drawables:
             on_device = self._on_device.get(drawable)
+            is_new, began = on_device is None, time.perf_counter()
+            if is_new and left_s <= 0:
+                self.is_complete = False
+                continue
             try:
                 if on_device is None:
                     on_device = _KINDS[type(drawable)](device, drawable)
@@ -990,6 +1008,8 @@ class SceneRenderer(QQuickRhiItemRenderer):
             except Exception as error:  # the others are drawn all the same
                 problem = f"{type(drawable).__name__} of {drawable.owner}: {error}"
                 continue
+            finally:
+                left_s -= time.perf_counter() - began if is_new else 0.0
             if drawable.opaque and alpha >= 0.9998:
                 opaque.append((on_device, False))
             elif isinstance(on_device, _LabelsOnDevice):

@@ -639,6 +639,11 @@ class SceneView(QQuickRhiItem):
         self._turning.stop()
 
     @property
+    def is_complete(self) -> bool:
+        """Whether the last picture showed all: new data is uploaded over several pictures."""
+        return all(one.is_complete for one in self._renderers if Shiboken.isValid(one))
+
+    @property
     def frames_drawn(self) -> int:
         """How many pictures were drawn."""
         return self._painted
