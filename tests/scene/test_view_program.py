@@ -876,6 +876,19 @@ def test_tools_are_added_and_removed_in_the_tool_bar(bench: SceneBench, window: 
     assert "there is no tool" in tools.addTool("Hammer")
 
 
+def test_a_narrow_window_has_all_buttons(bench: SceneBench, window: Any) -> None:
+    from PySide6.QtCore import QObject, QPointF
+
+    buttons = [window.findChild(QObject, name) for name in ("addTool", "removeTool", "rightDock")]
+    window.setWidth(700)
+
+    def right_edges() -> list[float]:
+        return [one.mapToScene(QPointF(one.width(), 0)).x() for one in buttons]
+
+    bench.wait(lambda: max(right_edges()) <= 700, right_edges)
+    assert buttons[0].mapToScene(QPointF(0, 0)).y() >= 20, "in the second line"
+
+
 def test_docks_are_hidden_as_the_config_says_and_saved(
     bench: SceneBench, window: Any, tmp_path: Path
 ) -> None:

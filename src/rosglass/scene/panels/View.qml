@@ -54,65 +54,68 @@ ApplicationWindow {
             anchors.fill: parent
             active: window.drawn
             sourceComponent: RowLayout {
-                ToolButton { text: "Open"; onClicked: window.openOther() }
-                ToolButton { text: "Save"; onClicked: window.save() }
-                ToolButton { text: "Save as"; onClicked: saving.ask(null) }
-                ToolSeparator { }
-                Repeater {
-                    model: scene.tools.all
-                    ToolButton {
-                        required property var modelData
+                // In a narrow window, tools go on in further lines.
+                Flow {
+                    Layout.fillWidth: true
+                    ToolButton { text: "Open"; onClicked: window.openOther() }
+                    ToolButton { text: "Save"; onClicked: window.save() }
+                    ToolButton { text: "Save as"; onClicked: saving.ask(null) }
+                    ToolSeparator { height: 26 }
+                    Repeater {
+                        model: scene.tools.all
+                        ToolButton {
+                            required property var modelData
 
-                        text: modelData.name
-                        down: modelData.selected ? true : undefined
-                        // Keys are the view's.
-                        focusPolicy: Qt.NoFocus
-                        onClicked: modelData.select()
-                        PlainToolTip {
-                            visible: parent.hovered
-                            plain: modelData.description + (modelData.shortcutKey ? " (" + modelData.shortcutKey.toUpperCase() + ")" : "")
+                            text: modelData.name
+                            down: modelData.selected ? true : undefined
+                            // Keys are the view's.
+                            focusPolicy: Qt.NoFocus
+                            onClicked: modelData.select()
+                            PlainToolTip {
+                                visible: parent.hovered
+                                plain: modelData.description + (modelData.shortcutKey ? " (" + modelData.shortcutKey.toUpperCase() + ")" : "")
+                            }
                         }
                     }
-                }
-                ToolButton {
-                    objectName: "addTool"
-                    text: "+"
-                    onClicked: newTools.popup()
-                    PlainToolTip { visible: parent.hovered; plain: "Add a tool" }
-                    Menu {
-                        id: newTools
-                        Repeater {
-                            model: scene.tools.choices
-                            MenuItem {
-                                required property var modelData
-                                text: modelData.name
-                                contentItem: Label { text: parent.text; textFormat: Text.PlainText }
-                                onTriggered: program.say(scene.tools.addTool(modelData.type))
-                                PlainToolTip { visible: parent.hovered; plain: parent.modelData.description }
+                    ToolButton {
+                        objectName: "addTool"
+                        text: "+"
+                        onClicked: newTools.popup()
+                        PlainToolTip { visible: parent.hovered; plain: "Add a tool" }
+                        Menu {
+                            id: newTools
+                            Repeater {
+                                model: scene.tools.choices
+                                MenuItem {
+                                    required property var modelData
+                                    text: modelData.name
+                                    contentItem: Label { text: parent.text; textFormat: Text.PlainText }
+                                    onTriggered: program.say(scene.tools.addTool(modelData.type))
+                                    PlainToolTip { visible: parent.hovered; plain: parent.modelData.description }
+                                }
+                            }
+                        }
+                    }
+                    ToolButton {
+                        objectName: "removeTool"
+                        text: "−"
+                        enabled: scene.tools.all.length > 1
+                        onClicked: oldTools.popup()
+                        PlainToolTip { visible: parent.hovered; plain: "Remove a tool" }
+                        Menu {
+                            id: oldTools
+                            Repeater {
+                                model: scene.tools.all
+                                MenuItem {
+                                    required property var modelData
+                                    text: modelData.name
+                                    contentItem: Label { text: parent.text; textFormat: Text.PlainText }
+                                    onTriggered: scene.tools.removeTool(modelData)
+                                }
                             }
                         }
                     }
                 }
-                ToolButton {
-                    objectName: "removeTool"
-                    text: "−"
-                    enabled: scene.tools.all.length > 1
-                    onClicked: oldTools.popup()
-                    PlainToolTip { visible: parent.hovered; plain: "Remove a tool" }
-                    Menu {
-                        id: oldTools
-                        Repeater {
-                            model: scene.tools.all
-                            MenuItem {
-                                required property var modelData
-                                text: modelData.name
-                                contentItem: Label { text: parent.text; textFormat: Text.PlainText }
-                                onTriggered: scene.tools.removeTool(modelData)
-                            }
-                        }
-                    }
-                }
-                Item { Layout.fillWidth: true }
                 ToolButton {
                     objectName: "reset"
                     text: "Reset"
