@@ -817,9 +817,16 @@ def test_a_display_is_chosen_from_a_list_that_is_filtered(bench: SceneBench, win
     bench.wait(lambda: not dialog.property("visible"))
     open_dialog()
     assert choices.property("count") == 2
+    window.grabWindow()
+    rows.click(middle_of(0))
+    rows.key("Down")
+    rows.key("Return")
+    assert rows.scene.displays[4].topic == "/plan1"
+    bench.wait(lambda: not dialog.property("visible"))
+    open_dialog()
     rows.key("Escape")
     bench.wait(lambda: not dialog.property("visible"))
-    assert len(rows.scene.displays) == 4
+    assert len(rows.scene.displays) == 5
 
 
 def test_reset_in_the_tool_bar_drops_what_was_received(bench: SceneBench, window: Any) -> None:

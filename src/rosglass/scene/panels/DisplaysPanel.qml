@@ -358,6 +358,8 @@ Pane {
                 // The first match of a filter: Enter adds it.
                 onModelChanged: currentIndex = filter.text && adding.found.length > 0 ? 0 : -1
                 ScrollBar.vertical: ScrollBar { }
+                Keys.onReturnPressed: if (adding.chosen) adding.accept()
+                Keys.onEnterPressed: if (adding.chosen) adding.accept()
                 delegate: ItemDelegate {
                     id: choice
 
@@ -371,7 +373,8 @@ Pane {
                         Label { Layout.fillWidth: true; text: choice.modelData.topic || choice.modelData.display; textFormat: Text.PlainText; elide: Text.ElideRight; color: parent.tint }
                         Label { visible: choice.modelData.topic !== ""; text: choice.modelData.display; textFormat: Text.PlainText; color: parent.tint }
                     }
-                    onClicked: choices.currentIndex = index
+                    focusPolicy: Qt.NoFocus
+                    onClicked: { choices.currentIndex = index; choices.forceActiveFocus() }
                     onDoubleClicked: { choices.currentIndex = index; adding.accept() }
                 }
                 Label {
