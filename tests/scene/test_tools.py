@@ -881,6 +881,29 @@ def test_an_own_tool_in_qml_gets_points(bench: SceneBench, hand: Hand) -> None:
     assert view.controller.yaw == yaw
 
 
+def test_points_keep_the_digits_of_utm_coordinates(bench: SceneBench, hand: Hand) -> None:
+    view = bench.load(
+        'tool: "Mark"; property var seen: []\n'
+        'Tool { name: "Mark"; onReleased: (event) => seen.push(event.point.x, event.ground.y) }'
+    )
+    at = (500123.4, 5400987.6, 0.0)
+    view.controller.focal_point = at
+    add_box(view, at)
+    hand.click((200, 150))
+    seen = view.property("seen").toVariant()
+    assert seen == [view.pick(200, 150).point[0], pytest.approx(at[1], abs=1e-5)]
+    points: list[Any] = []
+    tool = view.tools.find("PublishPoint")
+    tool.pointSet.connect(points.append)
+    view.tools.select(tool)
+    hand.move((200, 150))
+    hand.click((200, 150))
+    assert points[0]["x"] == seen[0]
+    view.tool = "SetGoal"
+    hand.press((200, 150))
+    assert "[500123.4, 5400987.6] m, 0.0 degrees" in view.statusText
+
+
 def test_an_own_tool_in_python_may_fail(bench: SceneBench, hand: Hand, caplog: Any) -> None:
     from rosglass.scene.tools import Tool
 

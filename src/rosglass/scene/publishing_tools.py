@@ -14,7 +14,7 @@ from rosglass.comm.qos import QoS
 from rosglass.errors import Error
 from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.properties import ReadOnly, report
-from rosglass.qt import QtCore, QtGui, Signal, Slot, is_alive
+from rosglass.qt import QtCore, Signal, Slot, is_alive
 from rosglass.scene.displays.shapes import ArrowShapes
 from rosglass.scene.drawing import instance_matrix
 from rosglass.scene.events import Button
@@ -27,7 +27,7 @@ from rosglass.scene.rviz_formats import (
     write_topic,
 )
 from rosglass.scene.settings import Setting
-from rosglass.scene.tools import PointerEvent, Tool, point_text
+from rosglass.scene.tools import MAP, PointerEvent, Tool, point_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -556,8 +556,8 @@ class PublishPointTool(PublishingTool):
         "Single click", "bool", True, "Switch away from this tool after one click."
     )
 
-    #: A point was published: x, y and z in metres, in the fixed frame.
-    pointSet = Signal(QtGui.QVector3D)
+    #: A point was published: its x, y and z in metres, in the fixed frame.
+    pointSet = Signal(MAP)
 
     def activate(self) -> None:
         """Say what to do."""
@@ -577,7 +577,7 @@ class PublishPointTool(PublishingTool):
         fields = dict(zip("xyz", point, strict=True))
         self.send({"header": self.header(), "point": fields}, f"Point {point_text(point)}")
         if is_alive(self):
-            self.pointSet.emit(QtGui.QVector3D(*point))
+            self.pointSet.emit(fields)
         if self.singleClick:
             self.finish()
 

@@ -13,8 +13,6 @@ from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
-import numpy as np
-
 from rosglass.comm.names import similar
 from rosglass.errors import ArgumentError, Error
 from rosglass.qml.element import Element, single_shot
@@ -39,7 +37,7 @@ if TYPE_CHECKING:
     from rosglass.scene.selection import Selection
     from rosglass.scene.views import ViewController
 
-__all__ = ["DEFAULT_TOOLS", "PointerEvent", "Tool", "ToolView", "Tools"]
+__all__ = ["DEFAULT_TOOLS", "MAP", "PointerEvent", "Tool", "ToolView", "Tools"]
 
 _log = logging.getLogger("rosglass.scene")
 
@@ -58,7 +56,7 @@ DEFAULT_TOOLS = (
 #: Milliseconds that the status bar shows the outcome of a tool, e.g. what was published.
 _OUTCOME_MS = 5000
 #: Types of Qt by name, which PySide's hints do not have.
-_MAP: Any = "QVariantMap"
+MAP: Any = "QVariantMap"
 _LIST: Any = "QVariantList"
 _Cursor = QtCore.Qt.CursorShape
 #: Cursors for what a drag of the camera does.
@@ -171,14 +169,15 @@ class PointerEvent:
             "button": int(self.button),
             "buttons": int(self.buttons),
             "modifiers": int(self.modifiers),
-            "point": _vector(self.point),
-            "ground": _vector(self.ground),
+            "point": _xyz(self.point),
+            "ground": _xyz(self.ground),
             "display": str(getattr(display, "name", "")),
         }
 
 
-def _vector(point: Point | None) -> QtGui.QVector3D | None:
-    return None if point is None else QtGui.QVector3D(*point)
+def _xyz(point: Point | None) -> dict[str, float] | None:
+    # No QVector3D: of UTM coordinates, its float32 keep half a metre.
+    return None if point is None else point._asdict()
 
 
 class Tool(Configurable, Element):
@@ -204,12 +203,12 @@ class Tool(Configurable, Element):
 
     nameChanged = Signal()
     #: A button, or a finger, was pressed; with what :meth:`PointerEvent.for_qml` returns.
-    pressed = Signal(_MAP)
+    pressed = Signal(MAP)
     #: The mouse or the finger has moved, also without a button.
-    moved = Signal(_MAP)
-    released = Signal(_MAP)
+    moved = Signal(MAP)
+    released = Signal(MAP)
     #: A key was pressed that is not the shortcut of a tool.
-    keyPressed = Signal(_MAP)
+    keyPressed = Signal(MAP)
     #: It has become the current tool, or another one has.
     selectedChanged = Signal()
     statusTextChanged = Signal()
@@ -932,5 +931,5 @@ def camera_cursor(event: PointerEvent) -> QtCore.Qt.CursorShape:
 
 
 def point_text(point: Iterable[float]) -> str:
-    """Return a point for the status bar."""
-    return "[" + ", ".join(f"{number:.4g}" for number in np.asarray(list(point))) + "]"
+    """Return a point for the status bar, in metres to the millimetre, also of UTM coordinates."""
+    return "[" + ", ".join(f"{round(number, 3) + 0.0:.12g}" for number in point) + "]"
