@@ -1070,6 +1070,25 @@ def test_a_publisher_has_the_qos_of_the_file(bench: SceneBench) -> None:
     bench.wait(lambda: received)
 
 
+def test_a_goal_goes_to_the_topic_that_was_just_set(bench: SceneBench, nav2: Any) -> None:
+    view = bench.load('SetGoalTool { topic: "/robot1/goal_pose" }')
+    before = listen(bench, "/robot1/goal_pose", "geometry_msgs/PoseStamped")
+    after = listen(bench, "/robot2/goal_pose", "geometry_msgs/PoseStamped")
+    view.tool = "SetGoal"
+    goal = view.tools.current
+    bench.wait(lambda: goal._endpoint is not None and goal._endpoint.subscription_count())
+    goal.topic = "/robot2/goal_pose"
+    goal.send_pose(1.0, 2.0, 0.0)
+    bench.wait(lambda: after)
+    driver = Driver(nav2)
+    goal.action = "navigate_to_pose"
+    goal.send_pose(3.0, 2.0, 0.0)
+    bench.wait(lambda: driver.goals)
+    goal.cancelGoal()
+    bench.wait(lambda: not goal.goalActive)
+    assert (len(before), len(after)) == (0, 1)
+
+
 def test_the_default_topic_of_the_other_rviz_is_none(bench: SceneBench) -> None:
     tools = bench.load().tools
     old = {"Class": "rviz/SetGoal", "Topic": "/move_base_simple/goal"}

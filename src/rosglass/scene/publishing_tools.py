@@ -159,6 +159,7 @@ class PublishingTool(Tool):
             text: What it is, for the status bar, e.g. ``Goal at [1, 2]``.
         """
         self._drop("another one followed")
+        self._run_update()  # the topic may just have been set
         sender, why = self._endpoint, self._disconnected()
         # In ROS 1, subscribers stay connected without the master.
         if why and (sender is None or not self._subscribers()):
