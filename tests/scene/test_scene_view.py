@@ -324,6 +324,24 @@ def test_what_follows_a_frame_fades_as_soon_as_nobody_publishes_it(
     assert axes.root.alpha < 1.0
 
 
+def test_a_broken_display_keeps_no_other_from_fading(
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass import Time
+    from rosglass.scene import display as displays
+    from rosglass.tf import Transform, TransformBroadcaster
+
+    monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 0.1)
+    view = bench.load('AxesDisplay {} AxesDisplay { frame: "tool" }')
+    broken, axes = view.scene.displays
+    monkeypatch.setattr(broken, "followed_frames", lambda: 1 / 0)
+    broadcaster = TransformBroadcaster(bench.robot)
+    pose = Transform((0, 0, 2), (0, 0, 0, 1), Time.from_parts(7, 0), "map", "tool")
+    bench.wait(lambda: broadcaster.send_transform(pose) or axes.statusLevel == "ok")
+    bench.wait(lambda: "[tool] may be somewhere else" in axes.statusText)
+    assert "ZeroDivisionError" in broken.statusText
+
+
 def test_transforms_in_the_namespace_of_the_node_have_publishers(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

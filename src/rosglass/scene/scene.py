@@ -397,7 +397,7 @@ class Scene(Element):
         node = self.node
         self.has_tf_publishers = node is not None and bool(node.publishers("tf"))
         for display in self._alive():
-            display.check_frames()
+            self._call(display, lambda one: one.check_frames())
 
     def _check_transforms(self) -> None:
         """Say that none are received, that they are mixed, or that there is no fixed frame."""
@@ -560,8 +560,8 @@ class Scene(Element):
 
         def restart(display: Display) -> None:
             display._close_endpoint()
-            display.reset()
             display._schedule()
+            display.reset()
 
         self._reset_at = time.monotonic()
         for one in self._resources:
@@ -572,15 +572,21 @@ class Scene(Element):
 
     def _each(self, job: Callable[[Display], None]) -> None:
         for display in self._alive():
-            if display.shown:
-                try:
-                    job(display)
-                    display.delete_status("Display")
-                except TransformException as error:
-                    display.set_status("Transform", "error", str(error))
-                except Exception as error:
-                    _log.exception("%s", display.label)
-                    display.set_status("Display", "error", repr(error))
+            if display.shown and self._call(display, job):
+                display.delete_status("Display")
+
+    def _call(self, display: Display, job: Callable[[Display], None]) -> bool:
+        """Return whether a job has not failed; otherwise the display says so, and others go on."""
+        try:
+            job(display)
+        except TransformException as error:
+            display.set_status("Transform", "error", str(error))
+        except Exception as error:
+            _log.exception("%s", display.label)
+            display.set_status("Display", "error", repr(error))
+        else:
+            return True
+        return False
 
     def _alive(self) -> Iterator[Display]:
         return (display for display in self.displays if is_alive(display))
