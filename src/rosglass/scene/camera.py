@@ -157,11 +157,6 @@ class Camera:
             matrix[2, 3] = -2 * self.near
         return matrix
 
-    @cached_property
-    def matrix(self) -> Matrix:
-        """The matrix from the fixed frame to OpenGL's clip space; see :attr:`projection`."""
-        return self.projection @ self.view
-
     def project(self, point: Sequence[float]) -> Seen:
         """Return where a point is seen.
 
@@ -182,26 +177,6 @@ class Camera:
         x, y = clip[:2] / clip[3]
         depth = float(np.linalg.norm(from_eye[:3]))
         return Seen(float((x + 1) / 2 * width), float((1 - y) / 2 * height), depth)
-
-    def unproject(self, x: float, y: float, depth: float) -> Point | None:
-        """Return the point of the fixed frame that is seen at a place.
-
-        Args:
-            x: Units of the item, from its left edge.
-            y: The same, from its upper edge.
-            depth: What the depth buffer holds there, 0 (near) to 1.
-
-        Returns:
-            Metres; None where there is nothing, i.e. depth 1.
-        """
-        if not (0 <= depth < 1 and math.isfinite(x) and math.isfinite(y)):
-            return None
-        width, height = self.size
-        seen = np.array([2 * x / width - 1, 1 - 2 * y / height, 2 * depth - 1, 1.0])
-        found = self.pose @ np.linalg.solve(self.projection, seen)
-        if not np.isfinite(found).all() or not found[3]:
-            return None
-        return point_of(found[:3] / found[3])
 
     def ray(self, x: float, y: float) -> tuple[Point, Point]:
         """Return the ray from the camera through a place of the picture, in the fixed frame.

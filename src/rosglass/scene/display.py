@@ -1,6 +1,6 @@
 """Base classes of displays: settings, status, the topic, and the place in the fixed frame.
 
-A display is a QML object inside a ``SceneView``, or is added with ``view.displays``. It fills its
+A display is a QML object inside a ``SceneView``, or is added with ``view.scene.add``. It fills its
 :attr:`Display.root` with drawables (:mod:`rosglass.scene.drawing`). One that shows messages derives
 from :class:`TopicDisplay` and implements :meth:`TopicDisplay.show`.
 """
@@ -29,7 +29,7 @@ from rosglass.qml.properties import ReadOnly, Writable, report
 from rosglass.qt import Signal, Slot, is_alive
 from rosglass.scene.declared import expect_view, find_view
 from rosglass.scene.drawing import Group, check_numbers, instance_matrix
-from rosglass.scene.rviz_formats import TopicSetting, read_topic, write_topic
+from rosglass.scene.rviz_formats import FIXED_FRAME, TopicSetting, read_topic, write_topic
 from rosglass.scene.settings import Configurable, Setting
 
 if TYPE_CHECKING:
@@ -48,7 +48,6 @@ if TYPE_CHECKING:
     from rosglass.scene.scene import Scene
 
 __all__ = [
-    "FIXED_FRAME",
     "MOST_WAITING",
     "OUTDATED_ALPHA",
     "Display",
@@ -65,8 +64,6 @@ __all__ = [
 _log = logging.getLogger("rosglass.scene")
 _T = TypeVar("_T")
 
-#: RViz's word for the fixed frame in settings that name a frame.
-FIXED_FRAME = "<Fixed Frame>"
 _LEVELS = ("ok", "warn", "error")
 #: The policy that matches every publisher; RViz does not have it.
 BEST_AVAILABLE = "Best Available"

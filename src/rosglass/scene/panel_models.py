@@ -16,6 +16,7 @@ from rosglass.qml.properties import Writable
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.scene.display import OneTopicDisplay
 from rosglass.scene.display_configs import GroupDisplay, UnknownDisplay, duplicate_display
+from rosglass.scene.rviz_formats import FIXED_FRAME
 from rosglass.scene.scene_view import SceneView
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ _REFRESH_MS = 250
 _MAX_PARTS, _MAX_NAME_LENGTH = 2000, 200
 #: Shares of a group's row at which a display is dropped above or below it, not into it.
 _EDGE = 0.25
-_FIXED_FRAME, _BACKGROUND = "Fixed Frame", "Background Color"
+_FRAME_ROW, _BACKGROUND = "Fixed Frame", "Background Color"
 
 
 class PanelRow(NamedTuple):
@@ -176,8 +177,7 @@ class DisplaysModel(QAbstractListModel):
             return
         self._view = view
         if view is not None:
-            view.scene.displayAdded.connect(lambda _: self.refresh())
-            view.scene.displayRemoved.connect(lambda _: self.refresh())
+            view.scene.displaysChanged.connect(self.refresh)
         self.viewChanged.emit()
         self._follow()
 
@@ -272,7 +272,7 @@ class DisplaysModel(QAbstractListModel):
         if key in self._expanded:
             frames = tuple(scene.frames())
             yield PanelRow(
-                (*key, _FIXED_FRAME), 1, _FIXED_FRAME, "frame", scene.fixed_frame,
+                (*key, _FRAME_ROW), 1, _FRAME_ROW, "frame", scene.fixed_frame,
                 "The frame in which everything is placed.", choices=frames,
             )  # fmt: skip
             yield PanelRow(
@@ -377,7 +377,7 @@ class DisplaysModel(QAbstractListModel):
         if setting.kind.NAME == "enum":
             return tuple(setting.kind.options["choices"])
         if setting.kind.NAME == "frame" and display.scene is not None:
-            return ("<Fixed Frame>", *display.scene.frames())
+            return (FIXED_FRAME, *display.scene.frames())
         if setting.kind.NAME == "topic" and isinstance(display, OneTopicDisplay):
             wanted = display.SUGGESTED or display.MESSAGES
             return tuple(name for name, kinds in self._topics() if set(kinds) & set(wanted))
@@ -441,7 +441,7 @@ class DisplaysModel(QAbstractListModel):
             elif display is not None and display.parts and path in display.parts.details:
                 detail = display.parts.details[path]
                 display.parts.set(part, path, _value(detail, text))
-            elif path == _FIXED_FRAME:
+            elif path == _FRAME_ROW:
                 view.scene.fixed_frame = text
             elif path == _BACKGROUND:
                 color = QColor(text)

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "COLOR_TRANSFORMERS",
-    "POSITION_TRANSFORMERS",
     "AxisColor",
     "ColorTransformer",
     "FlatColor",
@@ -332,8 +331,6 @@ COLOR_TRANSFORMERS: dict[str, type[ColorTransformer]] = {
     "RGB8": Rgb8,
     "RGBF32": RgbF32,
 }
-#: RViz's position transformers. RViz's needs float32; ours takes any type.
-POSITION_TRANSFORMERS = ("XYZ",)
 
 
 def supported_color_transformers(layout: CloudLayout) -> list[str]:

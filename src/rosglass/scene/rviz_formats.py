@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "DISPLAYS",
+    "FIXED_FRAME",
     "TOOLS",
     "VIEWS",
     "DescriptionSetting",
@@ -49,6 +50,9 @@ __all__ = [
     "write_marker_namespace",
     "write_topic",
 ]
+
+#: The word for the fixed frame in settings that name a frame.
+FIXED_FRAME = "<Fixed Frame>"
 
 # -- classes of plugins ----------------------------------------------------------------------------
 

@@ -65,10 +65,7 @@ class Scene(Element):
     #: The picture has changed.
     changed = Signal()
     fixedFrameChanged = Signal()
-    #: A display was added: itself.
-    displayAdded = Signal(object)
-    #: A display was removed: itself.
-    displayRemoved = Signal(object)
+    #: Displays were added, removed or moved.
     displaysChanged = Signal()
     #: Transforms were received, or data has to be placed anew.
     placed = Signal()
@@ -190,7 +187,6 @@ class Scene(Element):
             # The others are shown all the same.
             _log.exception("%s", display.label)
             display.set_status("Setup", "error", repr(error))
-        self.displayAdded.emit(display)
         self.displaysChanged.emit()
 
     def remove(self, display: Display) -> None:
@@ -206,7 +202,6 @@ class Scene(Element):
                 self.remove(inner)
         self._displays.remove(display)
         display.leave()
-        self.displayRemoved.emit(display)
         self.displaysChanged.emit()
         display.deleteLater()
 

@@ -30,11 +30,11 @@ from rosglass.scene.events import Button, Modifier, Touch, Wheel
 from rosglass.scene.picking import pick
 from rosglass.scene.renderer import Frame, SceneRenderer
 from rosglass.scene.rviz_config import RvizConfig, ToolConfig, ViewConfig
-from rosglass.scene.rviz_formats import ros_of
+from rosglass.scene.rviz_formats import FIXED_FRAME, ros_of
 from rosglass.scene.scene import Scene
 from rosglass.scene.selection import Selection
 from rosglass.scene.tools import PointerEvent, Tool, Tools
-from rosglass.scene.views import FIXED_FRAME, VIEWS, create_view
+from rosglass.scene.views import VIEWS, create_view
 
 if TYPE_CHECKING:
     import os

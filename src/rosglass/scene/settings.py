@@ -1,4 +1,4 @@
-"""Settings of displays, tools and views: RViz's properties, as QML properties.
+"""Settings of displays and tools: RViz's properties, as QML properties.
 
 A class body says ``cellSize = Setting("Cell Size", "float", 1.0, "metres", min=0.0001)``. That
 makes the QML property ``cellSize``, refuses values that do not fit, and reads and writes the value

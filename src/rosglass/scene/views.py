@@ -29,6 +29,7 @@ from rosglass.scene.camera import (
     unit,
 )
 from rosglass.scene.events import Action, Button, Drag, Modifier, Touch, Wheel
+from rosglass.scene.rviz_formats import FIXED_FRAME
 from rosglass.scene.view_settings import (
     MAX_NAME_LENGTH,
     ChoiceSetting,
@@ -47,7 +48,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 __all__ = [
-    "FIXED_FRAME",
     "VIEWS",
     "FPSView",
     "FocalShape",
@@ -60,8 +60,6 @@ __all__ = [
     "create_view",
 ]
 
-#: The target frame that stands for the scene's fixed frame, as RViz writes it.
-FIXED_FRAME = "<Fixed Frame>"
 #: Height of an orthographic camera above its target frame, as in RViz.
 _ORTHO_HEIGHT_M = 500.0
 #: Radians of rotation for each unit that the mouse moves.

@@ -52,13 +52,11 @@ def test_a_scale_is_units_of_the_item_per_metre() -> None:
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_depth_and_place_lead_back_to_the_point(camera: Camera) -> None:
+def test_the_ray_of_a_place_leads_back_to_the_point(camera: Camera) -> None:
     for point in ((0.0, 0.0, 0.0), (2.0, 1.0, 1.5), (1.0, -1.0, -1.0)):
-        clip = camera.matrix @ (*point, 1)
-        depth = (clip[2] / clip[3] + 1) / 2
-        assert 0 < depth < 1
+        clip = camera.projection @ camera.view @ (*point, 1)
+        assert 0 < (clip[2] / clip[3] + 1) / 2 < 1
         seen = camera.project(point)
-        assert camera.unproject(seen.x, seen.y, depth) == pytest.approx(point, abs=1e-6)
         origin, direction = camera.ray(seen.x, seen.y)
         along = np.subtract(point, origin)
         assert np.cross(along, direction) == pytest.approx((0, 0, 0), abs=1e-9)
@@ -68,9 +66,9 @@ def test_depth_and_place_lead_back_to_the_point(camera: Camera) -> None:
 
 def test_the_near_plane_is_at_depth_minus_1_and_far_away_is_1() -> None:
     camera = looking((-5, 0, 0), (0, 0, 0))
-    near = camera.matrix @ (-5 + camera.near, 0, 0, 1)
+    near = camera.projection @ camera.view @ (-5 + camera.near, 0, 0, 1)
     assert near[2] / near[3] == pytest.approx(-1)
-    far = camera.matrix @ (1e12, 0, 0, 1)
+    far = camera.projection @ camera.view @ (1e12, 0, 0, 1)
     assert far[2] / far[3] == pytest.approx(1)
 
 
@@ -79,8 +77,6 @@ def test_nothing_is_seen_behind_the_camera_or_at_infinity() -> None:
     for point in ((-6, 0, 0), (-5, 0, 0), (math.inf, 0, 0), (math.nan, 0, 0)):
         assert all(math.isnan(number) for number in camera.project(point))
     assert all(math.isnan(number) for number in from_above().project((0, 0, 501)))
-    for place in ((400, 300, 1.0), (400, 300, -0.1), (math.nan, 300, 0.5), (400, 300, math.nan)):
-        assert camera.unproject(*place) is None
 
 
 def test_bad_cameras_and_points_are_errors_that_name_them() -> None:
@@ -162,9 +158,6 @@ def test_a_pinhole_camera_sees_points_where_its_matrix_projects_them() -> None:
     origin, direction = camera.ray(seen.x, seen.y)
     assert origin == (0, 0, 0)
     assert np.array(direction) / -direction[2] * 2 == pytest.approx([0.5, -0.3, -2])
-    clip = camera.projection @ [0.5, -0.3, -2, 1]
-    found = camera.unproject(seen.x, seen.y, (clip[2] / clip[3] + 1) / 2)
-    assert found == pytest.approx((0.5, -0.3, -2))
 
 
 def test_pinhole_cameras_differ_by_their_lens() -> None:

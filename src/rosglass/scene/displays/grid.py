@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rosglass.scene.display import FIXED_FRAME, Display
+from rosglass.scene.display import Display
 from rosglass.scene.displays.shapes import AxesShapes
 from rosglass.scene.drawing import Group, Lines
+from rosglass.scene.rviz_formats import FIXED_FRAME
 from rosglass.scene.settings import Setting, rgb_of
 
 if TYPE_CHECKING:

@@ -33,7 +33,6 @@ from rosglass.scene.drawing import Points
 from rosglass.scene.point_clouds import Cloud, CloudHistory, is_ordered, order_points
 from rosglass.scene.point_colors import (
     COLOR_TRANSFORMERS,
-    POSITION_TRANSFORMERS,
     AxisColor,
     FlatColor,
     Intensity,
@@ -293,7 +292,7 @@ class CloudDisplay(TopicDisplay):
     )  # fmt: skip
     positionTransformer = Setting(
         "Position Transformer", "enum", "", "Where positions are from; empty for x, y and z.",
-        choices=["", *POSITION_TRANSFORMERS],
+        choices=["", "XYZ"],
     )  # fmt: skip
     colorTransformer = Setting(
         "Color Transformer", "enum", "", "Where colors are from; empty for RViz's choice.",
