@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from nav2_server import Driver
+from ports import free_port
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -480,6 +481,14 @@ def test_the_command_says_what_is_wrong(
     assert done.returncode == 1
     assert text in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_picture_without_a_robot_is_noted(app: Any, tmp_path: Path) -> None:
+    picture = tmp_path / "view.png"
+    nowhere = f"zenoh://127.0.0.1:{free_port()}"
+    done = view_command("--url", nowhere, "--after", "1", "--screenshot", str(picture))
+    assert done.returncode == 0, done.stderr
+    assert f"{picture} shows no robot: " in done.stderr
 
 
 def test_the_command_shows_overlays(app: Any, tmp_path: Path) -> None:

@@ -261,10 +261,14 @@ class Picture:
 
 
 def _save_connected(app: Application, target: Path) -> None:
-    """Save a picture; raise Error as well if there is no connection, as for a mistake in --url."""
+    """Save a picture; raise Error as well if there will be no connection, as with a wrong --url."""
     _save(app, target)
-    if app.session.state == "failed":
-        raise Error(f"{target} shows no robot: {app.session.detail}")
+    state = app.session.state
+    text = f"{target} shows no robot: {app.session.detail or state}"
+    if state == "failed":
+        raise Error(text)
+    if state in ("connecting", "lost"):
+        note(text)
 
 
 def _save(app: Application, target: Path) -> None:
