@@ -549,7 +549,7 @@ class _PointsOnDevice(_OnDevice):
         channel = points.channel if points.channel >= 0 else points.position
         thin = max(min(run.thin, _MAX_STRIDE // points.stride), 1)
         #: Vertices of each point.
-        each = {"quads": 4, "boxes": 36}.get(vertex, 1)
+        each = {"quads": 4, "boxes": 18}.get(vertex, 1)
         layout = (
             ((points.stride * thin, each > 1),),
             (

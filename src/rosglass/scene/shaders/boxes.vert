@@ -9,20 +9,22 @@ const float LIGHT[6] = float[](0.6, 0.6, 1.0, 0.4, 0.5, 0.9);
 
 void main()
 {
-    int face = gl_VertexIndex / 6;
-    int corner = gl_VertexIndex - face * 6;
-    // Two triangles: corners 0 1 2, 2 1 3 of the face.
+    // Of the two sides across to each axis, only the one towards the eye can be seen.
+    int axis = gl_VertexIndex / 6;
+    int corner = gl_VertexIndex - axis * 6;
+    // Two triangles: corners 0 1 2, 2 1 3 of the side.
     int at = corner < 3 ? corner : (corner == 3 ? 2 : (corner == 4 ? 1 : 3));
-    float w = (face & 1) == 0 ? -0.5 : 0.5;
+    vec4 middle = frame.view * (object.model * vec4(position, 1.0));
+    vec3 along = (frame.view * object.model[axis]).xyz;
+    float w = dot(along, frame.viewport.w > 0.5 ? vec3(0.0, 0.0, 1.0) : -middle.xyz) > 0.0 ? 0.5 : -0.5;
     // Counter-clockwise from outside: the inner sides are not drawn.
     float u = (float(at & 1) - 0.5) * w * 2.0;
     float v = float(at >> 1) - 0.5;
-    int axis = face >> 1;
     vec3 offset = axis == 0 ? vec3(w, u, v) : (axis == 1 ? vec3(v, w, u) : vec3(u, v, w));
     vec4 tint = point_colour(position, channel);
-    v_colour = vec4(tint.rgb * LIGHT[face], tint.a);
+    v_colour = vec4(tint.rgb * LIGHT[axis * 2 + (w > 0.0 ? 1 : 0)], tint.a);
     v_corner = vec2(u, v) * 2.0;
     gl_Position = is_finite(position)
-        ? frame.projection * (frame.view * (object.model * vec4(position + offset * size_in_metres(position), 1.0)))
+        ? frame.projection * (middle + frame.view * (object.model * vec4(offset * size_in_metres(position), 0.0)))
         : NOWHERE;
 }
