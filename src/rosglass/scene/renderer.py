@@ -796,8 +796,10 @@ class _LabelsOnDevice(_OnDevice):
         Args:
             others: Squared metres from the eye.
         """
-        cuts = np.searchsorted(-self._far, -others)
-        ends = np.unique(np.concatenate([[0], cuts, [len(self._far)]])).tolist()
+        ends = [0, len(self._far)]
+        if len(self._far) > 1:
+            cuts = np.searchsorted(-self._far, -others)
+            ends = np.unique(np.concatenate([ends, cuts])).tolist()
         for first, end in pairwise(ends):
             yield float(self._far[first]), _LabelsPart(self, first, end - first)
 
