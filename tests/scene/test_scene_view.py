@@ -1174,7 +1174,7 @@ def test_mistakes_in_qml_are_errors_that_name_the_line(
         "4: display 'Floor' is in no view, and has no effect: put it into a SceneView { }",
         "5: tool 'Measure' is in no view",
         "6: SceneOverlay is in no view",
-        "7: display: expected an ImageDisplay or a CameraDisplay, got ",
+        "7: display: expected an ImageDisplay or a CameraDisplay, got PathDisplay",
         "8: display 'Path' is in no view",
         "9: SceneView: view: there is no view",
         "9: SceneView: tool: there is no tool 'Mesure' in this view; did you mean Measure?",

@@ -75,7 +75,7 @@ def test_a_topic_that_is_none_is_a_status_until_it_is_one(bench: SceneBench) -> 
 
 
 def test_the_status_says_why_nothing_was_received(
-    bench: SceneBench, monkeypatch: pytest.MonkeyPatch
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     from rosglass.qml import element
     from rosglass.scene.display import OneTopicDisplay
@@ -97,6 +97,7 @@ def test_the_status_says_why_nothing_was_received(
     bench.wait(lambda: path.statusLevel == "error")
     wrong = "Topic: the topic's type is sensor_msgs/msg/LaserScan, not nav_msgs/Path"
     assert path.statusText == wrong
+    assert f"display 'Path': /scan: {wrong[7:]}" in caplog.text
     bench.wait(lambda: scan.statusText == "Topic: No messages received on /scan")
     # It may not be the subscription of the scan that the publisher knows already.
     message = {"header": {"frame_id": "map"}, "ranges": [1.0], "range_max": 2.0}

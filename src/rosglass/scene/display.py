@@ -641,7 +641,11 @@ class OneTopicDisplay(Display):
     def _report_waiting(self) -> None:
         """Say in the status what is received, as long as that is nothing, and why."""
         if self._is_waiting():
-            self.set_status("Topic", *self._find_reason())
+            level, text = self._find_reason()
+            if level == "error" and Status(level, text) != self.status_lines.get("Topic"):
+                # For interfaces that show no status.
+                self._log(f"{self.label}: {self._resolved}: {text}", logging.WARNING)
+            self.set_status("Topic", level, text)
 
     def _find_reason(self) -> tuple[str, str]:
         """Return why nothing was received: level and text."""

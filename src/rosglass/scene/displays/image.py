@@ -772,7 +772,8 @@ class PictureItem(ImageItem):
         if display is before:
             return
         if not (display is None or isinstance(display, PictureDisplay)):
-            text = f"display: expected an ImageDisplay or a CameraDisplay, got {display!r}"
+            kind = display.metaObject().className().partition("_QML")[0]
+            text = f"display: expected an ImageDisplay or a CameraDisplay, got {kind}"
             log_from_qml("", logging.ERROR, text, declared_at(self.parent() or self))
             return
         if before is not None and is_alive(before):
