@@ -9,6 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from inside import image_of
 from waiting import at_rate
 
 from rosglass.comm import Time
@@ -53,7 +54,7 @@ def colour(root: Any) -> tuple | None:
 
     item = root.property("item")
     assert isinstance(item, ImageItem)
-    image = item._image
+    image = image_of(item)
     return None if image is None else image.pixelColor(3, 3).getRgb()[:3]
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 import pytest
+from inside import image_of
 
 from rosglass.comm import Time
 from rosglass.qml.image_sinks import ImageItem
@@ -69,7 +70,7 @@ def seen(root: Any, view: int = 0) -> np.ndarray | None:
     """Return the colours in the middle of the four quarters that an item shows."""
     item = root.property(f"view{view}")
     assert isinstance(item, ImageItem)
-    image = item._image
+    image = image_of(item)
     if image is None:
         return None
     width, height = image.width(), image.height()
@@ -153,7 +154,7 @@ def test_viewers_of_one_camera_look_at_it_differently(
     assert len(running.world.subscriptions) == 1
     assert len(conversions) == 1
     # Those that want the same are given the very same.
-    images = [root.property(f"view{i}")._image for i in (0, 2)]
+    images = [image_of(root.property(f"view{i}")) for i in (0, 2)]
     assert images[0] is images[1]
 
 
@@ -512,7 +513,7 @@ class TestReduction:
         made.close()
 
     def width(self, root: Any) -> int:
-        image = root.property("view0")._image
+        image = image_of(root.property("view0"))
         return 0 if image is None else image.width()
 
     def test_a_large_picture_is_reduced_until_it_is_needed_whole(

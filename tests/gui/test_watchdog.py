@@ -68,6 +68,11 @@ class Helper(QtCore.QObject):
         self.told.emit()
 
 
+def root_of(runner: Runner) -> Any:
+    """Return the root object of the interface that runs."""
+    return runner._live.made.root
+
+
 @pytest.fixture
 def run(
     app: Any, tmp_path: Path, caplog: Any, wait: Callable[..., None]
@@ -85,7 +90,7 @@ def run(
         runner.helper = Helper(session)
         runner.engine.rootContext().setContextProperty("helper", runner.helper)
         runner.load()
-        runner.root = runner._live.made.root
+        runner.root = root_of(runner)
         # Until the event loop is known to run, only JavaScript is looked at.
         wait(lambda: session.shared[Watchdog]._lives)
         return runner
@@ -101,8 +106,13 @@ def done(runner: Runner) -> list[str]:
     return list(value.toVariant() if hasattr(value, "toVariant") else value)
 
 
+def notes(runner: Runner, name: str = "text") -> list[str]:
+    """Return a property of each line that the panel over the interface shows."""
+    return [item.property(name) for item in runner._notice.items]
+
+
 def panel(runner: Runner) -> str:
-    return "\n".join(item.property("text") for item in runner._notice.items)
+    return "\n".join(notes(runner))
 
 
 @pytest.mark.parametrize(
@@ -131,7 +141,7 @@ def test_a_loop_without_end_is_ended_and_told_with_its_place(
     (record,) = [r for r in caplog.records if "computed for" in r.getMessage()]
     assert f"{record.pathname}:{record.lineno}" == place
     assert record.getMessage() == panel(runner)
-    assert runner._notice.items[0].property("heading").startswith("The interface below goes on")
+    assert notes(runner, "heading")[0].startswith("The interface below goes on")
 
 
 def test_a_handler_of_a_signal_from_python_is_ended_too(
@@ -273,7 +283,7 @@ def test_a_loop_without_end_while_the_file_is_loaded_is_ended(
     runner = run("", 0.5)
     runner.file.write_text(LOADING % (binding, completed))
     assert runner.reload()
-    runner.root = runner._live.made.root
+    runner.root = root_of(runner)
     wait(lambda: panel(runner))
     assert f"{runner.file}:{line}" in panel(runner)
     wait(lambda: "after" in done(runner))
@@ -289,7 +299,7 @@ def test_a_file_whose_required_properties_nobody_sets_is_refused(
     runner.file.write_text("import QtQuick 2.15\nItem { required property int number }")
     assert not runner.reload()
     assert "number was not initialized" in runner._errors.items[0].property("text")
-    assert runner._live.made.root is before
+    assert root_of(runner) is before
 
 
 def test_that_more_may_have_ended_is_told(

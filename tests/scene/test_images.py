@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from inside import endpoint_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,6 +39,16 @@ def picture_of(color: tuple[int, int, int], seconds: int = 7, **fields: Any) -> 
     }
 
 
+def shown_of(display: Any) -> Any:
+    """Return the picture that a display shows; None without one."""
+    return display._picture
+
+
+def infos_of(display: Any) -> Any:
+    """Return what receives a display's CameraInfo."""
+    return display._infos
+
+
 class Robot:
     """Publishes pictures, CameraInfo and transforms."""
 
@@ -57,7 +68,7 @@ class Robot:
 
         def shown() -> bool:
             self.images.publish(message)
-            picture = display._picture
+            picture = shown_of(display)
             return picture is not None and picture.frame.stamp.nanoseconds == nanoseconds
 
         self.bench.wait(shown)
@@ -106,7 +117,7 @@ def test_a_panel_shows_the_pictures(bench: SceneBench, load: Callable[..., Any])
     robot.show(display, 255, 0, 255)
     assert pixel(bench) == (255, 0, 255)
     display.enabled = False
-    bench.wait(lambda: display._endpoint is None)
+    bench.wait(lambda: endpoint_of(display) is None)
     assert pixel(bench, 390, 290) == (48, 48, 48), "the panel is hidden"
 
 
@@ -126,9 +137,9 @@ def test_a_panel_that_is_destroyed_ends_the_stream(
     )
     robot.show(display)
     bench.view.fixedFrame = "odom"
-    bench.wait(lambda: display._endpoint is None)
+    bench.wait(lambda: endpoint_of(display) is None)
     assert "declare ImagePanel" in display.statusText
-    assert display._picture is None
+    assert shown_of(display) is None
     bench.wait(lambda: robot.images.subscription_count() == 0)
     bench.view.fixedFrame = "map"
     robot.show(display)
@@ -220,7 +231,7 @@ def test_compressed_pictures_are_shown(bench: SceneBench, load: Callable[..., An
     )
     _, data = cv2.imencode(".png", np.full((HEIGHT, WIDTH, 3), (255, 0, 255), np.uint8))
     message = {"format": "rgb8; png compressed ", "data": data.reshape(-1)}
-    bench.wait(lambda: publisher.publish(message) or display._picture is not None)
+    bench.wait(lambda: publisher.publish(message) or shown_of(display) is not None)
     assert pixel(bench) == (255, 0, 255)
     assert robot.images.subscription_count() == 0, "raw pictures are not received"
 
@@ -321,8 +332,8 @@ def test_a_picture_may_be_of_a_region_of_the_sensor(
     region = {"x_offset": 60, "y_offset": 40, "width": WIDTH, "height": HEIGHT}
     p = [*P[:2], P[2] + 60, *P[3:6], P[6] + 40, *P[7:]]
     info = {"width": 400, "height": 300, "p": p, "roi": region}
-    before = display._infos.received
-    bench.wait(lambda: robot.infos.publish(info) or display._infos.received > before)
+    before = infos_of(display).received
+    bench.wait(lambda: robot.infos.publish(info) or infos_of(display).received > before)
     bench.wait.settled(bench.session)
     assert middle_of_ball(bench) == pytest.approx(expected(), abs=2)
 
@@ -335,7 +346,7 @@ def test_a_single_picture_is_shown_alone_until_its_transform_is_known(
     bench.wait(robot.images.subscription_count)
     robot.images.publish(picture_of((0, 0, 255), seconds=7))
     # Nothing else is received, and no transform.
-    bench.wait(lambda: display._picture is not None)
+    bench.wait(lambda: shown_of(display) is not None)
     assert pixel(bench) == (0, 0, 255)
     assert "Transform: no transform from [camera]" in display.statusText
     robot.place(7)

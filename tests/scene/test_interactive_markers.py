@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from inside import ask_again_after, endpoint_of
 from rosmaster import RosMaster
 from scene_mouse import Hand, has_color
 
@@ -390,7 +391,7 @@ def test_a_click_that_reaches_no_server_says_so(
     bench.wait(lambda: server.events(MOUSE_UP))
     assert "stop" not in bench.view.statusText
     server.ignore_feedback()
-    bench.wait(lambda: not display._endpoint.feedback.subscription_count())
+    bench.wait(lambda: not endpoint_of(display).feedback.subscription_count())
     hand.click(middle)
     text = "button stop of marker arm: sent on /server/feedback, which no server receives"
     assert bench.view.statusText == text
@@ -417,7 +418,7 @@ def test_a_drag_that_reaches_no_server_says_so(
     hand.press(hand.at((1.5, 0, 0)))
     bench.wait(lambda: server.events(MOUSE_DOWN))
     server.ignore_feedback()
-    bench.wait(lambda: not display._endpoint.feedback.subscription_count())
+    bench.wait(lambda: not endpoint_of(display).feedback.subscription_count())
     hand.move(hand.at((2.5, 0, 0)))
     hand.release(hand.at((2.5, 0, 0)))
     assert bench.view.statusText == (
@@ -821,7 +822,7 @@ def test_a_mesh_that_was_missing_is_read_again(
         assert display.status_lines["Mesh"].text == f"{uri}: the server answers 404 Not Found"
         # Reset reads everything that is missing, and a server that is down is asked again.
         web.files["/flat.obj"] = lambda request: request.send_error(503)
-        bench.view.scene._ask_again_s = 0.1
+        ask_again_after(bench.view.scene, 0.1)
         bench.view.reset()
         bench.wait(lambda: "503" in display.statusText)
         assert drawn(display) == []
@@ -931,7 +932,7 @@ def test_a_server_of_ros_1(ros1: tuple[SceneBench, RospyServer, RosMaster]) -> N
     bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
     assert place(display) == [0.0, 0.0, 0.0]
     # Without the master it stays connected, but the robot may have another one.
-    bench.wait(display._endpoint.feedback.subscription_count)
+    bench.wait(endpoint_of(display).feedback.subscription_count)
     master.kill()
     bench.wait(lambda: bench.session.state != "connected")
     bench.picture()

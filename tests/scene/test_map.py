@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from inside import endpoint_of
 
 from rosglass.scene.displays.map import palette
 
@@ -118,7 +119,7 @@ def test_updates_follow_the_topic_of_the_map(bench: SceneBench) -> None:
     }
     assert display.load_settings(saved) == []
     display.topic = "/costmap"
-    bench.wait(lambda: display._endpoint is not None)
+    bench.wait(lambda: endpoint_of(display) is not None)
     assert display._wanted()[1] == ("/costmap", "/costmap_updates")
     kept = display.save_settings(saved)["Update Topic"]
     assert kept == {"Depth": 5, "Durability Policy": "Volatile", "Value": "/costmap_updates"}

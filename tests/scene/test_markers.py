@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from inside import ask_again_after, device_of, renderers_of
 
 from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Labels, Lines, Mesh, Points, Shape
 
@@ -539,15 +540,15 @@ def test_markers_with_one_mesh_share_its_texture(
     # Each has its texture, and its colour over it.
     bench.wait(lambda: len(drawables(display)) == 4)
     bench.picture()
-    (renderer,) = bench.view._renderers
-    (image,) = renderer._device.images.values()
+    (renderer,) = renderers_of(bench.view)
+    (image,) = device_of(renderer).images.values()
     assert image.users == 2
     show({**first, "action": DELETE})
     bench.picture()
-    assert (list(renderer._device.images.values()), image.users) == ([image], 1)
+    assert (list(device_of(renderer).images.values()), image.users) == ([image], 1)
     show({**second, "action": DELETE})
     bench.picture()
-    assert renderer._device.images == {}
+    assert device_of(renderer).images == {}
 
 
 def test_meshes_have_their_textures_and_are_made_in_another_thread(
@@ -624,7 +625,7 @@ def test_meshes_of_markers_that_were_missing_are_read_again(
         mesh = marker(10, 0, mesh_resource=f"{web.url}/flat.obj", scale={"x": 1, "y": 1, "z": 0})
         display = show(mesh)
         scene = display.scene
-        scene._ask_again_s = 0.1
+        ask_again_after(scene, 0.1)
         bench.wait(lambda: display.statusLevel == "error")
         text = display.status_lines["shapes/0"].text
         assert "503 Service Unavailable; it is asked again later, by Reset at once" in text

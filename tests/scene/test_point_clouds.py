@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from inside import queue_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -497,7 +498,7 @@ class Camera:
 
     def send(self, topic: str, message: dict[str, Any], second: int = 1) -> Any:
         header = {"frame_id": "camera", "stamp": {"sec": second, "nanosec": 0}}
-        publisher, queue = self.publishers[topic], self.display._queue
+        publisher, queue = self.publishers[topic], queue_of(self.display)
         before = queue.received
         self.bench.wait(publisher.subscription_count)
         publisher.publish({"header": header, **message})

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from inside import device_of, endpoint_of, queue_of, renderers_of, runtime_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -243,13 +244,13 @@ def test_a_destroyed_view_frees_what_it_made_on_the_device(bench: SceneBench) ->
     )
     loader = view.findChild(QObject, "loader")
     bench.picture()
-    (renderer,) = loader.property("item")._renderers
-    assert renderer._device is not None
+    (renderer,) = renderers_of(loader.property("item"))
+    assert device_of(renderer) is not None
     loader.setProperty("active", False)
     # The scene graph lets go of it before the item is gone.
     bench.picture()
     send_deferred_deletes()
-    bench.wait(lambda: renderer._device is None, timeout=5)
+    bench.wait(lambda: device_of(renderer) is None, timeout=5)
 
 
 def test_a_view_that_is_destroyed_does_not_wait_for_a_file_that_is_read(
@@ -772,8 +773,8 @@ def test_displays_of_a_hidden_group_show_nothing_old_later(bench: SceneBench) ->
     from rosglass.scene.display_configs import GroupDisplay
 
     view = bench.load()
-    group = view.scene.add(GroupDisplay(view.scene, view.scene._find_runtime()))
-    path = view.scene.TYPES["Path"](view.scene, view.scene._find_runtime())
+    group = view.scene.add(GroupDisplay(view.scene, runtime_of(view.scene)))
+    path = view.scene.TYPES["Path"](view.scene, runtime_of(view.scene))
     path.group, path.topic = group, "/plan"
     view.scene.adopt(path)
     publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
@@ -792,8 +793,8 @@ def test_nothing_that_is_on_its_way_is_shown_after_a_change(bench: SceneBench, c
     view = bench.load('PathDisplay { topic: "/plan" }')
     (path,) = view.scene.displays
     publisher = bench.robot.create_publisher("/plan", "nav_msgs/Path")
-    bench.wait(lambda: path._endpoint is not None and publisher.subscription_count())
-    queue = path._queue
+    bench.wait(lambda: endpoint_of(path) is not None and publisher.subscription_count())
+    queue = queue_of(path)
     publisher.publish({"header": {"frame_id": "map"}})
     while not queue.received:
         QtCore.QThread.msleep(10)
@@ -957,8 +958,8 @@ def test_a_scene_ends_before_its_displays(bench: SceneBench, capfd: Any) -> None
     from rosglass.scene.scene import Scene
 
     view = bench.load()
-    scene = Scene(None, view.scene._find_runtime())
-    display = scene.TYPES["Grid"](view, scene._find_runtime())
+    scene = Scene(None, runtime_of(view.scene))
+    display = scene.TYPES["Grid"](view, runtime_of(scene))
     scene.adopt(display)
     for one in (scene, display):
         one.deleteLater()
@@ -986,15 +987,15 @@ def test_a_view_that_leaves_its_window_frees_what_it_made_there(bench: SceneBenc
     )
     guest = view.findChild(type(view), "guest")
     bench.picture()
-    (renderer,) = guest._renderers
-    assert renderer._device is not None
+    (renderer,) = renderers_of(guest)
+    assert device_of(renderer) is not None
     loader = view.findChild(QObject, "other")
     loader.setProperty("active", True)
     other = loader.property("item")
     bench.wait(other.isExposed)
     guest.setParentItem(other.contentItem())
-    bench.wait(lambda: guest.pictures_drawn() and renderer not in guest._renderers)
-    assert renderer._device is None
+    bench.wait(lambda: guest.pictures_drawn() and renderer not in renderers_of(guest))
+    assert device_of(renderer) is None
     guest.setParentItem(view)
     bench.picture()
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from inside import endpoint_of, queue_of
 
 from rosglass.scene.drawing import CYLINDER, SPHERE, Lines, Mesh
 
@@ -125,7 +126,7 @@ def test_each_message_of_a_history_is_shown_once_in_any_fixed_frame(
     bench.wait(view.scene.frames)
     display = view.scene.add(kind, topic="/shown", **settings)
     publisher = bench.robot.create_publisher("/shown", message)
-    bench.wait(lambda: display._endpoint is not None and publisher.subscription_count())
+    bench.wait(lambda: endpoint_of(display) is not None and publisher.subscription_count())
     for number in range(12):
         point = {"x": float(number), "y": 0.0, "z": 0.0}
         pose = {"position": point, "orientation": {"w": 1.0}}
@@ -250,7 +251,7 @@ def test_bytes_of_what_waits_are_bounded(bench: SceneBench, monkeypatch: Any) ->
     bench.wait(lambda: display.received == 11)
     assert "while more than 100, or 0 MiB, waited for their transforms" in display.statusText
     # Nor do more of them wait for the GUI thread.
-    (queue, sample) = display._queue, display._waiting[-1]
+    (queue, sample) = queue_of(display), display._waiting[-1]
     drained, _ = queue.drain()
     assert drained == []
     monkeypatch.setattr(queue, "_executor", type("", (), {"post": lambda *_: None})())

@@ -8,6 +8,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from inside import endpoint_of
 from nav2_server import Driver
 from ports import free_port
 
@@ -941,7 +942,7 @@ def test_a_goal_is_canceled_by_its_button(bench: SceneBench, window: Any, nav2: 
     goal.activate()
     button = window.findChild(QObject, "cancelGoal")
     assert not button.property("visible")
-    bench.wait(lambda: goal._endpoint is not None and goal._endpoint.ready)
+    bench.wait(lambda: endpoint_of(goal) is not None and endpoint_of(goal).ready)
     goal.send_pose(1.0, 0.0, 0.0)
     bench.wait(lambda: driver.goals)
     assert button.property("visible")

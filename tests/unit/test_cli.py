@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -37,6 +38,12 @@ def test_each_command_has_help(command: str, capsys: pytest.CaptureFixture[str])
     assert f"usage: rosglass {command}" in capsys.readouterr().out
 
 
+def subparsers_of(parser: Any) -> dict[str, Any]:
+    """Return the parsers of a parser's subcommands by name; none without any."""
+    group = parser._subparsers
+    return {} if group is None else group._group_actions[0].choices
+
+
 def test_each_subcommand_has_a_function_in_the_module_of_its_command() -> None:
     modules = {command: f"rosglass.cli.{command.replace('-', '_')}" for command in COMMANDS}
     done = run_python(
@@ -48,11 +55,8 @@ def test_each_subcommand_has_a_function_in_the_module_of_its_command() -> None:
     )
     functions = json.loads(done.stdout)
     for command in COMMANDS:
-        [commands] = build_parser(command)._subparsers._group_actions
-        parsers = [commands.choices[command]]
-        if parsers[0]._subparsers is not None:
-            [subcommands] = parsers[0]._subparsers._group_actions
-            parsers = list(subcommands.choices.values())
+        parser = subparsers_of(build_parser(command))[command]
+        parsers = list(subparsers_of(parser).values()) or [parser]
         handlers = {parser.get_default("handler") for parser in parsers}
         assert handlers <= set(functions[command]), command
 
