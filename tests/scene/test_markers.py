@@ -156,7 +156,7 @@ def test_texts_and_lines_are_drawn_together(show: Callable[..., Any]) -> None:
 def test_lines_together_look_like_each_alone(
     bench: SceneBench, show: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass.scene.displays.marker_batches import LineBatch
+    from rosglass.scene.displays import marker as module
 
     two = [RED, {"r": 0.0, "g": 1.0, "b": 0.0, "a": 0.2}]
     turned = {"position": {"x": 1.0}, "orientation": {"z": 0.38, "w": 0.92}}
@@ -169,7 +169,7 @@ def test_lines_together_look_like_each_alone(
     display = show(*markers)
     assert len(drawables(display)) == 1
     together = bench.picture()
-    monkeypatch.setattr(LineBatch, "MAX_MARKER_POINTS", 0)
+    monkeypatch.setattr(module, "MAX_JOINED_POINTS", 0)
     show(*markers)
     assert len(drawables(display)) == 3
     assert np.abs(bench.picture().astype(int) - together).max() < 3
@@ -180,7 +180,7 @@ def test_translucent_lines_are_sorted_while_there_are_few(
 ) -> None:
     from rosglass.scene.displays import marker as module
 
-    monkeypatch.setattr(module, "_MAX_SORTED", 3)
+    monkeypatch.setattr(module, "_MAX_ALONE", 3)
     line = points((0, 0, 0), (1, 0, 0))
     color = {**RED, "a": 0.5}
     strips = [marker(4, n, points=line, scale={"x": 0.1}, color=color) for n in range(10)]
@@ -191,6 +191,35 @@ def test_translucent_lines_are_sorted_while_there_are_few(
     assert sorted(one.count for one in drawables(display)) == [1, 1, 1, 7]
     show(*({**one, "color": RED} for one in strips))
     assert [(one.count, one.opaque) for one in drawables(display)] == [(10, True)]
+
+
+def test_many_triangle_lists_are_drawn_together_and_look_the_same(
+    bench: SceneBench, show: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene.displays import marker as module
+
+    corners = points((0, 0, 0), (1, 0, 0), (0, 1, 0))
+    turned = {"position": {"x": -2.0}, "orientation": {"x": 0.38, "w": 0.92}}
+    green = {"r": 0.0, "g": 1.0, "b": 0.0, "a": 1.0}
+    markers = [
+        marker(11, 0, points=corners),
+        marker(11, 1, points=corners, pose=turned, color=green, scale={"x": 2, "y": 1, "z": 1}),
+        marker(11, 2, points=corners, colors=[RED, green, RED], pose={"position": {"y": -2.0}}),
+        marker(11, 3, points=corners, color={**green, "a": 0.5}, pose={"position": {"y": 2.0}}),
+    ]
+    display = show(*markers)
+    assert len(drawables(display)) == 4
+    expected = bench.picture().astype(int)
+    show(marker(1, action=DELETE_ALL, ns=""))
+    monkeypatch.setattr(module, "_MAX_ALONE", 0)
+    show(*markers)
+    # Lit ones, one with colors of its own, and a translucent one.
+    assert [(len(one.shape.rows), one.lit) for one in drawables(display)] == [
+        *((6, True), (3, False), (3, True)),
+    ]
+    assert np.abs(bench.picture() - expected).max() < 4
+    show(*(marker(11, number, action=DELETE) for number in range(4)))
+    assert drawables(display) == []
 
 
 def test_a_marker_replaces_the_one_of_its_id(show: Callable[..., Any]) -> None:

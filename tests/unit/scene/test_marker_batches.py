@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from rosglass.scene.displays.marker_batches import LineBatch, TextBatch
-from rosglass.scene.drawing import Labels, Lines, instance_matrix
+from rosglass.scene.displays.marker_batches import _MAX_POINTS as MAX_POINTS
+from rosglass.scene.displays.marker_batches import LineBatch, TextBatch, TriangleBatch
+from rosglass.scene.drawing import Labels, Lines, Shape, instance_matrix
 
 RED, GREEN = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.5)
 ZIGZAG = np.array([[0, 0, 0], [1, 0, 0], [1, 2, 0], [0, 2, 3]], np.float32)
@@ -59,13 +60,40 @@ def test_lines_are_what_each_marker_alone_would_be() -> None:
     assert (len(batch), batch.drawable.count) == (0, 0)
 
 
+def test_triangles_are_what_each_marker_alone_would_be() -> None:
+    batch = TriangleBatch(True, None)
+    colors = [RED, GREEN, (0.0, 0.0, 1.0, 1.0)]
+    shapes = [Shape(ZIGZAG[:3]), Shape(ZIGZAG, colors=[RED] * 4, indices=[0, 1, 2, 1, 2, 3])]
+    batch.put(("a", 0), np.eye(4), shapes[0], GREEN)
+    batch.put(("a", 1), TURNED, shapes[1], colors[2])
+    batch.put(("a", 2), TURNED, shapes[0], RED)
+    batch.put(("a", 1), TURNED, shapes[1], (0.5, 1.0, 1.0, 1.0))
+    batch.discard(("a", 2))
+    batch.flush()
+    mesh = batch.drawable
+    found = mesh.shape.rows[mesh.shape.faces.reshape(-1)]
+    positions = found["position"] @ mesh.pose[:3, :3].T + mesh.pose[:3, 3]
+    faces = [shapes[0].rows, shapes[1].rows[shapes[1].faces.reshape(-1)]]
+    turned = faces[1]["position"] @ TURNED[:3, :3].T + TURNED[:3, 3]
+    assert np.allclose(positions, np.concatenate([faces[0]["position"], turned]), atol=1e-6)
+    normals = faces[1]["normal"] @ TURNED[:3, :3].T
+    assert np.allclose(found["normal"], np.concatenate([faces[0]["normal"], normals]), atol=1e-6)
+    assert found["rgba"].tolist() == [[0, 255, 0, 128]] * 3 + [[128, 0, 0, 255]] * 6
+    assert (mesh.count, mesh.lit, mesh.opaque) == (1, True, False)
+    assert not batch.has_room(("a", 2), Shape(np.zeros((MAX_POINTS, 3))))
+    batch.discard(("a", 0))
+    batch.discard(("a", 1))
+    batch.flush()
+    assert (len(batch), mesh.count) == (0, 0)
+
+
 def test_batches_have_room_for_a_bounded_number_of_points_and_letters() -> None:
     lines = LineBatch(0.1, None)
-    many = np.zeros((LineBatch.MAX_POINTS - 10, 3), np.float32)
+    many = np.zeros((MAX_POINTS - 10, 3), np.float32)
     lines.put(("a", 0), np.eye(4), many, RED, True)
     assert lines.has_room(("a", 1), np.zeros((10, 3), np.float32))
     assert not lines.has_room(("a", 1), np.zeros((11, 3), np.float32))
-    assert lines.has_room(("a", 0), np.zeros((LineBatch.MAX_POINTS, 3), np.float32))
+    assert lines.has_room(("a", 0), np.zeros((MAX_POINTS, 3), np.float32))
 
     texts = TextBatch(None)
     long = "word\n" * Labels.MAX_LENGTH

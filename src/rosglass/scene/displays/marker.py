@@ -2,7 +2,7 @@
 
 Messages are turned into records of numpy arrays in the node's thread, all markers of one at once.
 Those of one namespace are drawn together (:mod:`rosglass.scene.displays.marker_batches`), except
-for meshes, lists of points and triangles, and lines that are long or translucent.
+for meshes, lists of points, long lines, and the first triangles and translucent lines.
 """
 # ruff: noqa: N815 - the names of properties are QML's
 
@@ -23,7 +23,13 @@ from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot, is_alive
 from rosglass.scene.display import OUTDATED_ALPHA, Status, TopicDisplay
-from rosglass.scene.displays.marker_batches import LineBatch, SolidBatch, TextBatch
+from rosglass.scene.displays.marker_batches import (
+    MAX_JOINED_POINTS,
+    LineBatch,
+    SolidBatch,
+    TextBatch,
+    TriangleBatch,
+)
 from rosglass.scene.displays.robot_model import STL_ENDINGS, MeshFiles, material_of
 from rosglass.scene.displays.shapes import poses_matrices
 from rosglass.scene.drawing import (
@@ -58,6 +64,7 @@ if TYPE_CHECKING:
 
     Matrix: TypeAlias = NDArray[np.float64]
     _Instances: TypeAlias = tuple[tuple[Shape, ...], tuple[Matrix, ...]]
+    _Joint: TypeAlias = LineBatch | TextBatch | TriangleBatch
 
 __all__ = [
     "MarkerArrayDisplay",
@@ -121,9 +128,9 @@ _MAX_NAMESPACES = 2000
 _MAX_MESHES, _MAX_KEPT_BYTES, _MAX_READING = 200, 256 << 20, 1000
 #: Bytes of the meshes and textures of all markers of a display.
 _MAX_MESH_BYTES = 2 << 30
-#: Markers of a group that are drawn on their own, up to which translucent lines are, too: these are
-#: sorted by their distance.
-_MAX_SORTED = 100
+#: Lists that are drawn together with others, and the markers of a group that are drawn alone, up to
+#: which triangles and translucent lines are, too: these are sorted by distance and selected alone.
+_JOINED, _MAX_ALONE = (LINE_STRIP, LINE_LIST, TRIANGLE_LIST), 100
 #: Lines of the status, and markers whose problems are known.
 _MAX_LINES, _MAX_PROBLEMS = 50, 1000
 
@@ -365,7 +372,7 @@ def _points_problem(kind: int, count: int) -> str:
     return ""
 
 
-_B = TypeVar("_B", LineBatch, TextBatch)
+_B = TypeVar("_B", LineBatch, TextBatch, TriangleBatch)
 
 
 class MarkerGroup:
@@ -381,12 +388,11 @@ class MarkerGroup:
         self._batches: dict[Shape, SolidBatch] = {}
         #: What those that are instances consist of.
         self._solids: dict[tuple[str, int], tuple[Shape, ...]] = {}
-        #: Batches of lines by their width and whether they are opaque, and of texts; the last one
+        #: Batches of texts, lines and triangles, by what those of one have in common; the last one
         #: takes further markers.
-        self._lines: dict[tuple[float, bool], list[LineBatch]] = {}
-        self._texts: list[TextBatch] = []
-        #: Those of markers that are lines or texts.
-        self._batch_of: dict[tuple[str, int], LineBatch | TextBatch] = {}
+        self._joint: dict[tuple[Any, ...], list[_Joint]] = {}
+        #: Those of markers that are in one.
+        self._batch_of: dict[tuple[str, int], _Joint] = {}
         #: Drawables of markers that are drawn on their own.
         self._own: dict[tuple[str, int], Group] = {}
         #: What those of meshes look like.
@@ -411,11 +417,7 @@ class MarkerGroup:
                 self._batch(shape).put(key, pose, local, marker.color)
             return
         place = pose @ marker.pose
-        if marker.kind == TEXT:
-            self._put_text(marker, place[:3, 3])
-            return
-        if self._are_joined(marker):
-            self._put_lines(marker, place)
+        if self._put_joined(marker, place):
             return
         # Textures are uploaded again only if they changed; a mesh that is read is empty.
         look: tuple[Any, ...] = ()
@@ -436,32 +438,43 @@ class MarkerGroup:
             self._looks[key] = look
         self.root.add(group)
 
-    def _put_text(self, marker: MarkerRecord, position: NDArray[np.float64]) -> None:
-        text = marker.text[: Labels.MAX_LENGTH]
-        batch = self._join(marker.key, self._texts, text, lambda: TextBatch(self._owner))
-        batch.put(marker.key, text, position, abs(marker.scale[2]), marker.color)
-
-    def _are_joined(self, marker: MarkerRecord) -> bool:
-        """Return whether a marker is lines that are drawn together with others."""
-        if marker.kind not in (LINE_STRIP, LINE_LIST):
+    def _put_joined(self, marker: MarkerRecord, pose: NDArray[np.float64]) -> bool:
+        """Draw a marker together with others, if it is of a kind that is."""
+        key, kind, points, owner = marker.key, marker.kind, marker.points, self._owner
+        if kind == TEXT:
+            text = marker.text[: Labels.MAX_LENGTH]
+            texts = self._join(key, (TEXT,), text, lambda: TextBatch(owner))
+            texts.put(key, text, pose[:3, 3], abs(marker.scale[2]), marker.color)
+            return True
+        if kind not in _JOINED or not 2 <= len(points) <= MAX_JOINED_POINTS:
             return False
-        if not 2 <= len(marker.points) <= LineBatch.MAX_MARKER_POINTS:
+        is_opaque = marker.color[3] >= OPAQUE
+        is_alone = len(self._own) < _MAX_ALONE or key in self._own
+        if is_alone and not (is_opaque and kind != TRIANGLE_LIST):
             return False
-        is_sorted = len(self._own) < _MAX_SORTED or marker.key in self._own
-        return marker.color[3] >= OPAQUE or not is_sorted
-
-    def _put_lines(self, marker: MarkerRecord, pose: NDArray[np.float64]) -> None:
-        width, is_opaque = abs(marker.scale[0]), marker.color[3] >= OPAQUE
-        batches = self._lines.setdefault((width, is_opaque), [])
-        batch = self._join(
-            marker.key, batches, marker.points, lambda: LineBatch(width, self._owner)
-        )
-        batch.put(marker.key, pose, marker.points, _line_colors(marker), marker.kind == LINE_STRIP)
+        if kind == TRIANGLE_LIST:
+            shape, color, lit = _triangles_look(marker)
+            look = (TRIANGLE_LIST, lit, shape.opaque and color[3] >= OPAQUE)
+            triangles = self._join(key, look, shape, lambda: TriangleBatch(lit, owner))
+            triangles.put(key, pose, shape, color)
+        else:
+            width = abs(marker.scale[0])
+            lines = self._join(key, (width, is_opaque), points, lambda: LineBatch(width, owner))
+            lines.put(key, pose, points, _line_colors(marker), kind == LINE_STRIP)
+        return True
 
     def _join(
-        self, key: tuple[str, int], batches: list[_B], data: Any, create: Callable[[], _B]
+        self, key: tuple[str, int], look: tuple[Any, ...], data: Any, create: Callable[[], _B]
     ) -> _B:
-        """Return the batch that a marker is in, or that it comes into."""
+        """Return the batch that a marker is in, or that it comes into.
+
+        Args:
+            key: The marker's.
+            look: What markers of one batch have in common.
+            data: What it must have room for.
+            create: Returns a new one.
+        """
+        batches = cast("list[_B]", self._joint.setdefault(look, []))
         batch = self._batch_of.get(key)
         for one in batches:
             if one is batch and one.has_room(key, data):
@@ -495,18 +508,14 @@ class MarkerGroup:
         """Draw what has changed since the last call."""
         for solids in self._batches.values():
             solids.flush()
-        self._texts = _flushed(self._texts)
-        lines = {look: _flushed(batches) for look, batches in self._lines.items()}
-        self._lines = {look: batches for look, batches in lines.items() if batches}
-
-
-def _flushed(batches: list[_B]) -> list[_B]:
-    """Draw what has changed in batches; return those that are not empty."""
-    for batch in batches:
-        batch.flush()
-        if not len(batch):
-            batch.drawable.remove()
-    return [batch for batch in batches if len(batch)]
+        for look, batches in list(self._joint.items()):
+            for batch in list(batches):
+                batch.flush()
+                if not len(batch):
+                    batch.drawable.remove()
+                    batches.remove(batch)
+            if not batches:
+                del self._joint[look]
 
 
 def _scaled(x: float, y: float, z: float, along: float = 0.0) -> NDArray[np.float64]:
@@ -573,10 +582,8 @@ def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]
         cloud.set_look(style=_POINT_STYLES[kind], size=abs(x))
         yield cloud
     elif kind == TRIANGLE_LIST:
-        # RViz does not light what has colors of its own.
-        own = len(marker.colors) in (len(marker.points), len(marker.points) // 3)
-        shape = marker.triangles or _triangles(marker)
-        yield Mesh(shape, lit=False) if own else Mesh(shape, marker.color)
+        shape, color, lit = _triangles_look(marker)
+        yield Mesh(shape, color, lit=lit)
     elif kind == ARROW_STRIP:
         yield from _arrow_strip(marker)
     elif kind == MESH:
@@ -603,6 +610,15 @@ def _list_colors(colors: Any) -> NDArray[np.float32]:
     if (alpha < 1).any():
         out[..., 3] = 1 - (1 - alpha) ** 2
     return out
+
+
+def _triangles_look(marker: MarkerRecord) -> tuple[Shape, tuple[float, ...], bool]:
+    """Return the shape of a triangle list, its color, and whether it is lit."""
+    shape = marker.triangles or _triangles(marker)
+    # RViz does not light what has colors of its own.
+    if len(marker.colors) in (len(marker.points), len(marker.points) // 3):
+        return shape, (1.0, 1.0, 1.0, 1.0), False
+    return shape, marker.color, True
 
 
 def _triangles(marker: MarkerRecord) -> Shape:

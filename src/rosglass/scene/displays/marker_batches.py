@@ -17,7 +17,11 @@ if TYPE_CHECKING:
     Key: TypeAlias = tuple[str, int]
     Color: TypeAlias = tuple[float, ...]
 
-__all__ = ["LineBatch", "SolidBatch", "TextBatch"]
+__all__ = ["MAX_JOINED_POINTS", "LineBatch", "SolidBatch", "TextBatch", "TriangleBatch"]
+
+#: Points of lines or triangles in one batch, all of which are computed again when a marker of it
+#: changes, and points of a marker up to which it is part of one.
+_MAX_POINTS, MAX_JOINED_POINTS = 10_000, 1000
 
 
 class SolidBatch:
@@ -170,10 +174,6 @@ class LineBatch:
         owner: What a pick of them finds; None where they cannot be picked.
     """
 
-    #: Points in one batch, all of which are computed again when a marker of it changes, and points
-    #: of a marker that is part of one.
-    MAX_POINTS, MAX_MARKER_POINTS = 10_000, 1000
-
     def __init__(self, width: float, owner: Any) -> None:
         self.width = width
         self.drawable = Lines(width, in_metres=True)
@@ -189,7 +189,7 @@ class LineBatch:
     def has_room(self, key: Key, points: NDArray[np.float32]) -> bool:
         """Return whether a marker may have as many points."""
         before = len(self._lines[key][1]) if key in self._lines else 0
-        return self._points - before + len(points) <= self.MAX_POINTS
+        return self._points - before + len(points) <= _MAX_POINTS
 
     def put(
         self,
@@ -255,3 +255,70 @@ class LineBatch:
             np.stack([tints[start], tints[start + 1]], axis=1),
             np.stack([at[before], at[after]], axis=1),
         )
+
+
+class TriangleBatch:
+    """Triangles, as one shape of one drawable.
+
+    Args:
+        lit: Whether the headlight shades them.
+        owner: What a pick of them finds; None where they cannot be picked.
+    """
+
+    def __init__(self, lit: bool, owner: Any) -> None:
+        self.drawable = Mesh(Shape([]), lit=lit)
+        self.drawable.owner = owner
+        #: Pose in the group, triangles, and the colour that these are multiplied with.
+        self._parts: dict[Key, tuple[Matrix, Shape, Color]] = {}
+        self._points = 0
+        self._dirty = False
+
+    def __len__(self) -> int:
+        return len(self._parts)
+
+    def has_room(self, key: Key, shape: Shape) -> bool:
+        """Return whether a marker may have these triangles."""
+        before = len(self._parts[key][1].rows) if key in self._parts else 0
+        return self._points - before + len(shape.rows) <= _MAX_POINTS
+
+    def put(self, key: Key, pose: Matrix, shape: Shape, color: Color) -> None:
+        """Draw a marker, in place of the one of the same key."""
+        self.discard(key)
+        self._parts[key] = (pose, shape, color)
+        self._points += len(shape.rows)
+
+    def discard(self, key: Key) -> None:
+        """Do not draw a marker any more."""
+        before = self._parts.pop(key, None)
+        self._points -= 0 if before is None else len(before[1].rows)
+        self._dirty = True
+
+    def flush(self) -> None:
+        """Give the mesh what has changed."""
+        if not self._dirty:
+            return
+        self._dirty = False
+        mesh = self.drawable
+        if not self._parts:
+            mesh.shape = Shape([])
+            mesh.set_instances(np.eye(4)[np.newaxis])
+            return
+        poses, shapes, colors = zip(*self._parts.values(), strict=True)
+        counts = [len(shape.rows) for shape in shapes]
+        marker = np.repeat(np.arange(len(counts)), counts)
+        rows = np.concatenate([shape.rows for shape in shapes])
+        turns = np.concatenate(poses).reshape(-1, 4, 4)
+        # From one of them: as float32, positions that are far from the origin would be rounded.
+        origin = turns[0, :3, 3].copy()
+        turns[:, :3, 3] -= origin
+        turn = turns[marker, :3, :3]
+        at = np.einsum("nij,nj->ni", turn, rows["position"]) + turns[marker, :3, 3]
+        first = np.repeat(np.cumsum([0, *counts[:-1]]), [len(shape.faces) for shape in shapes])
+        mesh.pose = instance_matrix(origin)
+        mesh.shape = Shape(
+            at,
+            np.einsum("nij,nj->ni", turn, rows["normal"]),
+            np.concatenate([shape.faces for shape in shapes]) + first[:, np.newaxis],
+            colors=rows["rgba"] / np.float32(255) * np.array(colors, np.float32)[marker],
+        )
+        mesh.set_instances(np.eye(4)[np.newaxis])
