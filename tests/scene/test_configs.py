@@ -95,6 +95,12 @@ Visualization Manager:
     assert plan["Topic"]["Depth"] == 7
     assert saved.current_view is not None
     assert saved.current_view.settings["Scale"] == 42
+    # RViz has no such policy; without one, rosglass takes it.
+    path.reliability = "Best Available"
+    view.save_config()
+    view.load_config(file)
+    path = view.scene.find("Plan")
+    assert (path.reliability, path.durability) == ("Best Available", "Volatile")
 
 
 def test_a_new_view_is_written_for_either_rviz(bench: SceneBench, tmp_path: Path) -> None:

@@ -738,12 +738,12 @@ class TopicDisplay(OneTopicDisplay):
         self.durability = given.durability or self.durability
 
     def _saved_topic(self) -> TopicSetting:
-        # What is ours alone, no RViz can read.
-        policies = [
-            value if value != BEST_AVAILABLE else None
+        # What is ours alone, no RViz can read; without a policy, it is that again.
+        reliability, durability = (
+            "" if value == BEST_AVAILABLE else str(value)
             for value in (self.reliability, self.durability)
-        ]
-        return TopicSetting(self.topic, self.depth, *policies)
+        )
+        return TopicSetting(self.topic, self.depth, reliability, durability)
 
     # -- the subscription ------------------------------------------------------------------------
 

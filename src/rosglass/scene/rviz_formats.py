@@ -305,7 +305,10 @@ _ROS1_TOPICS = {
 
 
 class TopicSetting(NamedTuple):
-    """A topic and its QoS; None for what the file leaves to the display's default."""
+    """A topic and its QoS; None for what the file leaves to the display's default.
+
+    Of policies that are written, None stays as the file has it, and an empty text is left out.
+    """
 
     #: The topic; empty if none is chosen.
     name: str = ""
@@ -352,12 +355,12 @@ def read_topic(settings: Mapping[str, Any], name: str = "Topic") -> TopicSetting
     if isinstance(value, (list, tuple)):
         raise Error(f"{key}: expected a topic, got {shown(value)}")
     if not isinstance(value, dict):
-        unreliable = settings.get("Unreliable")
-        best_effort = unreliable is not None and read_bool(unreliable, "Unreliable")
+        # RViz 1 writes false by itself: that must not refuse the publishers of ROS 2.
+        unreliable = read_bool(settings.get("Unreliable") or False, "Unreliable")
         return TopicSetting(
             setting_text(value),
             _count(settings, "Queue Size"),
-            None if unreliable is None else "Best Effort" if best_effort else "Reliable",
+            "Best Effort" if unreliable else None,
         )
     inner = value.get("Value")
     if isinstance(inner, (dict, list)):
@@ -389,22 +392,22 @@ def write_topic(
         settings[name] = topic.name
         if topic.depth is not None:
             settings["Queue Size"] = topic.depth
-        if topic.reliability is not None:
-            settings["Unreliable"] = topic.reliability == "Best Effort"
+        unreliable = topic.reliability == "Best Effort"
+        if unreliable or (topic.reliability is not None and "Unreliable" in settings):
+            settings["Unreliable"] = unreliable
         return
     known = settings.get(name)
-    changed = {
-        "Depth": topic.depth,
+    policies = {
         "Durability Policy": topic.durability,
-        "Filter size": topic.filter_size,
         "History Policy": topic.history,
         "Reliability Policy": topic.reliability,
-        "Value": topic.name,
     }
-    settings[name] = {
+    changed = {"Depth": topic.depth, "Filter size": topic.filter_size, "Value": topic.name}
+    kept = {
         **(known if isinstance(known, dict) else {}),
-        **{key: value for key, value in changed.items() if value is not None},
+        **{key: value for key, value in {**changed, **policies}.items() if value is not None},
     }
+    settings[name] = {key: value for key, value in kept.items() if value or key not in policies}
 
 
 def _count(settings: Mapping[str, Any], key: str, prefix: str = "") -> int | None:

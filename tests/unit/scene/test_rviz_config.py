@@ -177,9 +177,7 @@ def test_every_display_and_view_of_ros_1() -> None:
         "TwistStamped",
     }
     assert [view.type for view in found.saved_views] == [view.name for view in found.saved_views]
-    assert read_topic(find(found, "Camera").settings) == TopicSetting(
-        "some/topic/camera", 2, "Reliable"
-    )
+    assert read_topic(find(found, "Camera").settings) == TopicSetting("some/topic/camera", 2)
 
 
 def test_names_that_look_like_numbers_are_kept() -> None:
@@ -199,7 +197,7 @@ def test_settings_that_a_file_leaves_out() -> None:
         "topic", "/robot_description", TopicSetting("/robot_description")
     )
     plain = find(load("ros2_marker_tutorial"), "Marker").settings
-    assert read_topic(plain) == TopicSetting("/visualization_marker", 10, "Reliable")
+    assert read_topic(plain) == TopicSetting("/visualization_marker", 10)
 
 
 # -- classes ---------------------------------------------------------------------------------------
@@ -601,6 +599,8 @@ def test_topics_of_both_formats() -> None:
     assert read_topic({"Topic": "/a", "Queue Size": 5, "Unreliable": True}) == TopicSetting(
         "/a", 5, "Best Effort"
     )
+    # RViz 1 writes false by itself: a best-effort publisher of ROS 2 is received all the same.
+    assert read_topic({"Topic": "/a", "Unreliable": False}) == TopicSetting("/a")
     assert read_topic({"Image Topic": "/a"}) == read_topic({"Topic": {"Value": "/a"}})
     assert read_topic({}) == read_topic({"Topic": None}) == TopicSetting("")
     assert read_topic({"Topic": 5}).name == "5"
