@@ -105,6 +105,20 @@ def test_the_status_says_why_nothing_was_received(
     bench.wait(lambda: publisher.publish(message) or " messages received" in scan.statusText)
 
 
+def test_a_policy_that_no_publisher_offers_is_named(bench: SceneBench) -> None:
+    from rosglass.comm.qos import QoS, Reliability
+
+    view = bench.load('LaserScanDisplay { topic: "/scan"; reliability: "Reliable" }')
+    (display,) = view.scene.displays
+    qos = QoS(reliability=Reliability.BEST_EFFORT)
+    scans = bench.robot.create_publisher("/scan", "sensor_msgs/LaserScan", qos)
+    bench.wait(lambda: "best effort" in display.statusText, lambda: display.statusText)
+    assert display.statusText.startswith("Topic: No messages received on /scan: ")
+    assert display.statusLevel == "warn"
+    display.reliability = "Best Available"
+    bench.wait(lambda: scans.publish(SCAN) or display.statusLevel == "ok")
+
+
 @pytest.mark.parametrize(
     ("kind", "message", "settings", "shape"),
     [

@@ -662,6 +662,8 @@ class OneTopicDisplay(Display):
                 return "error", f"the topic's type is {', '.join(types)}, not {wanted}"
             if self._is_searched and not self._count_publishers():
                 text = f"{text}: it has no publisher{similar(topic, topics)}"
+            elif problem := getattr(self._endpoint, "problem", ""):
+                text = f"{text}: {problem}"
         return "warn", text
 
     @Slot()
@@ -902,7 +904,8 @@ class TopicDisplay(OneTopicDisplay):
         return min(age_s, time.monotonic() - self._placed_at) > _LATE_S
 
     def check_frames(self) -> None:
-        """Try again to place what is late, so that the status says why it is not shown."""
+        """Say why nothing is received or shown, and try again to place what is late."""
+        self._report_waiting()
         if self.shown and self._is_late():
             self._show_waiting()
         super().check_frames()
@@ -1092,6 +1095,11 @@ class Subscriptions:
         except Error:
             self.close()
             raise
+
+    @property
+    def problem(self) -> str:
+        """Why messages cannot be received, e.g. by their publishers' policies; empty otherwise."""
+        return "; ".join(filter(None, (one.problem for one in list(self._open))))
 
     def close(self) -> None:
         """Close them; safe to call twice."""
