@@ -140,6 +140,37 @@ def test_each_pose_of_an_odometry_keeps_its_covariance(
     assert ellipsoids(display) == {1.0: 2.0}
 
 
+def test_fewer_poses_are_shown_at_once_and_the_most_is_said(
+    show: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene.displays import pose as module
+
+    monkeypatch.setattr(module, "_MAX_KEPT", 4)
+    way = [{"pose": {"pose": pose(float(x)), "covariance": covariance()}} for x in range(6)]
+    display = show("Odometry", "nav_msgs/Odometry", *way, keep=0)
+    assert parts(display, CYLINDER)[0].count == 4
+    assert display.statusLevel == "warn"
+    assert "Keep: only the latest 4 poses are shown" in display.statusText
+    display.keep = 2
+    assert parts(display, CYLINDER)[0].count == 2
+    assert display.statusLevel == "ok", display.statusText
+
+
+def test_the_most_messages_of_a_history_is_said(
+    show: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene.displays import geometry
+
+    monkeypatch.setattr(geometry, "_MAX_HISTORY", 4)
+    messages = [{"point": {"x": float(x)}} for x in range(6)]
+    display = show("PointStamped", "geometry_msgs/PointStamped", *messages, historyLength=5)
+    assert len(parts(display, SPHERE)) == 4
+    assert "History Length: only the latest 4 are shown" in display.statusText
+    display.historyLength = 3
+    assert len(parts(display, SPHERE)) == 3
+    assert display.statusLevel == "ok", display.statusText
+
+
 def test_odometry_keeps_poses_that_are_apart(show: Callable[..., Any]) -> None:
     way = [
         {"pose": {"pose": pose(x), "covariance": covariance()}} for x in (0.0, 0.05, 1.0, 2.0, 3.0)

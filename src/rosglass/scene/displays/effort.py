@@ -175,6 +175,7 @@ class EffortDisplay(HistoryDisplay):
     """The efforts of ``sensor_msgs/JointState``. See its page in ``docs/scene.md``."""
 
     TYPE = "Effort"
+    LENGTH = "History Length"
     MESSAGES = ("sensor_msgs/JointState",)
     # Joint states name no frame: each joint has its own.
     HAS_FRAMES = True
@@ -353,10 +354,6 @@ class EffortDisplay(HistoryDisplay):
             return
         self._next_at = time.monotonic() + _INTERVAL_S
         super()._on_items()
-
-    def length(self) -> int:
-        """Return how many messages are shown."""
-        return int(self.historyLength)
 
     def preparer(self) -> Callable[[Any], Any]:
         """Return the function that reads names and efforts."""

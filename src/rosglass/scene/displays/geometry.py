@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -42,6 +42,7 @@ __all__ = [
 ]
 
 _MAX_CORNERS = 100_000
+#: Messages that one display shows.
 _MAX_HISTORY = 10_000
 
 
@@ -60,7 +61,13 @@ class _Kept(NamedTuple):
 
 
 class HistoryDisplay(TopicDisplay):
-    """A display of the last messages, each drawn on its own."""
+    """A display of the last messages, each drawn on its own.
+
+    Attributes:
+        LENGTH: The setting of how many are shown; empty for the newest one alone.
+    """
+
+    LENGTH: ClassVar[str] = ""
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -70,7 +77,7 @@ class HistoryDisplay(TopicDisplay):
 
     def length(self) -> int:
         """Return how many messages are shown."""
-        return 1
+        return int(self.get(self.LENGTH)) if self.LENGTH else 1
 
     def shows_all(self) -> bool:
         """Return whether earlier messages are shown as well."""
@@ -94,8 +101,13 @@ class HistoryDisplay(TopicDisplay):
         self._drop_old()
 
     def _drop_old(self) -> None:
-        while len(self._kept) > min(self.length(), _MAX_HISTORY):
+        length = self.length()
+        while len(self._kept) > min(length, _MAX_HISTORY):
             self._kept.popleft().group.remove()
+        if len(self._kept) == _MAX_HISTORY < length:
+            self.set_status(self.LENGTH, "warn", f"only the latest {_MAX_HISTORY} are shown")
+        else:
+            self.delete_status(self.LENGTH)
 
     def _restyle(self) -> None:
         self._drop_old()
@@ -119,6 +131,7 @@ class PointStampedDisplay(HistoryDisplay):
     """A ``geometry_msgs/PointStamped``, as a sphere. See its page in ``docs/scene.md``."""
 
     TYPE = "PointStamped"
+    LENGTH = "History Length"
     MESSAGES = ("geometry_msgs/PointStamped",)
 
     color = Setting("Color", "color", "#cc29cc", "Of the sphere.")
@@ -127,10 +140,6 @@ class PointStampedDisplay(HistoryDisplay):
     historyLength = Setting(
         "History Length", "int", 1, "How many are shown.", min=1, max=100_000, then="_on_length"
     )
-
-    def length(self) -> int:
-        """Return how many messages are shown."""
-        return int(self.historyLength)
 
     def preparer(self) -> Callable[[Any], Any]:
         """Return the function that reads the point."""
@@ -180,6 +189,7 @@ class RangeDisplay(HistoryDisplay):
     """A ``sensor_msgs/Range``, as a cone. See its page in ``docs/scene.md``."""
 
     TYPE = "Range"
+    LENGTH = "Buffer Length"
     IS_CONTINUOUS = True
     MESSAGES = ("sensor_msgs/Range",)
 
@@ -188,10 +198,6 @@ class RangeDisplay(HistoryDisplay):
     bufferLength = Setting(
         "Buffer Length", "int", 1, "How many are shown.", min=1, then="_on_length"
     )
-
-    def length(self) -> int:
-        """Return how many messages are shown."""
-        return int(self.bufferLength)
 
     def preparer(self) -> Callable[[Any], Any]:
         """Return the function that reads distance and angle."""
@@ -230,6 +236,7 @@ def _read_range(message: Any) -> tuple[float, float]:
 class _Screw(HistoryDisplay):
     """A display of a linear and an angular vector, as arrows."""
 
+    LENGTH = "History Length"
     #: Their names in the message, and the field that holds both.
     _FIELDS = ("linear", "angular")
     _HOLDER = ""
@@ -242,10 +249,6 @@ class _Screw(HistoryDisplay):
     hideSmallValues = Setting(
         "Hide Small Values", "bool", True, "Whether arrows shorter than their width are hidden."
     )
-
-    def length(self) -> int:
-        """Return how many messages are shown."""
-        return int(self.historyLength)
 
     def preparer(self) -> Callable[[Any], Any]:
         """Return the function that reads both vectors."""

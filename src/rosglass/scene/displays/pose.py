@@ -36,7 +36,7 @@ _POSE_PATHS = (
     *("position.x", "position.y", "position.z"),
     *("orientation.x", "orientation.y", "orientation.z", "orientation.w"),
 )
-#: Odometry messages that are kept where none is to be dropped.
+#: Poses of an odometry that are shown.
 _MAX_KEPT = 10_000
 #: Deviations of orientations that are drawn as this, as in RViz.
 _MAX_DEVIATION_RAD = math.radians(89)
@@ -476,10 +476,19 @@ class OdometryDisplay(_WithCovariance):
             return
         self._poses.append(new)
         self._covariances.append((data.covariance, pose[:3, :3]))
-        most = min(self.keep or _MAX_KEPT, _MAX_KEPT)
-        gone = max(len(self._poses) - most, 0)
-        del self._poses[:gone], self._covariances[:gone], self._shapes[:gone]
         self._draw()
+
+    def _restyle(self) -> None:
+        self._drop_old()
+        super()._restyle()
+
+    def _drop_old(self) -> None:
+        gone = max(len(self._poses) - min(self.keep or _MAX_KEPT, _MAX_KEPT), 0)
+        del self._poses[:gone], self._covariances[:gone], self._shapes[:gone]
+        if len(self._poses) == _MAX_KEPT != self.keep:
+            self.set_status("Keep", "warn", f"only the latest {_MAX_KEPT} poses are shown")
+        else:
+            self.delete_status("Keep")
 
     def _is_near(self, before: NDArray[np.float64], after: NDArray[np.float64]) -> bool:
         moved = float(np.linalg.norm(after[:3, 3] - before[:3, 3]))
