@@ -411,7 +411,7 @@ def test_paths_beside_each_other_are_bounded(robot: Robot, monkeypatch: pytest.M
         robot.send(robot.message)
     text = "Buffer Length: only the latest 2 paths are shown, which have 6 poses; reduce it"
     assert text in robot.display.statusText
-    assert len(robot.display._paths) == 2
+    assert len(robot.display._kept) == 2
     robot.send({**robot.message, "poses": STAMPED_POSES * 3})
     assert "poses: 9 are more than the 7" in robot.display.statusText
 

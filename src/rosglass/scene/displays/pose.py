@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from rosglass.errors import Error
-from rosglass.scene.display import MOST_WAITING, TopicDisplay, matrix_of
+from rosglass.scene.display import TopicDisplay, matrix_of
+from rosglass.scene.displays.geometry import HistoryDisplay
 from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, poses_matrices, read_columns
 from rosglass.scene.drawing import CONE, CYLINDER, SPHERE, Group, Lines, Mesh, check_numbers
 from rosglass.scene.settings import Setting, rgb_of
@@ -514,10 +515,11 @@ OdometryDisplay.SETTINGS = {
 _MAX_PATH_POSES = 500_000
 
 
-class PathDisplay(TopicDisplay):
+class PathDisplay(HistoryDisplay):
     """A path. See its page in ``docs/scene.md``."""
 
     TYPE = "Path"
+    LENGTH = "Buffer Length"
     MESSAGES = ("nav_msgs/Path",)
 
     lineStyle = Setting(
@@ -555,93 +557,43 @@ class PathDisplay(TopicDisplay):
         "Head Diameter", "float", 0.3, "In metres.", min=0.0, shown_if=_POSE_ARROWS
     )
 
-    def __init__(
-        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
-    ) -> None:
-        #: The paths that are shown, the oldest first: poses, and matrices.
-        self._paths: list[_Path] = []
-        super().__init__(parent, runtime)
-
-    def shows_all(self) -> bool:
-        """Return whether earlier paths are shown as well."""
-        return bool(self.bufferLength > 1)
-
-    def most_waiting(self) -> int:
-        """Return how many messages may wait: no more than are shown."""
-        return max(int(self.depth), min(int(self.bufferLength), MOST_WAITING))
-
     def preparer(self) -> Any:
         """Return the function that reads poses."""
         return _read_path
 
-    def show(self, data: NDArray[np.float64], pose: Any, frame: str, stamp: int) -> None:  # noqa: ARG002
-        """Show a path, beside earlier ones."""
-        path = _Path(data, self)
-        path.place(pose)
-        self._paths.append(path)
-        self.root.add(*path.parts)
-        self._drop_old()
-        path.restyle(self)
-
-    def reset(self) -> None:
-        """Drop all paths."""
-        super().reset()
-        self._paths.clear()
+    def draw(self, data: NDArray[np.float64], group: Group) -> None:
+        """Draw a line, and axes or arrows at its poses."""
+        points = data[:, :3] + [self.offset.x(), self.offset.y(), self.offset.z()]
+        line = Lines(self.lineWidth, in_metres=True) if self.lineStyle == "Billboards" else Lines()
+        line.owner = self
+        line.set_strip(points, (*rgb_of(self.color), self.alpha))
+        group.add(line)
+        if self.poseStyle == "Axes":
+            axes = AxesShapes(self)
+            axes.set_axes(poses_matrices(points, data[:, 3:]), self.axesLength, self.axesRadius)
+            group.add(axes)
+        elif self.poseStyle == "Arrows":
+            arrows = ArrowShapes(self)
+            arrows.set_arrows(
+                poses_matrices(points, data[:, 3:]),
+                (self.shaftLength, self.shaftDiameter),
+                (self.headLength, self.headDiameter),
+                (*rgb_of(self.poseColor), self.alpha),
+            )
+            group.add(arrows)
 
     def _drop_old(self) -> None:
         """Drop the oldest paths until neither they nor all their poses are too many."""
-        count = sum(path.count for path in self._paths)
-        is_full = False
-        while len(self._paths) > self.bufferLength or count > _MAX_PATH_POSES:
-            is_full = len(self._paths) <= self.bufferLength
-            oldest = self._paths.pop(0)
-            count -= oldest.count
-            for part in oldest.parts:
-                part.remove()
-        if is_full:
-            text = f"only the latest {len(self._paths)} paths are shown, which have {count} poses"
-            self.set_status("Buffer Length", "warn", f"{text}; reduce it")
-        else:
-            self.delete_status("Buffer Length")
-
-    def _restyle(self) -> None:
-        self._drop_old()
-        for path in self._paths:
-            path.restyle(self)
-
-
-class _Path:
-    """One path: a line, and axes or arrows at its poses."""
-
-    def __init__(self, poses: NDArray[np.float64], owner: PathDisplay) -> None:
-        self._poses, self.count = poses, len(poses)
-        self._line, self._axes, self._arrows = Lines(), AxesShapes(owner), ArrowShapes(owner)
-        self._line.owner = owner
-        self.parts = (self._line, self._axes, self._arrows)
-
-    def place(self, pose: NDArray[np.float64]) -> None:
-        for part in self.parts:
-            part.pose = pose
-
-    def restyle(self, display: PathDisplay) -> None:
-        shift = np.array([display.offset.x(), display.offset.y(), display.offset.z()])
-        points = self._poses[:, :3] + shift
-        self._line.in_metres = display.lineStyle == "Billboards"
-        self._line.set_strip(points, (*rgb_of(display.color), display.alpha))
-        self._line.set_look(width=display.lineWidth if self._line.in_metres else 1.0)
-        style = display.poseStyle
-        count = 0 if style == "None" else len(points)
-        matrices = poses_matrices(points[:count], self._poses[:count, 3:])
-        none = matrices[:0]
-        self._axes.set_axes(
-            matrices if style == "Axes" else none, display.axesLength, display.axesRadius
-        )
-        self._arrows.set_arrows(
-            matrices if style == "Arrows" else none,
-            (display.shaftLength, display.shaftDiameter),
-            (display.headLength, display.headDiameter),
-            (*rgb_of(display.poseColor), display.alpha),
-        )
+        super()._drop_old()
+        count = sum(len(path.data) for path in self._kept)
+        if count <= _MAX_PATH_POSES:
+            return
+        while count > _MAX_PATH_POSES:
+            oldest = self._kept.popleft()
+            count -= len(oldest.data)
+            oldest.group.remove()
+        text = f"only the latest {len(self._kept)} paths are shown, which have {count} poses"
+        self.set_status(self.LENGTH, "warn", f"{text}; reduce it")
 
 
 def _read_path(message: Any) -> NDArray[np.float64]:
