@@ -11,7 +11,12 @@ import numpy as np
 
 from rosglass.errors import Error
 from rosglass.scene.display import MOST_WAITING, TopicDisplay
-from rosglass.scene.displays.shapes import ArrowShapes, read_columns, rotation_of_z_to
+from rosglass.scene.displays.shapes import (
+    ArrowShapes,
+    pose_along,
+    read_columns,
+    rotation_of_z_to,
+)
 from rosglass.scene.drawing import (
     CONE,
     SPHERE,
@@ -272,22 +277,13 @@ class _Screw(HistoryDisplay):
             if length <= 0 or (self.hideSmallValues and length < wide):
                 continue
             rgba = (*rgb_of(color), self.alpha)
-            pose = _along(vector / np.linalg.norm(vector))
+            pose = pose_along(vector / np.linalg.norm(vector))
             arrow = ArrowShapes(self)
             # Proportions of RViz's arrow.
             arrow.set_arrows(pose, (length, 0.1 * wide), (0.3 * length, 0.2 * wide), rgba)
             group.add(arrow)
             if number:
                 group.add(*_circle(pose[:3, 0], length, wide, rgba))
-
-
-def _along(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    helper = np.array([0.0, 0.0, 1.0]) if abs(x[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    y = np.cross(helper, x)
-    y /= np.linalg.norm(y)
-    pose = np.eye(4)
-    pose[:3, 0], pose[:3, 1], pose[:3, 2] = x, y, np.cross(x, y)
-    return pose
 
 
 def _circle(

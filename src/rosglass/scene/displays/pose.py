@@ -11,12 +11,18 @@ import numpy as np
 from rosglass.errors import Error
 from rosglass.scene.display import TopicDisplay, matrix_of
 from rosglass.scene.displays.geometry import HistoryDisplay
-from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, poses_matrices, read_columns
+from rosglass.scene.displays.shapes import (
+    ALONG,
+    ArrowShapes,
+    AxesShapes,
+    poses_matrices,
+    read_columns,
+)
 from rosglass.scene.drawing import CONE, CYLINDER, SPHERE, Group, Lines, Mesh, check_numbers
 from rosglass.scene.settings import Setting, rgb_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -41,16 +47,6 @@ _POSE_PATHS = (
 _MAX_KEPT = 10_000
 #: Deviations of orientations that are drawn as this, as in RViz.
 _MAX_DEVIATION_RAD = math.radians(89)
-#: Turns z, along which cylinders and cones stand, to x and y.
-_STANDING = np.array(
-    [
-        [[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]],
-        [[0.0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0], [0, 0, 0, 1]],
-        np.eye(4),
-    ]
-)
-
-
 #: Of settings: the styles of a path that they are of.
 _BILLBOARDS = {"lineStyle": "Billboards"}
 _POSE_AXES, _POSE_ARROWS = {"poseStyle": "Axes"}, {"poseStyle": "Arrows"}
@@ -62,26 +58,23 @@ _COVARIANCE = {"covariance": True}
 _POSITION, _ORIENTATION = {"covariancePosition": True}, {"covarianceOrientation": True}
 
 
+def _metres(path: str, default: float, shown_if: Mapping[str, Any]) -> Setting:
+    """Return the setting of a length, and the settings for which it has an effect."""
+    return Setting(path, "float", default, "In metres.", min=0.0, shown_if=shown_if)
+
+
 class _Shaped(TopicDisplay):
     """A display of poses as arrows or axes."""
 
     shape = Setting("Shape", "enum", "Arrow", "How a pose is drawn.", choices=["Arrow", "Axes"])
     color = Setting("Color", "color", "#ff1900", "Of arrows.", shown_if=_ARROW)
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
-    shaftLength = Setting(
-        "Shaft Length", "float", 1.0, "Of arrows, in metres.", min=0.0, shown_if=_ARROW
-    )
-    shaftRadius = Setting(
-        "Shaft Radius", "float", 0.05, "Of arrows, in metres.", min=0.0, shown_if=_ARROW
-    )
-    headLength = Setting(
-        "Head Length", "float", 0.3, "Of arrows, in metres.", min=0.0, shown_if=_ARROW
-    )
-    headRadius = Setting(
-        "Head Radius", "float", 0.1, "Of arrows, in metres.", min=0.0, shown_if=_ARROW
-    )
-    axesLength = Setting("Axes Length", "float", 1.0, "In metres.", min=0.0, shown_if=_AXES)
-    axesRadius = Setting("Axes Radius", "float", 0.1, "In metres.", min=0.0, shown_if=_AXES)
+    shaftLength = _metres("Shaft Length", 1.0, _ARROW)
+    shaftRadius = _metres("Shaft Radius", 0.05, _ARROW)
+    headLength = _metres("Head Length", 0.3, _ARROW)
+    headRadius = _metres("Head Radius", 0.1, _ARROW)
+    axesLength = _metres("Axes Length", 1.0, _AXES)
+    axesRadius = _metres("Axes Radius", 0.1, _AXES)
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -157,23 +150,13 @@ class PoseArrayDisplay(TopicDisplay):
     )  # fmt: skip
     color = Setting("Color", "color", "#ff1900", "Of arrows.", shown_if=_ANY_ARROW)
     alpha = Setting("Alpha", "float", 1.0, "Opacity.", min=0.0, max=1.0)
-    arrowLength = Setting(
-        "Arrow Length", "float", 0.3, "Of flat arrows, in metres.", min=0.0, shown_if=_FLAT_ARROW
-    )
-    headRadius = Setting(
-        "Head Radius", "float", 0.03, "Of arrows, in metres.", min=0.0, shown_if=_SOLID_ARROW
-    )
-    headLength = Setting(
-        "Head Length", "float", 0.07, "Of arrows, in metres.", min=0.0, shown_if=_SOLID_ARROW
-    )
-    shaftRadius = Setting(
-        "Shaft Radius", "float", 0.01, "Of arrows, in metres.", min=0.0, shown_if=_SOLID_ARROW
-    )
-    shaftLength = Setting(
-        "Shaft Length", "float", 0.23, "Of arrows, in metres.", min=0.0, shown_if=_SOLID_ARROW
-    )
-    axesLength = Setting("Axes Length", "float", 0.3, "In metres.", min=0.0, shown_if=_AXES)
-    axesRadius = Setting("Axes Radius", "float", 0.01, "In metres.", min=0.0, shown_if=_AXES)
+    arrowLength = _metres("Arrow Length", 0.3, _FLAT_ARROW)
+    headRadius = _metres("Head Radius", 0.03, _SOLID_ARROW)
+    headLength = _metres("Head Length", 0.07, _SOLID_ARROW)
+    shaftRadius = _metres("Shaft Radius", 0.01, _SOLID_ARROW)
+    shaftLength = _metres("Shaft Length", 0.23, _SOLID_ARROW)
+    axesLength = _metres("Axes Length", 0.3, _AXES)
+    axesRadius = _metres("Axes Radius", 0.01, _AXES)
 
     def __init__(
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
@@ -399,7 +382,7 @@ class _WithCovariance(_Shaped):
         local = np.diag([1e-3, wide, -reach, 1.0])
         local[2, 3] = reach
         # Wide in y, flat in z: the shape stands along z, with x and y exchanged.
-        placed: NDArray[np.float64] = pose @ _STANDING[0] @ local[[1, 0, 2, 3]][:, [1, 0, 2, 3]]
+        placed: NDArray[np.float64] = pose @ ALONG[0] @ local[[1, 0, 2, 3]][:, [1, 0, 2, 3]]
         return placed
 
     def _discs_of(
@@ -419,7 +402,7 @@ class _WithCovariance(_Shaped):
             local = np.eye(4)
             local[:2, :2] = vectors * np.maximum(size, 1e-4)
             local[2, 2], local[2, 3] = 1e-3, reach
-            found.append((axis, pose @ _STANDING[axis] @ local))
+            found.append((axis, pose @ ALONG[axis] @ local))
         return found
 
 
@@ -537,25 +520,13 @@ class PathDisplay(HistoryDisplay):
     poseStyle = Setting(
         "Pose Style", "enum", "None", "How poses are drawn.", choices=["None", "Axes", "Arrows"]
     )
-    axesLength = Setting(
-        "Length", "float", 0.3, "Of axes, in metres.", min=0.0, shown_if=_POSE_AXES
-    )
-    axesRadius = Setting(
-        "Radius", "float", 0.03, "Of axes, in metres.", min=0.0, shown_if=_POSE_AXES
-    )
+    axesLength = _metres("Length", 0.3, _POSE_AXES)
+    axesRadius = _metres("Radius", 0.03, _POSE_AXES)
     poseColor = Setting("Pose Color", "color", "#ff55ff", "Of arrows.", shown_if=_POSE_ARROWS)
-    shaftLength = Setting(
-        "Shaft Length", "float", 0.1, "Of arrows, metres.", min=0.0, shown_if=_POSE_ARROWS
-    )
-    headLength = Setting(
-        "Head Length", "float", 0.2, "Of arrows, metres.", min=0.0, shown_if=_POSE_ARROWS
-    )
-    shaftDiameter = Setting(
-        "Shaft Diameter", "float", 0.1, "In metres.", min=0.0, shown_if=_POSE_ARROWS
-    )
-    headDiameter = Setting(
-        "Head Diameter", "float", 0.3, "In metres.", min=0.0, shown_if=_POSE_ARROWS
-    )
+    shaftLength = _metres("Shaft Length", 0.1, _POSE_ARROWS)
+    headLength = _metres("Head Length", 0.2, _POSE_ARROWS)
+    shaftDiameter = _metres("Shaft Diameter", 0.1, _POSE_ARROWS)
+    headDiameter = _metres("Head Diameter", 0.3, _POSE_ARROWS)
 
     def preparer(self) -> Any:
         """Return the function that reads poses."""

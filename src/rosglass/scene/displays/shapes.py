@@ -14,8 +14,10 @@ if TYPE_CHECKING:
     from rosglass.messages import MessageSequence
 
 __all__ = [
+    "ALONG",
     "ArrowShapes",
     "AxesShapes",
+    "pose_along",
     "poses_matrices",
     "read_columns",
     "rotation_of_z_to",
@@ -23,10 +25,13 @@ __all__ = [
 ]
 
 #: Turns z, along which cylinders and cones stand, to x, y and z.
-_ALONG = np.zeros((3, 4, 4))
-_ALONG[0] = [[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
-_ALONG[1] = [[0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]
-_ALONG[2] = np.eye(4)
+ALONG = np.array(
+    [
+        [[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]],
+        [[0.0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0], [0, 0, 0, 1]],
+        np.eye(4),
+    ]
+)
 _COLORS = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1]], np.float32)
 
 
@@ -80,6 +85,16 @@ def rotation_of_z_to(axis: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([[1 - x * u, -x * v, x], [-y * u, 1 - y * v, y], [-x, -y, z]])
 
 
+def pose_along(x: NDArray[np.float64], origin: ArrayLike = (0.0, 0.0, 0.0)) -> NDArray[np.float64]:
+    """Return a pose at a point whose x is along a direction of length 1, 4 x 4."""
+    helper = np.array([0.0, 0.0, 1.0]) if abs(x[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    y = np.cross(helper, x)
+    y /= np.linalg.norm(y)
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = x, y, np.cross(x, y), origin
+    return pose
+
+
 def _along(
     length: ArrayLike, diameter: ArrayLike, start: ArrayLike, count: int
 ) -> NDArray[np.float64]:
@@ -120,7 +135,7 @@ class AxesShapes(Group):
         at = stack_poses(poses)
         length = np.broadcast_to(np.asarray(length, np.float64), len(at))
         local = _along(length, radius, length / 2, len(at))
-        matrices = at[:, np.newaxis] @ (_ALONG @ local[:, np.newaxis])
+        matrices = at[:, np.newaxis] @ (ALONG @ local[:, np.newaxis])
         colors = np.tile(_COLORS, (len(at), 1))
         colors[:, 3] = np.repeat(np.broadcast_to(np.asarray(alpha), len(at)), 3)
         self._mesh.set_instances(matrices.reshape(-1, 4, 4), colors if len(at) else (1, 1, 1, 1))
@@ -158,7 +173,7 @@ class ArrowShapes(Group):
             colors: RGBA from 0 to 1, for each or all.
             head_colors: Those of the heads, if they are others.
         """
-        at = stack_poses(poses) @ _ALONG[0]
+        at = stack_poses(poses) @ ALONG[0]
         count = len(at)
         length = np.broadcast_to(np.asarray(shaft[0], np.float64), count)
         middle = _along(length, shaft[1], length / 2, count)

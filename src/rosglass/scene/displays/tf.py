@@ -14,7 +14,7 @@ from rosglass.errors import Error
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import QtCore, Signal, Slot
 from rosglass.scene.display import OUTDATED_ALPHA, Display
-from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, stack_poses
+from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, pose_along, stack_poses
 from rosglass.scene.drawing import Labels
 from rosglass.scene.parts import Parts
 from rosglass.scene.settings import Setting
@@ -383,7 +383,7 @@ class TFDisplay(Display):
             way = at[parent] - at[child]
             length = float(np.linalg.norm(way))
             if length > 1e-4:
-                arrows.append(_pointing(at[child], way / length))
+                arrows.append(pose_along(way / length, at[child]))
                 lengths.append(length)
                 opacities.append(alpha * shares[child])
         far = np.array(lengths)
@@ -402,13 +402,3 @@ def _with_alpha(color: tuple[float, ...], opacities: list[float]) -> NDArray[np.
     out = np.tile(np.array(color), (max(len(opacities), 1), 1))
     out[: len(opacities), 3] = opacities
     return out
-
-
-def _pointing(origin: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a pose at a point whose x is along a direction of length 1."""
-    helper = np.array([0.0, 0.0, 1.0]) if abs(x[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    y = np.cross(helper, x)
-    y /= np.linalg.norm(y)
-    pose = np.eye(4)
-    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = x, y, np.cross(x, y), origin
-    return pose
