@@ -494,21 +494,6 @@ def test_the_matrix_of_ros_1_is_a_capital(ros: int) -> None:
     assert lens == (4, 3, 180, 190, 90, 80, 0, 0)
 
 
-@pytest.mark.parametrize(
-    ("topic", "info"),
-    [
-        ("/front/image_raw", "/front/camera_info"),
-        ("/front/image_raw/compressed", "/front/camera_info"),
-        ("/image", "/camera_info"),
-    ],
-)
-def test_the_camera_info_is_beside_the_image(topic: str, info: str) -> None:
-    pytest.importorskip("PySide6")
-    from rosglass.scene.displays.image import camera_info_topic
-
-    assert camera_info_topic(topic) == info
-
-
 def test_panels_over_a_view_are_moved_and_resized(
     bench: SceneBench, load: Callable[..., Any]
 ) -> None:

@@ -716,6 +716,14 @@ def test_the_brightness_of_hidden_points_is_half(bench: SceneBench) -> None:
     assert tuple(bench.picture()[CENTER[0] - 40, CENTER[1] - 40]) == (0, 100, 50)
 
 
+@pytest.mark.parametrize("end", ["", "/compressedDepth"])
+def test_the_calibration_is_beside_the_images_of_any_transport(end: str) -> None:
+    from rosglass.scene.displays.point_cloud import DepthCloudDisplay
+
+    topics = DepthCloudDisplay().further_topics(f"/camera/depth/image_raw{end}")
+    assert topics == ("/camera/depth/camera_info",)
+
+
 def test_occlusion_compensation_is_kept_in_files() -> None:
     from rosglass.scene.displays.point_cloud import DepthCloudDisplay
 

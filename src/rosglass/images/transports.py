@@ -21,7 +21,14 @@ if TYPE_CHECKING:
     from rosglass.comm.inbox import Sample
     from rosglass.messages import MessageType
 
-__all__ = ["TRANSPORTS", "Choice", "PictureReader", "Transport", "choose"]
+__all__ = [
+    "TRANSPORTS",
+    "Choice",
+    "PictureReader",
+    "Transport",
+    "camera_info_topic",
+    "choose",
+]
 
 _UNSUPPORTED = ("zstd", "draco")
 
@@ -190,6 +197,18 @@ TRANSPORTS = {
         ),
     )
 }
+
+
+def camera_info_topic(topic: str) -> str:
+    """Return the topic of the ``CameraInfo`` that belongs to an image topic.
+
+    Args:
+        topic: The camera's base topic, or that of a transport: ``/front/image_raw/compressed``.
+    """
+    base, _, last = topic.rpartition("/")
+    if last in TRANSPORTS:
+        base = base.rpartition("/")[0]
+    return f"{base}/camera_info"
 
 
 def choose(topic: str, preferred: str, published: Mapping[str, list[str]]) -> Choice | None:

@@ -9,6 +9,7 @@ import rosglass
 from rosglass.comm import Sample
 from rosglass.errors import UnsupportedError
 from rosglass.images import choose
+from rosglass.images.transports import camera_info_topic
 
 RAW, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 BOTH = {"/cam": [RAW], "/cam/compressed": [COMPRESSED]}
@@ -61,3 +62,15 @@ def test_pictures_stay_where_they_were_received() -> None:
     picture = read(Sample(memoryview(block).toreadonly(), "cdr", kind, 1))
     assert np.shares_memory(np.asarray(picture.data), np.frombuffer(block, np.uint8))
     assert np.array_equal(picture.data, pixels)
+
+
+@pytest.mark.parametrize(
+    ("topic", "info"),
+    [
+        ("/front/image_raw", "/front/camera_info"),
+        ("/front/image_raw/compressed", "/front/camera_info"),
+        ("/image", "/camera_info"),
+    ],
+)
+def test_the_camera_info_is_beside_the_image(topic: str, info: str) -> None:
+    assert camera_info_topic(topic) == info

@@ -21,6 +21,7 @@ from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.errors import Error
 from rosglass.images import TRANSPORTS
 from rosglass.images.depth import GreyRange
+from rosglass.images.transports import camera_info_topic
 from rosglass.interfaces.names import ros1_name
 from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import DEFAULT_TIMEOUT_MS
@@ -56,7 +57,6 @@ __all__ = [
     "ImageDisplay",
     "PictureDisplay",
     "PictureItem",
-    "camera_info_topic",
 ]
 
 _CAMERA_INFO = "sensor_msgs/CameraInfo"
@@ -75,18 +75,6 @@ _OPTICAL = np.diag([1.0, -1.0, -1.0, 1.0])
 #: The place of a panel in a view, in config files; RViz does not read it.
 _PANEL, _SIDES = "Panel Geometry", ("X", "Y", "Width", "Height")
 _NO_PANEL = "no panel shows it: declare ImagePanel { display: ... }"
-
-
-def camera_info_topic(topic: str) -> str:
-    """Return the topic of the ``CameraInfo`` that belongs to an image topic.
-
-    Args:
-        topic: The camera's base topic, or that of a transport: ``/front/image_raw/compressed``.
-    """
-    base, _, last = topic.rpartition("/")
-    if last in TRANSPORTS:
-        base = base.rpartition("/")[0]
-    return f"{base}/camera_info"
 
 
 class PictureDisplay(OneTopicDisplay):

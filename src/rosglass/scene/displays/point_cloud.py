@@ -19,6 +19,7 @@ import numpy as np
 from rosglass.comm.time import Time
 from rosglass.errors import Error, TransformException
 from rosglass.images.compressed import decompress, decompress_depth
+from rosglass.images.transports import camera_info_topic
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Slot
 from rosglass.scene.cloud_sources import (
@@ -789,7 +790,10 @@ class DepthCloudDisplay(CloudDisplay):
     def further_topics(self, topic: str) -> tuple[str, ...]:
         """Return the topics of the calibration, and of color images."""
         colors = self._resolve_further("Color Image Topic", self.colorTopic)
-        return (_info_topic(topic), *(_transported(one, self.colorTransport) for one in colors))
+        return (
+            camera_info_topic(topic),
+            *(_transported(one, self.colorTransport) for one in colors),
+        )
 
     def _wanted(self) -> tuple[Any, ...] | None:
         wanted = super()._wanted()
@@ -876,11 +880,6 @@ class DepthCloudDisplay(CloudDisplay):
 def _transported(topic: str, transport: str) -> str:
     """Return the topic of a transport of image_transport."""
     return topic if transport == "raw" else f"{topic}/{transport}"
-
-
-def _info_topic(topic: str) -> str:
-    """Return where image_transport has the calibration of a camera's images."""
-    return f"{topic.rpartition('/')[0]}/camera_info"
 
 
 def _read_value(name: str) -> Callable[[Any], Cloud]:
