@@ -204,6 +204,25 @@ def test_overlays_of_configs_are_shown_and_kept(bench: Any, panel: Path, tmp_pat
     bench.wait(lambda: "Choose a QML file" in made.status.text)
 
 
+def test_the_status_of_an_overlay_is_there_again_when_it_is_shown(bench: Any, panel: Path) -> None:
+    scene = bench.load().scene
+    good = scene.add("rosglass/QmlOverlay", "Good", path=str(panel))
+    missing = panel.with_name("Later.qml")
+    bad = scene.add("rosglass/QmlOverlay", "Bad", path=str(missing))
+    bench.wait(lambda: good.statusText == "Qml: OK" and "Later.qml" in bad.statusText)
+    for display in (good, bad):
+        display.enabled = False
+        assert display.statusText == ""
+        display.enabled = True
+    assert good.statusText == "Qml: OK"
+    bench.wait(lambda: "Later.qml" in bad.statusText)
+    assert bad.statusLevel == "error"
+    missing.write_text(RED)
+    bad.enabled = False
+    bad.enabled = True
+    bench.wait(lambda: bad.statusText == "Qml: OK", lambda: bad.statusText)
+
+
 def test_popups_follow_points_of_a_view_beside_others(bench: Any, panel: Path) -> None:
     from PySide6.QtCore import QPointF
     from PySide6.QtQuick import QQuickItem

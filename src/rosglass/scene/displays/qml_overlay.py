@@ -96,14 +96,16 @@ class QmlOverlayDisplay(Display):
             self._close_endpoint()
         super().leave()
 
-    def _on_enabled(self) -> None:
-        super()._on_enabled()
-        self._arrange()
-
     def on_group_enabled(self) -> None:
-        """Show or hide it with its group."""
+        """Show or hide it, and say again what is wrong with it."""
         super().on_group_enabled()
         self._arrange()
+        if not self.shown:
+            return
+        if self.overlay is not None and self.overlay.loaded:
+            self._on_problem(self.overlay.problem)
+        else:
+            self._close_endpoint()  # it is tried again: the file may be there now
 
     def _arrange(self) -> None:
         overlay = self.overlay
