@@ -18,8 +18,12 @@ from rosglass.errors import Error
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+    from typing import TypeAlias
 
     from numpy.typing import ArrayLike, NDArray
+
+    #: The corners of a box with the smallest and the largest x, y and z.
+    Box: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 __all__ = [
     "BOX",
@@ -218,6 +222,9 @@ class Drawable(Item):
         self.geometry = self.look = 0
         self.count = 0
         self.layer = 0
+        #: The box around it, and the count of changes that it is of.
+        self._box: Box | None = None
+        self._boxed = -1
 
     def changed(self, *, geometry: bool = False) -> None:
         """Announce that its look, or all its data, has changed."""
@@ -230,12 +237,18 @@ class Drawable(Item):
         """Whether nothing behind it shines through."""
         return True
 
-    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    def bounds(self) -> Box | None:
         """Return the corners of the box around it in its own frame; None for nothing finite."""
+        if self._boxed != self.geometry:
+            self._boxed, self._box = self.geometry, self._find_bounds()
+        return self._box
+
+    def _find_bounds(self) -> Box | None:
+        """Compute the box, once for all pictures until the data changes."""
         raise NotImplementedError
 
 
-def _box_of(points: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+def _box_of(points: NDArray[Any]) -> Box | None:
     finite = points[np.isfinite(points).all(axis=1)] if len(points) else points
     if not len(finite):
         return None
@@ -375,8 +388,6 @@ class Points(Drawable):
         self.style, self.size, self.size_by_depth = "points", 3.0, False
         self.coloring = Coloring()
         self.alpha = 1.0
-        self._box: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
-        self._boxed = -1
 
     def set_data(
         self,
@@ -483,11 +494,8 @@ class Points(Drawable):
             return 0.0
         return self.size * np.abs(xyz[:, 2]) if self.size_by_depth else self.size
 
-    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Return the corners of the box around it in its own frame; None for nothing finite."""
-        if self._boxed != self.geometry:
-            self._boxed, self._box = self.geometry, _box_of(self.xyz())
-        return self._box
+    def _find_bounds(self) -> Box | None:
+        return _box_of(self.xyz())
 
 
 class Lines(Drawable):
@@ -573,8 +581,7 @@ class Lines(Drawable):
         """Whether nothing behind it shines through."""
         return self._opaque and self.alpha >= OPAQUE
 
-    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Return the corners of the box around it in its own frame; None for nothing finite."""
+    def _find_bounds(self) -> Box | None:
         return _box_of(np.concatenate([self.rows["start"], self.rows["end"]]))
 
 
@@ -786,8 +793,7 @@ class Mesh(Drawable):
             self._opaque and self.shape.opaque and self.texture_opaque and self.color[3] >= OPAQUE
         )
 
-    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Return the corners of the box around it in its own frame; None for nothing finite."""
+    def _find_bounds(self) -> Box | None:
         if self.shape.box is None or not self.count:
             return None
         low, high = self.shape.box
@@ -856,8 +862,7 @@ class MapImage(Drawable):
         """Whether nothing behind it shines through."""
         return self.alpha >= OPAQUE and bool((self.palette[:, 3] == 255).all())
 
-    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Return the corners of the box around it in its own frame; None for nothing finite."""
+    def _find_bounds(self) -> Box | None:
         return (np.zeros(3), np.array([*self.size, 0.0])) if self.count else None
 
 
@@ -928,8 +933,7 @@ class Labels(Drawable):
         """Whether nothing behind it shines through: never, for the edges of letters are soft."""
         return False
 
-    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Return the corners of the box around it in its own frame; None for nothing finite."""
+    def _find_bounds(self) -> Box | None:
         return _box_of(self.positions)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Lines, Shape
+from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Lines, Mesh, Shape, instance_matrix
 
 POINTS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 1, 0)]
 
@@ -46,3 +46,15 @@ def test_a_mirrored_shape_is_seen_from_the_other_side() -> None:
     assert shape.mirrored().faces.tolist() == [[2, 1, 0]]
     assert shape.faces.tolist() == [[0, 1, 2]]
     assert shape.mirrored().one_sided
+
+
+def test_the_box_around_a_mesh_is_found_once_for_all_pictures() -> None:
+    mesh = Mesh(BOX)
+    box = mesh.bounds()
+    assert box is not None
+    mesh.set_look(color=(1.0, 0.0, 0.0, 0.5))
+    assert mesh.bounds() is box
+    mesh.set_instances([instance_matrix((3.0, 0.0, 0.0)), instance_matrix((-1.0, 0.0, 2.0))])
+    moved = mesh.bounds()
+    assert moved is not None
+    assert [side.tolist() for side in moved] == [[-1.5, -0.5, -0.5], [3.5, 0.5, 2.5]]
