@@ -293,8 +293,8 @@ def _pick_labels(
     width, height = (labels.extents * (0.5, 1)).T * heights
     with np.errstate(invalid="ignore"):
         right = x - seen[:, 0] + (0 if labels.align == "left" else width / 2)
-        near = (far > 0) & (right >= 0) & (right <= width)
-        near &= np.abs(y - seen[:, 1]) <= height / 2
+        down = y - seen[:, 1] + (0 if labels.align == "below" else height / 2)
+        near = (far > 0) & (right >= 0) & (right <= width) & (down >= 0) & (down <= height)
     numbers = np.flatnonzero(near)
     if not len(numbers):
         return None

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from rosglass.scene.drawing import BOX, Group, Mesh
+import pytest
+
+from rosglass.scene.drawing import BOX, Group, Labels, Mesh
 from rosglass.scene.picking import pick
 from rosglass.scene.views import OrbitView
 
@@ -17,3 +19,26 @@ def test_a_ray_does_not_pass_between_two_triangles() -> None:
     missed = [y for y in rows if pick(Group(box).drawables(), camera, 200, y) is None]
     assert len(rows) > 20
     assert missed == []
+
+
+@pytest.mark.parametrize(
+    ("align", "found"),
+    [
+        ("centre", {"left", "right", "above", "below"}),
+        ("left", {"right", "above", "below"}),
+        ("below", {"left", "right", "below"}),
+    ],
+)
+def test_a_text_is_picked_where_it_is_drawn(align: str, found: set[str]) -> None:
+    labels = Labels(in_pixels=True, align=align)
+    labels.owner = "text"
+    labels.set_texts(["a long text"], [(0, 0, 0)], 40.0)
+    camera = OrbitView().camera(400, 300)
+    # A little beside its place, in the middle of the picture.
+    around = {"left": (-20, 1), "right": (20, 1), "above": (1, -15), "below": (1, 15)}
+    hits = {
+        name: pick(Group(labels).drawables(), camera, 200 + x, 150 + y)
+        for name, (x, y) in around.items()
+    }
+    assert {name for name, hit in hits.items() if hit is not None} == found
+    assert pick(Group(labels).drawables(), camera, 200, 205) is None
