@@ -422,6 +422,30 @@ def test_python_gets_errors_for_bad_settings(
     assert view.scene.displays == []
 
 
+def test_python_gets_errors_for_what_is_no_display_or_view(bench: SceneBench) -> None:
+    from rosglass.errors import Error
+
+    view = bench.load("GridDisplay {}")
+    scene = view.scene
+    (grid,) = scene.displays
+    for call, error in (
+        (lambda: scene.add(5), "expected a display, or the name of its type, e.g. 'Grid', got 5"),
+        (lambda: scene.adopt(None), "expected a display, .* got None"),
+        (lambda: scene.remove("Grid"), "'Grid' is not in this scene, whose displays are"),
+        (lambda: scene.move(grid, before="Grid"), "'Grid' is not in this scene"),
+        (lambda: grid.set_status("Topic", "bad", ""), "level: expected one of ok, warn, error"),
+        (lambda: view.show_view("Orbit"), "a view controller; select_view"),
+        (lambda: view.show_saved_view("home"), "there is no saved view 'home'; there are 0"),
+        (lambda: view.save_view(None), "name: expected a text, got None"),
+        (lambda: view.tools.select(None), "the name, type or class id of a tool, got None"),
+        (lambda: view.tools.remove("Measure"), "tool 'Measure' is not in this view"),
+    ):
+        with pytest.raises(Error, match=error):
+            call()
+    assert scene.displays == [grid]
+    assert view.camera().focus == (0.0, 0.0, 0.0)
+
+
 def test_displays_are_added_and_removed_from_python(bench: SceneBench) -> None:
     from rosglass.errors import Error
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from rosglass.comm.names import similar
 from rosglass.comm.qos import Durability, QoS, Reliability
-from rosglass.errors import Error, TransformException
+from rosglass.errors import ArgumentError, Error, TransformException
 from rosglass.interfaces.names import ros1_name
 from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import TopicElement
@@ -348,8 +348,12 @@ class Display(Configurable, TopicElement):
             name: What it is about, e.g. ``Topic``.
             level: ``ok``, ``warn`` or ``error``.
             text: In words: what is wrong, and what to do.
+
+        Raises:
+            ArgumentError: There is no such level.
         """
-        assert level in _LEVELS
+        if level not in _LEVELS:
+            raise ArgumentError("level", level, f"one of {', '.join(_LEVELS)}")
         name = name[:_MAX_NAME]
         if len(text) > _MAX_TEXT:
             text = f"{text[:_MAX_TEXT]}... ({len(text)} characters)"

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rosglass.errors import Error
+from rosglass.errors import ArgumentError, Error
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -87,8 +87,9 @@ class Item:
 
     @pose.setter
     def pose(self, pose: NDArray[np.float64]) -> None:
-        if pose.shape != (4, 4) or not np.isfinite(pose).all():
-            raise Error(f"a pose must be a finite matrix of 4 x 4, got {pose.tolist()!r:.200}")
+        is_matrix = isinstance(pose, np.ndarray) and pose.shape == (4, 4)
+        if not is_matrix or not np.isfinite(pose).all():
+            raise Error(f"a pose must be a finite matrix of 4 x 4, got {pose!r:.200}")
         if not np.array_equal(pose, self._pose):
             self._pose = pose
             self.touch()
@@ -159,13 +160,24 @@ class Group(Item):
 
     @alpha.setter
     def alpha(self, alpha: float) -> None:
+        alpha = _number("alpha", alpha)
         if alpha != self._alpha:
             self._alpha = alpha
             self.touch()
 
     def add(self, *items: Item) -> None:
-        """Add items as the last ones, out of their former groups."""
+        """Add items as the last ones, out of their former groups.
+
+        Raises:
+            Error: One is neither a drawable nor a group, or a group would be in itself.
+        """
         for item in items:
+            above: Group | None = self
+            while above is not None and above is not item:
+                above = above.parent
+            if not isinstance(item, Item) or above is not None:
+                expected = "a drawable, or a group that this one is not in"
+                raise ArgumentError("item", item, expected, "Group.add()")
             item.remove()
             item.parent = self
             self._items[item] = None
@@ -268,7 +280,7 @@ def rgba_bytes(colors: ArrayLike, count: int) -> NDArray[np.uint8]:
     given = np.asarray(colors)
     if given.dtype != np.uint8:
         with np.errstate(invalid="ignore"):
-            scaled = np.nan_to_num(np.asarray(given, np.float32), nan=0.0, posinf=1.0, neginf=0.0)
+            scaled = np.nan_to_num(_floats("colors", given), nan=0.0, posinf=1.0, neginf=0.0)
             given = (np.clip(scaled, 0, 1) * 255 + 0.5).astype(np.uint8)
     if given.ndim == 1:
         given = given[np.newaxis, :]
@@ -304,14 +316,35 @@ def check_numbers(name: str, numbers: ArrayLike) -> None:
     raise Error(f"{where}: {bad:g} is {reason}")
 
 
+def _number(name: str, value: float) -> float:
+    """Return a finite number; raises ArgumentError."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise ArgumentError(name, value, "a finite number")
+    return number
+
+
+def _floats(name: str, given: ArrayLike, shape: tuple[int, ...] | None = None) -> NDArray[Any]:
+    """Return an array of float32, of one row for all if a shape is given; raises ArgumentError."""
+    try:
+        with np.errstate(over="ignore"):
+            array = np.ascontiguousarray(given, np.float32)
+        return array if shape is None else np.broadcast_to(array, shape)
+    except (TypeError, ValueError):
+        expected = "numbers" if shape is None else f"numbers that fit the shape {shape}"
+        raise ArgumentError(name, given, expected) from None
+
+
 def _checked(name: str, given: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """Return an array of floats of the shape (n, *shape).
 
     Raises:
         Error: It has another shape, or too many rows.
     """
-    with np.errstate(over="ignore"):
-        array = np.ascontiguousarray(given, np.float32)
+    array = _floats(name, given)
     if array.size == 0:
         array = array.reshape(0, *shape)
     if array.shape[1:] != shape:
@@ -414,7 +447,10 @@ class Points(Drawable):
         Raises:
             Error: An offset is beyond a row or not divisible by 4, or `data` is too short.
         """
-        view = np.frombuffer(data, np.uint8)
+        try:
+            view = np.frombuffer(data, np.uint8)
+        except (TypeError, ValueError):
+            raise ArgumentError("data", data, "bytes, or an array of them") from None
         offsets = (stride, position, max(channel, 0))
         if min(offsets) < 0 or any(n % 4 for n in offsets) or stride < 12 or count < 0:
             raise Error(f"stride {stride}, position {position}, channel {channel}: not usable")
@@ -465,10 +501,10 @@ class Points(Drawable):
             raise Error(f"style {style!r} is none of {', '.join(self.STYLES)}")
         before = (self.style, self.size, self.size_by_depth, self.coloring, self.alpha)
         self.style = self.style if style is None else style
-        self.size = self.size if size is None else size
+        self.size = self.size if size is None else _number("size", size)
         self.size_by_depth = self.size_by_depth if size_by_depth is None else size_by_depth
         self.coloring = self.coloring if coloring is None else coloring
-        self.alpha = self.alpha if alpha is None else alpha
+        self.alpha = self.alpha if alpha is None else _number("alpha", alpha)
         if before != (self.style, self.size, self.size_by_depth, self.coloring, self.alpha):
             self.changed()
 
@@ -520,7 +556,7 @@ class Lines(Drawable):
     def __init__(self, width: float = 1.0, *, in_metres: bool = False) -> None:
         super().__init__()
         self.rows: NDArray[Any] = np.zeros(0, self.ROW)
-        self.width, self.in_metres, self.alpha = width, in_metres, 1.0
+        self.width, self.in_metres, self.alpha = _number("width", width), in_metres, 1.0
         self._opaque = True
 
     def set_segments(
@@ -571,8 +607,8 @@ class Lines(Drawable):
     def set_look(self, *, width: float | None = None, alpha: float | None = None) -> None:
         """Change the width, in pixels or metres, or the opacity."""
         before = self.width, self.alpha
-        self.width = self.width if width is None else width
-        self.alpha = self.alpha if alpha is None else alpha
+        self.width = self.width if width is None else _number("width", width)
+        self.alpha = self.alpha if alpha is None else _number("alpha", alpha)
         if before != (self.width, self.alpha):
             self.changed()
 
@@ -734,6 +770,8 @@ class Mesh(Drawable):
     def __init__(
         self, shape: Shape, color: Sequence[float] = (1.0, 1.0, 1.0, 1.0), *, lit: bool = True
     ) -> None:
+        if not isinstance(shape, Shape):
+            raise ArgumentError("shape", shape, "a Shape, such as rosglass.scene.drawing.BOX")
         super().__init__()
         self.shape, self.lit = shape, lit
         self.color = tuple(color)
@@ -753,7 +791,7 @@ class Mesh(Drawable):
             colors: RGBA from 0 to 1, for each or all.
         """
         given = _checked("matrices", matrices, (4, 4))
-        rgba = np.broadcast_to(np.asarray(colors, np.float32), (len(given), 4))
+        rgba = _floats("colors", colors, (len(given), 4))
         good = np.isfinite(given).all(axis=(1, 2))
         rows = np.zeros(int(good.sum()), self.ROW)
         rows["matrix"] = given[good].transpose(0, 2, 1).reshape(-1, 16)
@@ -769,10 +807,9 @@ class Mesh(Drawable):
         Raises:
             Error: It has another shape, or more than 16384 rows or columns.
         """
-        if pixels is not None and (
-            pixels.ndim != 3 or pixels.shape[2] != 4 or not 0 < max(pixels.shape) <= 16384
-        ):
-            raise Error(f"texture: expected up to 16384 x 16384 x 4 bytes, got {pixels.shape}")
+        shape = () if pixels is None else np.shape(pixels)
+        if pixels is not None and (len(shape) != 3 or shape[2] != 4 or not 0 < max(shape) <= 16384):
+            raise Error(f"texture: expected up to 16384 x 16384 x 4 bytes, got {shape}")
         self.texture = None if pixels is None else np.ascontiguousarray(pixels, np.uint8)
         self.texture_opaque = pixels is None or bool((pixels[..., 3] == 255).all())
         self.textures += 1
@@ -833,9 +870,10 @@ class MapImage(Drawable):
         Raises:
             Error: They are not bytes in two dimensions of up to 16384, or the size is not positive.
         """
+        cells = np.asarray(cells)
         if cells.ndim != 2 or cells.dtype != np.uint8 or max(cells.shape, default=0) > 16384:
             raise Error(f"expected up to 16384 x 16384 cells, got {cells.shape} of {cells.dtype}")
-        if not (math.isfinite(resolution) and resolution > 0):
+        if not _number("resolution", resolution) > 0:
             raise Error(f"resolution: expected a positive number of metres, got {resolution}")
         self.cells = np.ascontiguousarray(cells)
         self.size = (cells.shape[1] * resolution, cells.shape[0] * resolution)
@@ -844,6 +882,7 @@ class MapImage(Drawable):
 
     def set_palette(self, palette: NDArray[np.uint8]) -> None:
         """Take the colours, (256, 4) RGBA bytes."""
+        palette = np.asarray(palette)
         if palette.shape != (256, 4) or palette.dtype != np.uint8:
             raise Error(f"palette: expected 256 x 4 bytes, got {palette.shape} of {palette.dtype}")
         self.palette = np.ascontiguousarray(palette)
@@ -852,7 +891,7 @@ class MapImage(Drawable):
     def set_look(self, *, alpha: float | None = None, below: bool | None = None) -> None:
         """Change the opacity, or whether it is drawn below all else that is translucent."""
         before = self.alpha, self.layer
-        self.alpha = self.alpha if alpha is None else alpha
+        self.alpha = self.alpha if alpha is None else _number("alpha", alpha)
         self.layer = self.layer if below is None else -2 if below else -1
         if before != (self.alpha, self.layer):
             self.changed()
@@ -915,6 +954,9 @@ class Labels(Drawable):
                 f"expected up to {self.MAX_COUNT} texts with a position each, got "
                 f"{len(texts)} and {len(at)}"
             )
+        wrong = next((text for text in texts if not isinstance(text, str)), "")
+        if wrong != "":
+            raise ArgumentError("texts", wrong, "a text")
         cut = tuple(text[: self.MAX_LENGTH] for text in texts)
         if cut != self.texts:
             self.texts = cut
@@ -923,7 +965,7 @@ class Labels(Drawable):
             self.extents = np.array(extents, np.float64).reshape(-1, 2)
             self.texts_changed += 1
         self.positions = at
-        self.heights = np.broadcast_to(np.asarray(heights, np.float32), len(at)).copy()
+        self.heights = _floats("heights", heights, (len(at),)).copy()
         self.colors = rgba_bytes(colors, len(at))
         self.count = len(at)
         self.changed(geometry=True)

@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rosglass.comm.executor import Dispatcher
 from rosglass.comm.names import similar
 from rosglass.comm.time import Time
-from rosglass.errors import Error, LookupException, TransformException
+from rosglass.errors import ArgumentError, Error, LookupException, TransformException
 from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import Element, single_shot
 from rosglass.qml.runtime import runtime_of
 from rosglass.qml.tf_buffer import TfLink
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.rviz.property_values import shown
+from rosglass.scene.display import Display
 from rosglass.scene.displays.shapes import poses_matrices
 from rosglass.scene.drawing import Group, instance_matrix
 
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from rosglass.comm.clock import Jump
     from rosglass.qml.runtime import Runtime
     from rosglass.qml.session import Session
-    from rosglass.scene.display import Display
     from rosglass.scene.resource_retriever import ResourceRetriever
     from rosglass.tf import TransformBuffer
 
@@ -152,7 +152,7 @@ class Scene(Element):
                 display.deleteLater()
                 raise
         else:
-            display = kind
+            display = _checked(kind)
         if name:
             display.name = name
         self.adopt(display)
@@ -162,9 +162,9 @@ class Scene(Element):
         """Show a display.
 
         Raises:
-            Error: It is in another scene.
+            Error: It is in another scene, or is no display.
         """
-        if display in self._displays:
+        if _checked(display) in self._displays:
             return
         if display.scene is not None and is_alive(display.scene):
             raise Error(f"{display.label} is in another scene; make one for each scene")
@@ -195,8 +195,7 @@ class Scene(Element):
         Raises:
             Error: It is not in this scene.
         """
-        if display not in self._displays:
-            raise Error(f"{display.label} is not in this scene")
+        self._check_own(display)
         for inner in self.displays:
             if inner.group is display and inner in self._displays:
                 self.remove(inner)
@@ -219,9 +218,10 @@ class Scene(Element):
             Error: One of them is not in this scene, `before` is not in `group`, or a group would be
                 in itself.
         """
-        for one in (display, before, group):
-            if one is not None and one not in self._displays:
-                raise Error(f"{one.label} is not in this scene")
+        self._check_own(display)
+        for one in (before, group):
+            if one is not None:
+                self._check_own(one)
         if group is not None and group.TYPE != "Group":
             raise Error(f"{group.label} is no group")
         above = group
@@ -243,6 +243,11 @@ class Scene(Element):
         if display.shown != was_shown:
             display.on_group_enabled()
         self.displaysChanged.emit()
+
+    def _check_own(self, display: Display) -> None:
+        if display not in self._displays:
+            label = display.label if isinstance(display, Display) else shown(display)
+            raise Error(f"{label} is not in this scene, whose displays are in Scene.displays")
 
     def _in_order(self, group: Display | None) -> Iterator[Display]:
         """Iterate over the displays of a group, each before those in it, as panels list them."""
@@ -585,6 +590,12 @@ class Scene(Element):
 
     def _alive(self) -> Iterator[Display]:
         return (display for display in self.displays if is_alive(display))
+
+
+def _checked(display: Any) -> Display:
+    if not isinstance(display, Display):
+        raise ArgumentError("display", display, "a display, or the name of its type, e.g. 'Grid'")
+    return display
 
 
 def _end_loader(session: Session, loader: Dispatcher, takers: dict[object, Any]) -> None:

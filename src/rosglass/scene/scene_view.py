@@ -14,7 +14,7 @@ from PySide6.QtGui import QColor, QEventPoint, QGuiApplication
 from PySide6.QtQuick import QQuickRhiItem, QQuickWindow, QSGRendererInterface
 from shiboken6 import Shiboken
 
-from rosglass.errors import Error
+from rosglass.errors import ArgumentError, Error, shown
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.rviz.orbit import ease
 from rosglass.scene.camera import interpolate
@@ -34,7 +34,7 @@ from rosglass.scene.rviz_formats import FIXED_FRAME, ros_of
 from rosglass.scene.scene import Scene
 from rosglass.scene.selection import Selection
 from rosglass.scene.tools import PointerEvent, Tool, Tools
-from rosglass.scene.views import VIEWS, create_view
+from rosglass.scene.views import VIEWS, ViewController, create_view
 
 if TYPE_CHECKING:
     import os
@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     from rosglass.scene.display import Display
     from rosglass.scene.drawing import Drawable
     from rosglass.scene.picking import Hit
-    from rosglass.scene.views import ViewController
 
 __all__ = ["NO_GPU", "SceneView"]
 
@@ -382,7 +381,13 @@ class SceneView(QQuickRhiItem):
             self.show_view(made)
 
     def show_view(self, view: ViewController) -> None:
-        """Look through another view."""
+        """Look through another view.
+
+        Raises:
+            ArgumentError: It is none.
+        """
+        if not isinstance(view, ViewController):
+            raise ArgumentError("view", view, "a view controller; select_view() takes its type")
         self._view.on_change = self._view.on_target = None
         self._view = view
         view.on_change, view.on_target = self.camera_moved, self._on_placed
@@ -446,7 +451,13 @@ class SceneView(QQuickRhiItem):
     )
 
     def save_view(self, name: str) -> None:
-        """Save where the camera is, as the last of the saved views."""
+        """Save where the camera is, as the last of the saved views.
+
+        Raises:
+            ArgumentError: The name is no text.
+        """
+        if not isinstance(name, str):
+            raise ArgumentError("name", name, "a text")
         if self.config is None:
             self.config = RvizConfig(self._ros())
         self.config.saved_views.append(self._view_config(name, self.config.ros))
@@ -497,8 +508,8 @@ class SceneView(QQuickRhiItem):
 
     def _saved_index(self, index: int) -> int:
         count = len(self._saved_views())
-        if not 0 <= index < count:
-            raise Error(f"there is no saved view {index}; there are {count}")
+        if not isinstance(index, int) or not 0 <= index < count:
+            raise Error(f"there is no saved view {shown(index)}; there are {count}")
         return index
 
     @Slot(str, result=str)

@@ -616,7 +616,8 @@ class Tools(QtCore.QObject):
             Error: It is not in this view.
         """
         if tool not in self._items:
-            raise Error(f"{tool.label} is not in this view")
+            label = tool.label if isinstance(tool, Tool) else f"tool {shown(tool)}"
+            raise Error(f"{label} is not in this view, whose tools are in view.tools")
         self._items.remove(tool)
         self._defaults.discard(tool)
         self._declared.discard(tool)
@@ -633,7 +634,13 @@ class Tools(QtCore.QObject):
             self.remove(tool)
 
     def find(self, name: str) -> Tool | None:
-        """Return the first tool of a name, type or class id."""
+        """Return the first tool of a name, type or class id.
+
+        Raises:
+            ArgumentError: It is no text.
+        """
+        if not isinstance(name, str):
+            raise ArgumentError("name", name, "the name, type or class id of a tool")
         named = [tool for tool in self._items if tool.name == name]
         kind = tool_type(name) if "/" in name else name
         typed = [tool for tool in self._items if kind and kind == tool.TYPE]
@@ -652,10 +659,10 @@ class Tools(QtCore.QObject):
         Raises:
             Error: It is not in this view.
         """
-        found = self.find(tool) if isinstance(tool, str) else tool
+        found = tool if isinstance(tool, Tool) else self.find(tool)
         if found is None or found not in self._items:
             names = ", ".join(one.TYPE or one.name for one in self._items)
-            text = shown(tool) if isinstance(tool, str) else tool.label
+            text = tool.label if isinstance(tool, Tool) else shown(tool)
             hint = similar(tool, names.split(", ")) if isinstance(tool, str) else ""
             raise Error(f"there is no tool {text} in this view{hint or f'; there are: {names}'}")
         self._make_current(found)

@@ -2,10 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Lines, Mesh, Shape, instance_matrix
+from rosglass.errors import Error
+from rosglass.scene.drawing import (
+    BOX,
+    CYLINDER,
+    SPHERE,
+    Group,
+    Labels,
+    Lines,
+    MapImage,
+    Mesh,
+    Points,
+    Shape,
+    instance_matrix,
+)
 
 POINTS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 1, 0)]
 
@@ -58,3 +73,36 @@ def test_the_box_around_a_mesh_is_found_once_for_all_pictures() -> None:
     moved = mesh.bounds()
     assert moved is not None
     assert [side.tolist() for side in moved] == [[-1.5, -0.5, -0.5], [3.5, 0.5, 2.5]]
+
+
+def _add_to_itself() -> None:
+    inner = Group()
+    outer = Group(Group(inner))
+    inner.add(outer)
+
+
+@pytest.mark.parametrize(
+    ("call", "error"),
+    [
+        (lambda: Points().set_points("abc"), "points: expected numbers, got 'abc'"),
+        (lambda: Points().set_points([[1, 2, 3]], "red"), "colors: expected numbers"),
+        (lambda: Points().set_data(5, 1, 12), "data: expected bytes"),
+        (lambda: Points().set_look(size="x"), "size: expected a finite number, got 'x'"),
+        (lambda: Lines("wide"), "width: expected a finite number, got 'wide'"),
+        (lambda: Lines().set_look(alpha=np.nan), "alpha: expected a finite number, got nan"),
+        (lambda: Mesh(None), "shape: expected a Shape, such as rosglass.scene.drawing.BOX"),
+        (lambda: Mesh(BOX).set_instances([np.eye(4)], (1, 2)), "colors: .* fit the shape"),
+        (lambda: Mesh(BOX).set_texture([1, 2]), "texture: expected up to 16384"),
+        (lambda: MapImage().set_cells([1, 2], 1.0), "expected up to 16384 x 16384 cells"),
+        (lambda: MapImage().set_palette([1]), "palette: expected 256 x 4 bytes"),
+        (lambda: Labels().set_texts([5], [[0, 0, 0]]), "texts: expected a text, got 5"),
+        (lambda: Labels().set_texts(["a"], [[0, 0, 0]], "x"), "heights: expected numbers"),
+        (lambda: setattr(Group(), "alpha", "x"), "alpha: expected a finite number"),
+        (lambda: setattr(Group(), "pose", "x"), "a pose must be a finite matrix"),
+        (lambda: Group().add(5), "Group.add.*: expected a drawable, or a group"),
+        (_add_to_itself, "Group.add.*: expected a drawable, or a group"),
+    ],
+)
+def test_what_cannot_be_drawn_is_an_error_that_names_it(call: Any, error: str) -> None:
+    with pytest.raises(Error, match=error):
+        call()
