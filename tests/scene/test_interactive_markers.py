@@ -831,6 +831,22 @@ def test_a_mesh_that_was_missing_is_read_again(
         bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
 
 
+def test_markers_that_cannot_be_read_are_requested_again(
+    bench: SceneBench, server: MarkerServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = "rosglass.scene.displays.interactive_marker"
+    monkeypatch.setattr(f"{folder}._RETRY_MS", 100)
+    monkeypatch.setattr(f"{folder}_messages._MAX_MARKERS", 1)
+    server.markers = {name: marker(control(BUTTON), name=name) for name in ("arm", "leg")}
+    view = bench.load('InteractiveMarkersDisplay { topic: "/server" }')
+    (display,) = view.scene.displays
+    bench.wait(lambda: "markers: 2 are more than the 1" in display.statusText)
+    bench.wait(lambda: server.requests >= 3)
+    del server.markers["leg"]
+    bench.wait(lambda: display.markers == ["arm"])
+    bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
+
+
 def test_both_rviz_write_the_namespace_differently(bench: SceneBench) -> None:
     view = bench.load("InteractiveMarkersDisplay { }")
     (display,) = view.scene.displays

@@ -426,9 +426,15 @@ class InteractiveMarkersDisplay(TopicDisplay):
     # -- updates ---------------------------------------------------------------------------------
 
     def _on_items(self) -> None:
-        if is_alive(self) and self._outdated:
+        if not is_alive(self):  # it has no attributes then
+            return
+        if self._outdated:
             self._request_all()
         super()._on_items()
+        # It may be the answer that cannot be read.
+        is_unread = self._requested and "Message" in self.status_lines
+        if is_unread and not self._retry_request.isActive():
+            self._retry_request.start(_RETRY_MS)
 
     def _show_waiting(self) -> None:
         while self._waiting:
@@ -544,6 +550,8 @@ class InteractiveMarkersDisplay(TopicDisplay):
                 marker.controls.clear()
             server.root.remove()
         self._servers.clear()
+        for line in [one for one in self.status_lines if one.startswith("Marker ")]:
+            self.delete_status(line)
         report(self, markers=[])
 
     def reset(self) -> None:
