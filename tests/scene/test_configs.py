@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import logging
+import os
+import random
+import re
+from contextlib import suppress
+from copy import deepcopy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+import yaml
 
 from rosglass.errors import Error
+from rosglass.qt import QtCore
 from rosglass.scene.rviz_config import RvizConfig
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from conftest import SceneBench
 
 FILES = sorted((Path(__file__).parents[1] / "unit/scene/rviz_configs").glob("*.rviz"))
@@ -271,3 +281,133 @@ def test_settings_have_the_names_that_rviz_writes(bench: SceneBench) -> None:
         if names:
             added[old.type] = names
     assert added == {}
+
+
+def test_a_depth_cloud_keeps_a_topic_that_is_not_its_own(bench: SceneBench) -> None:
+    display = bench.load().scene.add("DepthCloud")
+    saved = {"Depth Map Topic": "/depth", "Topic": "mine"}
+    assert display.load_settings(saved) == []
+    assert display.topic == "/depth"
+    kept = display.save_settings(saved)
+    assert (kept["Depth Map Topic"], kept["Topic"]) == ("/depth", "mine")
+
+
+# -- files with random changes ---------------------------------------------------------------------
+
+#: Changed files of each public one; CHANGED_CONFIGS=50 for a search by hand.
+CHANGED_COUNT = int(os.environ.get("CHANGED_CONFIGS", "1"))
+SEED = os.environ.get("HOSTILE_SEED", "1")
+#: Values of another type, and those that are wrong for most settings.
+VALUES: list[Any] = [
+    None, True, 0, -1, 1e308, float("inf"), float("nan"), 2**63, 10**400, "", "~", "nan", "a; b",
+    "1e999", "1; 2; 3", "300; -1; 0", "x" * 10_000, "ü\u202e\n", "/", "rviz/Grid", "Rviz",
+    [], [1], ["x"] * 3, {}, {"Value": True}, {"X": "a"}, {"Class": "rviz/Grid"},
+]  # fmt: skip
+
+
+def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Return the paths of everything in a tree."""
+    inner: Any = value.items() if isinstance(value, dict) else ()
+    if isinstance(value, list):
+        inner = enumerate(value)
+    return [path, *(one for key, part in inner for one in places(part, (*path, key)))]
+
+
+def with_changes(tree: Any, rng: random.Random) -> Any:
+    """Return a tree with random changes."""
+    tree = deepcopy(tree)
+    for _ in range(rng.choice([1, 3, 10, 40])):
+        found = places(tree)[1:]
+        if not found:
+            break
+        path, holder = rng.choice(found), tree
+        for key in path[:-1]:
+            holder = holder[key]
+        how = rng.random()
+        if how < 0.15:
+            del holder[path[-1]]
+        elif how < 0.3 and isinstance(holder, list):
+            holder.insert(path[-1], deepcopy(rng.choice(holder)))
+        elif how < 0.4 and isinstance(holder, dict):
+            holder[rng.choice(["Unknown", "Value", "Class", "Topic"])] = holder[path[-1]]
+        else:
+            holder[path[-1]] = deepcopy(rng.choice(VALUES))
+    return tree
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_files_with_random_changes_are_shown_or_refused_and_come_back(
+    bench: SceneBench, file: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    view, changed, saved = bench.load(), tmp_path / "changed.rviz", tmp_path / "saved.rviz"
+    rng = random.Random(f"{SEED} {file.stem}")
+    tree = yaml.safe_load(file.read_text())
+    messages: list[str] = []
+    handler = QtCore.qInstallMessageHandler(lambda _kind, _about, text: messages.append(text))
+    try:
+        for _ in range(CHANGED_COUNT):
+            changed.write_text(yaml.safe_dump(with_changes(tree, rng)))
+            before = None
+            with suppress(Error):
+                before = RvizConfig.load(changed)
+            if before is None:
+                with pytest.raises(Error, match=re.escape(str(changed))):
+                    view.load_config(changed)
+                continue
+            view.load_config(changed)
+            bench.picture()
+            view.save_config(saved)
+            check_kept(before, RvizConfig.load(saved), view.scene.TYPES)
+            # Loaded and saved once more, it is the same file.
+            first = RvizConfig.load(saved)
+            view.load_config(saved)
+            view.save_config()
+            assert RvizConfig.load(saved) == first
+            assert view.problem == ""
+            errors = [one for one in caplog.records if one.levelno >= logging.ERROR]
+            assert not errors, errors[0].getMessage() + str(errors[0].exc_info)
+            assert not [one for one in messages if "pipewire" not in one], messages
+    finally:
+        QtCore.qInstallMessageHandler(handler)
+
+
+#: Keys of each display.
+OWN = {"Class", "Displays", "Enabled", "Name", "Value"}
+
+
+def check_kept(before: RvizConfig, after: RvizConfig, known: Collection[str]) -> None:
+    """Check that what rosglass does not know is as it was; it knows displays of these names."""
+    assert after.panels == before.panels
+    old, new = list(before.walk()), list(after.walk())
+    # Classes of the other RViz get the names that the file's has.
+    assert [(one.type or one.class_id, one.name, one.enabled) for one in new] == [
+        (one.type or one.class_id, one.name or "Unknown", one.enabled) for one in old
+    ]
+    for one, other in zip(old, new, strict=True):
+        assert set(one.settings) <= set(other.settings), one.name
+        is_known = one.type or one.class_id in known
+        unknown = {"Unknown"} if is_known else set(one.settings) - OWN
+        for key in unknown & set(one.settings):
+            assert repr(one.settings[key]) == repr(other.settings[key]), (one.name, key)
+
+
+def test_files_with_random_letters_are_shown_or_refused(bench: SceneBench, tmp_path: Path) -> None:
+    view, changed = bench.load(), tmp_path / "changed.rviz"
+    rng = random.Random(SEED)
+    for number in range(20 * CHANGED_COUNT):
+        text = FILES[number % len(FILES)].read_text()
+        for _ in range(rng.choice([1, 5, 50])):
+            at = rng.randrange(len(text))
+            new = rng.choice(
+                ["", ":", "-", "\n", "\t", "{", "[", '"', "&a ", "*a", "!!x ", "\0", "é"]
+            )
+            text = text[:at] + new + text[at + rng.choice([0, 1, 10]) :]
+        changed.write_text(text)
+        refused = ""
+        try:
+            view.load_config(changed)
+        except Error as error:
+            refused = str(error)
+        assert not refused or str(changed) in refused
+        assert view.problem == ""

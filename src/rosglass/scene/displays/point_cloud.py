@@ -874,7 +874,8 @@ class DepthCloudDisplay(CloudDisplay):
         """Return the settings for a file of either RViz."""
         kept = super().save_settings(older, 1)
         kept["Depth Map Topic"] = kept.pop("Topic")
-        return kept
+        # A setting of this name is another one's.
+        return {**kept, "Topic": older["Topic"]} if older and "Topic" in older else kept
 
 
 def _transported(topic: str, transport: str) -> str:
