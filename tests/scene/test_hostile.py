@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import math
+import os
+import random
 import sys
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from conftest import SceneBench
+
+#: What numpy computes of numbers that are too large is refused before, with the field's name.
+pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
 
 # -- messages that are right -----------------------------------------------------------------------
 
@@ -194,6 +199,37 @@ def changed(value: Any, path: tuple[Any, ...], new: Any) -> Any:
     return copy
 
 
+#: Messages of each type with random fields; HOSTILE_MESSAGES=1000 for a search by hand.
+RANDOM_COUNT = int(os.environ.get("HOSTILE_MESSAGES", "25"))
+SEED = os.environ.get("HOSTILE_SEED", "1")
+ANY_FLOATS = [*FLOATS, -math.inf, -0.0, 1.0, -1e18, 1e18, 1e19, 1e-30, 1e30, 5e-324]
+WIDTHS = (7, 8, 15, 16, 31, 32, 63)
+
+
+def randomised(value: Any, rng: random.Random, share: float) -> Any:
+    """Return a value of the same type, of which a share is random."""
+    if isinstance(value, dict):
+        return {key: randomised(inner, rng, share) for key, inner in value.items()}
+    is_kept = rng.random() >= share
+    if isinstance(value, list):
+        if not is_kept:
+            count = rng.choice([0, 1, 2, 3, 5, len(value) - 1, len(value) + 1, 3 * len(value)])
+            value = [rng.choice(value) for _ in range(max(count, 0))] if value else []
+        return [randomised(inner, rng, share) for inner in value]
+    if is_kept or isinstance(value, bool):
+        return value if is_kept else not value
+    if isinstance(value, float):
+        wide = rng.choice([-1, 1]) * 10 ** rng.uniform(-320, 308)
+        return rng.choice([*ANY_FLOATS, rng.uniform(-10, 10), wide])
+    if isinstance(value, int):
+        wide = (1 << rng.choice(WIDTHS)) - rng.choice([0, 1])
+        return rng.choice([0, 1, 2, 3, 4, 5, 12, -1, wide, -wide, value + 1])
+    if isinstance(value, str):
+        return rng.choice([*TEXTS, "map", "odom", "x", "rgb", value * 2])
+    data = bytes(value)
+    return rng.choice([b"", data[:-1], data * 2, rng.randbytes(len(data)), b"\xff" * len(data)])
+
+
 class Watch(logging.Handler):
     """Keeps what must not happen: tracebacks, exceptions in Qt's loop, warnings of Qt."""
 
@@ -211,7 +247,12 @@ def watch(monkeypatch: pytest.MonkeyPatch) -> Iterator[Watch]:
     logger = logging.getLogger("rosglass")
     logger.addHandler(made)
     monkeypatch.setattr(sys, "excepthook", lambda *error: made.seen.append(repr(error)))
-    before = QtCore.qInstallMessageHandler(lambda _kind, _about, text: made.seen.append(text))
+
+    def on_qt_message(_kind: Any, _about: Any, text: str) -> None:
+        if "pipewire" not in text:  # which QtMultimedia looks for
+            made.seen.append(text)
+
+    before = QtCore.qInstallMessageHandler(on_qt_message)
     yield made
     QtCore.qInstallMessageHandler(before)
     logger.removeHandler(made)
@@ -226,12 +267,14 @@ ROBOT = """<robot name="r"><link name="odom"/><link name="body"/>
 class Robot:
     """A robot whose messages are wrong, beside a display whose messages are right."""
 
-    def __init__(self, bench: SceneBench, watch: Watch) -> None:
+    def __init__(self, bench: SceneBench, watch: Watch, body: str = "") -> None:
         from rosglass import Time
         from rosglass.tf import StaticTransformBroadcaster, Transform
 
         self.bench, self._watch, self.node = bench, watch, bench.robot
-        self.view = bench.load()
+        #: The number of the last update of interactive markers.
+        self._number = 0
+        self.view = bench.load(body)
         tf = StaticTransformBroadcaster(self.node)
         tf.send_transform(Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", "odom"))
         self.good = self.view.scene.add("Pose", topic="/good")
@@ -248,7 +291,10 @@ class Robot:
             node.create_service_server(
                 "/hostile/get_interactive_markers",
                 "visualization_msgs/GetInteractiveMarkers",
-                lambda _: {"sequence_number": 0},
+                lambda _: {
+                    "sequence_number": self._number,
+                    "markers": [INTERACTIVE] if self._number else [],
+                },
             )
         elif kind == "Effort":
             latched = QoS(1, durability=Durability.TRANSIENT_LOCAL)
@@ -268,6 +314,8 @@ class Robot:
         if kind == "InteractiveMarkers":
             del self.message["header"]
         self.bench.wait(self.publisher.subscription_count)
+        if kind == "DepthCloud":
+            self.bench.wait(lambda: self.display.received)  # the calibration
         self.send(self.message)
         self.bench.wait(lambda: self.display.statusLevel == "ok", lambda: self.display.statusText)
 
@@ -281,7 +329,8 @@ class Robot:
             # A number that does not follow the last one makes the display request all markers.
             servers = display._servers
             self.bench.wait(lambda: not servers or servers[""].number is not None)
-            message = {**message, "seq_num": servers[""].number + 1 if servers else 1}
+            self._number = servers[""].number + 1 if servers else 1
+            message = {**message, "seq_num": self._number}
         try:
             self.publisher.publish(self._translated(message))
         except Error:
@@ -355,6 +404,109 @@ def test_every_field_may_be_wrong(robot: Robot, watch: Watch, case: Case) -> Non
         )
     robot.send(robot.message)
     robot.bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
+    robot.check()
+
+
+@pytest.mark.parametrize(
+    "case", CASES, ids=lambda case: f"{case.display}{case.message.get('type', '')}"
+)
+def test_all_fields_may_be_random(robot: Robot, watch: Watch, case: Case) -> None:
+    robot.show(case)
+    display, rng = robot.display, random.Random(f"{SEED} {case.display}")
+    for number in range(RANDOM_COUNT):
+        message = randomised(robot.message, rng, rng.choice([0.02, 0.1, 0.3]))
+        robot.send(message)
+        if number % 5 == 0:
+            robot.bench.picture()
+        assert not watch.seen, f"{message!r:.3000}: {watch.seen}"
+        assert not robot.view.problem, f"{message!r:.3000}: {robot.view.problem}"
+        assert len(display.statusText) < 30_000, f"{message!r:.3000}: {display.statusText}"
+    # What is random may be far away, in a namespace of its own, or ahead of time.
+    display.reset()
+    robot.send(robot.message)
+    robot.bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText, timeout=10.0)
+    robot.check()
+
+
+#: Displays that need panels, or several topics.
+DISPLAYS = """
+CameraDisplay { id: camera; topic: "/hostile/image" }
+ImageDisplay { id: image; topic: "/hostile/image" }
+ImagePanel { display: camera; width: 200; height: 150 }
+ImagePanel { display: image; x: 200; width: 200; height: 150 }
+MapDisplay { topic: "/hostile/map" }
+MarkerArrayDisplay { topic: "/hostile/markers" }
+RobotModelDisplay { }
+TFDisplay { whitelist: "^(.*_?)*[a-z]$" }
+"""
+TRANSFORM = {"header": HEADER, "child_frame_id": "arm",
+             "transform": {"translation": POINT, "rotation": TURN}}  # fmt: skip
+STREAMS = {
+    "/hostile/camera_info": ("sensor_msgs/CameraInfo", CAMERA),
+    "/hostile/image": ("sensor_msgs/Image", {**DEPTH, "header": HEADER}),
+    "/hostile/map": ("nav_msgs/OccupancyGrid", {**GRID, "header": HEADER}),
+    "/hostile/map_updates": ("map_msgs/OccupancyGridUpdate", {"header": HEADER, "x": 1, "y": 0,
+                             "width": 2, "height": 1, "data": [1, 2]}),
+    "/hostile/markers": ("visualization_msgs/MarkerArray", {"markers": [
+                         marker(kind, id=kind) for kind in range(13) if kind != 10]}),
+    "/robot_description": ("std_msgs/String", {"data": ""}),
+    "/tf": ("tf2_msgs/TFMessage", {"transforms": [TRANSFORM, TRANSFORM]}),
+}  # fmt: skip
+BODY = """<robot name="r"><material name="red"><color rgba="1 0 0 1"/></material><link name="odom">
+<visual><origin xyz="1 0 0" rpy="0 1 0"/><geometry><box size="1 1 1"/></geometry>
+<material name="red"/></visual><collision><geometry><sphere radius="0.5"/></geometry></collision>
+</link><link name="body"><visual><geometry><cylinder radius="0.2" length="0.5"/></geometry>
+</visual></link><joint name="arm" type="revolute"><parent link="odom"/><child link="body"/>
+<axis xyz="0 0 1"/><limit effort="5" velocity="1" lower="-1" upper="1"/></joint></robot>"""
+
+
+def edited(text: str, rng: random.Random) -> str:
+    """Return a text with random changes."""
+    for _ in range(rng.choice([1, 2, 5])):
+        start = rng.randrange(len(text))
+        end = min(start + rng.choice([1, 3, 20]), len(text))
+        new = rng.choice(["", text[start:end] * 2, "1e999", "nan", "-1", '"', "<", "/>", "\0", "é"])
+        text = text[:start] + new + text[end:]
+    return text
+
+
+def test_all_topics_of_a_robot_may_be_random(bench: SceneBench, watch: Watch) -> None:
+    from rosglass import Error
+    from rosglass.comm.qos import QoS
+
+    robot = Robot(bench, watch, DISPLAYS)
+    rng = random.Random(f"{SEED} robot")
+    publishers = {
+        topic: robot.node.create_publisher(topic, kind, QoS.latched())
+        for topic, (kind, _) in STREAMS.items()
+    }
+    bench.wait(
+        lambda: all(one.subscription_count() for one in publishers.values()),
+        lambda: [one.topic for one in publishers.values() if not one.subscription_count()],
+    )
+    for number in range(RANDOM_COUNT):
+        for topic, (_, fields) in STREAMS.items():
+            message = randomised(fields, rng, rng.choice([0.0, 0.02, 0.1, 0.3]))
+            if topic == "/robot_description":
+                message = {"data": edited(BODY, rng)}
+            for one in message.get("transforms", ()):
+                # The good display stays in its place.
+                if one["child_frame_id"].lstrip("/") in ("map", "odom"):
+                    one["child_frame_id"] = "tool"
+            try:
+                publishers[topic].publish(message)
+            except Error:
+                continue  # no such message exists
+        bench.wait.settled(bench.session)
+        if number % 3 == 0:
+            bench.picture()
+        assert not watch.seen, "\n".join(watch.seen)
+        assert not robot.view.problem, robot.view.problem
+        for display in robot.view.scene.displays:
+            assert len(display.statusText) < 50_000, display.statusText
+    model = robot.view.scene.find("RobotModel")
+    publishers["/robot_description"].publish({"data": BODY})
+    bench.wait(lambda: model.links == ["body", "odom"], lambda: model.statusText)
     robot.check()
 
 
@@ -569,6 +721,37 @@ def test_transforms_that_are_refused_are_named(
     is_reported("the last one: TF_LOOP ignoring the transform of 'map' in 'base'")
     monkeypatch.setattr("rosglass.scene.displays.tf._REFUSED_S", 0.0)
     robot.bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
+    robot.check()
+
+
+def test_frames_that_are_too_far_away_are_named(robot: Robot) -> None:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    frames = robot.view.scene.add("TF")
+    robot.show(CASES[0])
+    StaticTransformBroadcaster(robot.node).send_transform(
+        [Transform((1e30, 0, 0), (0, 0, 0, 1), Time(1), "odom", "far"),
+         Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "odom", "near")]
+    )  # fmt: skip
+    text = "[far] is more than 1e18 m away from [map]"
+    robot.bench.wait(lambda: f"far: no transform: {text}" in frames.statusText)
+    assert set(frames.frames) == {"map", "near", "odom"}
+    robot.send({**robot.message, "header": {**HEADER, "frame_id": "far"}})
+    assert f"Transform: no transform from [far]: {text}" in robot.display.statusText
+    robot.check()
+
+
+def test_triangles_and_colors_that_are_too_large(robot: Robot) -> None:
+    robot.show(Case("Marker", "visualization_msgs/Marker", marker(11)))
+    far = [{"x": 1e18, "y": float(at), "z": 0.0} for at in range(3)]
+    robot.send(marker(11, points=far, colors=[{**COLOR, "r": 1e30}] * 3))
+    assert robot.display.statusLevel == "ok", robot.display.statusText
+    robot.send(marker(11, points=far, scale={"x": 1e9, "y": 1.0, "z": 1.0}))
+    text = "points times scale[0]: 1e+27 is beyond the 1e+18 that is drawn"
+    robot.bench.wait(lambda: text in robot.display.statusText)
+    robot.send(marker(7, colors=[{**COLOR, "a": 1e30}] * 6))
+    robot.bench.wait(lambda: robot.display.statusLevel == "ok", lambda: robot.display.statusText)
     robot.check()
 
 

@@ -53,6 +53,8 @@ OPAQUE = 0.9998
 _MAX_COUNT = 20_000_000
 #: Largest number of a message that is drawn: shaders square it as a float32.
 _MAX_NUMBER = 1e18
+#: Largest number whose fourth power is a float32.
+_MAX_FOR_NORMALS = 1e9
 _IDENTITY = np.eye(4)
 _IDENTITY.setflags(write=False)
 
@@ -710,6 +712,9 @@ def _fitting(name: str, given: ArrayLike, at: NDArray[Any], width: int) -> NDArr
 
 def _normals(at: NDArray[np.float32], faces: NDArray[np.uint32]) -> NDArray[np.float32]:
     """Return the normals of vertices: the mean of their triangles', by area."""
+    most = np.abs(at).max(initial=0.0)
+    if most > _MAX_FOR_NORMALS:
+        at = at / most
     a, b, c = at[faces[:, 0]], at[faces[:, 1]], at[faces[:, 2]]
     flat = np.cross(b - a, c - a)
     out = np.zeros_like(at)
@@ -730,6 +735,10 @@ def instance_matrix(
     A quaternion of length 0 is no rotation, others are normalised, as RViz does it.
     """
     x, y, z, w = (float(number) for number in rotation)
+    most = max(abs(x), abs(y), abs(z), abs(w))
+    if 0 < most < math.inf:
+        # Squares of very small numbers are 0, or so coarse that their sum is.
+        x, y, z, w = x / most, y / most, z / most, w / most
     n = x * x + y * y + z * z + w * w
     m = np.eye(4)
     if n > 0 and math.isfinite(n):

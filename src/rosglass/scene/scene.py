@@ -10,6 +10,8 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
 from rosglass.comm.executor import Dispatcher
 from rosglass.comm.names import similar
 from rosglass.comm.time import Time
@@ -22,12 +24,11 @@ from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.rviz.property_values import shown
 from rosglass.scene.display import Display
 from rosglass.scene.displays.shapes import poses_matrices
-from rosglass.scene.drawing import Group, instance_matrix
+from rosglass.scene.drawing import Group, are_drawable, instance_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from rosglass.comm.clock import Jump
@@ -316,6 +317,8 @@ class Scene(Element):
         if buffer is None:
             raise LookupException("not connected yet")
         found = buffer.lookup_transform(target, frame, Time(stamp) if stamp else None)
+        if not are_drawable(found.translation).all():
+            raise _too_far(frame, target)
         return instance_matrix(found.translation, found.rotation)
 
     def look_up_all(
@@ -335,8 +338,11 @@ class Scene(Element):
         )
         unknown = {one: why for one, why in found.items() if isinstance(why, TransformException)}
         poses = {**found, **dict.fromkeys([fixed, *unknown], (_ORIGIN, _UPRIGHT))}
-        positions = [poses[frame][0] for frame in frames]
+        positions = np.array([poses[frame][0] for frame in frames]).reshape(-1, 3)
         rotations = [poses[frame][1] for frame in frames]
+        for at in np.flatnonzero(~are_drawable(positions).all(axis=1)).tolist():
+            unknown[frames[at]] = _too_far(frames[at], fixed)
+            positions[at] = _ORIGIN
         return poses_matrices(positions, rotations), unknown
 
     def latest_time(self, frame: str) -> int:
@@ -602,3 +608,7 @@ def _end_loader(session: Session, loader: Dispatcher, takers: dict[object, Any])
     takers.clear()
     # Not in the GUI thread: it waits for the file that is being read.
     session.background(loader.close)
+
+
+def _too_far(frame: str, target: str) -> TransformException:
+    return TransformException(f"[{frame}] is more than 1e18 m away from [{target}]")

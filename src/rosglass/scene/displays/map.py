@@ -13,7 +13,7 @@ from rosglass.errors import Error
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.scene.display import TopicDisplay, matrix_of
 from rosglass.scene.displays.shapes import read_columns
-from rosglass.scene.drawing import MapImage, Points, check_numbers
+from rosglass.scene.drawing import MapImage, Points, are_drawable, check_numbers
 from rosglass.scene.settings import Setting, rgb_of
 
 if TYPE_CHECKING:
@@ -297,7 +297,10 @@ def _read_cells(message: Any) -> tuple[NDArray[np.float32], float, float]:
     check_numbers("cell_width, cell_height", (width, height))
     if len(message.cells) > _MAX_CELLS:
         raise Error(f"cells: {len(message.cells)} are more than the {_MAX_CELLS} that are drawn")
-    points = read_columns(message.cells, "x", "y", "z").astype(np.float32)
+    points = read_columns(message.cells, "x", "y", "z")
     check_numbers("cells", points)
+    # Tiles are squares.
     points[:, 1] *= width / height
-    return points, width, height
+    if not are_drawable([width / height, height / width]).all() or not are_drawable(points).all():
+        raise Error(f"cell_width {width}, cell_height {height}: one is too small for the other")
+    return points.astype(np.float32), width, height

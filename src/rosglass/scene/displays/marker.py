@@ -286,6 +286,7 @@ def _read_one(
     if tints:
         colors = _rows(message.colors, attrgetter("r", "g", "b", "a"), 4)
     warning = warning or _colors_warning(kind, count, colors)
+    colors = np.clip(np.nan_to_num(colors, nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
     x, y, z, red, green, blue, alpha = numbers[7:]
     shapes = _SOLIDS.get(kind)
     record = MarkerRecord(
@@ -310,7 +311,12 @@ def _read_one(
         None if shapes is None else (shapes, (scaled.copy(),)),
     )
     if shapes is None:
-        triangles = _triangles(record) if kind == TRIANGLE_LIST else None
+        triangles = None
+        if kind == TRIANGLE_LIST:
+            try:
+                triangles = _triangles(record)
+            except Error as error:
+                return MarkerRecord(key, kind, action, frame, at, problem=str(error))
         record = record._replace(instances=_instances(record), triangles=triangles)
     return record
 
@@ -605,7 +611,7 @@ def _list_colors(colors: Any) -> NDArray[np.float32]:
 
     One colour for all counts for the points and for the list, so that its opacity is squared.
     """
-    out = np.array(colors, np.float32)
+    out = np.clip(np.array(colors, np.float32), 0, 1)
     alpha = out[..., 3] ** 2 if out.ndim == 1 else out[..., 3]
     if (alpha < 1).any():
         out[..., 3] = 1 - (1 - alpha) ** 2
@@ -623,6 +629,7 @@ def _triangles_look(marker: MarkerRecord) -> tuple[Shape, tuple[float, ...], boo
 
 def _triangles(marker: MarkerRecord) -> Shape:
     points = marker.points * np.array(marker.scale, np.float32)
+    check_numbers("points times scale", points)
     colors, alpha = marker.colors, marker.color[3]
     # RViz's rules for the opacity of vertices, and of triangles.
     if len(colors) == len(points):
