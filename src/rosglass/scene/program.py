@@ -206,7 +206,8 @@ class ViewProgram(QtCore.QObject):
         for note in notes:
             _log.warning("%s: %s", config.source, note)
         if notes:
-            self.say(f"{len(notes)} notes on {Path(config.source).name}: {notes[0]}")
+            count = "a note" if len(notes) == 1 else f"{len(notes)} notes"
+            self.say(f"{count} on {Path(config.source).name}: {notes[0]}")
 
     @Slot(str)
     def _on_config_loaded(self, source: str) -> None:
