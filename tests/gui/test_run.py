@@ -324,3 +324,17 @@ def test_bad_urls_are_shown(start: Any, file: Path) -> None:
     program = start("run", file, "--url", "carrier-pigeon://loft")
     assert "unknown scheme" in program.until("failed:")
     assert program.end() == 5
+
+
+def test_a_program_of_rosglass_reads_no_sources(python: Any) -> None:
+    # PySide looks for its features in those of all modules.
+    text = (
+        "import linecache\n"
+        "from rosglass.cli.run import load_qt\n"
+        "load_qt()\n"
+        "import rosglass.qml.application, rosglass.qml.ros2\n"
+        "print(sorted(file for file in linecache.cache if 'rosglass' in file))"
+    )
+    program = python(text)
+    assert program.end() == 0
+    assert program.text.strip() == "[]"

@@ -23,8 +23,8 @@ __all__ = [
     "QUIET_MEDIA",
     "Picture",
     "format_log",
+    "load_qt",
     "make_recorder",
-    "quiet_media",
     "run",
     "show",
     "show_interface",
@@ -40,7 +40,6 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         UnsupportedError: It is to be recorded by Qt 5, or without a graphics interface.
     """
-    quiet_media()
     recorder = make_recorder(args)
     if recorder is not None:
         # Not the software renderer, which may be the faster one.
@@ -64,6 +63,7 @@ def make_recorder(args: argparse.Namespace) -> WindowRecorder | None:
             "QT_QUICK_BACKEND; without a graphics card, Mesa's llvmpipe will do"
         )
     try:
+        load_qt()
         # Not all programs need numpy and PyAV.
         from rosglass.scene.window_recorder import WindowRecorder  # noqa: PLC0415
     except ModuleNotFoundError as error:
@@ -106,11 +106,14 @@ def show_interface(args: argparse.Namespace, file: str, **options: Any) -> int:
         return 1
 
 
-def quiet_media() -> None:
-    """Hide messages of Qt that are of no use to users; Qt reads this when it is loaded."""
+def load_qt() -> None:
+    """Load Qt for a program of rosglass itself, without messages that are of no use to users."""
     rules = os.environ.get("QT_LOGGING_RULES", "")
     if QUIET_MEDIA not in rules:
         os.environ["QT_LOGGING_RULES"] = ";".join(filter(None, [QUIET_MEDIA, rules]))
+    from rosglass.qt import import_plainly  # noqa: PLC0415 - Qt reads the rules when it is loaded
+
+    import_plainly()
 
 
 def show(
@@ -144,7 +147,6 @@ def show(
         UnsupportedError: There is no display.
         RosArgumentError: One of the arguments for ROS is not valid.
     """
-    quiet_media()
     if screenshot is not None or recorder is not None:
         # Grabbing waits for the renderer, which may wait for Python.
         os.environ["QSG_RENDER_LOOP"] = "basic"
@@ -176,6 +178,7 @@ def _show(
     recorder: WindowRecorder | None,
     options: dict[str, Any],
 ) -> int:
+    load_qt()
     from rosglass.qml.application import Application  # noqa: PLC0415
     from rosglass.qml.log import install_message_handler  # noqa: PLC0415
 

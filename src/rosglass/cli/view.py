@@ -6,7 +6,7 @@ import gc
 import os
 from typing import TYPE_CHECKING
 
-from rosglass.cli.run import make_recorder, quiet_media, show_interface
+from rosglass.cli.run import load_qt, make_recorder, show_interface
 from rosglass.errors import UnsupportedError
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ def run(args: argparse.Namespace) -> int:
         Error: The config is missing, or is no config of RViz.
         UnsupportedError: There is no Qt 6, or it would draw without a graphics interface.
     """
-    quiet_media()
     # Threads for products of large matrices, which a view does not have, would delay its window.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Nothing that is loaded becomes garbage.
@@ -40,6 +39,7 @@ def _run(args: argparse.Namespace) -> int:
             "without a graphics card, Mesa's llvmpipe will do"
         )
     try:
+        load_qt()
         from rosglass.qml.modules import interface_file  # noqa: PLC0415 - loads Qt
         from rosglass.scene.program import WINDOW, ViewProgram  # noqa: PLC0415 - loads Qt
     except ModuleNotFoundError as error:

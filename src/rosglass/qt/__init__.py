@@ -7,6 +7,7 @@ overwrite each other's symbols, so a second one is refused.
 
 from __future__ import annotations
 
+import builtins
 import os
 import sys
 from importlib import import_module
@@ -28,6 +29,7 @@ __all__ = [
     "Slot",
     "address",
     "choose_binding",
+    "import_plainly",
     "is_alive",
     "optional",
     "run_event_loop",
@@ -132,6 +134,16 @@ def optional(module: str) -> Any:
         return import_module(f"{BINDING}.{module}")
     except ImportError:
         return None
+
+
+def import_plainly() -> None:
+    """Let Python import modules again as it does without PySide; for programs of rosglass itself.
+
+    After each import, PySide 6 reads the source of the module to see whether it uses PySide: a
+    tenth of the time until the first frame of ``rosglass view``. Only ``from __feature__ import``,
+    which would fail from now on, needs this.
+    """
+    builtins.__import__ = getattr(builtins, "__orig_import__", builtins.__import__)
 
 
 def is_alive(item: QtCore.QObject | None) -> bool:
