@@ -1080,9 +1080,11 @@ def test_the_global_status_says_that_there_is_no_connection(bench: SceneBench, m
 
 def run_in(window: Any, script: str) -> Any:
     """Return the result of JavaScript in the program's window."""
+    from PySide6.QtCore import QObject
     from PySide6.QtQml import QQmlExpression, qmlContext
 
-    expression = QQmlExpression(qmlContext(window), window, script)
+    around = window.findChild(QObject, "status")
+    expression = QQmlExpression(qmlContext(around), around, script)
     result, _ = expression.evaluate()
     assert not expression.hasError(), expression.error().toString()
     return result

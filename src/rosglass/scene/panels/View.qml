@@ -1,337 +1,54 @@
 import QtQuick
-import QtQuick.Controls.Fusion
-import QtQuick.Dialogs
-import QtQuick.Layouts
 import RosScene 1.0
 
-// The window of `rosglass view`: the 3D view and its panels. `program` is a ViewProgram.
-ApplicationWindow {
+// The window of `rosglass view`: the 3D view, and what is around it once the first picture is on the screen, as
+// loading Qt's controls takes long. `program` is a ViewProgram.
+Window {
     id: window
 
     property bool panels: !program.kiosk
-    // Whether the first picture is on the screen; what is beside the 3D view is made after it.
+    // Whether the first picture is on the screen.
     property bool drawn: false
-    property var displays: displaysPanel.item
-    readonly property int aboveOverlays: 1000000
+    // Where the 3D view is; until the panels are there, about where it will be.
+    readonly property rect place: around.item ? around.item.place : !panels ? Qt.rect(0, 0, width, height)
+        : Qt.rect(left, 27, width - left - (program.hidesRightDock ? 0 : 252), height - 49)
+    readonly property int left: program.hidesLeftDock ? 0 : 332
 
     width: 1280
     height: 800
     visible: true
+    color: palette.window
     title: (program.configName || "new view") + (program.modified ? " *" : "") + " - rosglass"
 
     Component.onCompleted: { scene.bare = !panels; program.begin(scene) }
-    onFrameSwapped: drawn = true
-    onClosing: close => {
-        if (!program.mayClose()) {
-            close.accepted = false
-            unsaved.ask(() => { program.discard(); window.close() })
-        }
-    }
-
+    // Later: the picture is not on the screen before this handler has ended.
+    onFrameSwapped: if (!drawn) Qt.callLater(showPanels)
     onPanelsChanged: scene.bare = !panels
 
-    Shortcut { sequences: [StandardKey.Save]; onActivated: window.save() }
-    Shortcut { sequences: [StandardKey.Open]; onActivated: window.openOther() }
-    Shortcut { sequence: "F10"; onActivated: window.panels = !window.panels }
-    Shortcut { sequence: "F11"; onActivated: window.visibility = window.visibility === Window.FullScreen ? Window.Windowed : Window.FullScreen }
-
-    function openOther() {
-        if (program.mayClose())
-            opening.open()
-        else
-            unsaved.ask(() => opening.open())
-    }
-    function save() {
-        if (program.configName)
-            program.save("")
-        else
-            saving.ask(null)
+    function showPanels() {
+        around.setSource("WindowPanels.qml", { "window": window, "scene": scene })
+        drawn = true
     }
 
-    header: ToolBar {
-        visible: window.panels
+    Loader { id: around; anchors.fill: parent }
+    SceneView {
+        id: scene
+        objectName: "scene"
+        x: window.place.x
+        y: window.place.y
+        width: window.place.width
+        height: window.place.height
+        focus: true
+        // Overlays may want it alone.
+        onBareChanged: window.panels = !bare
+
+        // Its types are loaded with the first display of pictures.
         Loader {
+            objectName: "imagePanels"
             anchors.fill: parent
-            active: window.drawn
-            sourceComponent: RowLayout {
-                // In a narrow window, tools go on in further lines.
-                Flow {
-                    Layout.fillWidth: true
-                    ToolButton { text: "Open"; onClicked: window.openOther() }
-                    ToolButton { text: "Save"; onClicked: window.save() }
-                    ToolButton { text: "Save as"; onClicked: saving.ask(null) }
-                    ToolSeparator { height: 26 }
-                    Repeater {
-                        model: scene.tools.all
-                        ToolButton {
-                            required property var modelData
-
-                            text: modelData.name
-                            down: modelData.selected ? true : undefined
-                            // Keys are the view's.
-                            focusPolicy: Qt.NoFocus
-                            onClicked: modelData.select()
-                            PlainToolTip {
-                                visible: parent.hovered
-                                plain: modelData.description + (modelData.shortcutKey ? " (" + modelData.shortcutKey.toUpperCase() + ")" : "")
-                            }
-                        }
-                    }
-                    ToolButton {
-                        objectName: "addTool"
-                        text: "+"
-                        onClicked: newTools.popup()
-                        PlainToolTip { visible: parent.hovered; plain: "Add a tool" }
-                        Menu {
-                            id: newTools
-                            Repeater {
-                                model: scene.tools.choices
-                                MenuItem {
-                                    required property var modelData
-                                    text: modelData.name
-                                    contentItem: Label { text: parent.text; textFormat: Text.PlainText }
-                                    onTriggered: program.say(scene.tools.addTool(modelData.type))
-                                    PlainToolTip { visible: parent.hovered; plain: parent.modelData.description }
-                                }
-                            }
-                        }
-                    }
-                    ToolButton {
-                        objectName: "removeTool"
-                        text: "−"
-                        enabled: scene.tools.all.length > 1
-                        onClicked: oldTools.popup()
-                        PlainToolTip { visible: parent.hovered; plain: "Remove a tool" }
-                        Menu {
-                            id: oldTools
-                            Repeater {
-                                model: scene.tools.all
-                                MenuItem {
-                                    required property var modelData
-                                    text: modelData.name
-                                    contentItem: Label { text: parent.text; textFormat: Text.PlainText }
-                                    onTriggered: scene.tools.removeTool(modelData)
-                                }
-                            }
-                        }
-                    }
-                }
-                ToolButton {
-                    objectName: "reset"
-                    text: "Reset"
-                    focusPolicy: Qt.NoFocus
-                    onClicked: scene.reset()
-                    PlainToolTip { visible: parent.hovered; plain: "Drop all data that was received" }
-                }
-                ToolSeparator { }
-                ToolButton {
-                    objectName: "leftDock"
-                    text: "Displays"
-                    checkable: true
-                    checked: !program.hidesLeftDock
-                    onToggled: program.hideDocks(!checked, program.hidesRightDock)
-                    PlainToolTip { visible: parent.hovered; plain: "Show the Displays panel; F10 hides everything but the 3D view" }
-                }
-                ToolButton {
-                    objectName: "rightDock"
-                    text: "Views"
-                    checkable: true
-                    checked: !program.hidesRightDock
-                    onToggled: program.hideDocks(program.hidesLeftDock, !checked)
-                    PlainToolTip { visible: parent.hovered; plain: "Show the panels Views, Tools and Selection; F10 hides everything but the 3D view" }
-                }
-            }
-        }
-    }
-
-    SplitView {
-        anchors.fill: parent
-        Loader {
-            id: displaysPanel
-            visible: window.panels && !program.hidesLeftDock
-            SplitView.preferredWidth: 330
-            active: window.drawn
-            sourceComponent: DisplaysPanel { objectName: "displaysPanel"; view: scene }
-        }
-        SceneView {
-            id: scene
-            objectName: "scene"
-            SplitView.fillWidth: true
-            SplitView.minimumWidth: 100
-            focus: true
-            // Overlays may want it alone.
-            onBareChanged: window.panels = !bare
-
-            // As in RViz, keys are the view's while the mouse is over it, except for those of a text.
-            HoverHandler { onHoveredChanged: if (hovered && !(window.activeFocusItem instanceof TextInput)) scene.forceActiveFocus() }
-            // Its types are loaded with the first display of pictures.
-            Loader {
-                objectName: "imagePanels"
-                anchors.fill: parent
-                active: scene.scene.displayList.some(one => one.isPicture === true)
-                source: "ImagePanels.qml"
-                onLoaded: item.view = scene
-            }
-            // A goal can be ended from everywhere, as in RViz's panel of Nav2.
-            Button {
-                objectName: "cancelGoal"
-                readonly property var tool: scene.tools.all.find(one => one.goalActive === true) || null
-                z: window.aboveOverlays
-                anchors { left: parent.left; top: parent.top; margins: 8 }
-                visible: tool !== null
-                text: "Cancel goal"
-                focusPolicy: Qt.NoFocus
-                onClicked: tool.cancelGoal()
-            }
-            // Without the status bar: keys still select tools, which send something.
-            Label {
-                objectName: "bareStatus"
-                z: window.aboveOverlays
-                anchors { left: parent.left; bottom: parent.bottom; margins: 8 }
-                width: Math.min(implicitWidth, parent.width - 16)
-                visible: !window.panels && text !== ""
-                text: scene.tools.outcome || (program.connected ? "" : program.connection)
-                textFormat: Text.PlainText
-                elide: Text.ElideRight
-                padding: 6
-                color: "white"
-                background: Rectangle { color: "#c0202020"; radius: 4 }
-            }
-            Label {
-                anchors.centerIn: parent
-                width: Math.min(implicitWidth, parent.width - 40)
-                visible: scene.problem !== ""
-                text: scene.problem
-                textFormat: Text.PlainText
-                wrapMode: Text.Wrap
-                padding: 12
-                color: "white"
-                background: Rectangle { color: "#c0801010"; radius: 6 }
-            }
-        }
-        Loader {
-            visible: window.panels && !program.hidesRightDock
-            SplitView.preferredWidth: 250
-            active: window.drawn
-            sourceComponent: ColumnLayout {
-                spacing: 0
-                TabBar {
-                    id: tabs
-
-                    Layout.fillWidth: true
-                    TabButton { text: "Views" }
-                    TabButton { text: "Tools" }
-                    TabButton { text: "Selection" }
-                }
-                StackLayout {
-                    currentIndex: tabs.currentIndex
-                    ViewsPanel { view: scene }
-                    ToolsPanel { view: scene }
-                    SelectionPanel { view: scene }
-                }
-            }
-        }
-    }
-
-    FontMetrics { id: line; font: window.font }
-    footer: Pane {
-        visible: window.panels
-        padding: 4
-        contentHeight: Math.ceil(line.height)
-        Loader {
-            anchors.fill: parent
-            active: window.drawn
-            sourceComponent: RowLayout {
-                Label { Layout.maximumWidth: window.width / 2; text: program.connection; textFormat: Text.PlainText; elide: Text.ElideRight; color: program.connected ? palette.text : "#9a5b00" }
-                ToolSeparator { }
-                Label { text: program.time; textFormat: Text.PlainText }
-                ToolSeparator { }
-                // What was sent to the robot, or was not, comes first.
-                Label { objectName: "status"; Layout.fillWidth: true; text: scene.tools.outcome || program.message || scene.statusText.replace(/<[^>]*>/g, "").replace(/&lt;/g, "<").replace(/&amp;/g, "&"); textFormat: Text.PlainText; elide: Text.ElideRight }
-                Label { objectName: "recording"; visible: text !== ""; text: program.recording; textFormat: Text.PlainText; color: "#c02020" }
-                Label { text: program.frameRate + " fps"; textFormat: Text.PlainText }
-            }
-        }
-    }
-
-    FileDialog {
-        id: opening
-        title: "Open an RViz config"
-        nameFilters: ["RViz configs (*.rviz)", "All files (*)"]
-        onAccepted: program.open(selectedFile)
-    }
-    FileDialog {
-        id: saving
-        // What waits until it is saved, e.g. closing.
-        property var then: null
-        // Where the name is typed: Qt's own dialog neither has it focused nor accepts it by Return.
-        property QtObject nameField: null
-        property bool byReturn: false
-        function ask(job) { then = job; byReturn = false; open(); Qt.callLater(focusName) }
-        function focusName() {
-            const field = program.findNameField(window)
-            if (field === null) return  // a dialog of the system
-            if (field !== nameField) {
-                nameField = field
-                field.accepted.connect(acceptName)
-            }
-            field.forceActiveFocus()
-            field.selectAll()
-        }
-        function acceptName() {
-            if (nameField.text.trim() === "") return
-            byReturn = true
-            accept()
-        }
-        function save(file) {
-            program.save(file)
-            if (then && program.mayClose()) then()
-        }
-        title: "Save the RViz config"
-        fileMode: FileDialog.SaveFile
-        defaultSuffix: "rviz"
-        nameFilters: ["RViz configs (*.rviz)"]
-        onAccepted: {
-            const typed = program.typedFile(selectedFile)
-            const isPath = typed.toString() !== ""
-            // The dialog shows this folder the next time.
-            if (isPath)
-                selectedFile = typed
-            // Its button has asked, for a file in the folder.
-            if ((isPath || byReturn) && program.exists(selectedFile))
-                replacing.ask(selectedFile)
-            else
-                save(selectedFile)
-        }
-    }
-    MessageDialog {
-        id: replacing
-        property url file
-        function ask(file) { replacing.file = file; open() }
-        title: "rosglass view"
-        text: "There is such a file already. Replace it?"
-        informativeText: file.toString().replace(/^file:\/\//, "")
-        buttons: MessageDialog.Yes | MessageDialog.No
-        onButtonClicked: (button, role) => { if (button === MessageDialog.Yes) saving.save(file) }
-    }
-    MessageDialog {
-        id: unsaved
-        property var then: null
-        function ask(job) { then = job; open() }
-        title: "rosglass view"
-        text: "The view has changed. Save it?"
-        buttons: MessageDialog.Save | MessageDialog.Discard | MessageDialog.Cancel
-        onButtonClicked: (button, role) => {
-            if (button === MessageDialog.Save) {
-                if (program.configName) {
-                    program.save("")
-                    if (program.mayClose()) then()
-                } else {
-                    saving.ask(then)
-                }
-            } else if (button === MessageDialog.Discard) {
-                then()
-            }
+            active: scene.scene.displayList.some(one => one.isPicture === true)
+            source: "ImagePanels.qml"
+            onLoaded: item.view = scene
         }
     }
 }
