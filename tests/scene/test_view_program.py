@@ -1078,6 +1078,44 @@ def test_the_global_status_says_that_there_is_no_connection(bench: SceneBench, m
     assert status().value != "Ok"
 
 
+def test_the_first_frame_waits_for_what_it_shows_only(app: Any) -> None:
+    code = """
+import builtins, os, sys
+from rosglass.cli import main, view
+
+show = view.show_interface
+
+def watched(*args, **options):
+    program = options["context"]["program"]
+    begin = type(program).begin
+
+    def look():
+        import linecache
+        from PySide6 import QtCore
+
+        print("pictures", program.view.pictures_drawn())
+        print("enumerations", "Qt" in vars(QtCore))
+        print("sources", [file for file in linecache.cache if "scene" in file])
+        print("controls", "libQt6QuickControls2" in open("/proc/self/maps").read())
+        sys.stdout.flush()
+        os._exit(0)
+
+    def watch(self, view, *others):
+        begin(self, view, *others)
+        view.window().frameSwapped.connect(look)
+
+    type(program).begin = watch
+    return show(*args, **options)
+
+view.show_interface = watched
+sys.exit(main(["view", "--url", "local://first"]))
+"""
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    expected = "pictures 1\nenumerations False\nsources []\ncontrols False\n"
+    assert done.stdout == expected, done.stderr
+
+
 def run_in(window: Any, script: str) -> Any:
     """Return the result of JavaScript in the program's window."""
     from PySide6.QtCore import QObject

@@ -38,6 +38,7 @@ class Modifier(enum.IntFlag):
     SHIFT = 0x02000000
     CTRL = 0x04000000
     ALT = 0x08000000
+    META = 0x10000000
 
 
 class Action(enum.Enum):

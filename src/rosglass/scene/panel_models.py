@@ -7,7 +7,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from PySide6.QtCore import QAbstractListModel, QModelIndex, Qt
+from PySide6.QtCore import QAbstractListModel, QModelIndex
 from PySide6.QtGui import QColor
 
 from rosglass.errors import Error
@@ -86,9 +86,9 @@ class _Landing(NamedTuple):
     into: bool = False
 
 
-_ROLES = {
-    Qt.ItemDataRole.UserRole + number: name for number, name in enumerate(PanelRow._fields[1:], 1)
-}
+#: Qt.ItemDataRole.UserRole; its name would make PySide load all of Qt's enumerations.
+_USER_ROLE = 0x0100
+_ROLES = {_USER_ROLE + number: name for number, name in enumerate(PanelRow._fields[1:], 1)}
 
 
 @cache

@@ -9,7 +9,6 @@ import time
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QEventPoint, QGuiApplication
 from PySide6.QtQuick import QQuickRhiItem, QQuickWindow, QSGRendererInterface
 from shiboken6 import Shiboken
@@ -65,7 +64,7 @@ _HOVER_MS = 33
 _MAX_PAUSE_S = 0.5
 _SCENE_GONE = "The scene was that of another view, which is gone: nothing is shown."
 #: RViz's background.
-_BACKGROUND = QColor(48, 48, 48)
+_BACKGROUND = (48, 48, 48)
 
 
 class SceneView(QQuickRhiItem):
@@ -96,7 +95,7 @@ class SceneView(QQuickRhiItem):
     def __init__(self, parent: Any = None, runtime: Runtime | None = None) -> None:
         super().__init__(parent)
         self._runtime = runtime
-        self._background = QColor(_BACKGROUND)
+        self._background = QColor(*_BACKGROUND)
         self._bare = False
         self._problem = ""
         #: Whether it showed the scene of another view, which is gone.
@@ -144,7 +143,6 @@ class SceneView(QQuickRhiItem):
         self._still.setSingleShot(True)
         self._still.setInterval(int(_STILL_S * 1000))
         self._still.timeout.connect(self._draw)
-        self.setAcceptedMouseButtons(Qt.MouseButton.AllButtons)
         self.setAcceptHoverEvents(True)
         self.setFlag(QQuickRhiItem.Flag.ItemAcceptsInputMethod, False)
         self.windowChanged.connect(self._on_window)
@@ -795,6 +793,12 @@ class SceneView(QQuickRhiItem):
                 self._next_picture = now + min(now - self._frame_began, _MAX_PAUSE_S)
 
     @Slot()
+    def _take_mouse(self) -> None:
+        # After the window's first frame, as PySide then makes all of Qt's enumerations, in 12 ms.
+        self.setAcceptedMouseButtons(QtCore.Qt.MouseButton.AllButtons)
+        QtCore.QObject.disconnect(self._frames.pop())
+
+    @Slot()
     def _report_device(self) -> None:
         in_software = any(one.draws_in_software for one in self._renderers)
         self.scene.set_draws_in_software(in_software)
@@ -819,6 +823,7 @@ class SceneView(QQuickRhiItem):
             return
         self._frames.append(window.afterAnimating.connect(self._on_frame))
         self._frames.append(window.frameSwapped.connect(self._on_frame_swapped))
+        self._frames.append(window.afterFrameEnd.connect(self._take_mouse))
         api = window.rendererInterface().graphicsApi()
         self._set_problem(NO_GPU if api == QSGRendererInterface.GraphicsApi.Software else "")
 
@@ -846,7 +851,7 @@ class SceneView(QQuickRhiItem):
 
     def mousePressEvent(self, event: Any) -> None:
         """Give a press to the tool, or start to drag the camera."""
-        self.forceActiveFocus(Qt.FocusReason.MouseFocusReason)
+        self.forceActiveFocus(QtCore.Qt.FocusReason.MouseFocusReason)
         self._stop_turning()
         event.accept()
         self._tools.on_press(self._event(event))
@@ -960,9 +965,9 @@ class SceneView(QQuickRhiItem):
         """Handle the keys of tools, F and Z, and Escape."""
         self._tools.on_modifiers(Modifier(event.modifiers().value & _MODIFIERS))
         used = False
-        if event.key() == Qt.Key.Key_Escape:
+        if event.key() == QtCore.Qt.Key.Key_Escape:
             used = self._tools.on_escape()
-        elif event.text() and not (event.isAutoRepeat() or event.modifiers() & _COMMAND_KEYS):
+        elif event.text() and not (event.isAutoRepeat() or event.modifiers().value & _COMMAND_KEYS):
             used = self._tools.on_key(event.text(), self._event_at(self._pointed, event))
         event.setAccepted(used)
 
@@ -982,11 +987,7 @@ class SceneView(QQuickRhiItem):
 
 
 #: With these, a key is a command of the program and no tool's.
-_COMMAND_KEYS = (
-    Qt.KeyboardModifier.ControlModifier
-    | Qt.KeyboardModifier.AltModifier
-    | Qt.KeyboardModifier.MetaModifier
-)
+_COMMAND_KEYS = int(Modifier.CTRL | Modifier.ALT | Modifier.META)
 _BUTTONS = int(Button.LEFT | Button.RIGHT | Button.MIDDLE)
 _MODIFIERS = int(Modifier.SHIFT | Modifier.CTRL | Modifier.ALT)
 

@@ -6,8 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PySide6.QtCore import QPointF, Qt
-from PySide6.QtGui import QFont, QFontMetricsF, QImage, QPainter, QPainterPath, QPen
+
+# Not their classes: PySide prepares each when it is named, in 3 ms; first pictures have no text.
+from rosglass.qt import QtCore, QtGui
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -49,9 +50,9 @@ class TextImage:
         #: Where the next text goes: x, y, and the height of what is in this row of texts.
         self._free = (0, 0, 0)
         self._left_out = False
-        self._font = QFont("DejaVu Sans")
+        self._font = QtGui.QFont("DejaVu Sans")
         self._font.setPixelSize(int(_LINE_PX * 0.75))
-        self._metrics = QFontMetricsF(self._font)
+        self._metrics = QtGui.QFontMetricsF(self._font)
 
     def set_texts(self, texts: Sequence[str], outlined: bool = False) -> tuple[int, int]:
         """Paint those that are new.
@@ -127,21 +128,23 @@ class TextImage:
 
     def _paint(self, texts: Iterable[_Text]) -> None:
         height, width = self.pixels.shape
-        image = QImage(self.pixels.data, width, height, width, QImage.Format.Format_Alpha8)
-        painter = QPainter(image)
+        image = QtGui.QImage(
+            self.pixels.data, width, height, width, QtGui.QImage.Format.Format_Alpha8
+        )
+        painter = QtGui.QPainter(image)
         painter.setFont(self._font)
-        painter.setPen(Qt.GlobalColor.white)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        pen = QPen(Qt.GlobalColor.white, _EDGE_PX)
+        painter.setPen(QtCore.Qt.GlobalColor.white)
+        painter.setRenderHint(QtGui.QPainter.RenderHint.Antialiasing)
+        pen = QtGui.QPen(QtCore.Qt.GlobalColor.white, _EDGE_PX)
         for text, edges in texts:
             left, top, wide, high = self._boxes[text, edges]
             if not high:
                 continue
             painter.setClipRect(left, top, wide, high)
             for number, line in enumerate(text.split("\n")):
-                at = QPointF(left + 2, top + number * _LINE_PX + _BASELINE_PX)
+                at = QtCore.QPointF(left + 2, top + number * _LINE_PX + _BASELINE_PX)
                 if edges:
-                    path = QPainterPath()
+                    path = QtGui.QPainterPath()
                     path.addText(at, self._font, line)
                     painter.strokePath(path, pen)
                 else:

@@ -58,15 +58,14 @@ _OUTCOME_MS = 5000
 #: Types of Qt by name, which PySide's hints do not have.
 MAP: Any = "QVariantMap"
 _LIST: Any = "QVariantList"
-_Cursor = QtCore.Qt.CursorShape
-#: Cursors for what a drag of the camera does.
+#: Cursors for what a drag of the camera does: names in ``Qt.CursorShape``.
 _CURSORS = {
-    Action.NONE: _Cursor.ArrowCursor,
-    Action.ROTATE_3D: _Cursor.OpenHandCursor,
-    Action.ROTATE_2D: _Cursor.OpenHandCursor,
-    Action.MOVE_XY: _Cursor.SizeAllCursor,
-    Action.MOVE_Z: _Cursor.SizeVerCursor,
-    Action.ZOOM: _Cursor.SizeVerCursor,
+    Action.NONE: "ArrowCursor",
+    Action.ROTATE_3D: "OpenHandCursor",
+    Action.ROTATE_2D: "OpenHandCursor",
+    Action.MOVE_XY: "SizeAllCursor",
+    Action.MOVE_Z: "SizeVerCursor",
+    Action.ZOOM: "SizeVerCursor",
 }
 
 
@@ -235,7 +234,7 @@ class Tool(Configurable, Element):
         self._tools: Tools | None = None
         self._name = ""
         self._key: str | None = None
-        self._pointer = _Cursor.ArrowCursor
+        self._has_hit = False
         #: Whether it uses the node; only then it joins the session.
         self._uses_node = False
         #: RViz's class, as the file had it; RViz 2's for new ones.
@@ -383,7 +382,7 @@ class Tool(Configurable, Element):
             hit: Whether the cursor is a cross; None to leave it.
         """
         if hit is not None:
-            self._pointer = _Cursor.CrossCursor if hit else _Cursor.ArrowCursor
+            self._has_hit = hit
         if is_alive(self):
             report(self, statusText=text)
 
@@ -405,7 +404,7 @@ class Tool(Configurable, Element):
 
     def cursor(self, event: PointerEvent) -> QtCore.Qt.CursorShape:  # noqa: ARG002 - for subclasses
         """Return the cursor of the mouse."""
-        return self._pointer
+        return _cursor("CrossCursor" if self._has_hit else "ArrowCursor")
 
     def help(self, modifiers: Modifier) -> str:  # noqa: ARG002 - for subclasses
         """Return the text for the status bar."""
@@ -903,11 +902,11 @@ class Tools(QtCore.QObject):
         if not is_alive(self):
             return  # a handler has destroyed the view
         self.on_modifiers(event.modifiers)
-        tool, controller = self._current, self._view.controller
+        tool = self._current
         if self._grab == "camera" or tool is None:
-            cursor = _CURSORS[controller.action(event.buttons, event.modifiers)]
+            cursor = camera_cursor(event)
         else:
-            cursor = self._call(tool, tool.cursor, event) or _Cursor.ArrowCursor
+            cursor = self._call(tool, tool.cursor, event) or _cursor("ArrowCursor")
         if self._view.cursor().shape() != cursor:
             self._view.setCursor(cursor)
 
@@ -932,9 +931,15 @@ def _text_of(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
+def _cursor(name: str) -> QtCore.Qt.CursorShape:
+    # Looked up when needed: with the first, PySide makes all of Qt's enumerations, in 12 ms.
+    found: QtCore.Qt.CursorShape = getattr(QtCore.Qt.CursorShape, name)
+    return found
+
+
 def camera_cursor(event: PointerEvent) -> QtCore.Qt.CursorShape:
     """Return the cursor for what a drag of the camera would do."""
-    return _CURSORS[event.view.controller.action(event.buttons, event.modifiers)]
+    return _cursor(_CURSORS[event.view.controller.action(event.buttons, event.modifiers)])
 
 
 def point_text(point: Iterable[float]) -> str:
