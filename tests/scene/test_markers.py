@@ -193,6 +193,22 @@ def test_translucent_lines_are_sorted_while_there_are_few(
     assert [(one.count, one.opaque) for one in drawables(display)] == [(10, True)]
 
 
+def test_one_that_is_far_away_does_not_round_the_places_of_others(show: Callable[..., Any]) -> None:
+    line = points((0, 0, 0), (1, 0, 0))
+    places = [(0.0, 0.0), (5e6, 0.01), (5e6, 0.02), (1e18, 0.0)]
+    poses = [{"position": {"x": x, "y": y}, "orientation": {"w": 1.0}} for x, y in places]
+    texts = [marker(9, n, pose=pose, text=f"{n}") for n, pose in enumerate(poses)]
+    lines = [marker(4, 10 + n, pose=pose, points=line) for n, pose in enumerate(poses)]
+    display = show(*texts, *lines)
+    found: dict[type, list[tuple[float, float]]] = {Labels: [], Lines: []}
+    for one, pose, _ in display.root.drawables():
+        starts = one.positions if isinstance(one, Labels) else one.rows["start"]
+        at = starts.astype(np.float64) @ pose[:3, :3].T + pose[:3, 3]
+        found[type(one)] += [(x, round(y, 6)) for x, y, _ in at.tolist()]
+    assert found == {Labels: places, Lines: places}
+    assert len(drawables(display)) == 6
+
+
 def test_many_triangle_lists_are_drawn_together_and_look_the_same(
     bench: SceneBench, show: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -29,7 +29,7 @@ def colors_of(lines: Lines) -> Any:
 
 def test_lines_are_what_each_marker_alone_would_be() -> None:
     colors = np.array([RED, GREEN, RED, GREEN], np.float32)
-    batch, expected, tints = LineBatch(0.1, None), [], []
+    batch, expected, tints = LineBatch(0.1, (0.0, 0.0, 0.0), None), [], []
     markers = [
         (np.eye(4), ZIGZAG, colors, True),
         (TURNED, ZIGZAG, GREEN, False),
@@ -61,7 +61,7 @@ def test_lines_are_what_each_marker_alone_would_be() -> None:
 
 
 def test_triangles_are_what_each_marker_alone_would_be() -> None:
-    batch = TriangleBatch(True, None)
+    batch = TriangleBatch(True, (0.0, 0.0, 0.0), None)
     colors = [RED, GREEN, (0.0, 0.0, 1.0, 1.0)]
     shapes = [Shape(ZIGZAG[:3]), Shape(ZIGZAG, colors=[RED] * 4, indices=[0, 1, 2, 1, 2, 3])]
     batch.put(("a", 0), np.eye(4), shapes[0], GREEN)
@@ -88,14 +88,14 @@ def test_triangles_are_what_each_marker_alone_would_be() -> None:
 
 
 def test_batches_have_room_for_a_bounded_number_of_points_and_letters() -> None:
-    lines = LineBatch(0.1, None)
+    lines = LineBatch(0.1, (0.0, 0.0, 0.0), None)
     many = np.zeros((MAX_POINTS - 10, 3), np.float32)
     lines.put(("a", 0), np.eye(4), many, RED, True)
     assert lines.has_room(("a", 1), np.zeros((10, 3), np.float32))
     assert not lines.has_room(("a", 1), np.zeros((11, 3), np.float32))
     assert lines.has_room(("a", 0), np.zeros((MAX_POINTS, 3), np.float32))
 
-    texts = TextBatch(None)
+    texts = TextBatch((0.0, 0.0, 0.0), None)
     long = "word\n" * Labels.MAX_LENGTH
     assert texts.has_room(("a", 0), long)
     texts.put(("a", 0), long, np.zeros(3), 1.0, RED)
@@ -112,7 +112,8 @@ def test_batches_have_room_for_a_bounded_number_of_points_and_letters() -> None:
 
 def test_what_is_far_from_the_origin_is_not_rounded() -> None:
     utm = np.array([476_000.123, 5_429_000.456, 0.0])
-    texts, lines = TextBatch(None), LineBatch(0.1, None)
+    origin = np.round(utm, -3).tolist()
+    texts, lines = TextBatch(origin, None), LineBatch(0.1, origin, None)
     for number in range(3):
         at = utm + np.array([0.01 * number, 0, 0])
         texts.put(("a", number), f"{number}", at, 1.0, RED)

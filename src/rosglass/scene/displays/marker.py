@@ -131,6 +131,8 @@ _MAX_MESH_BYTES = 2 << 30
 #: Lists that are drawn together with others, and the markers of a group that are drawn alone, up to
 #: which triangles and translucent lines are, too: these are sorted by distance and selected alone.
 _JOINED, _MAX_ALONE = (LINE_STRIP, LINE_LIST, TRIANGLE_LIST), 100
+#: Cubes whose markers are drawn together: 32 bits are exact to 0.1 mm there.
+_CELL_M = 2000.0
 #: Lines of the status, and markers whose problems are known.
 _MAX_LINES, _MAX_PROBLEMS = 50, 1000
 
@@ -447,25 +449,28 @@ class MarkerGroup:
     def _put_joined(self, marker: MarkerRecord, pose: NDArray[np.float64]) -> bool:
         """Draw a marker together with others, if it is of a kind that is."""
         key, kind, points, owner = marker.key, marker.kind, marker.points, self._owner
+        if kind != TEXT:
+            if kind not in _JOINED or not 2 <= len(points) <= MAX_JOINED_POINTS:
+                return False
+            is_opaque = marker.color[3] >= OPAQUE
+            is_alone = len(self._own) < _MAX_ALONE or key in self._own
+            if is_alone and not (is_opaque and kind != TRIANGLE_LIST):
+                return False
+        cell = tuple(_CELL_M * round(at / _CELL_M) for at in pose[:3, 3].tolist())
+        look: tuple[Any, ...] = (TEXT, cell)
         if kind == TEXT:
             text = marker.text[: Labels.MAX_LENGTH]
-            texts = self._join(key, (TEXT,), text, lambda: TextBatch(owner))
+            texts = self._join(key, look, text, lambda: TextBatch(cell, owner))
             texts.put(key, text, pose[:3, 3], abs(marker.scale[2]), marker.color)
-            return True
-        if kind not in _JOINED or not 2 <= len(points) <= MAX_JOINED_POINTS:
-            return False
-        is_opaque = marker.color[3] >= OPAQUE
-        is_alone = len(self._own) < _MAX_ALONE or key in self._own
-        if is_alone and not (is_opaque and kind != TRIANGLE_LIST):
-            return False
-        if kind == TRIANGLE_LIST:
+        elif kind == TRIANGLE_LIST:
             shape, color, lit = _triangles_look(marker)
-            look = (TRIANGLE_LIST, lit, shape.opaque and color[3] >= OPAQUE)
-            triangles = self._join(key, look, shape, lambda: TriangleBatch(lit, owner))
+            look = (TRIANGLE_LIST, cell, lit, shape.opaque and color[3] >= OPAQUE)
+            triangles = self._join(key, look, shape, lambda: TriangleBatch(lit, cell, owner))
             triangles.put(key, pose, shape, color)
         else:
             width = abs(marker.scale[0])
-            lines = self._join(key, (width, is_opaque), points, lambda: LineBatch(width, owner))
+            look = (LINE_LIST, cell, width, is_opaque)
+            lines = self._join(key, look, points, lambda: LineBatch(width, cell, owner))
             lines.put(key, pose, points, _line_colors(marker), kind == LINE_STRIP)
         return True
 

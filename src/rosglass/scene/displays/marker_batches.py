@@ -1,4 +1,8 @@
-"""Draws markers of one namespace together: ten thousand of them are a few drawables."""
+"""Draws markers of one namespace together: ten thousand of them are a few drawables.
+
+Texts, lines and triangles of one batch are near its origin: as float32, positions that are far from
+it would be rounded.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,7 @@ import numpy as np
 from rosglass.scene.drawing import Labels, Lines, Mesh, Shape, instance_matrix
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from typing import TypeAlias
 
     from numpy.typing import NDArray
@@ -105,6 +110,7 @@ class TextBatch:
     """Texts, as the labels of one drawable.
 
     Args:
+        origin: x, y, z of a place in the group near all of them.
         owner: What a pick of them finds; None where they cannot be picked.
     """
 
@@ -112,9 +118,11 @@ class TextBatch:
     #: into one image.
     MAX_LETTERS = 10_000
 
-    def __init__(self, owner: Any) -> None:
+    def __init__(self, origin: Sequence[float], owner: Any) -> None:
+        self._origin = np.array(origin)
         self.drawable = Labels()
         self.drawable.owner = owner
+        self.drawable.pose = instance_matrix(origin)
         #: Text, position in the group, height and colour of each.
         self._texts: dict[Key, tuple[str, NDArray[np.float64], float, Color]] = {}
         self._letters = 0
@@ -155,10 +163,7 @@ class TextBatch:
             self.drawable.set_texts([], [])
             return
         texts, positions, heights, colors = zip(*self._texts.values(), strict=True)
-        # From one of them: as float32, positions that are far from the origin would be rounded.
-        at = np.array(positions)
-        self.drawable.pose = instance_matrix(at[0])
-        self.drawable.set_texts(texts, at - at[0], heights, colors)
+        self.drawable.set_texts(texts, np.array(positions) - self._origin, heights, colors)
 
 
 def _letters(text: str) -> int:
@@ -171,13 +176,15 @@ class LineBatch:
 
     Args:
         width: Metres.
+        origin: x, y, z of a place in the group near all of them.
         owner: What a pick of them finds; None where they cannot be picked.
     """
 
-    def __init__(self, width: float, owner: Any) -> None:
-        self.width = width
+    def __init__(self, width: float, origin: Sequence[float], owner: Any) -> None:
+        self._origin = np.array(origin)
         self.drawable = Lines(width, in_metres=True)
         self.drawable.owner = owner
+        self.drawable.pose = instance_matrix(origin)
         #: Pose in the group, points, colours of these or one for all, and whether they are a strip.
         self._lines: dict[Key, tuple[Matrix, NDArray[np.float32], NDArray[np.float32], bool]] = {}
         self._points = 0
@@ -231,9 +238,7 @@ class LineBatch:
         counts = [len(one) for one in points]
         marker = np.repeat(np.arange(len(counts)), counts)
         turns = np.concatenate(poses).reshape(-1, 4, 4)
-        # From one of them: as float32, positions that are far from the origin would be rounded.
-        origin = turns[0, :3, 3].copy()
-        turns[:, :3, 3] -= origin
+        turns[:, :3, 3] -= self._origin
         at = np.einsum("nij,nj->ni", turns[marker, :3, :3], np.concatenate(points))
         at += turns[marker, :3, 3]
         tints = np.concatenate(colors)
@@ -247,7 +252,6 @@ class LineBatch:
         # Strips bend to the points beside; those of lists, and at the ends, are their own ones.
         before = np.where(is_strip[start] & (start > first[marker[start]]), start - 1, start)
         after = np.where(is_strip[start] & has_next[start + 1], start + 2, start + 1)
-        self.drawable.pose = instance_matrix(origin)
         with np.errstate(over="ignore"):
             at = at.astype(np.float32)
         self.drawable.set_segments(
@@ -262,12 +266,15 @@ class TriangleBatch:
 
     Args:
         lit: Whether the headlight shades them.
+        origin: x, y, z of a place in the group near all of them.
         owner: What a pick of them finds; None where they cannot be picked.
     """
 
-    def __init__(self, lit: bool, owner: Any) -> None:
+    def __init__(self, lit: bool, origin: Sequence[float], owner: Any) -> None:
+        self._origin = np.array(origin)
         self.drawable = Mesh(Shape([]), lit=lit)
         self.drawable.owner = owner
+        self.drawable.pose = instance_matrix(origin)
         #: Pose in the group, triangles, and the colour that these are multiplied with.
         self._parts: dict[Key, tuple[Matrix, Shape, Color]] = {}
         self._points = 0
@@ -308,13 +315,10 @@ class TriangleBatch:
         marker = np.repeat(np.arange(len(counts)), counts)
         rows = np.concatenate([shape.rows for shape in shapes])
         turns = np.concatenate(poses).reshape(-1, 4, 4)
-        # From one of them: as float32, positions that are far from the origin would be rounded.
-        origin = turns[0, :3, 3].copy()
-        turns[:, :3, 3] -= origin
+        turns[:, :3, 3] -= self._origin
         turn = turns[marker, :3, :3]
         at = np.einsum("nij,nj->ni", turn, rows["position"]) + turns[marker, :3, 3]
         first = np.repeat(np.cumsum([0, *counts[:-1]]), [len(shape.faces) for shape in shapes])
-        mesh.pose = instance_matrix(origin)
         mesh.shape = Shape(
             at,
             np.einsum("nij,nj->ni", turn, rows["normal"]),
