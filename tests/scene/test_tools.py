@@ -756,6 +756,30 @@ def test_a_rectangle_selects(bench: SceneBench, hand: Hand) -> None:
     assert not list(view.overlay.drawables())
 
 
+def test_a_cell_of_a_large_map_is_selected_without_the_others(bench: SceneBench) -> None:
+    import tracemalloc
+
+    from rosglass.scene.drawing import MapImage
+    from rosglass.scene.picking import Selected
+
+    view = bench.load()
+    image = MapImage()
+    image.owner = view.scene.add("Map", "Floor")
+    image.set_cells(np.zeros((16384, 16384), np.uint8), 0.05)
+    cell = 16384 * 16000 + 5
+    tracemalloc.start()
+    try:
+        view.selection.apply([Selected(image, np.array([cell]))])
+        view.selection.apply([Selected(image, np.array([cell + 3, cell + 1]))], "add")
+        view.selection.apply([Selected(image, np.array([cell]))], "remove")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert view.selection.count == 2
+    assert [part.part for part in view.selection.items()] == [str(cell + 1), str(cell + 3)]
+    assert peak < 1 << 20
+
+
 def test_the_panel_follows_what_is_selected(bench: SceneBench) -> None:
     from rosglass.scene.drawing import instance_matrix
 

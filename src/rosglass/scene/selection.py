@@ -148,11 +148,14 @@ class Selection(QtCore.QObject):
             # Flags: numpy's sets take a second for 200,000 points.
             is_same = old is not None and not _is_outdated(drawable, old)
             known = old.indices if old is not None and is_same else indices[:0]
-            last = max(known.max(initial=-1), indices.max(initial=-1))
-            flags = np.zeros(last + 1, np.bool_)
-            flags[known] = True
-            flags[indices] = change != "remove"
-            new = np.flatnonzero(flags)
+            both = np.concatenate([known, indices])
+            if not len(both):
+                continue
+            first = both.min()
+            flags = np.zeros(both.max() - first + 1, np.bool_)
+            flags[known - first] = True
+            flags[indices - first] = change != "remove"
+            new = np.flatnonzero(flags) + first
             if len(new):
                 self._marked[drawable] = _Marked(new, drawable.geometry, _find_whole(drawable))
         self._draw()
