@@ -543,8 +543,9 @@ def test_a_depth_image_is_a_cloud_of_squares_of_its_pixels(bench: SceneBench) ->
 def test_a_depth_image_has_the_color_of_its_time(bench: SceneBench) -> None:
     camera = Camera(bench, 'colorTopic: "/camera/rgb/image_raw"')
     camera.send("/camera/depth/camera_info", CAMERA)
-    camera.color((255, 0, 0), 1)
-    display = camera.depth([4000] * 4, 2)
+    display = camera.color((255, 0, 0), 1)
+    assert display.statusLevel != "error", display.statusText
+    camera.depth([4000] * 4, 2)
     assert display.points == 0, "a color image of a nearer time may follow"
     camera.color((0, 255, 0), 2)
     assert display.points == 4

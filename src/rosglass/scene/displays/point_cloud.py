@@ -655,6 +655,8 @@ class _DepthMatcher:
 
     def _pair(self) -> tuple[Any, Any, Any] | None:
         """Return the newest depth image whose color is known: that of the nearest time."""
+        if not self._depths:
+            return None
         colors = [(frame_and_stamp(color)[1], color) for color in self._colors]
         if not colors:
             if len(self._depths) == self._size:
