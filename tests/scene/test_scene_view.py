@@ -73,21 +73,24 @@ def test_the_window_is_drawn_once_with_a_new_picture(bench: SceneBench) -> None:
     assert len(frames) == 3
 
 
-_SOFTWARE = """
-import sys
+_PROBLEM = """
+import sys, time
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtQuick import QQuickView
 import rosglass.scene
 from rosglass.qml import Session, install
 
-app = QGuiApplication(["software"])
+app = QGuiApplication(["problem"])
 rosglass.scene.register()
 window = QQuickView()
-session = Session("local://software")
+session = Session("local://problem")
 install(window.engine(), session)
 window.setSource("file://" + sys.argv[1])
 window.show()
-print(window.rootObject().problem)
+view, until = window.rootObject(), time.monotonic() + 30
+while not (view.problem or view.pictures_drawn()) and time.monotonic() < until:
+    app.processEvents()
+print(view.problem)
 session.close()
 """
 
@@ -96,9 +99,22 @@ def test_without_a_graphics_interface_it_says_so(tmp_path: Path) -> None:
     file = tmp_path / "View.qml"
     file.write_text("import RosScene 1.0\nSceneView {}")
     env = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "QT_QUICK_BACKEND": "software"}
-    command = [sys.executable, "-c", _SOFTWARE, str(file)]
+    command = [sys.executable, "-c", _PROBLEM, str(file)]
     ended = subprocess.run(command, env=env, stdout=subprocess.PIPE, text=True, check=True)
     assert "Unset QT_QUICK_BACKEND; without a graphics card, Mesa's llvmpipe" in ended.stdout
+
+
+def test_an_old_opengl_is_a_problem_in_words(app: Any, tmp_path: Path) -> None:
+    file = tmp_path / "View.qml"
+    file.write_text("import RosScene 1.0\nSceneView { width: 200; height: 100; AxesDisplay {} }")
+    mesa = {"__GLX_VENDOR_LIBRARY_NAME": "mesa", "LIBGL_ALWAYS_SOFTWARE": "1"}
+    old = {"MESA_GL_VERSION_OVERRIDE": "2.1", "MESA_GLSL_VERSION_OVERRIDE": "120"}
+    command = [sys.executable, "-c", _PROBLEM, str(file)]
+    ended = subprocess.run(
+        command, env={**os.environ, **mesa, **old}, capture_output=True, text=True, check=True
+    )
+    assert "cannot draw: it needs OpenGL 3.3 or OpenGL ES 3.0, and Qt has an older" in ended.stdout
+    assert "Traceback" not in ended.stderr
 
 
 def test_a_scene_that_changes_all_the_time_leaves_frames_to_qml(

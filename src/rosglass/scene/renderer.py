@@ -43,6 +43,7 @@ from PySide6.QtGui import (
 from PySide6.QtQuick import QQuickRhiItemRenderer
 from shiboken6 import Shiboken
 
+from rosglass.errors import UnsupportedError
 from rosglass.scene.drawing import Labels, Lines, MapImage, Mesh, Points
 from rosglass.scene.text_images import TextImage
 
@@ -72,6 +73,11 @@ _FRAGMENT = QRhiShaderResourceBinding.StageFlag.FragmentStage
 _PerInstance = QRhiVertexInputBinding.Classification.PerInstance
 #: In the names of drivers that draw with the processor.
 _SOFTWARE = ("llvmpipe", "lavapipe", "softpipe", "swiftshader", "basic render")
+_OLD_OPENGL = (
+    "it needs OpenGL 3.3 or OpenGL ES 3.0, and Qt has an older one of {}. Update the graphics "
+    "driver, let Mesa's llvmpipe draw (LIBGL_ALWAYS_SOFTWARE=1), or use a screen, as Xvfb is one, "
+    "instead of QT_QPA_PLATFORM=offscreen."
+)
 #: Bytes of the blocks in shaders/frame.glsl.
 _FRAME_BYTES, _OBJECT_BYTES = 144, 144
 #: Metres from the origin of what is drawn at which the origin moves: 32 bits stay exact to 0.1 mm.
@@ -131,9 +137,11 @@ class _Device:
     def __init__(self, rhi: QRhi, samples: int, target: Any) -> None:
         self.rhi, self.samples, self.target = rhi, samples, target
         driver = rhi.driverInfo()  # its name lives no longer than it
-        name = bytes(driver.deviceName.data()).decode(errors="replace").lower()
+        name = bytes(driver.deviceName.data()).decode(errors="replace")
+        if not rhi.isFeatureSupported(QRhi.Feature.Instancing):
+            raise UnsupportedError(_OLD_OPENGL.format(name))
         #: Whether the processor draws.
-        self.is_software = any(word in name for word in _SOFTWARE)
+        self.is_software = any(word in name.lower() for word in _SOFTWARE)
         self.has_point_size = rhi.isFeatureSupported(QRhi.Feature.VertexShaderPointSize)
         self.largest_texture = rhi.resourceLimit(QRhi.ResourceLimit.TextureSizeMax)
         self.correction = np.array(rhi.clipSpaceCorrMatrix().copyDataTo(), np.float64).reshape(4, 4)
