@@ -152,7 +152,9 @@ def test_a_scene_that_changes_all_the_time_leaves_frames_to_qml(
         return (frames[-1] - frames[0]) / (len(frames) - 1)
 
     bench.window.frameSwapped.connect(change)
-    bench.wait(lambda: view.scene.draws_in_software)
+    bench.wait(lambda: len(frames) > 5)
+    if not view.scene.draws_in_software:
+        pytest.skip("a graphics card draws, which leaves the time to QML")
     share(5)
     assert share(40) < 0.75
     # What the user drags is drawn at once.

@@ -188,9 +188,9 @@ def test_settings_of_a_file_of_rviz_count(bench: SceneBench, tmp_path: Path) -> 
     ours.write_text(ENTRY)
     view = bench.load()
     assert view.load_config(ours) == []
-    bench.wait(lambda: services_of(bench))
+    names = {"/robot/camera/move_eye", "/robot/camera/move_eye_and_focus"}
+    bench.wait(lambda: services_of(bench) == names)
     settings = control(bench).view.settings
-    assert services_of(bench) == {"/robot/camera/move_eye", "/robot/camera/move_eye_and_focus"}
     assert (settings.animation_duration, settings.tracking_gain, settings.speed) == (0.25, 7, 2)
     assert not settings.keys
     control(bench).view.set_mode(1, animate=False)
