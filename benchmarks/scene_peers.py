@@ -337,6 +337,16 @@ class View:
         """Return how many displays have got a message."""
         return sum(getattr(one, "received", 1) > 0 for one in self._view.scene.displays)
 
+    def points(self) -> int:
+        """Return how many points of clouds are shown."""
+        return sum(getattr(one, "points", 0) for one in self._view.scene.displays)
+
+    def device(self) -> str:
+        """Return the name of what draws, and by which graphics interface."""
+        driver = self._window.rhi().driverInfo()  # its name lives no longer than it
+        name = bytes(driver.deviceName.data()).decode(errors="replace")
+        return f"{name}, by {self._window.rendererInterface().graphicsApi().name}"
+
     def wait(self, seconds: float) -> dict[str, float]:
         """Let it draw as it does by itself, and count what messages cost."""
         costs = self.costs
