@@ -16,7 +16,20 @@ import pytest
 import yaml
 from pictures import drawn, patches, unmatched
 from rosmaster import RosMaster
-from rviz_cases import CASES, LINKS, ROBOTS, VIEWS, Case
+from rospy_markers import INSTALLED, RospyServer
+from rviz_cases import (
+    CASES,
+    INTERACTIVE_MARKERS,
+    LINKS,
+    ROBOTS,
+    VIEWS,
+    Case,
+    controlled,
+    marker,
+    pose,
+)
+from rviz_cases import display as display_config
+from scene_mouse import Hand
 
 from rosglass.comm.qos import QoS
 from rosglass.demo.processes import VirtualScreen
@@ -45,6 +58,7 @@ class Pair:
         from rosglass.qml import Session, install
 
         self.wait, self.folder, self._config = wait, folder, folder / "judge.rviz"
+        self.master = master
         self.robot = rosglass.connect(master.url, "robot")
         self.session = Session(master.url)
         self.window = QQuickView()
@@ -109,8 +123,8 @@ class Pair:
             ]
         )
 
-    def show(self, case: Case, view: dict[str, Any]) -> None:
-        """Have both open a config."""
+    def show(self, case: Case, view: dict[str, Any], tool: str = "MoveCamera") -> None:
+        """Have both open a config, with one tool."""
         config = {
             "Visualization Manager": {
                 "Class": "",
@@ -122,7 +136,7 @@ class Pair:
                     "Frame Rate": 30,
                 },
                 "Name": "root",
-                "Tools": [{"Class": "rviz/MoveCamera"}],
+                "Tools": [{"Class": f"rviz/{tool}"}],
                 "Value": True,
                 "Views": {"Current": view, "Saved": None},
             }
@@ -284,6 +298,72 @@ def test_pictures_are_those_of_rviz(pair: Pair, name: str) -> None:
     finally:
         for publisher in publishers.values():
             publisher.close()
+
+
+def test_markers_of_a_real_server_are_those_of_rviz_and_can_be_used(pair: Pair) -> None:
+    if not INSTALLED:
+        pytest.skip("not installed: sudo apt-get install python3-interactive-markers")
+    server = RospyServer(pair.master)
+    try:
+        use_markers(pair, server)
+    finally:
+        server.kill()
+
+
+def use_markers(pair: Pair, server: RospyServer) -> None:
+    box = marker(0, 1, "red", pose(0, 0), (0.6, 0.4, 0.3), header={})
+    server.send("erase arm")
+    server.insert(
+        *INTERACTIVE_MARKERS[0].fields["markers"],
+        controlled("choice", pose(0, 2.2), {"interaction_mode": 1, "markers": [box]}),
+    )
+    server.send("menu choice Go Stop")
+    server.send("settle")
+    shown = display_config(
+        "InteractiveMarkers", Update_Topic="/arm_markers/update", Show_Descriptions=False,
+        Enable_Transparency=False,
+    )  # fmt: skip
+    pair.show(Case([shown]), VIEWS["TopDownOrtho"], "Interact")
+    (display,) = pair.view.scene.displays
+    pair.wait(lambda: len(display.markers) == 7, lambda: display.statusText)
+    assert pair.view.tool == "Interact"
+    hand = Hand(pair)  # type: ignore[arg-type] - it uses the window and the view
+
+    def compared(name: str) -> NDArray[np.uint8]:
+        until = time.monotonic() + TIMEOUT_S
+        while True:
+            ours, theirs = pair.ours(), pair.theirs()
+            found = difference(ours, theirs)
+            if not found or time.monotonic() > until:
+                break
+        keep(f"real server {name}", ours, theirs)
+        assert not found, found
+        return theirs
+
+    before = compared("before")
+    pair.wait(lambda: "settled\n" in server.lines)
+    # Along its arrow, by a metre: the server moves it in both.
+    way = np.array([math.cos(0.4), math.sin(0.4), 0.0])
+    grip = np.array([-2.5, -1.5, 0.0]) + 0.9 * way
+    hand.press(hand.at(grip))
+    hand.move(hand.at(grip + way))
+    pair.wait(lambda: server.feedback("arrows", 1), lambda: (server.lines, display.statusText))
+    hand.release(hand.at(grip + way))
+    pair.wait(lambda: server.feedback("arrows", 5))
+    x, y, _ = map(float, server.feedback("arrows", 5)[-1])
+    assert (x, y) == pytest.approx((-2.5 + way[0], -1.5 + way[1]), abs=0.06)
+    hand.move((2, 2))
+    after = compared("after")
+    assert unmatched(before, after).sum() > 100
+    # The middle of the yellow arrow, and of the box with the menu.
+    hand.click(hand.at((0.3 + 0.35 * math.cos(0.5), 1 + 0.35 * math.sin(0.5), 0)))
+    pair.wait(lambda: server.feedback("facing", 3), lambda: server.lines)
+    hand.click(hand.at((0, 2.2, 0)))
+    pair.wait(lambda: display._asked)
+    display.selectMenuEntry(2)
+    pair.wait(lambda: server.feedback("choice", 2), lambda: server.lines)
+    assert [entry for *_, entry in server.feedback("choice", 2)] == ["2"]
+    assert display.statusLevel == "ok", display.statusText
 
 
 def keep(name: str, ours: NDArray[np.uint8], theirs: NDArray[np.uint8]) -> None:

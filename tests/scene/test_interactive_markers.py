@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import itertools
-import subprocess
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from inside import ask_again_after, endpoint_of
 from rosmaster import RosMaster
+from rospy_markers import INSTALLED, RospyServer
 from scene_mouse import Hand, has_color
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
     from conftest import SceneBench
 
@@ -860,42 +860,11 @@ def test_both_rviz_write_the_namespace_differently(bench: SceneBench) -> None:
 # -- ROS 1 ----------------------------------------------------------------------------------------
 
 
-class RospyServer:
-    """Debian's server, as a process."""
-
-    def __init__(self, master: RosMaster) -> None:
-        self.lines: list[str] = []
-        program = Path(__file__).with_name("rospy_interactive_markers.py")
-        # It must not outlive tests that are killed.
-        command = ["setpriv", "--pdeathsig", "KILL", "/usr/bin/python3", str(program)]
-        pipe = subprocess.PIPE
-        self._process = subprocess.Popen(
-            command, env=master.env(), stdin=pipe, stdout=pipe, text=True, bufsize=1
-        )
-        assert self._process.stdout is not None
-        self._output = self._process.stdout
-        assert self._output.readline() == "ready\n"
-        import threading
-
-        threading.Thread(target=self._read, daemon=True).start()
-
-    def _read(self) -> None:
-        self.lines.extend(self._output)
-
-    def send(self, line: str) -> None:
-        assert self._process.stdin is not None
-        self._process.stdin.write(f"{line}\n")
-
-    def kill(self) -> None:
-        self._process.kill()
-        self._process.wait()
-
-
 @pytest.fixture
 def ros1(
     make_bench: Callable[[str], SceneBench], tmp_path: Path
 ) -> Iterator[tuple[SceneBench, RospyServer, RosMaster]]:
-    if not Path("/usr/lib/python3/dist-packages/interactive_markers").exists():
+    if not INSTALLED:
         pytest.skip("not installed: sudo apt-get install python3-interactive-markers")
     with RosMaster(tmp_path / "ros") as master:
         server = RospyServer(master)
