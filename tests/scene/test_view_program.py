@@ -1080,7 +1080,7 @@ def test_the_global_status_says_that_there_is_no_connection(bench: SceneBench, m
 
 def test_the_first_frame_waits_for_what_it_shows_only(app: Any) -> None:
     code = """
-import builtins, os, sys
+import os, sys
 from rosglass.cli import main, view
 
 show = view.show_interface
@@ -1090,13 +1090,14 @@ def watched(*args, **options):
     begin = type(program).begin
 
     def look():
-        import linecache
+        import gc, linecache
         from PySide6 import QtCore
 
         print("pictures", program.view.pictures_drawn())
         print("enumerations", "Qt" in vars(QtCore))
         print("sources", [file for file in linecache.cache if "scene" in file])
         print("controls", "libQt6QuickControls2" in open("/proc/self/maps").read())
+        print("collects", gc.isenabled())
         sys.stdout.flush()
         os._exit(0)
 
@@ -1112,7 +1113,7 @@ sys.exit(main(["view", "--url", "local://first"]))
 """
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
-    expected = "pictures 1\nenumerations False\nsources []\ncontrols False\n"
+    expected = "pictures 1\nenumerations False\nsources []\ncontrols False\ncollects False\n"
     assert done.stdout == expected, done.stderr
 
 

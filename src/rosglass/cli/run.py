@@ -32,6 +32,8 @@ __all__ = [
 
 #: Rules for messages of Qt that are of no use to users of an interface.
 QUIET_MEDIA = "qt.multimedia.symbolsresolver=false;qt.multimedia.ffmpeg*=false;qt.qpa.theme*=false"
+#: Seconds after which garbage is collected, which takes some 20 ms: not before the first frame.
+_FIRST_COLLECTION_S = 1.0
 
 
 def run(args: argparse.Namespace) -> int:
@@ -151,7 +153,7 @@ def show(
         # Grabbing waits for the renderer, which may wait for Python.
         os.environ["QSG_RENDER_LOOP"] = "basic"
 
-    # Nothing created until the window is shown becomes garbage.
+    # Nothing created until the first frame becomes garbage.
     gc.disable()
     try:
         return _show(
@@ -189,13 +191,13 @@ def _show(
     picture = None if screenshot is None else Picture(screenshot, after)
 
     def shown() -> None:
-        gc.enable()
         if recorder is not None and app.window is not None:
             recorder.start(app.window)
         if picture is not None:
             picture.take(app.quit, lambda target: _save_connected(app, target))
 
     _call_later(0.0, shown)
+    _call_later(_FIRST_COLLECTION_S, gc.enable)
     if recorder is not None:
         # While the window exists, and the program may still take some seconds.
         app.qt.aboutToQuit.connect(recorder.close)
