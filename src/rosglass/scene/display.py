@@ -197,9 +197,6 @@ class Display(Configurable, TopicElement):
         """The display in error messages."""
         return f"display {self._name or self.TYPE!r}"
 
-    def _owner_name(self) -> str:
-        return self.label
-
     def _set_name(self, name: str) -> None:
         if name != self._name:
             self._name = name

@@ -133,10 +133,12 @@ class Configurable:
         found = self.SETTINGS.get(path)
         if found is None:
             hint = similar(path, self.SETTINGS) or f"; there are: {', '.join(self.SETTINGS)}"
-            raise Error(f"{self._owner_name()} has no setting {path!r}{hint}")
+            raise Error(f"{self.label} has no setting {path!r}{hint}")
         return found
 
-    def _owner_name(self) -> str:
+    @property
+    def label(self) -> str:
+        """What has the settings, in error messages."""
         return type(self).__name__
 
     def get(self, path: str) -> Any:
@@ -160,7 +162,7 @@ class Configurable:
         try:
             accepted = setting.kind.read(value)
         except Error as error:
-            raise Error(f"{self._owner_name()}, {path}: {error}") from None
+            raise Error(f"{self.label}, {path}: {error}") from None
         setattr(self, setting.name, accepted)
 
     def describe(self) -> Iterator[dict[str, Any]]:

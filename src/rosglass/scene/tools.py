@@ -249,9 +249,6 @@ class Tool(Configurable, Element):
         """The tool in error messages."""
         return f"tool {self.name!r}"
 
-    def _owner_name(self) -> str:
-        return self.label
-
     def _set_name(self, name: str) -> None:
         if name != self._name:
             self._name = name
