@@ -628,6 +628,33 @@ def test_a_config_does_not_silently_drop_a_goal_that_waits(
     assert "not sent: the tool was removed" in caplog.text
 
 
+def test_qml_does_not_silently_destroy_a_tool_with_a_goal(
+    bench: SceneBench, nav2: Any, monkeypatch: pytest.MonkeyPatch, caplog: Any
+) -> None:
+    from rosglass.qt import send_deferred_deletes
+
+    monkeypatch.setattr("rosglass.scene.publishing_tools._MATCH_TIMEOUT_S", 60.0)
+    view = bench.load(
+        "id: top; property bool wanted: true\n"
+        "Loader { active: top.wanted; sourceComponent: Item { \n"
+        '  SetGoalTool { name: "Drive"; action: "/navigate_to_pose" }\n'
+        '  SetGoalTool { name: "Later"; topic: "/later" } } }'
+    )
+    bench.wait(lambda: view.tools.find("Later") is not None)
+    drive, later = view.tools.find("Drive"), view.tools.find("Later")
+    driver = Driver(nav2)
+    for tool in (drive, later):
+        view.tools.select(tool)
+        bench.wait(lambda tool=tool: tool._endpoint is not None)
+        tool.send_pose(1.0, 2.0, 0.0)
+    bench.wait(lambda: driver.goals)
+    view.setProperty("wanted", False)
+    send_deferred_deletes()
+    assert "/navigate_to_pose: the tool was destroyed: its goal continues" in caplog.text
+    assert "Goal at [1, 2] m, 0.0 degrees: not sent: the tool was destroyed" in caplog.text
+    driver.goals.append(None)  # ends it
+
+
 def test_a_config_does_not_silently_end_the_reports_of_a_goal(
     bench: SceneBench, hand: Hand, nav2: Any, caplog: Any
 ) -> None:

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -46,6 +48,7 @@ __all__ = [
     "SetInitialPoseTool",
 ]
 
+_log = logging.getLogger("rosglass.scene")
 #: RViz's, for what a file does not say.
 _QOS = QoS(depth=5)
 #: Seconds that a new publisher waits for the first subscriber.
@@ -81,6 +84,7 @@ class PublishingTool(Tool):
         self._created_at = 0.0
         self._qos = _QOS
         super().__init__(parent, runtime)
+        self.destroyed.connect(partial(_warn_of_goals, self.__dict__))
 
     # -- files -----------------------------------------------------------------------------------
 
@@ -243,6 +247,16 @@ class PublishingTool(Tool):
         if node is not None:
             found["stamp"] = node.now()
         return found
+
+
+def _warn_of_goals(state: dict[str, Any], *_: Any) -> None:
+    """Log what a tool that QML has destroyed leaves behind; only its attributes are left."""
+    waiting = state.get("_waiting")
+    if waiting is not None:
+        _log.warning("%s: not sent: the tool was destroyed", waiting[1])
+    if state.get("_goalActive"):
+        text = "goal of %s: the tool was destroyed: its goal continues, and is reported no longer"
+        _log.warning(text, state.get("_action"))
 
 
 class PoseTool(PublishingTool):
@@ -459,6 +473,7 @@ class SetGoalTool(PoseTool):
         if self.goalActive:
             text = "the tool was removed: its goal continues, and is reported no longer"
             self._complain(f"goal of {self.action}: {text}")
+            report(self, goalActive=False)
         super().leave()
 
     def _wanted(self) -> tuple[Any, ...] | None:
