@@ -1150,21 +1150,21 @@ def test_texts_without_room_are_a_problem(bench: SceneBench) -> None:
 
 
 def test_an_image_beyond_the_limit_keeps_the_walls_of_a_map() -> None:
-    from rosglass.scene.renderer import _reduced
+    from rosglass.scene.graphics_device import reduce_image
 
     cells = np.zeros((101, 60), np.int8)
     cells[:, 31] = 100
     cells[:4] = -1
     # Unknown cells beside a wall, and beside free ones.
     cells[50, 30] = cells[50, 10] = -1
-    small = _reduced(cells.view(np.uint8), 51).view(np.int8)
+    small = reduce_image(cells.view(np.uint8), 51).view(np.int8)
     assert small.shape == (51, 30)
     assert (small[2:, 15] == 100).all()
     assert (small[:2] == -1).all()
     assert not small[2:, :15].any()
     colors = np.arange(100 * 100 * 4, dtype=np.uint8).reshape(100, 100, 4)
-    assert _reduced(colors, 50).shape == (50, 50, 4)
-    assert _reduced(colors, 100) is colors
+    assert reduce_image(colors, 50).shape == (50, 50, 4)
+    assert reduce_image(colors, 100) is colors
 
 
 def test_a_depth_that_a_config_may_not_have_is_named(bench: SceneBench) -> None:
