@@ -1,4 +1,4 @@
-"""Ten thousand topics that a peer announces."""
+"""Thousands of topics that a peer announces."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from waiting import eventually
 
 from rosglass.comm import ConnectionState
 
-TOPICS = 10_000
+TOPICS = 4_000
 #: Bytes of memory for each, and seconds of this process's CPU in all.
-MEMORY, CPU = 10_000, 120.0
-#: Seconds; Zenoh alone takes four for a program that joins, on an idle machine.
+MEMORY, CPU = 10_000, 20.0
+#: Seconds; for each wait, where other tests take the processor.
 LONG = 120.0
 
 
@@ -24,7 +24,7 @@ def count(node):
     return len(node.topics())
 
 
-def test_ten_thousand_announced_topics_cost_their_share(router, connect, run_command):
+def test_thousands_of_announced_topics_cost_their_share(router, connect, run_command):
     node = connect("panel", "?domain=0")
     states = []
     node.on_status_change(lambda status: states.append(status.state))
@@ -65,4 +65,7 @@ def test_ten_thousand_announced_topics_cost_their_share(router, connect, run_com
 @pytest.fixture
 def run_command(run_command, monkeypatch):
     monkeypatch.setenv("ROS_DOMAIN_ID", "0")
+    # Its 18 s are too few where other tests take the processor, and its 1 s too many where none do.
+    monkeypatch.setattr("rosglass.cli.connecting._INTRODUCTION_S", {"zenoh": LONG})
+    monkeypatch.setattr("rosglass.cli.connecting._REPORT_PERIOD_S", 0.1)
     return run_command
