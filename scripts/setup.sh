@@ -69,7 +69,7 @@ install_apt() {
 
 # make_venv DIR PYTHON EXTRAS [venv options]
 make_venv() {
-  local dir=$1 python=$2 extras=$3; shift 3
+  local dir=$1 python=$2 extras=$3 log=.stamps/pip$1.log; shift 3
   local wanted; wanted="$(cat pyproject.toml; echo "$python $extras $*"; "$python" -V)"
   [ "$(cat "$dir/.rosglass" 2>/dev/null)" = "$wanted" ] && return
   "$python" -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null ||
@@ -77,20 +77,20 @@ make_venv() {
       "install a newer one, or name it: make PYTHON=/usr/bin/python3.11 $purpose"
   say "making $dir with $("$python" -V)"
   [ -x "$dir/bin/python" ] && "$dir/bin/python" -m pip --version >/dev/null 2>&1 ||
-    "$python" -m venv --clear "$@" "$dir" >.stamps/venv.log 2>&1 || {
-      tail -3 .stamps/venv.log >&2; fail "$python cannot make virtual environments" \
+    "$python" -m venv --clear "$@" "$dir" >".stamps/venv$dir.log" 2>&1 || {
+      tail -3 ".stamps/venv$dir.log" >&2; fail "$python cannot make virtual environments" \
         "on Debian and Ubuntu: sudo apt-get install python3-venv, then run this again."; }
   say "installing Python packages into $dir (rosglass[$extras]; a few minutes the first time)"
   if ! "$dir/bin/python" -m pip install --disable-pip-version-check --progress-bar off -e ".[$extras]" \
-    2>&1 | tee .stamps/pip.log | sed -un 's/^ *Downloading \([^ ]*\)\(.*\)/    \1\2/p'; then
-    grep -E '^ *(ERROR|error)' .stamps/pip.log | tail -5 >&2
-    if grep -q 'Python\.h' .stamps/pip.log; then
+    2>&1 | tee "$log" | sed -un 's/^ *Downloading \([^ ]*\)\(.*\)/    \1\2/p'; then
+    grep -E '^ *(ERROR|error)' "$log" | tail -5 >&2
+    if grep -q 'Python\.h' "$log"; then
       fail "a package had to be compiled and Python's headers are missing" \
         "sudo apt-get install build-essential python3-dev, then run this again."
-    elif grep -qiE 'connection|resol|timed out|network' .stamps/pip.log; then
+    elif grep -qiE 'connection|resol|timed out|network' "$log"; then
       fail "PyPI could not be reached" "check the network (or set https_proxy / PIP_INDEX_URL) and run this again;" \
-        "pip's whole output is in .stamps/pip.log"
-    else fail "pip could not install the Python packages" "pip's whole output is in .stamps/pip.log"; fi
+        "pip's whole output is in $log"
+    else fail "pip could not install the Python packages" "pip's whole output is in $log"; fi
   fi
   printf '%s\n' "$wanted" >"$dir/.rosglass"
 }
@@ -133,12 +133,19 @@ case $purpose in
     # Once it was made for the tests, keep it complete.
     if [ -f .venv/.rosglass-dev ]; then make_venv .venv-system /usr/bin/python3 "$system_extras" --system-site-packages
     else make_venv .venv-system /usr/bin/python3 images --system-site-packages; fi ;;
-  dev|test)
+  dev)
     make_venv .venv "$python" dev
-    touch .venv/.rosglass-dev ;;&
+    touch .venv/.rosglass-dev ;;
   test)
     [ -x /usr/bin/python3 ] || fail "/usr/bin/python3 is missing" "the RViz environment needs Debian's own Python 3"
-    make_venv .venv-system /usr/bin/python3 "$system_extras" --system-site-packages
-    make_rclpy_venv ;;
+    # Beside each other, as pip uses one core.
+    set -m # a process group of its own, to end all of it
+    { make_venv .venv-system /usr/bin/python3 "$system_extras" --system-site-packages; make_rclpy_venv; } </dev/null &
+    beside=$!
+    set +m
+    trap 'kill -- "-$beside" 2>/dev/null || true' EXIT
+    make_venv .venv "$python" dev
+    touch .venv/.rosglass-dev
+    wait "$beside" ;;
 esac
 say "set-up complete"
