@@ -10,7 +10,15 @@ unset PYTHONDONTWRITEBYTECODE
 # Types take longest, on one core: they are checked beside everything else up to the unit tests, in
 # the time that those leave, and must not slow them down.
 types=$(mktemp)
-trap 'kill $(jobs -p) 2>/dev/null || true; rm -f "$types"' EXIT
+output=$(mktemp)
+beside=
+end() {
+  kill $(jobs -p) 2>/dev/null || true
+  [[ -z $beside ]] || kill -- "-$beside" 2>/dev/null || true
+  rm -f "$types" "$output"
+}
+trap end EXIT
+trap 'exit 130' INT
 nice -n 19 .venv/bin/mypy >"$types" 2>&1 &
 checked=$!
 say "lint and format (ruff)"
@@ -27,7 +35,7 @@ if [[ -e /usr/include/ros/ros.h ]]; then
   .venv/bin/python tests/interop/ros1/peers/build_roscpp.py .pytest_cache/d/roscpp
 fi
 # Most tests wait for others most of the time: six side by side, each file in one process.
-# RViz and Qt 5 draw on the processor: four of them keep two cores busy.
+# RViz draws on the processor: four of them keep two cores busy.
 # A process that crashes fails its test and is not replaced: the others would wait for it for ever.
 # Files in the order of their folders, first those that wait for others: by default, those of few
 # tests come last, which are the same here, and the end would be spent on waiting for one of them.
@@ -52,7 +60,7 @@ wait "$checked" || failed=$?
 cat "$types"
 ((failed == 0)) || exit "$failed"
 say "tests of interfaces in Qt 5 ($(.venv-system/bin/python -V), PySide2)"
-run .venv-system 4 "${once_more[@]}" -m "not one_qt" tests/gui "$@"
+run .venv-system 6 "${once_more[@]}" -m "not one_qt" tests/gui "$@"
 say "tests in RViz ($(.venv-system/bin/python -V))"
 # Apart from tests/gui: a process has one Qt application, and RViz needs one of its own kind.
 run .venv-system 4 "${once_more[@]}" tests/rviz "$@"
@@ -63,5 +71,26 @@ fi
 say "tests of the 3D view ($(.venv/bin/python -V), PySide6)"
 # Apart from tests/gui: it needs an X server, the others are drawn offscreen.
 run .venv 3 "${once_more[@]}" tests/scene "$@"
-say "tests of interfaces in Qt 6, and with other programs ($(.venv/bin/python -V), PySide6)"
-run .venv 6 "${once_more[@]}" -m "not exhaustive" tests/gui tests/interop "$@"
+# These two beside each other: interfaces keep the processor busy while programs wait for each other.
+# One after the other where they would share a network, and with it ROS domains.
+programs() {
+  say "tests with other programs ($(.venv/bin/python -V))"
+  run .venv "$1" "${once_more[@]}" -m "not exhaustive" tests/interop "${@:2}"
+}
+if scripts/private_network.sh sh -c '[ -n "${ROSGLASS_PRIVATE_NETWORK-}" ]' 2>/dev/null; then
+  set -m # a process group of its own, to end all of it
+  programs 4 "$@" >"$output" 2>&1 </dev/null &
+  set +m
+  beside=$!
+fi
+failed=0
+say "tests of interfaces in Qt 6 ($(.venv/bin/python -V), PySide6)"
+run .venv 4 "${once_more[@]}" tests/gui "$@" || failed=1
+if [[ -n $beside ]]; then
+  wait "$beside" || failed=1
+  beside=
+  cat "$output"
+else
+  programs 6 "$@" || failed=1
+fi
+exit "$failed"

@@ -33,6 +33,12 @@ if TYPE_CHECKING:
     from rosglass.qml import Session
 
 QT5 = os.environ.get("ROSGLASS_QT") == "pyside2"
+#: Files that take longest, each in one process: begun last, they would keep all others waiting.
+LONG = {"test_examples.py", "test_run.py", "test_run_ending.py", "test_video_output.py"}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: item.path.name not in LONG)
 
 
 @pytest.fixture(scope="session")
