@@ -263,6 +263,21 @@ def test_a_lifetime_ends(bench: SceneBench, show: Callable[..., Any]) -> None:
     bench.wait(lambda: len(drawables(display)) == 1)
 
 
+def test_a_display_of_markers_shows_the_arrays_beside_its_topic(bench: SceneBench) -> None:
+    from rosglass.comm.qos import QoS
+
+    view = bench.load('MarkerDisplay { topic: "/visualization_marker"; durability: "Volatile" }')
+    (display,) = view.scene.displays
+    arrays = bench.robot.create_publisher(
+        "/visualization_marker_array", "visualization_msgs/MarkerArray", QoS.latched()
+    )
+    arrays.publish({"markers": [marker(1), marker(2, 1)]})
+    bench.wait(lambda: len(drawables(display)) == 2)
+    single = bench.robot.create_publisher("/visualization_marker", "visualization_msgs/Marker")
+    bench.wait(lambda: single.publish(marker(3, 2)) or len(drawables(display)) == 3)
+    assert display.statusLevel == "ok", display.statusText
+
+
 def test_a_namespace_is_hidden(bench: SceneBench, show: Callable[..., Any]) -> None:
     display = show(marker(1), marker(2, ns="other"))
     assert display.namespaces == ["other", "shapes"]

@@ -1271,6 +1271,10 @@ class MarkerDisplay(Markers):
 
     TYPE = "Marker"
 
+    def further_topics(self, topic: str) -> tuple[str, ...]:
+        """Return the topic of arrays that RViz receives beside it."""
+        return (f"{topic}_array",)
+
 
 class MarkerArrayDisplay(Markers):
     """Markers of a ``visualization_msgs/MarkerArray`` topic. See its page in ``docs/scene.md``."""
