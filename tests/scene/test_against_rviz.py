@@ -366,6 +366,41 @@ def use_markers(pair: Pair, server: RospyServer) -> None:
     assert display.statusLevel == "ok", display.statusText
 
 
+def test_arrays_and_delete_all_are_those_of_rviz(pair: Pair) -> None:
+    # Beside the topic of a display of single markers.
+    publisher = pair.robot.create_publisher("/gone_array", "visualization_msgs/MarkerArray", 10)
+
+    def cube(namespace: str, y: float, *rgb: float, action: int = 0) -> dict[str, Any]:
+        return {
+            "header": {"frame_id": "map"},
+            "ns": namespace,
+            "type": 1,
+            "action": action,
+            "pose": {"position": {"y": y}, "orientation": {"w": 1.0}},
+            "scale": dict.fromkeys("xyz", 1.0),
+            "color": dict(zip("rgba", (*rgb, 1.0), strict=True)),
+        }
+
+    def send(*markers: dict[str, Any], until: str) -> tuple[set[str], set[str]]:
+        end = time.monotonic() + TIMEOUT_S
+        while time.monotonic() < end:
+            publisher.publish({"markers": list(markers)})
+            ours, theirs = set(patches(pair.ours())), set(patches(pair.theirs()))
+            if until in ours & theirs:
+                break
+        return ours, theirs
+
+    try:
+        pair.show(Case([display_config("Marker", "/gone")]), VIEWS["TopDownOrtho"])
+        two = cube("a", 1.5, 1.0, 0.0, 0.0), cube("b", -1.5, 0.0, 1.0, 0.0)
+        assert send(*two, until="green") == ({"red", "green"}, {"red", "green"})
+        blue = cube("c", 0.0, 0.0, 0.0, 1.0)
+        ours, theirs = send(cube("a", 0.0, 0.0, 0.0, 0.0, action=3), blue, until="blue")
+        assert ours == theirs == {"blue"}
+    finally:
+        publisher.close()
+
+
 def keep(name: str, ours: NDArray[np.uint8], theirs: NDArray[np.uint8]) -> None:
     """Save both pictures side by side, where JUDGE_PICTURES names a folder."""
     folder = os.environ.get("JUDGE_PICTURES")

@@ -1008,7 +1008,9 @@ class Markers(TopicDisplay):
     def _apply(self, marker: MarkerRecord, poses: _Poses) -> None:
         key = marker.key
         if marker.action == _DELETE_ALL:
-            self._clear(key[0])
+            # In ROS 1, RViz removes those of all namespaces, whatever the message's is.
+            is_ros1 = self.node is not None and self.node.wire == "ros1"
+            self._clear("" if is_ros1 else key[0])
             return
         # What waits under its name is older.
         self._late.pop(key, None)
@@ -1142,7 +1144,7 @@ class Markers(TopicDisplay):
                     self._empty[self._group_key(marker)] = None
 
     def _clear(self, namespace: str) -> None:
-        """Remove the markers of a namespace; all of them for an empty one, as RViz does."""
+        """Remove the markers of a namespace; all of them for an empty one, as RViz 2 does."""
         for key in [*self._shown, *self._late, *self._problems]:
             if namespace in ("", key[0]):
                 self._late.pop(key, None)
