@@ -278,6 +278,13 @@ def test_a_display_of_markers_shows_the_arrays_beside_its_topic(bench: SceneBenc
     assert display.statusLevel == "ok", display.statusText
 
 
+def test_a_marker_that_names_no_frame_is_an_error(show: Callable[..., Any]) -> None:
+    display = show(marker(1), marker(2, 1, header={"frame_id": ""}))
+    assert len(drawables(display)) == 1
+    assert "shapes/1: header.frame_id is empty: the publisher has to" in display.statusText
+    assert display.statusLevel == "error"
+
+
 def test_a_namespace_is_hidden(bench: SceneBench, show: Callable[..., Any]) -> None:
     display = show(marker(1), marker(2, ns="other"))
     assert display.namespaces == ["other", "shapes"]

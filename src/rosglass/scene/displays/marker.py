@@ -270,6 +270,8 @@ def _read_one(
         problem = f"action {action}: expected 0 (add), 2 (delete) or 3 (delete all)"
     elif not 0 <= kind <= ARROW_STRIP:
         problem = f"type {kind}: expected 0 to {ARROW_STRIP}"
+    elif not frame and part is None:
+        problem = "header.frame_id is empty: the publisher has to name the frame"
     elif not is_finite:
         problem = _numbers_problem(numbers)
     elif count > _MAX_POINTS:
@@ -851,10 +853,10 @@ class _Poses:
         scene, buffer = self._scene, self._scene.transforms
         what = f"no transform from [{frame[:100]}]"
         # A look at the names costs much less than a lookup that fails.
-        if frame not in ("", scene.fixed_frame) and buffer and not buffer.has_frame(frame):
+        if frame != scene.fixed_frame and buffer and not buffer.has_frame(frame):
             return f"{what}: there is no frame of this name yet"
         try:
-            return scene.look_up(frame or scene.fixed_frame, stamp)
+            return scene.look_up(frame, stamp)
         except TransformException as error:
             self.misses += 1
             return f"{what}: {error}"
@@ -1073,7 +1075,7 @@ class Markers(TopicDisplay):
             group = self._groups.get(where)
             if group is None:
                 group = self._add_group(marker)
-            if marker.locked and marker.frame:
+            if marker.locked:
                 if group.root.pose is not pose:
                     group.root.pose = pose
                 pose = _IDENTITY
