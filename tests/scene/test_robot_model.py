@@ -52,6 +52,13 @@ def publish(bench: SceneBench, text: str, topic: str = "/robot_description") -> 
     return publisher
 
 
+def test_a_description_may_come_from_a_publisher_that_does_not_keep_it(bench: SceneBench) -> None:
+    view = bench.load("RobotModelDisplay {}")
+    (display,) = view.scene.displays
+    publisher = bench.robot.create_publisher("/robot_description", "std_msgs/String")
+    bench.wait(lambda: publisher.publish({"data": URDF}) or display.robotName)
+
+
 def shapes(display: Any) -> set[Any]:
     return {one.shape for one, _, _ in display.root.drawables()}
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
-from rosglass.comm.qos import Durability, QoS, Reliability
+from rosglass.comm.qos import QoS
 from rosglass.errors import Error, UnsupportedError
 from rosglass.images.encodings import MAX_PIXELS
 from rosglass.qml.callbacks import weak_callback
@@ -97,7 +97,7 @@ class DescriptionSource:
             self._subscription = node.create_subscription(
                 name,
                 "std_msgs/String",
-                qos=QoS(1, Reliability.RELIABLE, Durability.TRANSIENT_LOCAL),
+                qos=QoS.best_available(1),
                 raw_callback=self._receive,
             )
         elif kind == _FILE:
