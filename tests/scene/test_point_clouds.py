@@ -240,6 +240,24 @@ def test_squares_of_one_vertex_look_as_those_of_four(
     assert differs.sum() <= 0.02 * drawn.sum()
 
 
+@pytest.mark.parametrize("transformer", ["AxisColor", "Intensity"])
+def test_bounds_that_are_computed_do_not_change_a_config(
+    bench: SceneBench, show: Callable[..., Shown], transformer: str
+) -> None:
+    shown = show("PointCloud2", f'colorTransformer: "{transformer}"')
+    display = bench.view.scene.displays[0]
+    before = display.save_settings()
+    shown.send(cloud([(1, 2, 3, 7.0), (4, 5, 6, 9.0)], "intensity"))
+    low = display.minValue if transformer == "AxisColor" else display.minIntensity
+    assert low == {"AxisColor": 3.0, "Intensity": 7.0}[transformer]
+    assert display.save_settings() == before
+    display.autocomputeValueBounds = display.autocomputeIntensityBounds = False
+    saved = display.save_settings()
+    bounds = {"AxisColor": saved["Autocompute Value Bounds"]["Min Value"]}
+    bounds["Intensity"] = saved["Min Intensity"]
+    assert bounds[transformer] == low
+
+
 def test_clouds_stay_for_the_decay_time(bench: SceneBench, show: Callable[..., Shown]) -> None:
     shown = show("PointCloud2", 'decayTime: 1000; colorTransformer: "FlatColor"')
     for x in (-3, 0, 3):

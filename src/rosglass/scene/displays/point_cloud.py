@@ -350,6 +350,20 @@ class CloudDisplay(TopicDisplay):
         """The color transformer that is chosen, or else in use; empty while there is none."""
         return str(self.colorTransformer or self.usedColorTransformer)
 
+    def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
+        """Return the settings for a file; bounds that are computed are not the user's."""
+        kept, before = super().save_settings(older, ros), dict(older or {})
+        if self.autocomputeIntensityBounds:
+            for name in ("Min Intensity", "Max Intensity"):
+                kept[name] = before.get(name, self.SETTINGS[name].default)
+        if self.autocomputeValueBounds:
+            title = "Autocompute Value Bounds"
+            inner = before.get(title)
+            for name in ("Min Value", "Max Value"):
+                default = self.SETTINGS[f"{title}/{name}"].default
+                kept[title][name] = inner.get(name, default) if isinstance(inner, dict) else default
+        return kept
+
     # -- in the node's thread --------------------------------------------------------------------
 
     def preparer(self) -> Callable[[Message], Any]:
