@@ -847,6 +847,26 @@ def test_markers_that_cannot_be_read_are_requested_again(
     bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
 
 
+def test_what_cannot_be_drawn_is_named_and_the_rest_is_shown(
+    bench: SceneBench,
+    show: Callable[..., Any],
+    server: MarkerServer,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("rosglass.scene.displays.marker._MAX_READING", 0)
+    mesh = {**BOX, "type": 10, "mesh_resource": "file:///gone.obj"}
+    display = show(
+        marker(control(BUTTON) | {"markers": [mesh, BOX]}, name="mesh"),
+        marker(control(ROTATE_AXIS), name="last"),
+    )
+    server.insert(marker(control(ROTATE_AXIS), name="large", scale=1e30))
+    bench.wait(lambda: "Marker large" in display.status_lines)
+    lines = {name: one.text for name, one in display.status_lines.items()}
+    assert lines["Marker large"] == "scale: 1e+30 is beyond the 1e+18 that is drawn"
+    assert lines["Marker mesh"] == "more than 0 meshes are being read; send it again later"
+    assert len(drawn(display)) == 2
+
+
 def test_both_rviz_write_the_namespace_differently(bench: SceneBench) -> None:
     view = bench.load("InteractiveMarkersDisplay { }")
     (display,) = view.scene.displays

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rosglass.comm.time import Time
-from rosglass.errors import TransformException
+from rosglass.errors import Error, TransformException
 from rosglass.qt import is_alive
 from rosglass.scene.camera import inverse, quaternion_of
 from rosglass.scene.displays.interactive_marker_messages import (
@@ -139,8 +139,12 @@ class Control:
             if marker.problem:
                 continue
             pose = self._relative_pose(marker)
-            if pose is not None:
+            if pose is None:
+                continue
+            try:
                 self._shapes.put(self._painted(marker), pose, self.display.meshes)
+            except Error as error:  # one that cannot be drawn does not hide the others
+                self.display.set_line(self.marker.record.name, str(error))
         self._shapes.flush()
         self.root.add(self._shapes.root, self._aid)
 

@@ -19,7 +19,7 @@ from rosglass.scene.displays.marker import (
     MarkerRecord,
     read_marker,
 )
-from rosglass.scene.drawing import instance_matrix
+from rosglass.scene.drawing import check_numbers, instance_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -141,6 +141,7 @@ def read_interactive_marker(message: Any) -> InteractiveMarkerRecord:
         scale = float(message.scale) or 1.0
         if not (math.isfinite(scale) and scale > 0):
             raise Error(f"scale {scale}: expected a positive number of metres")
+        check_numbers("scale", scale)
         shapes = sum(len(control.markers) for control in message.controls)
         if len(message.controls) > _MAX_CONTROLS or shapes > _MAX_SHAPES:
             raise Error(
