@@ -510,6 +510,50 @@ def test_all_topics_of_a_robot_may_be_random(bench: SceneBench, watch: Watch) ->
     robot.check()
 
 
+REQUESTS = {
+    "move_eye": ("MoveEye", {"header": HEADER, "eye": POINT, "disable_animation": False,
+                 "stop_tracking": False, "switch_to_3d_mode": True}),
+    "move_eye_and_focus": ("MoveEyeAndFocus", {"header": HEADER, "eye": POINT, "focus": POINT,
+                           "disable_animation": False, "stop_tracking": False}),
+    "set_view_mode": ("SetViewMode", {"mode": {"mode": 0}, "disable_animation": True}),
+    "set_tracked_frame": ("TrackFrame", {"frame": "odom"}),
+}  # fmt: skip
+
+
+def test_requests_that_move_the_camera_may_be_random(bench: SceneBench, watch: Watch) -> None:
+    from rosglass import Error
+
+    robot = Robot(bench, watch, "ViewControllerDisplay { animationDuration: 0.01 }")
+    rng = random.Random(f"{SEED} camera")
+    package, above = "hector_rviz_plugins_msgs", "/hector_view_controller"
+    clients = {
+        name: robot.node.create_service_client(f"{above}/{name}", f"{package}/srv/{kind}")
+        for name, (kind, _) in REQUESTS.items()
+    }
+    bench.wait(lambda: all(one.ready for one in clients.values()))
+    for number in range(RANDOM_COUNT):
+        for name, (_, fields) in REQUESTS.items():
+            try:
+                call = clients[name].call_async(randomised(fields, rng, rng.choice([0.05, 0.3])))
+            except Error:
+                continue  # no such request exists
+            bench.wait(call.done)
+        if number % 3 == 0:
+            bench.picture()
+        assert not watch.seen, "\n".join(watch.seen)
+        assert not robot.view.problem, robot.view.problem
+    clients["set_tracked_frame"].call_async({"frame": ""})
+    eye, focus = {"x": 1.0, "y": 2.0, "z": 3.0}, {"x": 0.0, "y": 0.0, "z": 0.0}
+    clients["move_eye_and_focus"].call_async(
+        {"header": {"frame_id": "map"}, "eye": eye, "focus": focus, "disable_animation": True}
+    )
+    bench.wait(
+        lambda: np.allclose(robot.view.camera().eye, (1, 2, 3), atol=0.01),
+        lambda: robot.view.camera().eye,
+    )
+    robot.check()
+
+
 @pytest.mark.parametrize("kind", ["PoseWithCovariance", "Odometry"])
 @pytest.mark.parametrize("number", [math.nan, sys.float_info.max])
 def test_a_pose_is_shown_without_a_covariance_that_is_none(
