@@ -26,6 +26,7 @@ from waiting import eventually
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from counting import Counter
     from PySide6.QtCore import QCoreApplication, QObject
     from qt_waiting import QtWaiting
 
@@ -211,6 +212,19 @@ def live(app: QCoreApplication, url: str, tmp_path: Path, wait: Any) -> Iterator
     send_deferred_deletes()
     engine.deleteLater()
     send_deferred_deletes()
+
+
+@pytest.fixture
+def counter(live: Bench, url: str) -> Iterator[Counter]:
+    """The server of an action that counts; offered by the test, on the robot."""
+    from counting import Counter
+
+    made = Counter(live.robot, url)
+    yield made
+    made.go.set()
+    made.stop.set()
+    if made.server is not None:
+        made.server.close()
 
 
 @pytest.fixture(scope="session")

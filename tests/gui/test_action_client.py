@@ -16,18 +16,7 @@ from conftest import Bench
 from rosglass.comm import ClientGoal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
-
-
-@pytest.fixture
-def counter(live: Bench, url: str) -> Iterator[Counter]:
-    made = Counter(live.robot, url)
-    yield made
-    made.go.set()
-    made.stop.set()
-    if made.server is not None:
-        made.server.close()
 
 
 CLIENT = """

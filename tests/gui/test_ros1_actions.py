@@ -8,19 +8,7 @@ import pytest
 from counting import Client, Counter
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from conftest import Bench
-
-
-@pytest.fixture
-def counter(live: Bench, url: str) -> Iterator[Counter]:
-    made = Counter(live.robot, url)
-    yield made
-    made.go.set()
-    made.stop.set()
-    if made.server is not None:
-        made.server.close()
 
 
 @pytest.fixture

@@ -135,7 +135,24 @@ class Rosbags:
         return corpus.plain(value)
 
 
-class Genpy:
+class FromObjects:
+    """What peers share whose messages are objects with attributes and lists."""
+
+    types: Types
+
+    def _plain(self, name: str, message: Any) -> dict[str, Any]:
+        return {f.name: self._out(f, getattr(message, f.name)) for f in self.types[name]}
+
+    def _out(self, field: Field, value: Any) -> Any:
+        if field.kind == "one":
+            return self._one_out(field, value)
+        return [self._one_out(field, item) for item in value]
+
+    def _one_out(self, field: Field, value: Any) -> Any:
+        raise NotImplementedError
+
+
+class Genpy(FromObjects):
     """genpy's run-time generated classes, ROS 1."""
 
     def __init__(self, types: Types, ros: int = 1) -> None:
@@ -186,14 +203,6 @@ class Genpy:
             return stamp
         return value
 
-    def _plain(self, name: str, message: Any) -> dict[str, Any]:
-        return {f.name: self._out(f, getattr(message, f.name)) for f in self.types[name]}
-
-    def _out(self, field: Field, value: Any) -> Any:
-        if field.kind == "one":
-            return self._one_out(field, value)
-        return [self._one_out(field, item) for item in value]
-
     def _one_out(self, field: Field, value: Any) -> Any:
         if field.is_compound:
             return self._plain(field.base, value)
@@ -202,7 +211,7 @@ class Genpy:
         return bool(value) if field.base == "bool" else value
 
 
-class Mcap:
+class Mcap(FromObjects):
     """mcap-ros2-support, CDR little endian."""
 
     def __init__(self, types: Types, ros: int = 2) -> None:
@@ -238,14 +247,6 @@ class Mcap:
         if field.base == "char" and value > 127:
             return value - 256  # fault 3: char is signed there
         return value
-
-    def _plain(self, name: str, message: Any) -> dict[str, Any]:
-        return {f.name: self._out(f, getattr(message, f.name)) for f in self.types[name]}
-
-    def _out(self, field: Field, value: Any) -> Any:
-        if field.kind == "one":
-            return self._one_out(field, value)
-        return [self._one_out(field, item) for item in value]
 
     def _one_out(self, field: Field, value: Any) -> Any:
         if field.is_compound:
