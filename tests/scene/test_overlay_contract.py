@@ -41,9 +41,9 @@ class OverScene(Over):
 
     def frames(self, count: int) -> None:
         for _ in range(count):
-            drawn = self.view.frames_drawn
+            drawn = self.view.pictures_drawn()
             self.view.update()
-            self.wait(lambda drawn=drawn: self.view.frames_drawn > drawn)
+            self.wait(lambda drawn=drawn: self.view.pictures_drawn() > drawn)
 
     @property
     def size(self) -> tuple[float, float]:

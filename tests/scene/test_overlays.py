@@ -68,9 +68,9 @@ def test_the_view_at_rest_is_not_drawn_for_an_overlay(bench: Any, panel: Path) -
     overlay = rosglass.scene.add_overlay(view, panel)
     bench.wait(lambda: overlay.root.property("frames") > 3)
     bench.wait(lambda: not view.is_moving)
-    drawn, frames = view.frames_drawn, overlay.root.property("frames")
+    drawn, frames = view.pictures_drawn(), overlay.root.property("frames")
     bench.wait(lambda: overlay.root.property("frames") > frames + 10)
-    assert view.frames_drawn <= drawn + 1
+    assert view.pictures_drawn() <= drawn + 1
 
 
 def test_wrong_files_are_refused(bench: Any, panel: Path, caplog: Any) -> None:

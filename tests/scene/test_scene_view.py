@@ -396,7 +396,7 @@ def test_a_path_is_shown_and_fades_when_its_publisher_is_gone(bench: SceneBench)
         return bool(path.received)
 
     bench.wait(send)
-    assert path.statusLevel == "ok"
+    bench.wait(lambda: path.statusLevel == "ok", lambda: path.statusText)
     assert "messages received" in path.statusText
     bright = has_color(bench.picture(), 25, 255, 0)
     assert bright > 100
@@ -1035,8 +1035,9 @@ def test_a_view_that_leaves_its_window_frees_what_it_made_there(bench: SceneBenc
     loader.setProperty("active", True)
     other = loader.property("item")
     bench.wait(other.isExposed)
+    before = guest.pictures_drawn()
     guest.setParentItem(other.contentItem())
-    bench.wait(lambda: guest.pictures_drawn() and renderer not in renderers_of(guest))
+    bench.wait(lambda: guest.pictures_drawn() > before and renderer not in renderers_of(guest))
     assert device_of(renderer) is None
     guest.setParentItem(view)
     bench.picture()
@@ -1147,6 +1148,28 @@ def test_texts_without_room_are_a_problem(bench: SceneBench) -> None:
     bench.wait(lambda: "of 600 texts have no room" in view.problem)
     labels.set_texts(texts[:10], np.zeros((10, 3)), 10.0)
     bench.wait(lambda: view.problem == "")
+
+
+def test_texts_whose_image_is_refused_are_painted_again(
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene.drawing import Labels
+    from rosglass.scene.graphics_device import GraphicsDevice
+
+    view = bench.load()
+    labels = Labels(in_pixels=True)
+    labels.set_texts(["x"], np.zeros((1, 3)), 100.0)
+    with monkeypatch.context() as patch:
+
+        def refuse(*_: Any) -> None:
+            raise MemoryError("the graphics interface refused a QRhiTexture")
+
+        patch.setattr(GraphicsDevice, "texture", refuse)
+        view.scene.root.add(labels)
+        bench.wait(lambda: "refused a QRhiTexture" in view.problem)
+    view.update()
+    bench.wait(lambda: view.problem == "")
+    assert has_color(bench.picture(), 255, 255, 255) > 50
 
 
 def test_an_image_beyond_the_limit_keeps_the_walls_of_a_map() -> None:

@@ -379,9 +379,9 @@ def test_arrow_keys_shift_the_view(bench: SceneBench, hand: Hand) -> None:
     assert abs(view.focus.x - shifted) < 1e-6
     # Nothing is drawn any more.
     bench.wait.nothing_happens(0.3)
-    drawn = bench.view.frames_drawn
+    drawn = bench.view.pictures_drawn()
     bench.wait.nothing_happens(0.3)
-    assert bench.view.frames_drawn == drawn
+    assert bench.view.pictures_drawn() == drawn
 
 
 def test_ctrl_d_switches_between_2d_and_3d(bench: SceneBench, hand: Hand) -> None:

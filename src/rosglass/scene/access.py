@@ -262,7 +262,7 @@ class SceneAccess(Access):
             self.view.end_motion()
 
     def _frames_drawn(self) -> int:
-        return self.scene_view.frames_drawn
+        return self.scene_view.pictures_drawn()
 
     @Slot()
     def _measure(self) -> None:

@@ -457,12 +457,16 @@ class _LabelsOnDevice(_OnDevice):
     def upload(self, batch: QRhiResourceUpdateBatch) -> None:
         labels, device = self.drawable, self.device
         if self._painted != labels.texts_changed:
-            self._painted = labels.texts_changed
             top, bottom = self._image.set_texts(labels.texts, labels.outlined)
             if top < bottom:
                 pixels = self._image.pixels
-                self._texture = device.texture(batch, pixels, self._texture, (top, bottom))
+                try:
+                    self._texture = device.texture(batch, pixels, self._texture, (top, bottom))
+                except MemoryError:  # it is painted and tried again with the next picture
+                    self._image = TextImage(self._image.limit)
+                    raise
                 self.bind((self._texture, device.smooth))
+            self._painted = labels.texts_changed
         places, shapes = self._image.places(labels.texts)
         left_out = np.count_nonzero(shapes[:, 1] == 0)
         self.problem = f"{left_out} of {labels.count} texts have no room" if left_out else ""

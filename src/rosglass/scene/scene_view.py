@@ -129,6 +129,7 @@ class SceneView(QQuickRhiItem):
         self.sceneChanged.connect(self._selection.clear)
         self._scene = Scene(self, runtime)
         self._watch_scene()
+        #: Pictures that renderers have drawn which are gone.
         self._painted = 0
         #: The config that was loaded; None before.
         self.config: RvizConfig | None = None
@@ -540,7 +541,7 @@ class SceneView(QQuickRhiItem):
 
     def pictures_drawn(self) -> int:
         """Return how many pictures were drawn."""
-        return sum(one.count for one in self._renderers if Shiboken.isValid(one))
+        return self._painted + sum(one.count for one in self._renderers)
 
     # -- config files ----------------------------------------------------------------------------
 
@@ -652,11 +653,6 @@ class SceneView(QQuickRhiItem):
         """Whether the last picture showed all: new data is uploaded over several pictures."""
         return all(one.is_complete for one in self._renderers if Shiboken.isValid(one))
 
-    @property
-    def frames_drawn(self) -> int:
-        """How many pictures were drawn."""
-        return self._painted
-
     def camera_moved(self) -> None:
         """Draw from where the camera is now."""
         self._moved_at = time.monotonic()
@@ -733,6 +729,7 @@ class SceneView(QQuickRhiItem):
         for one in self._renderers:
             if not Shiboken.isValid(one):
                 one.close()
+                self._painted += one.count
         self._renderers[:] = [one for one in self._renderers if Shiboken.isValid(one)]
 
     def _take_frame(self) -> Frame:
@@ -740,7 +737,6 @@ class SceneView(QQuickRhiItem):
             return Frame([], self.camera(), self._background)
         if any(one.draws_in_software for one in self._renderers) != self.scene.draws_in_software:
             QtCore.QTimer.singleShot(0, self, self._report_device)
-        self._painted += 1
         self._is_in_frame, self._is_late = True, False
         return Frame(
             list(self._drawables()),

@@ -39,11 +39,12 @@ class TextImage:
         limit: Largest width and height, in pixels.
 
     Attributes:
+        limit: As given.
         pixels: (h, w), one byte for each pixel.
     """
 
     def __init__(self, limit: int) -> None:
-        self._limit = limit
+        self.limit = limit
         self.pixels: NDArray[np.uint8] = np.zeros((0, 0), np.uint8)
         #: Left, top, width and height of each text in pixels; the size is 0 if it has no room.
         self._boxes: dict[_Text, _Box] = {}
@@ -104,12 +105,12 @@ class TextImage:
         sizes = dict(sorted(self._sizes(texts).items(), key=lambda one: -one[1][1]))
         area = sum((wide + _GAP_PX) * (high + _GAP_PX) for wide, high in sizes.values())
         widest = max(wide for wide, _ in sizes.values())
-        width = min(max(widest, math.isqrt(area)), self._limit)
+        width = min(max(widest, math.isqrt(area)), self.limit)
         boxes, free = _arrange(sizes, width, (0, 0, 0))
-        if free[1] + free[2] > self._limit:
-            width = self._limit
+        if free[1] + free[2] > self.limit:
+            width = self.limit
             boxes, free = _arrange(sizes, width, (0, 0, 0))
-        height = min((free[1] + free[2]) * room, self._limit)
+        height = min((free[1] + free[2]) * room, self.limit)
         self.pixels = np.zeros((height, width), np.uint8)
         left_out = [text for text, (_, top, _, high) in boxes.items() if top + high > height]
         self._left_out = bool(left_out)
@@ -123,7 +124,7 @@ class TextImage:
             lines = text[0].split("\n")
             wide = int(max(map(self._metrics.horizontalAdvance, lines))) + 5
             high = len(lines) * _LINE_PX
-            found[text] = (min(wide, self._limit - 2), min(high, self._limit - 2))
+            found[text] = (min(wide, self.limit - 2), min(high, self.limit - 2))
         return found
 
     def _paint(self, texts: Iterable[_Text]) -> None:
