@@ -392,6 +392,39 @@ def test_obstacles_fade_when_a_sensor_sends_nothing_any_more(
     bench.wait(lambda: points.statusLevel == "ok", lambda: points.statusText)
 
 
+@pytest.mark.parametrize(
+    ("kind", "message"),
+    [
+        ("Odometry", {"pose": {"pose": {"orientation": {"w": 1.0}}}}),
+        ("WrenchStamped", {"wrench": {"force": {"x": 1.0}}}),
+        ("TwistStamped", {"twist": {"linear": {"x": 1.0}}}),
+        ("AccelStamped", {"accel": {"linear": {"x": 1.0}}}),
+        ("Temperature", {"temperature": 20.0}),
+        ("FluidPressure", {"fluid_pressure": 1e5}),
+        ("Illuminance", {"illuminance": 100.0}),
+        ("RelativeHumidity", {"relative_humidity": 0.5}),
+    ],
+)
+def test_what_a_robot_measures_all_the_time_fades_without_a_message(
+    bench: SceneBench, monkeypatch: Any, kind: str, message: dict[str, Any]
+) -> None:
+    from rosglass.scene import display as displays
+
+    monkeypatch.setattr(displays, "_CONTINUOUS_S", 0.5)
+    display = bench.load().scene.add(kind, topic="/shown")
+    publisher = bench.robot.create_publisher("/shown", display.MESSAGES[0])
+
+    def send() -> bool:
+        publisher.publish({"header": {"frame_id": "map"}, **message})
+        return bool(display.received) and display.root.alpha == 1.0
+
+    bench.wait(send)
+    # The driver hangs: its publisher is still there.
+    bench.wait(lambda: display.root.alpha < 1.0)
+    assert "Data: no message for" in display.statusText
+    bench.wait(send)
+
+
 def test_a_sensor_may_send_nothing_while_a_simulation_is_paused(
     bench: SceneBench, monkeypatch: Any
 ) -> None:

@@ -241,6 +241,7 @@ def _read_range(message: Any) -> tuple[float, float]:
 class _Screw(HistoryDisplay):
     """A display of a linear and an angular vector, as arrows."""
 
+    IS_CONTINUOUS = True
     LENGTH = "History Length"
     #: Their names in the message, and the field that holds both.
     _FIELDS = ("linear", "angular")

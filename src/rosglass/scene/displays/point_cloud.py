@@ -912,6 +912,7 @@ class TemperatureDisplay(CloudDisplay):
     """A ``sensor_msgs/Temperature``, as a point in its frame. See ``docs/scene.md``."""
 
     TYPE = "Temperature"
+    IS_CONTINUOUS = True
     MESSAGES = ("sensor_msgs/Temperature",)
     READ = _read_value("temperature")
 
@@ -926,6 +927,7 @@ class FluidPressureDisplay(CloudDisplay):
     """A ``sensor_msgs/FluidPressure``, as a point in its frame. See ``docs/scene.md``."""
 
     TYPE = "FluidPressure"
+    IS_CONTINUOUS = True
     MESSAGES = ("sensor_msgs/FluidPressure",)
     READ = _read_value("fluid_pressure")
 
@@ -939,6 +941,7 @@ class IlluminanceDisplay(CloudDisplay):
     """A ``sensor_msgs/Illuminance``, as a point in its frame. See ``docs/scene.md``."""
 
     TYPE = "Illuminance"
+    IS_CONTINUOUS = True
     MESSAGES = ("sensor_msgs/Illuminance",)
     READ = _read_value("illuminance")
 
@@ -952,6 +955,7 @@ class RelativeHumidityDisplay(CloudDisplay):
     """A ``sensor_msgs/RelativeHumidity``, as a point in its frame. See ``docs/scene.md``."""
 
     TYPE = "RelativeHumidity"
+    IS_CONTINUOUS = True
     MESSAGES = ("sensor_msgs/RelativeHumidity",)
     READ = _read_value("relative_humidity")
 

@@ -439,6 +439,7 @@ class OdometryDisplay(_WithCovariance):
     """The way of a ``nav_msgs/Odometry``. See its page in ``docs/scene.md``."""
 
     TYPE = "Odometry"
+    IS_CONTINUOUS = True
     MESSAGES = ("nav_msgs/Odometry",)
 
     positionTolerance = Setting(
