@@ -267,6 +267,16 @@ def test_a_web_server_that_was_down_is_asked_again(
         bench.wait(lambda: len(list(robot.root.drawables())) == 2)
         bench.wait(lambda: robot.statusLevel == "ok", lambda: robot.statusText)
         assert ask_again_after(view.scene) == 0.1
+        # One that is hidden is loaded once it is shown.
+        web.files["/foot.stl"] = lambda request: request.send_error(503)
+        publish(bench, with_meshes(f"{web.url}/foot.stl"))
+        bench.wait(lambda: "Mesh foot.stl" in robot.status_lines)
+        robot.enabled = False
+        web.files["/foot.stl"] = STL
+        bench.wait(lambda: robot._text is None)
+        assert robot.statusText == ""
+        robot.enabled = True
+        bench.wait(lambda: len(list(robot.root.drawables())) == 1)
         send.close()
 
 

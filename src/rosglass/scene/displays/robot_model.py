@@ -631,7 +631,8 @@ class RobotModelDisplay(Display):
         text, is_missing = self._text, any(uri in one for one in self._missing for uri in uris)
         if text is not None and is_missing:
             self._text = None
-            self._take_text(text, self._source)
+            if self.shown:  # otherwise it is received again once it is
+                self._take_text(text, self._source)
 
     def followed_frames(self) -> list[str]:
         """Return the frames of the links that are shown, the root link's first."""
