@@ -1117,6 +1117,18 @@ sys.exit(main(["view", "--url", "local://first"]))
     assert done.stdout == expected, done.stderr
 
 
+def test_a_window_that_is_too_small_gives_the_view_no_negative_size(
+    bench: SceneBench, window: Any
+) -> None:
+    from PySide6.QtCore import QObject
+
+    scene = window.findChild(QObject, "scene")
+    window.setProperty("width", 300)
+    window.setProperty("height", 40)
+    bench.wait(lambda: scene.property("width") < 300)
+    assert scene.property("height") == 0
+
+
 def run_in(window: Any, script: str) -> Any:
     """Return the result of JavaScript in the program's window."""
     from PySide6.QtCore import QObject

@@ -11,7 +11,7 @@ Window {
     property bool drawn: false
     // Where the 3D view is; until the panels are there, about where it will be.
     readonly property rect place: around.item ? around.item.place : !panels ? Qt.rect(0, 0, width, height)
-        : Qt.rect(left, 27, width - left - (program.hidesRightDock ? 0 : 252), height - 49)
+        : Qt.rect(left, 27, Math.max(width - left - (program.hidesRightDock ? 0 : 252), 100), Math.max(height - 49, 0))
     readonly property int left: program.hidesLeftDock ? 0 : 332
 
     width: 1280

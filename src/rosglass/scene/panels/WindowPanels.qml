@@ -12,7 +12,7 @@ Page {
     required property Window window
     required property SceneView scene
     // Where the 3D view goes.
-    readonly property rect place: Qt.rect(middle.x, contentItem.y, middle.width, middle.height)
+    readonly property rect place: Qt.rect(middle.x, contentItem.y, middle.width, Math.max(middle.height, 0))
     readonly property int aboveOverlays: 1000000
 
     function openOther() {
