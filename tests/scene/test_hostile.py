@@ -800,7 +800,7 @@ def test_triangles_and_colors_that_are_too_large(robot: Robot) -> None:
 
 
 def test_points_are_read_some_at_a_time(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rosglass.scene.displays.marker._ROWS_AT_ONCE", 4)
+    monkeypatch.setattr("rosglass.scene.displays.marker_messages._ROWS_AT_ONCE", 4)
     robot.show(Case("Marker", "visualization_msgs/Marker", marker(8)))
     (points,) = [one for one, _, _ in robot.display.root.drawables()]
     assert points.xyz().tolist() == [[float(at), 0.0, 0.0] for at in range(6)]

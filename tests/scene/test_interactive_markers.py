@@ -853,7 +853,7 @@ def test_what_cannot_be_drawn_is_named_and_the_rest_is_shown(
     server: MarkerServer,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("rosglass.scene.displays.marker._MAX_READING", 0)
+    monkeypatch.setattr("rosglass.scene.displays.marker_meshes._MAX_READING", 0)
     mesh = {**BOX, "type": 10, "mesh_resource": "file:///gone.obj"}
     display = show(
         marker(control(BUTTON) | {"markers": [mesh, BOX]}, name="mesh"),

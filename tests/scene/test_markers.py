@@ -713,7 +713,8 @@ def test_meshes_of_markers_that_were_missing_are_read_again(
 
 def test_meshes_that_are_kept_are_bounded() -> None:
     from rosglass.errors import Error
-    from rosglass.scene.displays.marker import MESH, MarkerMeshes, MarkerRecord
+    from rosglass.scene.displays.marker_meshes import MarkerMeshes
+    from rosglass.scene.displays.marker_messages import MESH, MarkerRecord
 
     waiting: list[Any] = []
     loaded: list[str] = []
@@ -735,14 +736,14 @@ def test_meshes_that_are_kept_are_bounded() -> None:
 
 
 def mesh_file(triangles: int) -> Any:
-    from rosglass.scene.displays.marker import _MeshFile
+    from rosglass.scene.displays.marker_meshes import _MeshFile
 
     corners = np.arange(9 * triangles, dtype=np.float32).reshape(-1, 3)
     return _MeshFile([(Mesh(Shape(corners)), None)], "")
 
 
 def test_bytes_of_meshes_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    from rosglass.scene.displays import marker as markers
+    from rosglass.scene.displays import marker_meshes as markers
 
     size = mesh_file(100).size
     assert size == 300 * 36 + 300 * 4

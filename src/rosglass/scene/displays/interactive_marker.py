@@ -37,7 +37,7 @@ from rosglass.scene.displays.interactive_marker_messages import (
     MarkerUpdate,
     read_update,
 )
-from rosglass.scene.displays.marker import MarkerMeshes
+from rosglass.scene.displays.marker_meshes import MarkerMeshes
 from rosglass.scene.drawing import Group
 from rosglass.scene.rviz_formats import read_marker_namespace, write_marker_namespace
 from rosglass.scene.settings import Setting

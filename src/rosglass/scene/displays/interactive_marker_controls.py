@@ -34,7 +34,8 @@ from rosglass.scene.displays.interactive_marker_messages import (
     InteractiveMarkerRecord,
     description_control,
 )
-from rosglass.scene.displays.marker import MESH, MarkerGroup, MarkerRecord
+from rosglass.scene.displays.marker import MarkerGroup
+from rosglass.scene.displays.marker_messages import MESH, MarkerRecord
 from rosglass.scene.displays.shapes import AxesShapes
 from rosglass.scene.drawing import Group, Lines, instance_matrix
 from rosglass.scene.events import Button, Modifier

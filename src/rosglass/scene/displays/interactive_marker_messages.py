@@ -12,7 +12,7 @@ import numpy as np
 
 from rosglass.errors import Error
 from rosglass.scene.display import frame_and_stamp, matrix_of
-from rosglass.scene.displays.marker import (
+from rosglass.scene.displays.marker_messages import (
     ARROW,
     TEXT,
     TRIANGLE_LIST,

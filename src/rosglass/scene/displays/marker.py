@@ -1,6 +1,7 @@
 """The displays Marker and MarkerArray: shapes, lines, points, meshes and texts that robots send.
 
-Messages are turned into records of numpy arrays in the node's thread, all markers of one at once.
+Messages are turned into records (:mod:`rosglass.scene.displays.marker_messages`) in the node's
+thread.
 Those of one namespace are drawn together (:mod:`rosglass.scene.displays.marker_batches`), except
 for meshes, lists of points, long lines, and the first triangles and translucent lines.
 """
@@ -11,10 +12,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from copy import copy
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar, cast
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -30,14 +28,29 @@ from rosglass.scene.displays.marker_batches import (
     TextBatch,
     TriangleBatch,
 )
-from rosglass.scene.displays.robot_model import STL_ENDINGS, MeshFiles, material_of
-from rosglass.scene.displays.shapes import poses_matrices
+from rosglass.scene.displays.marker_meshes import MarkerMeshes
+from rosglass.scene.displays.marker_messages import (
+    ARROW,
+    ARROW_SHAPES,
+    ARROW_STRIP,
+    CUBE_LIST,
+    DELETE,
+    DELETE_ALL,
+    LINE_LIST,
+    LINE_STRIP,
+    MAX_MARKERS,
+    MESH,
+    POINTS,
+    SPHERE_LIST,
+    TEXT,
+    TRIANGLE_LIST,
+    MarkerRecord,
+    instances_of,
+    read_markers,
+    triangles_of,
+)
 from rosglass.scene.drawing import (
-    BOX,
-    CONE,
-    CYLINDER,
     OPAQUE,
-    SPHERE,
     Drawable,
     Group,
     Labels,
@@ -45,14 +58,11 @@ from rosglass.scene.drawing import (
     Mesh,
     Points,
     Shape,
-    are_drawable,
-    check_numbers,
 )
-from rosglass.scene.meshes import ending_of
 from rosglass.scene.parts import Parts
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Sequence
+    from collections.abc import Callable, Collection, Iterable
     from typing import TypeAlias
 
     from numpy.typing import NDArray
@@ -63,55 +73,20 @@ if TYPE_CHECKING:
     from rosglass.scene.scene import Scene
 
     Matrix: TypeAlias = NDArray[np.float64]
-    _Instances: TypeAlias = tuple[tuple[Shape, ...], tuple[Matrix, ...]]
     _Joint: TypeAlias = LineBatch | TextBatch | TriangleBatch
 
 __all__ = [
     "MarkerArrayDisplay",
     "MarkerDisplay",
     "MarkerGroup",
-    "MarkerMeshes",
-    "MarkerRecord",
     "Markers",
-    "read_marker",
 ]
 
 _log = logging.getLogger("rosglass.scene")
 
-# visualization_msgs/Marker: types and actions.
-ARROW, CUBE, SPHERE_TYPE, CYLINDER_TYPE, LINE_STRIP, LINE_LIST = range(6)
-CUBE_LIST, SPHERE_LIST, POINTS, TEXT, MESH, TRIANGLE_LIST, ARROW_STRIP = range(6, 13)
-_ADD, _DELETE, _DELETE_ALL = 0, 2, 3
-_NAMES = [
-    *("arrow", "cube", "sphere", "cylinder", "line_strip", "line_list", "cube_list"),
-    *("sphere_list", "points", "text_view_facing", "mesh_resource", "triangle_list", "arrow_strip"),
-]
-_MAX_POINTS, _MAX_MARKERS = 2_000_000, 100_000
-#: Types whose points may have a color each.
-_COLORED = (LINE_STRIP, LINE_LIST, CUBE_LIST, SPHERE_LIST, POINTS, TRIANGLE_LIST)
 #: What lists of points are drawn as.
 _POINT_STYLES = {CUBE_LIST: "boxes", SPHERE_LIST: "spheres", POINTS: "squares"}
-#: Share of an arrow between two points that is its head, where no length is given, as in RViz.
-_HEAD_SHARE = 0.23
-#: Turns z, along which cylinders and cones stand, to x, along which arrows point.
-_TO_X = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 _IDENTITY = np.eye(4)
-#: What markers consist of, where these are always the same shapes.
-_SOLIDS: dict[int, tuple[Shape, ...]] = {
-    CUBE: (BOX,),
-    SPHERE_TYPE: (SPHERE,),
-    CYLINDER_TYPE: (CYLINDER,),
-}
-_ARROW_SHAPES = (CYLINDER, CONE)
-_NO_POINTS, _NO_COLORS = np.zeros((0, 3), np.float32), np.zeros((0, 4), np.float32)
-#: Directions of the scale that count, where not all do.
-_SCALED = {LINE_STRIP: "x", LINE_LIST: "x", POINTS: "xy", TEXT: "z", ARROW_STRIP: "xy"}
-#: Points that numpy converts at once: for two million, the GUI thread would wait for 0.2 s.
-_ROWS_AT_ONCE = 10_000
-#: Metres below which a scale is 0.
-_LEAST_M = 1e-18
-#: Metres that are drawn for a scale of 0: surfaces without thickness have no shade.
-_THIN_M = 1e-4
 #: Markers that wait for a transform, of which the oldest make room, and their bytes.
 _MAX_LATE, _MAX_LATE_BYTES = 1000, 256 << 20
 #: Bytes of the points, colors and texts of all markers that are shown.
@@ -124,10 +99,6 @@ _LATE_S = 1.0
 _MAX_MISSES = 50
 #: Namespaces of a topic, each drawn on its own, for each frame that markers are locked to.
 _MAX_NAMESPACES = 2000
-#: Meshes that are kept for further markers, their bytes, and meshes that are being read.
-_MAX_MESHES, _MAX_KEPT_BYTES, _MAX_READING = 200, 256 << 20, 1000
-#: Bytes of the meshes and textures of all markers of a display.
-_MAX_MESH_BYTES = 2 << 30
 #: Lists that are drawn together with others, and the markers of a group that are drawn alone, up to
 #: which triangles and translucent lines are, too: these are sorted by distance and selected alone.
 _JOINED, _MAX_ALONE = (LINE_STRIP, LINE_LIST, TRIANGLE_LIST), 100
@@ -135,251 +106,6 @@ _JOINED, _MAX_ALONE = (LINE_STRIP, LINE_LIST, TRIANGLE_LIST), 100
 _CELL_M = 2000.0
 #: Lines of the status, and markers whose problems are known.
 _MAX_LINES, _MAX_PROBLEMS = 50, 1000
-
-
-class MarkerRecord(NamedTuple):
-    """One marker, read from its message.
-
-    Attributes:
-        key: Its namespace and id.
-        kind: Its type.
-        action: What to do with it.
-        frame: Its frame.
-        stamp: Its time in nanoseconds; 0 for the newest.
-        pose: In its frame, 4 x 4.
-        scale: x, y, z in metres.
-        color: RGBA.
-        lifetime: Seconds; 0 for ever.
-        locked: Whether it moves with its frame.
-        points: (n, 3), metres.
-        colors: (n, 4) or (0, 4).
-        text: Of texts.
-        resource: URI of a mesh.
-        embedded: Whether a mesh has its own colors.
-        problem: Why it is not drawn, in words; empty otherwise.
-        warning: Why it may not look as it should, in words; empty otherwise.
-        instances: Shapes that it consists of, where these are always the same ones, and the matrix
-            of each in its frame; None to compute them when it is drawn.
-        triangles: Of a triangle list, which may be long: its shape; None to make it when it is
-            drawn.
-    """
-
-    key: tuple[str, int]
-    kind: int
-    action: int
-    frame: str = ""
-    stamp: int = 0
-    pose: NDArray[np.float64] = np.eye(4)
-    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    lifetime: float = 0.0
-    locked: bool = False
-    points: NDArray[np.float32] = _NO_POINTS
-    colors: NDArray[np.float32] = _NO_COLORS
-    text: str = ""
-    resource: str = ""
-    embedded: bool = False
-    problem: str = ""
-    warning: str = ""
-    instances: _Instances | None = None
-    triangles: Shape | None = None
-
-    @property
-    def size(self) -> int:
-        """About how many bytes it takes."""
-        shape = 0 if self.triangles is None else self.triangles.size
-        return self.points.nbytes + self.colors.nbytes + len(self.text) + shape
-
-
-def read_marker(message: Any, part: tuple[str, int] | None = None) -> MarkerRecord:
-    """Return the record of a ``visualization_msgs/Marker`` of ROS 1 or ROS 2.
-
-    What cannot be drawn has the reason in :attr:`MarkerRecord.problem`.
-
-    Args:
-        message: The message.
-        part: Its key where it is part of an interactive marker: it has no namespace and id of its
-            own then, and a scale of 0 is 1 m, as in RViz.
-    """
-    (record,) = _read_all([message], part)
-    return record
-
-
-def _read_all(messages: Sequence[Any], part: tuple[str, int] | None = None) -> list[MarkerRecord]:
-    """Return the records of markers; what numpy computes, it computes for all of them at once."""
-    rows = []
-    for message in messages:
-        p, q = message.pose.position, message.pose.orientation
-        s, c = message.scale, message.color
-        rows.append((p.x, p.y, p.z, q.x, q.y, q.z, q.w, s.x, s.y, s.z, c.r, c.g, c.b, c.a))
-    numbers = np.array(rows, np.float64).reshape(-1, 14)
-    finite: NDArray[np.bool_] = np.asarray(are_drawable(numbers).all(axis=1))
-    sizes = numbers[:, 7:10]
-    sizes[np.abs(sizes) < _LEAST_M] = 0.0
-    if part is not None:
-        sizes[sizes == 0] = 1.0
-    warnings: dict[int, str] = {}
-    for at in np.flatnonzero((sizes == 0).any(axis=1)).tolist():
-        message, (x, y, z) = messages[at], sizes[at].tolist()
-        if finite[at] and 0 <= message.type <= ARROW_STRIP:
-            sizes[at], warnings[at] = _without_zeros(message.type, (x, y, z), len(message.points))
-    with np.errstate(invalid="ignore", over="ignore"):
-        poses = poses_matrices(numbers[:, :3], numbers[:, 3:7])
-        scaled = poses.copy()
-        scaled[:, :3, :3] *= sizes[:, np.newaxis]
-    return [
-        _read_one(message, part, row, bool(finite[at]), warnings.get(at, ""), poses[at], scaled[at])
-        for at, (message, row) in enumerate(zip(messages, numbers.tolist(), strict=True))
-    ]
-
-
-def _read_one(
-    message: Any,
-    part: tuple[str, int] | None,
-    numbers: list[float],
-    is_finite: bool,
-    warning: str,
-    pose: NDArray[np.float64],
-    scaled: NDArray[np.float64],
-) -> MarkerRecord:
-    """Return the record of a marker.
-
-    Args:
-        message: The message.
-        part: As for :func:`read_marker`.
-        numbers: Pose, scale and color.
-        is_finite: Whether all of these are, and can be drawn.
-        warning: Of the record.
-        pose: Matrix of the pose.
-        scaled: The same, multiplied with the scale.
-    """
-    key, kind, action = (message.ns, message.id), message.type, message.action
-    if part is not None:
-        key, action = part, _ADD
-    if action in (_DELETE, _DELETE_ALL):
-        return MarkerRecord(key, kind, action)
-    frame, stamp, lifetime = message.header.frame_id.lstrip("/"), message.header.stamp, 0.0
-    if hasattr(stamp, "secs"):
-        at = stamp.secs * 1_000_000_000 + stamp.nsecs
-        lifetime = message.lifetime.secs + message.lifetime.nsecs * 1e-9
-    else:
-        at = stamp.sec * 1_000_000_000 + stamp.nanosec
-        lifetime = message.lifetime.sec + message.lifetime.nanosec * 1e-9
-    problem, count, tints = "", len(message.points), len(message.colors)
-    if action != _ADD:
-        problem = f"action {action}: expected 0 (add), 2 (delete) or 3 (delete all)"
-    elif not 0 <= kind <= ARROW_STRIP:
-        problem = f"type {kind}: expected 0 to {ARROW_STRIP}"
-    elif not frame and part is None:
-        problem = "header.frame_id is empty: the publisher has to name the frame"
-    elif not is_finite:
-        problem = _numbers_problem(numbers)
-    elif count > _MAX_POINTS:
-        problem = f"points: {count} are more than the {_MAX_POINTS} that are drawn"
-    elif count or kind not in _SOLIDS:
-        problem = _points_problem(kind, count)
-    if problem:
-        return MarkerRecord(key, kind, action, frame, at, problem=problem)
-    points, colors = _NO_POINTS, _NO_COLORS
-    if count:
-        points = _rows(message.points, attrgetter("x", "y", "z"), 3)
-        try:
-            check_numbers("points", points)
-        except Error as error:
-            return MarkerRecord(key, kind, action, frame, at, problem=str(error))
-    if tints:
-        colors = _rows(message.colors, attrgetter("r", "g", "b", "a"), 4)
-    warning = warning or _colors_warning(kind, count, colors)
-    colors = np.clip(np.nan_to_num(colors, nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
-    x, y, z, red, green, blue, alpha = numbers[7:]
-    shapes = _SOLIDS.get(kind)
-    record = MarkerRecord(
-        key,
-        kind,
-        action,
-        frame,
-        at,
-        # Copies: a record must not hold the arrays of all markers of its message.
-        pose.copy(),
-        (x, y, z),
-        (red, green, blue, alpha),
-        max(lifetime, 0.0),
-        message.frame_locked,
-        points,
-        colors,
-        message.text,
-        message.mesh_resource,
-        message.mesh_use_embedded_materials,
-        "",
-        warning,
-        None if shapes is None else (shapes, (scaled.copy(),)),
-    )
-    if shapes is None:
-        triangles = None
-        if kind == TRIANGLE_LIST:
-            try:
-                triangles = _triangles(record)
-            except Error as error:
-                return MarkerRecord(key, kind, action, frame, at, problem=str(error))
-        record = record._replace(instances=_instances(record), triangles=triangles)
-    return record
-
-
-def _without_zeros(
-    kind: int, size: tuple[float, float, float], count: int
-) -> tuple[tuple[float, float, float], str]:
-    """Return a scale without zeros where it counts, and a warning if there was one."""
-    axes = "xy" if kind == ARROW and count else _SCALED.get(kind, "xyz")
-    x, y, z = (n or _THIN_M if axis in axes else n for axis, n in zip("xyz", size, strict=True))
-    # As in RViz, an arrow may be flat.
-    if (x, y, z) == size or (kind == ARROW and size[0] and size[1]):
-        return (x, y, z), ""
-    return (x, y, z), f"scale {size} of a {_NAMES[kind]} is 0 in a direction: drawn as {_THIN_M} m"
-
-
-def _rows(items: Sequence[Any], read: Callable[[Any], Any], width: int) -> NDArray[np.float32]:
-    """Return numbers of each item, (n, width); numpy holds the GIL for some of them at a time."""
-    rows = np.empty((len(items), width), np.float32)
-    for start in range(0, len(items), _ROWS_AT_ONCE):
-        some = items[start : start + _ROWS_AT_ONCE]
-        with np.errstate(over="ignore"):
-            rows[start : start + len(some)] = [read(item) for item in some]
-    return rows
-
-
-def _numbers_problem(numbers: list[float]) -> str:
-    """Return which of pose, scale and color has a number that cannot be drawn."""
-    try:
-        for name, part in (
-            ("pose", numbers[:7]),
-            ("scale", numbers[7:10]),
-            ("color", numbers[10:]),
-        ):
-            check_numbers(name, part)
-    except Error as error:
-        return str(error)
-    return ""
-
-
-def _colors_warning(kind: int, points: int, colors: NDArray[np.float32]) -> str:
-    """Return what is wrong with the colors of points; empty if nothing is."""
-    if kind not in _COLORED:
-        return ""
-    if len(colors) not in ((0, points, points // 3) if kind == TRIANGLE_LIST else (0, points)):
-        return f"colors: {len(colors)} for {points} points: they have the marker's color"
-    return "" if np.isfinite(colors).all() else "colors: a number is not finite: drawn as 0 or 1"
-
-
-def _points_problem(kind: int, count: int) -> str:
-    if kind == LINE_LIST and count % 2:
-        return f"points: {count} are not pairs, which a line_list needs"
-    if kind == TRIANGLE_LIST and (count % 3 or not count):
-        return f"points: {count} are not triples, which a triangle_list needs"
-    if kind == ARROW and count == 1:
-        return "points: an arrow has none, or start and end"
-    if kind == LINE_STRIP and count < 2:
-        return f"points: {count}, where a line_strip needs 2"
-    return ""
 
 
 _B = TypeVar("_B", LineBatch, TextBatch, TriangleBatch)
@@ -418,7 +144,7 @@ class MarkerGroup:
     def put(self, marker: MarkerRecord, pose: NDArray[np.float64], meshes: MarkerMeshes) -> None:
         """Draw a marker at a pose of its frame in the fixed frame."""
         key = marker.key
-        shapes, places = marker.instances or _instances(marker)
+        shapes, places = marker.instances or instances_of(marker)
         if shapes:
             if self._solids.get(key) is not shapes:
                 self.remove(key)
@@ -531,48 +257,6 @@ class MarkerGroup:
                 del self._joint[look]
 
 
-def _scaled(x: float, y: float, z: float, along: float = 0.0) -> NDArray[np.float64]:
-    matrix = np.diag([x, y, z, 1.0])
-    matrix[2, 3] = along
-    return matrix
-
-
-def _instances(marker: MarkerRecord) -> _Instances:
-    """Return the shapes that a marker consists of, where these are always the same ones."""
-    x, y, z = marker.scale
-    if marker.kind in _SOLIDS:
-        return _SOLIDS[marker.kind], (marker.pose @ _scaled(x, y, z),)
-    if marker.kind != ARROW:
-        return (), ()
-    if not len(marker.points):
-        # Proportions of RViz: 77 % shaft, and a head of twice its width.
-        place = marker.pose @ _TO_X
-        shaft = _scaled(y, z, 0.77 * x, 0.385 * x)
-        head = _scaled(2 * y, 2 * z, 0.23 * x, 0.77 * x)
-        return _ARROW_SHAPES, (place @ shaft, place @ head)
-    start, end = marker.points[0].astype(np.float64), marker.points[1].astype(np.float64)
-    way = end - start
-    length = float(np.linalg.norm(way))
-    if length < 1e-9 or not np.isfinite(length):
-        return (), ()
-    tip = min(z, length) if z else _HEAD_SHARE * length
-    place = marker.pose @ _standing(start, way / length)
-    return _ARROW_SHAPES, (
-        place @ _scaled(x, x, length - tip, (length - tip) / 2),
-        place @ _scaled(y, y, tip, length - tip),
-    )
-
-
-def _standing(origin: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a pose at a point whose z is along a direction of length 1."""
-    helper = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    y = np.cross(z, helper)
-    y /= np.linalg.norm(y)
-    pose = np.eye(4)
-    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = np.cross(y, z), y, z, origin
-    return pose
-
-
 def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]:
     """Iterate over what a marker draws beside instances, in its own frame."""
     kind, points, (x, y, z) = marker.kind, marker.points, marker.scale
@@ -627,189 +311,23 @@ def _list_colors(colors: Any) -> NDArray[np.float32]:
 
 def _triangles_look(marker: MarkerRecord) -> tuple[Shape, tuple[float, ...], bool]:
     """Return the shape of a triangle list, its color, and whether it is lit."""
-    shape = marker.triangles or _triangles(marker)
+    shape = marker.triangles or triangles_of(marker)
     # RViz does not light what has colors of its own.
     if len(marker.colors) in (len(marker.points), len(marker.points) // 3):
         return shape, (1.0, 1.0, 1.0, 1.0), False
     return shape, marker.color, True
 
 
-def _triangles(marker: MarkerRecord) -> Shape:
-    points = marker.points * np.array(marker.scale, np.float32)
-    check_numbers("points times scale", points)
-    colors, alpha = marker.colors, marker.color[3]
-    # RViz's rules for the opacity of vertices, and of triangles.
-    if len(colors) == len(points):
-        blended = bool((colors[:, 3] < OPAQUE).any())
-    elif len(colors) == len(points) // 3:
-        colors, blended = np.repeat(colors, 3, axis=0), alpha < OPAQUE
-    else:
-        return Shape(points)
-    each = colors[:, 3:] * alpha if blended else np.ones((len(points), 1), np.float32)
-    return Shape(points, colors=np.hstack([colors[:, :3], each]))
-
-
 def _arrow_strip(marker: MarkerRecord) -> Iterable[Mesh]:
     arrow = marker._replace(kind=ARROW, pose=_IDENTITY)
     arrows = [
-        _instances(arrow._replace(points=marker.points[at : at + 2]))[1]
+        instances_of(arrow._replace(points=marker.points[at : at + 2]))[1]
         for at in range(len(marker.points) - 1)
     ]
-    for part, shape in enumerate(_ARROW_SHAPES):
+    for part, shape in enumerate(ARROW_SHAPES):
         mesh = Mesh(shape, marker.color)
         mesh.set_instances(np.array([one[part] for one in arrows if one]).reshape(-1, 4, 4))
         yield mesh
-
-
-class _MeshFile(NamedTuple):
-    """A mesh file that was read.
-
-    Attributes:
-        parts: For each part a drawable, with its texture, and the color of its material; None in
-            STL files, which have none.
-        problem: What could not be read, in words; empty otherwise.
-    """
-
-    parts: list[tuple[Mesh, tuple[float, ...] | None]]
-    problem: str
-
-    @property
-    def size(self) -> int:
-        """How many bytes it takes."""
-        return sum(_size_of(mesh) for mesh, _ in self.parts)
-
-
-def _size_of(mesh: Mesh) -> int:
-    return mesh.shape.size + (0 if mesh.texture is None else mesh.texture.nbytes)
-
-
-def _read_mesh(uri: str, resources: ResourceRetriever) -> _MeshFile:
-    """Read a mesh and its textures; takes seconds for large ones."""
-    made: list[tuple[Mesh, tuple[float, ...] | None]] = []
-    problem = ""
-    is_stl = ending_of(uri) in STL_ENDINGS
-    files = MeshFiles(resources)
-    for part, shape in files.mesh(uri):
-        mesh = Mesh(shape)
-        if part.texture is not None:
-            try:
-                mesh.set_texture(files.texture(part.texture, uri))
-            except (Error, OSError) as error:
-                problem = str(error)
-        made.append((mesh, None if is_stl else material_of(part)))
-    return _MeshFile(made, problem)
-
-
-def _embedded_looks(
-    part: Mesh, own: tuple[float, ...] | None, color: tuple[float, ...]
-) -> Iterable[tuple[Mesh, tuple[float, ...]]]:
-    """Iterate over what is drawn of a part with the materials of its file, and its colours.
-
-    As in RViz, a marker's colour is painted over them, half translucent, unless it is all zeros.
-    """
-    *rgb, alpha = color
-    is_set, tint = any(color), (*rgb, min(alpha, 0.5))
-    if own is None:
-        plain = color if alpha >= OPAQUE else tint
-        yield copy(part), plain if is_set else (1.0, 1.0, 1.0, 1.0)
-        return
-    yield copy(part), (*own[:3], alpha if is_set else 1.0)
-    if is_set:
-        yield Mesh(part.shape), tint
-
-
-class MarkerMeshes:
-    """Loads the meshes of markers in the scene's thread; until then they draw nothing.
-
-    Args:
-        background: Runs a function in another thread, with what finds files, and one with its
-            result in the GUI thread.
-        on_loaded: Called in the GUI thread with the URI, and with why it failed or "".
-    """
-
-    def __init__(
-        self,
-        background: Callable[[Callable[[ResourceRetriever], Any], Callable[[Any], None]], None],
-        on_loaded: Callable[[str, str], None],
-    ) -> None:
-        self._background, self._on_loaded = background, on_loaded
-        #: By URI, those used last at the end; None while it is being read.
-        self._files: dict[str, _MeshFile | None] = {}
-        self._reading = 0
-        #: Bytes of each part that is kept or drawn.
-        self._sizes: WeakKeyDictionary[Shape, int] = WeakKeyDictionary()
-
-    def of(self, marker: MarkerRecord) -> Iterable[Mesh]:
-        """Return the drawables of a mesh marker; begin to load it if need be.
-
-        Raises:
-            Error: Too many others are being loaded.
-        """
-        uri = marker.resource
-        if uri not in self._files:
-            if self._reading >= _MAX_READING:
-                raise Error(f"more than {_MAX_READING} meshes are being read; send it again later")
-            self._files[uri] = None
-            self._reading += 1
-            self._background(
-                lambda resources: _read_mesh(uri, resources),
-                lambda result: self._loaded(uri, result),
-            )
-        file = self._files[uri] = self._files.pop(uri)
-        for part, own in file.parts if file is not None else ():
-            looks: Iterable[tuple[Mesh, tuple[float, ...]]] = [(Mesh(part.shape), marker.color)]
-            if marker.embedded:
-                looks = _embedded_looks(part, own, marker.color)
-            for mesh, color in looks:
-                if np.prod(marker.scale) < 0:
-                    mesh.shape = mesh.shape.mirrored()
-                mesh.set_look(color=color)
-                mesh.set_instances(_scaled(*marker.scale)[np.newaxis])
-                yield mesh
-
-    def problem_of(self, marker: MarkerRecord) -> str:
-        """Return what is wrong with the file of a marker, in words; empty for none."""
-        file = self._files.get(marker.resource) if marker.kind == MESH else None
-        return "" if file is None else file.problem
-
-    def _loaded(self, uri: str, result: Any) -> None:
-        self._reading -= 1
-        file = result if isinstance(result, _MeshFile) else _MeshFile([], str(result))
-        self._files.pop(uri, None)
-        self._files[uri] = file
-        self._drop_unused()
-        if sum(self._sizes.values()) + file.size > _MAX_MESH_BYTES:
-            text = f"with its {file.size} bytes, all meshes have more than {_MAX_MESH_BYTES}"
-            file = self._files[uri] = _MeshFile([], f"{uri}: {text}; reduce them")
-        self._sizes.update((mesh.shape, _size_of(mesh)) for mesh, _ in file.parts)
-        self._on_loaded(uri, "" if file.parts else file.problem)
-
-    def _drop_unused(self) -> None:
-        """Forget the files that were used longest ago; markers that are shown keep theirs."""
-        kept = {uri: file.size for uri, file in self._files.items() if file is not None}
-        size = sum(kept.values())
-        # Not the last one, which is asked for again as soon as it is there.
-        for uri in list(kept)[:-1]:
-            if len(kept) <= _MAX_MESHES and size <= _MAX_KEPT_BYTES:
-                return
-            size -= kept.pop(uri)
-            del self._files[uri]
-
-    def forget_failed(self, uris: Collection[str] | None = None) -> set[str]:
-        """Forget files that could not be read, so that they are read again.
-
-        Args:
-            uris: The files, of meshes and of their textures, that may be there now; None for all.
-
-        Returns:
-            The URIs of the meshes.
-        """
-        failed = {uri: file.problem for uri, file in self._files.items() if file and file.problem}
-        if uris is not None:
-            failed = {k: text for k, text in failed.items() if any(one in text for one in uris)}
-        for uri in failed:
-            del self._files[uri]
-        return set(failed)
 
 
 class _Late(NamedTuple):
@@ -906,7 +424,7 @@ class Markers(TopicDisplay):
 
     def preparer(self) -> Callable[[Any], list[MarkerRecord]]:
         """Return the function that reads markers."""
-        return _read_markers
+        return read_markers
 
     @Slot(str, bool)
     def setNamespaceEnabled(self, namespace: str, enabled: bool) -> None:  # noqa: N802 - QML's name
@@ -1009,14 +527,14 @@ class Markers(TopicDisplay):
 
     def _apply(self, marker: MarkerRecord, poses: _Poses) -> None:
         key = marker.key
-        if marker.action == _DELETE_ALL:
+        if marker.action == DELETE_ALL:
             # In ROS 1, RViz removes those of all namespaces, whatever the message's is.
             is_ros1 = self.node is not None and self.node.wire == "ros1"
             self._clear("" if is_ros1 else key[0])
             return
         # What waits under its name is older.
         self._late.pop(key, None)
-        if marker.action == _DELETE or marker.problem:
+        if marker.action == DELETE or marker.problem:
             self._remove(key)
             if marker.problem:
                 self._note_problem(key, "error", marker.problem)
@@ -1058,8 +576,8 @@ class Markers(TopicDisplay):
             self._expires.pop(key, None)
         else:
             self._remove(key)
-        if len(self._shown) >= _MAX_MARKERS:
-            self._note_problem(key, "error", f"only {_MAX_MARKERS} markers are shown")
+        if len(self._shown) >= MAX_MARKERS:
+            self._note_problem(key, "error", f"only {MAX_MARKERS} markers are shown")
             return
         self._shown[key] = marker
         self._size += marker.size
@@ -1259,15 +777,6 @@ class Markers(TopicDisplay):
 def _line_of(key: tuple[str, int]) -> str:
     """Return the name of the line of the status about a marker."""
     return f"{key[0][:100]}/{key[1]}"
-
-
-def _read_markers(message: Any) -> list[MarkerRecord]:
-    if "markers" not in message:
-        return [read_marker(message)]
-    count = len(message.markers)
-    if count > _MAX_MARKERS:
-        raise Error(f"markers: {count} are more than the {_MAX_MARKERS} that are shown")
-    return _read_all(message.markers)
 
 
 class MarkerDisplay(Markers):
