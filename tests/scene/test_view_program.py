@@ -837,6 +837,21 @@ def test_a_display_is_chosen_from_a_list_that_is_filtered(bench: SceneBench, win
     rows.key("Escape")
     bench.wait(lambda: not dialog.property("visible"))
     assert len(rows.scene.displays) == 5
+    # A filter that fits the other list only says so; a click on its tab leaves the keyboard there.
+    open_dialog()
+    for letter in "robot":
+        QTest.keyClick(window, letter)
+    nothing = window.findChild(QObject, "addNothing")
+    assert nothing.property("text") == "Nothing here has these words. By type: RobotModel"
+    tab = window.findChild(QObject, "addByType")
+    rows.click(tab.mapToScene(tab.boundingRect().center()).toPoint())
+    assert choices.property("count") == 1
+    QTest.keyClick(window, "x")
+    assert choices.property("count") == 0
+    assert nothing.property("text") == "Nothing has these words."
+    rows.key("Backspace")
+    rows.key("Return")
+    assert outline(rows.scene)[5:] == ["RobotModel"]
 
 
 def test_reset_in_the_tool_bar_drops_what_was_received(bench: SceneBench, window: Any) -> None:

@@ -304,8 +304,7 @@ Pane {
         property var topics: []
         property var types: []
         readonly property var words: filter.text.toLowerCase().split(" ")
-        readonly property var found: (tabs.currentIndex === 0 ? topics : types)
-            .filter(one => words.every(word => (one.topic + " " + one.display).toLowerCase().includes(word)))
+        readonly property var found: matching(tabs.currentIndex === 0 ? topics : types)
         readonly property var chosen: found[choices.currentIndex] || null
 
         objectName: "addDialog"
@@ -315,6 +314,9 @@ Pane {
         height: parent ? Math.min(480, parent.height - 20) : 480
         parent: Overlay.overlay
         anchors.centerIn: parent
+        function matching(ones) {
+            return ones.filter(one => words.every(word => (one.topic + " " + one.display).toLowerCase().includes(word)))
+        }
         onOpened: {
             topics = rows.suggestions()
             types = rows.types().map(name => ({ topic: "", display: name }))
@@ -336,8 +338,9 @@ Pane {
             TabBar {
                 id: tabs
                 Layout.fillWidth: true
-                TabButton { text: "By topic" }
-                TabButton { text: "By type" }
+                // The filter keeps the keyboard: letters and Enter are for the list.
+                TabButton { objectName: "addByTopic"; text: "By topic"; onClicked: filter.forceActiveFocus() }
+                TabButton { objectName: "addByType"; text: "By type"; onClicked: filter.forceActiveFocus() }
             }
             TextField {
                 id: filter
@@ -378,10 +381,20 @@ Pane {
                     onDoubleClicked: { choices.currentIndex = index; adding.accept() }
                 }
                 Label {
+                    // Matches of the other list: a robot's model, for one, has no topic here.
+                    readonly property var others: adding.matching(tabs.currentIndex === 0 ? adding.types : adding.topics)
+
+                    objectName: "addNothing"
                     anchors.centerIn: parent
+                    width: parent.width - 20
                     visible: choices.count === 0
+                    horizontalAlignment: Text.AlignHCenter
+                    wrapMode: Text.Wrap
                     textFormat: Text.PlainText
-                    text: adding.topics.length > 0 || tabs.currentIndex === 1 ? "Nothing has these words." : "The robot publishes nothing that a display shows."
+                    text: adding.topics.length === 0 && tabs.currentIndex === 0 ? "The robot publishes nothing that a display shows."
+                        : others.length === 0 ? "Nothing has these words."
+                        : "Nothing here has these words. " + (tabs.currentIndex === 0 ? "By type" : "By topic") + ": "
+                            + others.slice(0, 3).map(one => one.topic || one.display).join(", ")
                 }
             }
         }
