@@ -127,8 +127,14 @@ def test_a_broken_description_is_an_error_in_words(
 
 
 def test_meshes_come_from_files_and_missing_ones_are_named(
-    bench: SceneBench, tmp_path: Path
+    bench: SceneBench,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
+    from rosglass.scene import display
+
+    monkeypatch.setattr(display, "_LOGGED_MS", 50)
     corners = ((0, 0, 0), (2, 0, 0), (0, 2, 0))
     triangle = struct.pack("<12fH", 0, 0, 1, *(n for corner in corners for n in corner), 0)
     (tmp_path / "part.stl").write_bytes(bytes(80) + struct.pack("<I", 1) + triangle)
@@ -151,6 +157,27 @@ def test_meshes_come_from_files_and_missing_ones_are_named(
     assert mesh.shape.rows["position"].tolist() == [list(map(float, c)) for c in corners]
     assert robot.statusLevel == "error"
     assert "package://nowhere/gone.stl" in robot.statusText
+    # It is logged for interfaces that show no status, once, with the line that declares it.
+    start = "display 'RobotModel': Mesh gone.stl: package://nowhere/gone.stl: there is no package"
+
+    def logged() -> list[str]:
+        return [one.getMessage() for one in caplog.records if start in one.getMessage()]
+
+    bench.wait(logged)
+    for number in range(5):
+        robot.set_status(f"Part {number}", "error", "wrong as well")
+    bench.wait(lambda: "display 'RobotModel': 2 more errors, see its statusText" in caplog.text)
+    assert "display 'RobotModel': Part 0: wrong as well" in caplog.text
+    assert "Part 3" not in caplog.text
+    assert len(logged()) == 1
+    # A fixed frame that does not exist is one error, not one of each display.
+    monkeypatch.setattr(display, "_LOGGED_MS", 10_000)
+    view.fixedFrame = "nowhere"
+    bench.wait(lambda: "the fixed frame [nowhere] does not exist" in caplog.text)
+    bench.wait(lambda: "Link base_link" in robot.status_lines)
+    robot._log_errors()
+    assert "Link base_link" not in caplog.text
+    view.fixedFrame = "map"
     green = (bench.picture().astype(int) - (0, 255, 0)).clip(0).max(axis=2) < 30
     assert green.sum() > 100
     send.close()

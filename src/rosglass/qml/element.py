@@ -338,6 +338,10 @@ class TopicElement(Element):
         self._mixing = ""
         self._no_publisher = single_shot(self, self._log_no_publisher)
 
+    def _topic_in_logs(self) -> str:
+        """Return the topic, after what else the log has to name."""
+        return self._resolved
+
     def _expect_publishers(self) -> None:
         """Log a topic that still has no publisher after a while."""
         self._no_publisher.start(NO_PEER_MS)
@@ -352,7 +356,7 @@ class TopicElement(Element):
         with suppress(Error):
             hint = similar(self._resolved, node.topics())
             level = logging.WARNING if hint else logging.INFO
-            self._log(f"{self._resolved}: this topic has no publisher{hint}", level)
+            self._log(f"{self._topic_in_logs()}: this topic has no publisher{hint}", level)
 
     def _resolve(self, topic: str) -> str:
         """Return the absolute name of a topic; empty, with a problem set, for an invalid name."""

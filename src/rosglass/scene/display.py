@@ -23,10 +23,10 @@ from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.errors import ArgumentError, Error, TransformException
 from rosglass.interfaces.names import ros1_name
 from rosglass.qml.callbacks import weak_callback
-from rosglass.qml.element import TopicElement
+from rosglass.qml.element import TopicElement, single_shot
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.properties import ReadOnly, Writable, report
-from rosglass.qt import Signal, Slot, is_alive
+from rosglass.qt import QtQml, Signal, Slot, is_alive
 from rosglass.scene.declared import expect_view, find_view
 from rosglass.scene.drawing import Group, check_numbers, instance_matrix
 from rosglass.scene.rviz_formats import FIXED_FRAME, TopicSetting, read_topic, write_topic
@@ -96,6 +96,10 @@ _FRAME_TIMEOUT_S = 5.0
 _UNPUBLISHED_TIMEOUT_S = 0.5
 #: Letters of a line of the status: what robots name may be of any length.
 _MAX_NAME, _MAX_TEXT = 200, 1000
+#: Milliseconds for which something may be wrong with a display before that is logged.
+_LOGGED_MS = 3000
+#: Lines of the status that are logged at a time.
+_MAX_LOGGED = 3
 #: Names of parts in an error.
 _MAX_NAMES = 20
 #: Opacity of data whose publisher or connection is gone.
@@ -174,6 +178,8 @@ class Display(Configurable, TopicElement):
         self.saved: dict[str, Any] = {}
         #: When a frame was found last, by the clock of :func:`time.monotonic`.
         self._placed_at = -math.inf
+        #: Lines of the status whose error was logged.
+        self._logged: set[str] = set()
         #: Frames that it follows and that are not updated any more, and for how many seconds.
         self._outdated_frames: dict[str, float] = {}
         #: What of it is shown and hidden one by one; None for nothing.
@@ -183,6 +189,7 @@ class Display(Configurable, TopicElement):
         #: The group that it is in; None for none.
         self.group: Display | None = None
         super().__init__(parent, runtime)
+        self._log_timer = single_shot(self, self._log_errors)
         state, root = self.__dict__, self.root
 
         def forget() -> None:
@@ -377,6 +384,27 @@ class Display(Configurable, TopicElement):
         worst = max((_LEVELS.index(one.level) for _, one in lines), default=0)
         text = "\n".join(f"{name}: {one.text}" for name, one in lines)
         report(self, statusLevel=_LEVELS[worst], statusText=text)
+        if self.statusLevel == "error" and not self._log_timer.isActive():
+            self._log_timer.start(_LOGGED_MS)
+
+    @Slot()
+    def _log_errors(self) -> None:
+        """Log what is wrong for a while, once: an interface in QML may show no status."""
+        if self.scene is None or QtQml.QQmlEngine.contextForObject(self) is None:
+            return
+        if self.scene.problem:
+            # It is logged, and may be the reason: a fixed frame that does not exist.
+            self._log_timer.start(_LOGGED_MS)
+            return
+        errors = {name: one.text for name, one in self.status_lines.items() if one.level == "error"}
+        # The topic's own are logged where they occur.
+        new = [name for name in errors if name not in self._logged and name != "Topic"]
+        self._logged = set(errors)
+        for name in new[:_MAX_LOGGED]:
+            self._log(f"{self.label}: {name}: {errors[name]}", logging.WARNING)
+        if len(new) > _MAX_LOGGED:
+            more = f"{len(new) - _MAX_LOGGED} more errors, see its statusText"
+            self._log(f"{self.label}: {more}", logging.WARNING)
 
     # -- frames ----------------------------------------------------------------------------------
 
@@ -645,7 +673,7 @@ class OneTopicDisplay(Display):
             level, text = self._find_reason()
             if level == "error" and Status(level, text) != self.status_lines.get("Topic"):
                 # For interfaces that show no status.
-                self._log(f"{self.label}: {self._resolved}: {text}", logging.WARNING)
+                self._log(f"{self._topic_in_logs()}: {text}", logging.WARNING)
             self.set_status("Topic", level, text)
 
     def _find_reason(self) -> tuple[str, str]:
@@ -666,6 +694,9 @@ class OneTopicDisplay(Display):
             elif problem := getattr(self._endpoint, "problem", ""):
                 text = f"{text}: {problem}"
         return "warn", text
+
+    def _topic_in_logs(self) -> str:
+        return f"{self.label}: {self._resolved}"
 
     @Slot()
     def _log_no_publisher(self) -> None:
