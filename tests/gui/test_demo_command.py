@@ -65,6 +65,12 @@ def children(pid: int) -> list[int]:
     return [int(child) for child in found]
 
 
+def catches(pid: int, number: signal.Signals) -> bool:
+    """Whether a process has a handler for a signal."""
+    found = re.search(r"^SigCgt:\s*(\w+)$", Path(f"/proc/{pid}/status").read_text(), re.MULTILINE)
+    return found is not None and bool(int(found[1], 16) >> (number - 1) & 1)
+
+
 @pytest.fixture
 def demo(tmp_path: Path, url: str) -> Iterator[tuple[subprocess.Popen[str], list[int]]]:
     """A demo that runs without display, and its children: the virtual screen and the robot."""
@@ -75,7 +81,7 @@ def demo(tmp_path: Path, url: str) -> Iterator[tuple[subprocess.Popen[str], list
             break
     pids = children(process.pid)
     assert len(pids) == 2
-    time.sleep(1.0)
+    eventually(lambda: catches(process.pid, signal.SIGTERM), "its window is shown")
     yield process, pids
     process.kill()
     process.wait()
