@@ -777,6 +777,27 @@ def test_a_typed_frame_counts_when_the_user_goes_on(bench: SceneBench, window: A
     assert field.property("text") == "odom"
 
 
+def test_a_transformer_that_is_not_chosen_shows_the_one_in_use(
+    bench: SceneBench, window: Any
+) -> None:
+    rows = Rows(window)
+    rows.model.add("LaserScan", "/scan")
+    scan = rows.scene.find("LaserScan")
+    publisher = bench.robot.create_publisher("/scan", "sensor_msgs/LaserScan")
+    message = {"header": {"frame_id": "map"}, "ranges": [1.0], "range_max": 2.0}
+    bench.wait(lambda: publisher.publish(message) or scan.usedColorTransformer)
+
+    def shown(item: Any) -> set[str]:
+        texts = {str(item.property("displayText"))}
+        return texts.union(*(shown(one) for one in item.childItems()))
+
+    wanted = {f"{scan.usedColorTransformer} (automatic)", "XYZ (automatic)"}
+    bench.wait(lambda: wanted <= shown(window.contentItem()))
+    scan.colorTransformer, scan.positionTransformer = "FlatColor", "XYZ"
+    bench.wait(lambda: {"FlatColor", "XYZ"} <= shown(window.contentItem()))
+    assert not wanted & shown(window.contentItem())
+
+
 def test_a_display_is_chosen_from_a_list_that_is_filtered(bench: SceneBench, window: Any) -> None:
     from PySide6.QtCore import QMetaObject, QObject, Qt
     from PySide6.QtTest import QTest

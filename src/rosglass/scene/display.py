@@ -343,6 +343,10 @@ class Display(Configurable, TopicElement):
                 log_from_qml("", logging.ERROR, text, caller)
         self._switched_parts.clear()
 
+    def placeholder(self, path: str) -> str:  # noqa: ARG002 - for subclasses
+        """Return what an empty setting means, for panels; empty for nothing to say."""
+        return ""
+
     # -- status ----------------------------------------------------------------------------------
 
     def set_status(self, name: str, level: str, text: str) -> None:

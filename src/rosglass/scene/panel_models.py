@@ -53,6 +53,7 @@ class PanelRow(NamedTuple):
         expandable: Whether it has rows below it.
         expanded: Whether these are shown.
         choices: Of enumerations and names of frames.
+        placeholder: What an empty value means.
     """
 
     key: tuple[Any, ...]
@@ -66,6 +67,7 @@ class PanelRow(NamedTuple):
     expandable: bool = False
     expanded: bool = False
     choices: tuple[str, ...] = ()
+    placeholder: str = ""
 
 
 class _Landing(NamedTuple):
@@ -344,7 +346,7 @@ class DisplaysModel(QAbstractListModel):
                 yield PanelRow(
                     own, depth, name, setting.kind.NAME, _text(getattr(display, setting.name)),
                     setting.description, expandable=expandable, expanded=expanded,
-                    choices=self._choices(display, setting),
+                    choices=self._choices(display, setting), placeholder=display.placeholder(path),
                 )  # fmt: skip
             if expandable and expanded:
                 yield from self._walk_settings(display, key, depth + 1, path)

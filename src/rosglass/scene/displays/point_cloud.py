@@ -345,6 +345,11 @@ class CloudDisplay(TopicDisplay):
         self._colors: _ColorSettings | None = None
         super().__init__(parent, runtime)
 
+    def placeholder(self, path: str) -> str:
+        """Return the transformer in use where none is chosen."""
+        used = {"Color Transformer": self.usedColorTransformer, "Position Transformer": "XYZ"}
+        return f"{name} (automatic)" if (name := used.get(path)) else super().placeholder(path)
+
     @property
     def wanted_transformer(self) -> str:
         """The color transformer that is chosen, or else in use; empty while there is none."""

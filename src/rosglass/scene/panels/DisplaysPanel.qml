@@ -174,6 +174,7 @@ Pane {
                 required property bool expandable
                 required property bool expanded
                 required property var choices
+                required property string placeholder
                 readonly property bool ofDisplay: kind === "display"
                 readonly property bool current: index === panel.current
                 readonly property color tint: level === "error" ? (current ? "#ffc8c0" : "#c62818")
@@ -255,6 +256,7 @@ Pane {
                         kind: row.kind
                         value: row.value
                         choices: row.choices
+                        placeholder: row.placeholder
                         onEdited: value => rows.edit(row.index, value)
                         onColorAsked: before => {
                             panel.current = row.index

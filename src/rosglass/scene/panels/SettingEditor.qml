@@ -12,7 +12,7 @@ RowLayout {
     property var choices: []
     // The same; a list that is open is not made anew by one that is equal.
     property var names: []
-    // What an empty text means.
+    // What an empty value means.
     property string placeholder: ""
     readonly property bool isName: kind === "frame" || kind === "topic"
     readonly property bool isList: kind === "enum" || isName && choices.length > 0
@@ -51,6 +51,7 @@ RowLayout {
         model: editor.names
         editable: editor.kind !== "enum"
         currentIndex: editor.names.indexOf(String(editor.value))
+        displayText: currentText || editor.placeholder
         // What is set may be none of the choices, e.g. a frame that is not there yet.
         readonly property string given: String(editor.value)
         function showGiven() { if (editable) editText = given }
