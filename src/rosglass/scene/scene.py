@@ -171,15 +171,15 @@ class Scene(Element):
             raise Error(f"{display.label} is in another scene; make one for each scene")
         self._displays.append(display)
         root, displays = display.root, self._displays
+        announce = weak_callback(self._announce_displays)
 
         def forget() -> None:
             # QML has destroyed it: only its Python half is left.
             root.remove()
             if display in displays:
                 displays.remove(display)
-                if is_alive(self):
-                    # Later: all of a view may be about to be destroyed.
-                    QtCore.QTimer.singleShot(0, self, self.displaysChanged.emit)
+                # Later: all of a view may be about to be destroyed.
+                QtCore.QTimer.singleShot(0, announce)
 
         display.destroyed.connect(forget)
         try:
@@ -189,6 +189,10 @@ class Scene(Element):
             _log.exception("%s", display.label)
             display.set_status("Setup", "error", repr(error))
         self.displaysChanged.emit()
+
+    def _announce_displays(self) -> None:
+        if is_alive(self):
+            self.displaysChanged.emit()
 
     def remove(self, display: Display) -> None:
         """Remove a display, and if it is a group, the displays in it.

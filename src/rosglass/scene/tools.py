@@ -485,15 +485,11 @@ class Tools(QtCore.QObject):
 
     #: Names of the types of tools that can be added.
     types = Property(list, lambda self: sorted(self.TYPES), constant=True)
-    #: The same for a menu, by what their buttons say: ``type``, ``name`` and ``description``.
-    choices = Property(_LIST, lambda self: self._list_choices(), constant=True)
 
-    def _list_choices(self) -> list[dict[str, str]]:
-        found = sorted(self.TYPES.items(), key=lambda item: item[1].NAME)
-        return [
-            {"type": name, "name": kind.NAME, "description": kind.DESCRIPTION}
-            for name, kind in found
-        ]
+    @Slot(str, result=str)
+    def nameOf(self, kind: str) -> str:
+        """Return what the button of a type of tools says; the type for one that does not exist."""
+        return self.TYPES[kind].NAME if kind in self.TYPES else kind
 
     @Slot(str, result=str)
     def addTool(self, kind: str) -> str:

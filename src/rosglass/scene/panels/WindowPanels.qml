@@ -78,13 +78,12 @@ Page {
                     Menu {
                         id: newTools
                         Repeater {
-                            model: page.scene.tools.choices
+                            model: page.scene.tools.types
                             MenuItem {
-                                required property var modelData
-                                text: modelData.name
+                                required property string modelData
+                                text: page.scene.tools.nameOf(modelData)
                                 contentItem: Label { text: parent.text; textFormat: Text.PlainText }
-                                onTriggered: program.say(page.scene.tools.addTool(modelData.type))
-                                PlainToolTip { visible: parent.hovered; plain: parent.modelData.description }
+                                onTriggered: program.say(page.scene.tools.addTool(modelData))
                             }
                         }
                     }
