@@ -777,6 +777,24 @@ def test_a_typed_frame_counts_when_the_user_goes_on(bench: SceneBench, window: A
     assert field.property("text") == "odom"
 
 
+def test_what_a_row_is_stands_beside_the_panel(bench: SceneBench, window: Any) -> None:
+    from PySide6.QtCore import QObject, QPointF
+    from PySide6.QtTest import QTest
+
+    rows = Rows(window)
+    QTest.mouseMove(window, rows.at("Fixed Frame", x=60))
+
+    def tips(item: Any) -> list[Any]:
+        is_tip = item.property("text") == "The frame in which everything is placed."
+        below = [tip for one in item.childItems() for tip in tips(one)]
+        return [item, *below] if is_tip and item.isVisible() else below
+
+    (tip,) = bench.wait(lambda: tips(window.contentItem()))
+    panel = window.findChild(QObject, "displayRows")
+    edge = panel.mapToScene(QPointF(panel.width(), 0)).x()
+    assert tip.mapToScene(QPointF(0, 0)).x() >= edge
+
+
 def test_a_transformer_that_is_not_chosen_shows_the_one_in_use(
     bench: SceneBench, window: Any
 ) -> None:

@@ -216,7 +216,13 @@ Pane {
                     onCanceled: dragging.end()
                     onClicked: panel.current = row.index
                     onDoubleClicked: if (row.expandable) rows.toggle(row.index)
-                    PlainToolTip { visible: parent.containsMouse && row.description !== ""; plain: row.description }
+                    PlainToolTip {
+                        // Beside the panel: above the row it would hide those that the mouse goes to next.
+                        x: parent.width
+                        y: 0
+                        visible: parent.containsMouse && row.description !== ""
+                        plain: row.description
+                    }
                 }
                 RowLayout {
                     anchors { fill: parent; leftMargin: 4 + 14 * row.depth; rightMargin: 10 }
