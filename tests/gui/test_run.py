@@ -162,7 +162,16 @@ def test_offscreen_without_any_display(start: Any, file: Path, tmp_path: Path) -
 
 def test_a_screenshot_that_cannot_be_written(start: Any, file: Path, tmp_path: Path) -> None:
     file.write_text(GOOD)
-    program = start("run", file, "--screenshot", tmp_path / "no" / "x.png", "--after", "0.1")
+    for target, error in (
+        (tmp_path / "no" / "x.png", "x.png': there is no folder '"),
+        (tmp_path / "x.xyz", "x.xyz': the name of a picture ends in .png or .jpg"),
+    ):
+        program = start("run", file, "--screenshot", target)
+        assert program.end() == 2
+        assert error in program.text
+    locked = tmp_path / "locked.png"
+    locked.mkdir()
+    program = start("run", file, "--screenshot", locked, "--after", "0.1")
     assert program.end() == 1
     assert "could not be written" in program.text
 

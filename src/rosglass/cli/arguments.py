@@ -19,6 +19,7 @@ from rosglass.cli.parser import (
     complete,
     number,
     pair,
+    picture_file,
     positive_int,
     seconds,
 )
@@ -141,6 +142,7 @@ def _add_interface_options(
     parser.add_argument(
         "--screenshot",
         metavar="PICTURE",
+        type=picture_file,
         help=f"save a screenshot of {window} (PNG, JPEG) and exit",
     )
     parser.add_argument(
@@ -323,6 +325,7 @@ def _demo(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--screenshot",
         metavar="FILE.png",
+        type=picture_file,
         help="save a screenshot before the end (without display: demo.png)",
     )
     parser.add_argument(

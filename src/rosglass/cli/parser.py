@@ -25,6 +25,7 @@ __all__ = [
     "is_completing",
     "number",
     "pair",
+    "picture_file",
     "positive_int",
     "seconds",
 ]
@@ -219,6 +220,16 @@ def positive_int(text: str) -> int:
     if not (text.isascii() and text.isdigit() and 0 < int(text[:10]) < 2**31):
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 1 or more")
     return int(text)
+
+
+def picture_file(text: str) -> str:
+    """Parse the file of a picture that is written later; a type of options."""
+    folder = os.path.dirname(text) or "."  # noqa: PTH120 - pathlib would take time here
+    if not text.lower().endswith((".png", ".jpg", ".jpeg")):
+        raise argparse.ArgumentTypeError(f"{text!r}: the name of a picture ends in .png or .jpg")
+    if not os.path.isdir(folder):  # noqa: PTH112
+        raise argparse.ArgumentTypeError(f"{text!r}: there is no folder {folder!r}")
+    return text
 
 
 def pair(form: str) -> Callable[[str], tuple[str, str]]:
