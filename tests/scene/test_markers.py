@@ -744,6 +744,7 @@ def mesh_file(triangles: int) -> Any:
 
 def test_bytes_of_meshes_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     from rosglass.scene.displays import marker_meshes as markers
+    from rosglass.scene.displays.marker_messages import MESH, MarkerRecord
 
     size = mesh_file(100).size
     assert size == 300 * 36 + 300 * 4
@@ -761,7 +762,7 @@ def test_bytes_of_meshes_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     def draw(name: str, triangles: int = 100) -> list[Any]:
         nonlocal uri
         uri = name
-        record = markers.MarkerRecord(("", 1), markers.MESH, ADD, resource=name)
+        record = MarkerRecord(("", 1), MESH, ADD, resource=name)
         assert list(meshes.of(record)) == []
         done[name](mesh_file(triangles))
         return list(meshes.of(record))

@@ -569,18 +569,18 @@ class Markers(TopicDisplay):
             return
         if before is not None and self._group_key(before) == self._group_key(marker):
             # Its group replaces it, or moves it if nothing else has changed.
-            del self._shown[key]
-            self._size -= before.size
-            self._forget_hidden(before)
+            if self._hidden:
+                self._forget_hidden(before)
             self._problems.pop(key, None)
             self._expires.pop(key, None)
         else:
             self._remove(key)
-        if len(self._shown) >= MAX_MARKERS:
+            size = self._size + marker.size
+        if key not in self._shown and len(self._shown) >= MAX_MARKERS:
             self._note_problem(key, "error", f"only {MAX_MARKERS} markers are shown")
             return
         self._shown[key] = marker
-        self._size += marker.size
+        self._size = size
         if marker.warning:
             self._note_problem(key, "warn", marker.warning)
         if marker.lifetime and self.scene is not None:
@@ -599,7 +599,7 @@ class Markers(TopicDisplay):
                 pose = _IDENTITY
             group.put(marker, pose, self._meshes)
             self._empty.pop(where, None)
-            problem = self._meshes.problem_of(marker)
+            problem = self._meshes.problem_of(marker) if marker.kind == MESH else ""
             if problem:
                 self._note_problem(marker.key, "error", problem)
         except Exception as error:  # one that cannot be drawn does not hide the others

@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from rosglass.errors import Error
-from rosglass.scene.displays.marker_messages import MESH, MarkerRecord, scale_matrix
+from rosglass.scene.displays.marker_messages import MarkerRecord, scale_matrix
 from rosglass.scene.displays.robot_model import STL_ENDINGS, MeshFiles, material_of
 from rosglass.scene.drawing import (
     OPAQUE,
@@ -139,8 +139,8 @@ class MarkerMeshes:
                 yield mesh
 
     def problem_of(self, marker: MarkerRecord) -> str:
-        """Return what is wrong with the file of a marker, in words; empty for none."""
-        file = self._files.get(marker.resource) if marker.kind == MESH else None
+        """Return what is wrong with the file of a mesh marker, in words; empty for none."""
+        file = self._files.get(marker.resource)
         return "" if file is None else file.problem
 
     def _loaded(self, uri: str, result: Any) -> None:

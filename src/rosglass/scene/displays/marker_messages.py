@@ -113,6 +113,7 @@ class MarkerRecord(NamedTuple):
             of each in its frame; None to compute them when it is drawn.
         triangles: Of a triangle list, which may be long: its shape; None to make it when it is
             drawn.
+        size: About how many bytes its points, colors and text take.
     """
 
     key: tuple[str, int]
@@ -134,12 +135,7 @@ class MarkerRecord(NamedTuple):
     warning: str = ""
     instances: _Instances | None = None
     triangles: Shape | None = None
-
-    @property
-    def size(self) -> int:
-        """About how many bytes it takes."""
-        shape = 0 if self.triangles is None else self.triangles.size
-        return self.points.nbytes + self.colors.nbytes + len(self.text) + shape
+    size: int = 0
 
 
 def read_marker(message: Any, part: tuple[str, int] | None = None) -> MarkerRecord:
@@ -210,7 +206,7 @@ def _read_one(
     if action in (DELETE, DELETE_ALL):
         return MarkerRecord(key, kind, action)
     frame, stamp, lifetime = message.header.frame_id.lstrip("/"), message.header.stamp, 0.0
-    if hasattr(stamp, "secs"):
+    if "secs" in stamp:  # hasattr() would look for similar names
         at = stamp.secs * 1_000_000_000 + stamp.nsecs
         lifetime = message.lifetime.secs + message.lifetime.nsecs * 1e-9
     else:
@@ -240,8 +236,8 @@ def _read_one(
             return MarkerRecord(key, kind, action, frame, at, problem=str(error))
     if tints:
         colors = _rows(message.colors, attrgetter("r", "g", "b", "a"), 4)
-    warning = warning or _colors_warning(kind, count, colors)
-    colors = np.clip(np.nan_to_num(colors, nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
+        warning = warning or _colors_warning(kind, count, colors)
+        colors = np.clip(np.nan_to_num(colors, nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
     x, y, z, red, green, blue, alpha = numbers[7:]
     shapes = _SOLIDS.get(kind)
     record = MarkerRecord(
@@ -264,15 +260,17 @@ def _read_one(
         "",
         warning,
         None if shapes is None else (shapes, (scaled.copy(),)),
+        None,
+        points.nbytes + colors.nbytes + len(message.text),
     )
     if shapes is None:
-        triangles = None
+        record = record._replace(instances=instances_of(record))
         if kind == TRIANGLE_LIST:
             try:
                 triangles = triangles_of(record)
             except Error as error:
                 return MarkerRecord(key, kind, action, frame, at, problem=str(error))
-        record = record._replace(instances=instances_of(record), triangles=triangles)
+            record = record._replace(triangles=triangles, size=record.size + triangles.size)
     return record
 
 
