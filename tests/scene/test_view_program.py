@@ -11,6 +11,7 @@ import pytest
 from inside import endpoint_of
 from nav2_server import Driver
 from ports import free_port
+from scene_mouse import Hand
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -1229,3 +1230,31 @@ def test_closing_waits_for_the_name_of_a_new_file(
     run_in(window, f"saving.close(); saving.save('{tmp_path}/new.rviz')")
     bench.wait(lambda: not window.isVisible())
     assert (tmp_path / "new.rviz").exists()
+
+
+def test_choices_are_never_rich_text(bench: SceneBench) -> None:
+    from PySide6.QtQml import QQmlExpression, qmlContext
+
+    import rosglass.scene
+    from rosglass.qt import QtCore
+
+    panels = QtCore.QUrl.fromLocalFile(f"{rosglass.scene.__path__[0]}/panels").toString()
+    bench.load(
+        'SettingEditor { width: 200; kind: "frame"\n'
+        'choices: ["map", "<b>bold</b>"]; value: "<b>bold</b>" }',
+        imports=f'import "{panels}"',
+    )
+
+    def shown(item: Any) -> list[Any]:
+        own = [item] if item.property("text") == "<b>bold</b>" else []
+        return own + [one for child in item.childItems() for one in shown(child)]
+
+    Hand(bench).click((190, 11))
+
+    def formats() -> list[Any]:
+        context = qmlContext(bench.view)
+        items = [one for one in shown(bench.window.contentItem()) if one.inherits("QQuickText")]
+        return [QQmlExpression(context, one, "textFormat").evaluate()[0] for one in items]
+
+    bench.wait(formats)
+    assert set(formats()) == {QtCore.Qt.TextFormat.PlainText.value}

@@ -43,7 +43,7 @@ RowLayout {
         checked: editor.kind === "bool" && editor.value === true
         onToggled: editor.edited(checked)
     }
-    ComboBox {
+    PlainComboBox {
         visible: editor.isList
         Layout.fillWidth: true
         Layout.preferredWidth: 150

@@ -29,7 +29,7 @@ Pane {
         anchors.fill: parent
         RowLayout {
             Label { text: "Type" }
-            ComboBox {
+            PlainComboBox {
                 objectName: "viewType"
                 Layout.fillWidth: true
                 model: panel.view ? panel.view.viewTypes : []
