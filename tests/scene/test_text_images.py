@@ -37,6 +37,19 @@ def test_only_texts_that_are_new_are_painted() -> None:
     assert np.array_equal(part(image, "one"), one)
 
 
+def test_a_text_that_is_wider_than_the_image_is_painted_as_a_whole() -> None:
+    from rosglass.scene.text_images import TextImage
+
+    image = TextImage(4096)
+    for texts in (["9.9"], ["9.8"]):  # from the second time on, there is room below
+        image.set_texts(texts)
+    wide = "much wider than those before it"
+    image.set_texts(["9.8", wide])
+    assert part(image, wide).shape[1] == image._boxes[wide, False][2]
+    places, _ = image.places([wide])
+    assert (places[:, :2] + places[:, 2:]).max() <= 1
+
+
 def test_an_image_of_ever_other_texts_stays_small() -> None:
     from rosglass.scene.text_images import TextImage
 

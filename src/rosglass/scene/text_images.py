@@ -76,7 +76,8 @@ class TextImage:
         top = self._free[1]
         boxes, free = _arrange(self._sizes(new), width, self._free)
         bottom = free[1] + free[2]
-        if bottom > height or self._left_out:
+        fits = bottom <= height and all(wide <= width for _, _, wide, _ in boxes.values())
+        if not fits or self._left_out:
             self._begin_anew(wanted)
             return 0, len(self.pixels)
         self._free = free
