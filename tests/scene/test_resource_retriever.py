@@ -176,6 +176,13 @@ def test_servers_that_answer_later_are_asked_for_one_file_each(web: WebServer) -
     assert not retriever.is_waiting
 
 
+def test_what_is_no_url_is_not_asked_for_again(web: WebServer) -> None:
+    retriever = ResourceRetriever()
+    with pytest.raises(ResourceError, match=r"^http://\[1/a.stl: Invalid IPv6 URL"):
+        retriever.find("http://[1/a.stl")
+    assert not retriever.is_waiting
+
+
 def test_a_body_without_an_end_is_cut_off(web: WebServer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(resource_retriever, "_MAX_BYTES", 100_000)
     sent = []

@@ -277,7 +277,7 @@ class ResourceRetriever:
             if time.monotonic() - now > _SLOW_S and not isinstance(reason, _NotOffered):
                 self._failures.append(time.monotonic())
             return _Outcome(time.monotonic() + _REMEMBER_S, None, f"{reason}{_LATER}")
-        except Error as reason:
+        except (Error, ValueError) as reason:  # the latter of what is no URL
             error = _plain(reason, uri)
         self._unanswered.pop(uri, None)
         return _Outcome(time.monotonic() + _REMEMBER_S, data, error)
@@ -415,6 +415,6 @@ def _check_size(size: int) -> None:
         raise ResourceError(f"{size} bytes; the limit is {_MAX_BYTES}")
 
 
-def _plain(error: Error, uri: str) -> str:
+def _plain(error: Exception, uri: str) -> str:
     """Return an error without the URI that it begins with."""
     return str(error).removeprefix(f"{uri}: ")
