@@ -1116,6 +1116,34 @@ def test_a_grabbed_picture_shows_all(bench: SceneBench, monkeypatch: pytest.Monk
     bench.picture()
 
 
+def test_texts_that_are_taken_away_meanwhile_hide_nothing(
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene.drawing import Labels
+
+    view = bench.load("AxesDisplay {}")
+    labels = Labels()
+    labels.set_texts(["a text"], [(0.0, 0.0, 1.0)])
+    view.scene.root.add(labels)
+    bench.picture()
+    (renderer,) = renderers_of(view)
+    take, problems = renderer._take_frame, []
+
+    def take_late() -> Any:
+        frame = take()
+        if labels.count:
+            # Another thread draws then, or the next frame waits, for QML is to have its time.
+            view._next_picture = time.monotonic() + 60
+            labels.set_texts([], [])
+        return frame
+
+    monkeypatch.setattr(renderer, "_take_frame", take_late)
+    monkeypatch.setattr(renderer, "_on_problem", problems.append)
+    bench.picture()
+    assert not labels.count
+    assert problems == []
+
+
 def test_texts_are_drawn_between_what_is_translucent_by_their_distance(bench: SceneBench) -> None:
     from rosglass.scene.drawing import BOX, Labels, Mesh, instance_matrix
 

@@ -495,6 +495,8 @@ class _LabelsOnDevice(_OnDevice):
         Args:
             others: Squared metres from the eye.
         """
+        if not len(self._far):
+            return  # they were taken away after the frame was taken
         ends = [0, len(self._far)]
         if len(self._far) > 1:
             cuts = np.searchsorted(-self._far, -others)
