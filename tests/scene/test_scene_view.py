@@ -1043,6 +1043,21 @@ def test_a_view_that_leaves_its_window_frees_what_it_made_there(bench: SceneBenc
     bench.picture()
 
 
+def test_the_first_frame_may_be_announced_with_further_ones(bench: SceneBench) -> None:
+    from PySide6.QtCore import QMetaObject, Qt
+
+    view = bench.load("AxesDisplay {}")
+    bench.picture()
+    for _ in range(4):  # as of a thread that has drawn four frames meanwhile
+        QMetaObject.invokeMethod(view, "_take_mouse", Qt.ConnectionType.QueuedConnection)
+    bench.wait(lambda: view.acceptedMouseButtons() == Qt.MouseButton.AllButtons)
+    bench.wait.nothing_happens(0.1)
+    # The view still follows the frames of its window, by which it leaves time to QML.
+    began = view._frame_began
+    view.update()
+    bench.wait(lambda: view._frame_began > began)
+
+
 def boxes_in_a_row(count: int) -> list[Any]:
     """Return red boxes beside each other, as drawables of their own."""
     from rosglass.scene.drawing import BOX, Mesh, instance_matrix

@@ -121,7 +121,9 @@ class SceneView(QQuickRhiItem):
         self._hover.setSingleShot(True)
         self._hover.setInterval(_HOVER_MS)
         self._hover.timeout.connect(self._hover_again)
+        #: Connections to the window: to each frame, and to the end of the first one until then.
         self._frames: list[Any] = []
+        self._first_frame: Any = None
         #: What the view itself draws into the scene: its tools, the marks of what is selected.
         self.overlay = Group()
         #: What is selected.
@@ -792,7 +794,13 @@ class SceneView(QQuickRhiItem):
     def _take_mouse(self) -> None:
         # After the window's first frame, as PySide then makes all of Qt's enumerations, in 12 ms.
         self.setAcceptedMouseButtons(QtCore.Qt.MouseButton.AllButtons)
-        QtCore.QObject.disconnect(self._frames.pop())
+        self._forget_first_frame()
+
+    def _forget_first_frame(self) -> None:
+        # Where another thread draws, the ends of further frames may be on their way already.
+        first, self._first_frame = self._first_frame, None
+        if first is not None:
+            QtCore.QObject.disconnect(first)
 
     @Slot()
     def _report_device(self) -> None:
@@ -814,12 +822,13 @@ class SceneView(QQuickRhiItem):
     def _on_window(self, window: QQuickWindow | None) -> None:
         while self._frames:
             QtCore.QObject.disconnect(self._frames.pop())
+        self._forget_first_frame()
         self._drawing = None
         if window is None:
             return
         self._frames.append(window.afterAnimating.connect(self._on_frame))
         self._frames.append(window.frameSwapped.connect(self._on_frame_swapped))
-        self._frames.append(window.afterFrameEnd.connect(self._take_mouse))
+        self._first_frame = window.afterFrameEnd.connect(self._take_mouse)
         api = window.rendererInterface().graphicsApi()
         self._set_problem(NO_GPU if api == QSGRendererInterface.GraphicsApi.Software else "")
 
