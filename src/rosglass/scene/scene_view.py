@@ -141,7 +141,6 @@ class SceneView(QQuickRhiItem):
         self._view.on_change, self._view.on_target = self.camera_moved, self._on_placed
         #: Why the camera does not follow its target frame.
         self._view_problem = ""
-        self._moved_at = -1.0
         self._still = QtCore.QTimer(self)
         self._still.setSingleShot(True)
         self._still.setInterval(int(_STILL_S * 1000))
@@ -657,7 +656,6 @@ class SceneView(QQuickRhiItem):
 
     def camera_moved(self) -> None:
         """Draw from where the camera is now."""
-        self._moved_at = time.monotonic()
         self._still.start()
         self._show_focal_shape()
         self.cameraChanged.emit()
@@ -744,7 +742,8 @@ class SceneView(QQuickRhiItem):
             list(self._drawables()),
             self.camera(),
             self._background,
-            time.monotonic() - self._moved_at < _STILL_S,
+            # Not by the clock: the timer, after which the whole is drawn, may end early.
+            self.is_moving,
         )
 
     def _request_picture(self) -> None:
