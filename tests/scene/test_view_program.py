@@ -113,6 +113,23 @@ def test_displays_are_added_renamed_moved_and_removed(bench: SceneBench, model: 
     assert [one.name for one in bench.view.scene.displays] == ["Grid"]
 
 
+def test_topics_are_suggested_as_rviz_suggests_them(bench: SceneBench, model: Any) -> None:
+    kinds = {
+        "/arrow": "visualization_msgs/Marker",
+        "/arrows": "visualization_msgs/MarkerArray",
+        "/map": "nav_msgs/OccupancyGrid",
+        "/map_updates": "map_msgs/OccupancyGridUpdate",
+    }
+    for topic, kind in kinds.items():
+        bench.robot.create_publisher(topic, kind)
+    bench.wait(lambda: kinds.keys() <= bench.view.scene.node.topics().keys())
+    found = [(one["topic"], one["display"]) for one in model.suggestions()]
+    assert found == [("/arrow", "Marker"), ("/arrows", "MarkerArray"), ("/map", "Map")]
+    model.add("Map", "/map")
+    choices = {row.label: row.choices for row in model.rows if row.kind == "topic"}
+    assert choices == {"Topic": ("/map",), "Update Topic": ("/map_updates",)}
+
+
 def test_a_refresh_lists_the_topics_of_the_robot_once(
     bench: SceneBench, model: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -592,7 +592,7 @@ class OneTopicDisplay(Display):
 
     Attributes:
         MESSAGES: Names of the types that it shows, without ``msg/``.
-        SUGGESTED: Those of topics that panels suggest, if these are fewer.
+        SUGGESTED: Those of topics that panels suggest for it, if these are fewer.
     """
 
     MESSAGES: ClassVar[tuple[str, ...]] = ()
@@ -639,6 +639,10 @@ class OneTopicDisplay(Display):
 
     def _saved_topic(self) -> TopicSetting:
         return TopicSetting(self.topic, self.depth)
+
+    def suggested(self, path: str) -> tuple[str, ...]:  # noqa: ARG002 - for subclasses
+        """Return the types of the topics that panels suggest for a setting."""
+        return self.SUGGESTED or self.MESSAGES
 
     def on_group_enabled(self) -> None:
         """Receive something, or nothing any more, as it or its group is shown or hidden."""

@@ -381,7 +381,7 @@ class DisplaysModel(QAbstractListModel):
         if setting.kind.NAME == "frame" and display.scene is not None:
             return (FIXED_FRAME, *display.scene.frames())
         if setting.kind.NAME == "topic" and isinstance(display, OneTopicDisplay):
-            wanted = display.SUGGESTED or display.MESSAGES
+            wanted = display.suggested(setting.path)
             return tuple(name for name, kinds in self._topics() if set(kinds) & set(wanted))
         return ()
 

@@ -116,6 +116,7 @@ class MapDisplay(TopicDisplay):
 
     TYPE = "Map"
     MESSAGES = ("nav_msgs/OccupancyGrid", "map_msgs/OccupancyGridUpdate")
+    SUGGESTED = MESSAGES[:1]
     KEEPS_ALL = True
     #: A kept update may be older than the map.
     FURTHER_QOS: ClassVar[QoS] = QoS(reliability=Reliability.BEST_AVAILABLE)
@@ -172,6 +173,10 @@ class MapDisplay(TopicDisplay):
                 {**before, "Value": updates} if isinstance(before, dict) else updates
             )
         return kept
+
+    def suggested(self, path: str) -> tuple[str, ...]:
+        """Return the types of the topics that panels suggest for a setting."""
+        return self.MESSAGES[1:] if path == "Update Topic" else super().suggested(path)
 
     def further_topics(self, topic: str) -> tuple[str, ...]:
         """Return the topic of updates."""

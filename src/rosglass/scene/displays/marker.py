@@ -783,6 +783,7 @@ class MarkerDisplay(Markers):
     """Markers of a ``visualization_msgs/Marker`` topic. See its page in ``docs/scene.md``."""
 
     TYPE = "Marker"
+    SUGGESTED = Markers.MESSAGES[:1]
 
     def further_topics(self, topic: str) -> tuple[str, ...]:
         """Return the topic of arrays that RViz receives beside it."""
@@ -793,3 +794,4 @@ class MarkerArrayDisplay(Markers):
     """Markers of a ``visualization_msgs/MarkerArray`` topic. See its page in ``docs/scene.md``."""
 
     TYPE = "MarkerArray"
+    SUGGESTED = Markers.MESSAGES[1:]
