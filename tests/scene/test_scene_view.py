@@ -666,6 +666,23 @@ def test_frames_are_updated_at_the_interval_and_at_once_after_it_is_0(bench: Sce
     bench.wait(lambda: move(3.0) and places() == [3.0, 0.0])
 
 
+def test_a_static_frame_is_shown_after_the_interval_in_which_it_came(bench: SceneBench) -> None:
+    from rosglass import Time
+    from rosglass.tf import StaticTransformBroadcaster, Transform
+
+    view = bench.load("TFDisplay { updateInterval: 1 }")
+    (frames,) = view.scene.displays
+    static = StaticTransformBroadcaster(bench.robot)
+
+    def add(frame: str) -> None:
+        static.send_transform(Transform((1, 0, 0), (0, 0, 0, 1), Time(1), "map", frame))
+
+    add("arm")
+    bench.wait(lambda: frames.frames == ["arm", "map"])
+    add("hand")
+    bench.wait(lambda: frames.frames == ["arm", "hand", "map"])
+
+
 def test_what_follows_frames_fades_without_a_node(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import Transform, TransformBroadcaster

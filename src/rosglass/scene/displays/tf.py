@@ -231,10 +231,12 @@ class TFDisplay(Display):
 
     @Slot()
     def _on_tick(self) -> None:
-        # Frames that are not updated any more fade without a transform.
         super()._on_tick()
         if self.shown and self._moves:
+            # Frames that are not updated any more fade without a transform.
             self._draw_after(_LOOK_S)
+        elif self.shown:
+            self.on_transforms()  # what came during the Update Interval, as the last one
 
     def _report_refused(self) -> None:
         """Say which transform was refused last, while there are any."""
