@@ -43,6 +43,7 @@ def test_a_header_without_a_frame_is_an_error(bench: SceneBench) -> None:
     for display in (path, area):
         assert display.statusLevel == "error"
         assert "header.frame_id is empty" in display.statusText
+        assert display.status_lines["Topic"].text.endswith(" messages received")
     assert not len(path.root)
     bench.wait(lambda: send(frame_id="map") and path.statusLevel == area.statusLevel == "ok")
 
@@ -103,6 +104,20 @@ def test_the_status_says_why_nothing_was_received(
     # It may not be the subscription of the scan that the publisher knows already.
     message = {"header": {"frame_id": "map"}, "ranges": [1.0], "range_max": 2.0}
     bench.wait(lambda: publisher.publish(message) or " messages received" in scan.statusText)
+
+
+def test_depth_images_that_have_no_publisher_are_named_where_a_calibration_came(
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.qml import element
+
+    monkeypatch.setattr(element, "NO_PEER_MS", 1500)
+    view = bench.load('DepthCloudDisplay { topic: "/depth/image" }')
+    (display,) = view.scene.displays
+    info = bench.robot.create_publisher("/depth/camera_info", "sensor_msgs/CameraInfo")
+    bench.wait(lambda: info.publish() or display.received)
+    wanted = "No messages received on /depth/image: it has no publisher"
+    bench.wait(lambda: wanted in display.statusText, lambda: display.statusText)
 
 
 def test_a_policy_that_no_publisher_offers_is_named(bench: SceneBench) -> None:

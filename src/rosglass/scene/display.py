@@ -857,10 +857,6 @@ class TopicDisplay(OneTopicDisplay):
     def _on_created(self, endpoint: Any) -> None:  # noqa: ARG002 - the base class's signature
         self._begin_to_wait()
 
-    def _is_waiting(self) -> bool:
-        queue = self._queue
-        return super()._is_waiting() and queue is not None and not queue.received
-
     def _on_closed(self, endpoint: Any) -> None:  # noqa: ARG002 - the base class's signature
         self._queue = None
         self._waiting.clear()
@@ -982,13 +978,14 @@ class TopicDisplay(OneTopicDisplay):
             self.set_status("Message", "error", error)
         elif items:
             self.delete_status("Message")
+        if items or error:
+            self.set_status("Topic", "ok", f"{queue.received} messages received")
         if not items:
             return
         now = self._steady()
         self._intervals.append(now - self._arrived_at)
         self._arrived, self._arrived_at = time.time(), now
         self._newest = items[-1]
-        self.set_status("Topic", "ok", f"{queue.received} messages received")
         self._outdated = False
         self._waiting.extend(items)
         self._show_waiting()
