@@ -361,6 +361,19 @@ def test_a_broken_display_keeps_no_other_from_fading(
     assert "ZeroDivisionError" in broken.statusText
 
 
+def test_a_broken_display_keeps_no_other_from_reading_its_files_again(
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    view = bench.load("AxesDisplay {} AxesDisplay {}")
+    broken, other = view.scene.displays
+    read: list[str] = []
+    monkeypatch.setattr(broken, "on_files", lambda _: 1 / 0)
+    monkeypatch.setattr(other, "on_files", read.extend)
+    view.scene._on_asked_again(["http://robot/arm.stl"])
+    assert read == ["http://robot/arm.stl"]
+    assert "ZeroDivisionError" in broken.statusText
+
+
 def test_transforms_in_the_namespace_of_the_node_have_publishers(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -473,7 +473,7 @@ class Scene(Element):
         if is_alive(self) and uris and not isinstance(uris, Error):
             self._ask_again_s = _ASK_AGAIN_S
             for display in self._alive():
-                display.on_files(uris)
+                self._call(display, lambda one: one.on_files(uris))
 
     def _retriever(self) -> ResourceRetriever:
         if not self._resources:
