@@ -245,6 +245,28 @@ def test_a_marker_replaces_the_one_of_its_id(show: Callable[..., Any]) -> None:
     assert sorted(labels.texts) == ["a", "b"]
 
 
+def test_a_list_that_is_sent_again_is_drawn_in_each_picture(
+    bench: SceneBench, show: Callable[..., Any]
+) -> None:
+    clear, blue = {**RED, "a": 0.5}, {"b": 1.0, "a": 1.0}
+    sizes = {"x": 0.5, "y": 1.0, "z": 2.0}
+    display = show(marker(6, points=points((-2, 0, 0), (2, 0, 0)), scale=sizes, color=clear))
+    (cloud,) = drawables(display)
+    assert (cloud.style, cloud.opaque) == ("boxes", False)
+    bench.picture()
+    # As the same drawable, which is not uploaded in a later picture, as what is new may be.
+    last = marker(7, points=points((0, 1, 0)), color=blue)
+    assert drawables(show(last)) == [cloud]
+    changed = bench.picture()
+    show(marker(7, action=DELETE))
+    assert drawables(show(last)) != [cloud]
+    assert np.array_equal(bench.picture(), changed)
+    # A list that becomes something else, and the other way round.
+    (mesh,) = drawables(show(marker(1)))
+    assert isinstance(mesh, Mesh)
+    assert [type(one) for one in drawables(show(last))].count(Points) == 1
+
+
 def test_colors_of_points_count(show: Callable[..., Any]) -> None:
     line = points((0, 0, 0), (1, 0, 0))
     two = [RED, {"r": 0.0, "g": 1.0, "b": 0.0, "a": 1.0}]

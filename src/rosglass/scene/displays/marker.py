@@ -163,6 +163,12 @@ class MarkerGroup:
         if own and look and self._looks.get(key) == look:
             own.pose = place
             return
+        cloud = next(iter(own)) if own and marker.kind in _POINT_STYLES else None
+        if own and isinstance(cloud, Points):
+            # What is new is uploaded over several pictures: until then, it would be missing.
+            _set_list(cloud, marker)
+            own.pose = place
+            return
         self.remove(key)
         group = Group(*_drawables(marker, meshes))
         for item in group:
@@ -259,10 +265,9 @@ class MarkerGroup:
 
 def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]:
     """Iterate over what a marker draws beside instances, in its own frame."""
-    kind, points, (x, y, z) = marker.kind, marker.points, marker.scale
-    each = marker.colors if len(marker.colors) == len(points) else marker.color
+    kind, points = marker.kind, marker.points
     if kind in (LINE_STRIP, LINE_LIST):
-        lines = Lines(abs(x), in_metres=True)
+        lines = Lines(abs(marker.scale[0]), in_metres=True)
         tints = _line_colors(marker)
         if kind == LINE_STRIP:
             lines.set_strip(points, tints)
@@ -272,11 +277,7 @@ def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]
         yield lines
     elif kind in _POINT_STYLES:
         cloud = Points()
-        # Their sides are equal: the others come with the pose.
-        sides = np.abs([1.0, y / x, z / x]) if kind == CUBE_LIST else np.ones(3)
-        cloud.set_points(points / sides, _list_colors(each))
-        cloud.pose = np.diag([*sides, 1.0])
-        cloud.set_look(style=_POINT_STYLES[kind], size=abs(x))
+        _set_list(cloud, marker)
         yield cloud
     elif kind == TRIANGLE_LIST:
         shape, color, lit = _triangles_look(marker)
@@ -285,6 +286,17 @@ def _drawables(marker: MarkerRecord, meshes: MarkerMeshes) -> Iterable[Drawable]
         yield from _arrow_strip(marker)
     elif kind == MESH:
         yield from meshes.of(marker)
+
+
+def _set_list(cloud: Points, marker: MarkerRecord) -> None:
+    """Let points show a list of cubes, spheres or points."""
+    kind, points, (x, y, z) = marker.kind, marker.points, marker.scale
+    each = marker.colors if len(marker.colors) == len(points) else marker.color
+    # Their sides are equal: the others come with the pose.
+    sides = np.abs([1.0, y / x, z / x]) if kind == CUBE_LIST else np.ones(3)
+    cloud.set_points(points / sides, _list_colors(each))
+    cloud.pose = np.diag([*sides, 1.0])
+    cloud.set_look(style=_POINT_STYLES[kind], size=abs(x))
 
 
 def _line_colors(marker: MarkerRecord) -> NDArray[np.float32] | tuple[float, ...]:
