@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from typing import Any
 
 import numpy as np
@@ -81,6 +82,33 @@ def test_texts_have_places_and_sizes_in_lines_or_no_room() -> None:
     image.set_texts(many[-3:])
     _, sizes = image.places(many[-3:])
     assert sizes[:, 1].tolist() == [1, 1, 1]
+
+
+@pytest.mark.parametrize("limit", [64, 256, 1000])
+def test_random_texts_are_beside_each_other_in_the_image(limit: int) -> None:
+    from rosglass.scene.text_images import TextImage
+
+    chance = random.Random(limit)
+    for outlined in (False, True) * 5:
+        image = TextImage(limit)
+        for _ in range(25):
+            lengths = [
+                chance.choice((0, 1, 3, 10, 60)) for _ in range(chance.choice((0, 1, 5, 30)))
+            ]
+            texts = ["".join(chance.choices("ab W\n", k=length)) for length in lengths]
+            before = image.pixels
+            top, bottom = image.set_texts(texts, outlined)
+            height, width = image.pixels.shape
+            assert 0 <= top <= bottom <= height <= limit
+            assert width <= limit
+            assert image.pixels is before or (top, bottom) == (0, height)
+            used = np.zeros((height, width), int)
+            for left, upper, wide, high in image._boxes.values():
+                assert left + wide <= width or not high
+                assert upper + high <= height
+                used[upper : upper + high, left : left + wide] += 1
+            assert used.max(initial=0) <= 1
+            assert all((text, False) in image._boxes for text in texts)
 
 
 def test_edges_are_texts_of_their_own_around_the_letters() -> None:

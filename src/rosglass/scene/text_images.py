@@ -70,7 +70,7 @@ class TextImage:
         if outlined:
             wanted.update(dict.fromkeys((text, True) for text in texts))
         new = [text for text in wanted if text not in self._boxes]
-        if not new and not self._left_out:
+        if not wanted or not (new or self._left_out):
             return 0, 0
         height, width = self.pixels.shape
         top = self._free[1]
