@@ -762,6 +762,34 @@ def test_a_frame_is_hidden_by_its_check_box(bench: SceneBench, window: Any) -> N
     bench.wait(lambda: tf.frames == ["map"])
 
 
+def test_a_text_being_typed_stays_while_rows_come_above_and_below(
+    bench: SceneBench, window: Any
+) -> None:
+    from PySide6.QtTest import QTest
+
+    rows = Rows(window)
+    rows.model.toggle(row_of(rows.model, "Grid"))
+    window.grabWindow()
+    rows.click(rows.at("Cell Size", x=230))
+    field = bench.wait(window.activeFocusItem)
+    rows.model.active = False
+    field.selectAll()
+    for letter in "57":
+        QTest.keyClick(window, letter)
+    for change in (
+        lambda: rows.scene.find("Grid").set_status("X", "warn", "bad"),
+        rows.scene.find("Grid").clear_status,
+    ):
+        change()
+        rows.scene.add("Axes")  # a row below
+        window.grabWindow()
+        assert window.activeFocusItem() == field
+        assert field.property("text") == "57"
+    QTest.keyClick(window, "5")
+    rows.key("Return")
+    assert rows.scene.find("Grid").cellSize == 575.0
+
+
 def test_a_typed_frame_counts_when_the_user_goes_on(bench: SceneBench, window: Any) -> None:
     from PySide6.QtCore import QObject, QPoint
     from PySide6.QtTest import QTest

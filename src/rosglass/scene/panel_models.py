@@ -238,32 +238,44 @@ class DisplaysModel(QAbstractListModel):
         view = self._view
         self._seen_topics = None
         new = list(self._walk(view)) if view is not None and is_alive(view) else []
-        old = self._rows
-        if [row.key for row in new] != [row.key for row in old]:
-            # As few rows as possible: an editor that is open stays so.
-            start = 0
-            while start < min(len(old), len(new)) and old[start].key == new[start].key:
-                start += 1
-            end = 0
-            while end < min(len(old), len(new)) - start and old[-1 - end].key == new[-1 - end].key:
-                end += 1
-            if start < len(old) - end:
-                self.beginRemoveRows(QModelIndex(), start, len(old) - end - 1)
-                self._rows = [*old[:start], *old[len(old) - end :]]
-                self.endRemoveRows()
-            if start < len(new) - end:
-                self.beginInsertRows(QModelIndex(), start, len(new) - end - 1)
-                self._rows = [
-                    *self._rows[:start],
-                    *new[start : len(new) - end],
-                    *self._rows[start:],
-                ]
-                self.endInsertRows()
+        if [row.key for row in new] != [row.key for row in self._rows]:
+            self._change_rows(new)
         before, self._rows = self._rows, new
         for number, (one, other) in enumerate(zip(before, new, strict=True)):
             if one != other:
                 index = self.index(number)
                 self.dataChanged.emit(index, index)
+
+    def _change_rows(self, new: list[PanelRow]) -> None:
+        """Remove and insert rows, as few as possible: an editor that is open stays so."""
+        known, wanted = {row.key for row in self._rows}, {row.key for row in new}
+        here = [row.key for row in self._rows if row.key in wanted]
+        there = [row.key for row in new if row.key in known]
+        # All of them, unless displays were moved.
+        start = end = 0
+        while start < len(here) and here[start] == there[start]:
+            start += 1
+        while end < len(here) - start and here[-1 - end] == there[-1 - end]:
+            end += 1
+        kept = {*here[:start], *here[len(here) - end :]}
+        first = len(self._rows)
+        while first > 0:
+            last = first = first - 1
+            if self._rows[first].key not in kept:
+                while first > 0 and self._rows[first - 1].key not in kept:
+                    first -= 1
+                self.beginRemoveRows(QModelIndex(), first, last)
+                del self._rows[first : last + 1]
+                self.endRemoveRows()
+        last = -1
+        while last + 1 < len(new):
+            first = last = last + 1
+            if new[first].key not in kept:
+                while last + 1 < len(new) and new[last + 1].key not in kept:
+                    last += 1
+                self.beginInsertRows(QModelIndex(), first, last)
+                self._rows[first:first] = new[first : last + 1]
+                self.endInsertRows()
 
     def _walk(self, view: SceneView) -> Iterator[PanelRow]:
         scene = view.scene
