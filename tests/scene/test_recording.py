@@ -130,6 +130,11 @@ def test_interfaces_are_recorded_as_well(app: Any, tmp_path: Path) -> None:
     _, said = process.communicate(timeout=60)
     assert process.returncode == 1
     assert "--record: Qt's software renderer cannot be recorded" in said
+    process = start("run", str(tmp_path / "none.qml"), "--record", str(tmp_path / "none.mp4"))
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert "there is no such file" in said
+    assert "recording to" not in said
 
 
 @pytest.mark.parametrize("interface", ["opengl", "vulkan"])

@@ -72,10 +72,7 @@ def make_recorder(args: argparse.Namespace) -> WindowRecorder | None:
         if not str(error.name).startswith("PySide6"):
             raise
         raise UnsupportedError('--record needs Qt 6: pip install "rosglass[qml]"') from None
-    recorder = WindowRecorder(args.record)
-    # What the window shows is in the video: a kiosk has no mark of it.
-    note(f"recording to {recorder.path}")
-    return recorder
+    return WindowRecorder(args.record)
 
 
 def show_interface(args: argparse.Namespace, file: str, **options: Any) -> int:
@@ -193,6 +190,8 @@ def _show(
     def shown() -> None:
         if recorder is not None and app.window is not None:
             recorder.start(app.window)
+            # What the window shows is in the video: a kiosk has no mark of it.
+            note(f"recording to {recorder.path}")
         if picture is not None:
             picture.take(app.quit, lambda target: _save_connected(app, target))
 
