@@ -154,6 +154,9 @@ def test_fewer_poses_are_shown_at_once_and_the_most_is_said(
     display.keep = 2
     assert parts(display, CYLINDER)[0].count == 2
     assert display.statusLevel == "ok", display.statusText
+    display.set_status("Keep", "warn", "of poses that are dropped")
+    display.reset()
+    assert "Keep" not in display.status_lines
 
 
 def test_the_most_messages_of_a_history_is_said(
@@ -169,6 +172,9 @@ def test_the_most_messages_of_a_history_is_said(
     display.historyLength = 3
     assert len(parts(display, SPHERE)) == 3
     assert display.statusLevel == "ok", display.statusText
+    display.set_status("History Length", "warn", "of messages that are dropped")
+    display.reset()
+    assert "History Length" not in display.status_lines
 
 
 def test_odometry_keeps_poses_that_are_apart(show: Callable[..., Any]) -> None:

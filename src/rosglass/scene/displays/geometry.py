@@ -124,6 +124,7 @@ class HistoryDisplay(TopicDisplay):
         """Drop all messages."""
         super().reset()
         self._kept.clear()
+        self._drop_old()
 
 
 def _vector(name: str, vector: Any) -> tuple[float, float, float]:

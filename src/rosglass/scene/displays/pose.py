@@ -467,6 +467,11 @@ class OdometryDisplay(_WithCovariance):
         self._drop_old()
         super()._restyle()
 
+    def reset(self) -> None:
+        """Drop all poses."""
+        super().reset()
+        self._drop_old()
+
     def _drop_old(self) -> None:
         gone = max(len(self._poses) - min(self.keep or _MAX_KEPT, _MAX_KEPT), 0)
         del self._poses[:gone], self._covariances[:gone], self._shapes[:gone]
