@@ -1138,6 +1138,12 @@ def test_a_goal_goes_to_the_topic_that_was_just_set(bench: SceneBench, nav2: Any
     bench.wait(lambda: driver.goals)
     goal.cancelGoal()
     bench.wait(lambda: not goal.goalActive)
+    goal.action = "served_by_nobody"
+    goal.send_pose(3.0, 2.0, 0.0)
+    bench.wait(lambda: "looking for a server" in view.tools.outcome)
+    goal.action = ""
+    goal._on_tick()  # before what sends has followed
+    bench.wait(lambda: "the topic was changed" in view.tools.outcome, lambda: view.tools.outcome)
     assert (len(before), len(after)) == (0, 1)
 
 

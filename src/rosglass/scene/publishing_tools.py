@@ -503,6 +503,8 @@ class SetGoalTool(PoseTool):
 
     def _send_waiting(self) -> None:
         client, waiting = self._endpoint, self._waiting
+        if client is not None and hasattr(client, "send_goal") != bool(self.action):
+            return  # the topic or action was just set: it is about to be replaced
         if not self.action or client is None or waiting is None or self._session is None:
             super()._send_waiting()
             return

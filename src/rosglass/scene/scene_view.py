@@ -908,8 +908,9 @@ class SceneView(QQuickRhiItem):
             modifiers = Modifier(QGuiApplication.keyboardModifiers().value & _MODIFIERS)
             at = (self._pointed.x(), self._pointed.y())
             self._tools.on_move(PointerEvent(self, at, modifiers=modifiers))
-            # What a tool shows of it is no reason to look once more.
-            self._hover.stop()
+            if is_alive(self):
+                # What a tool shows of it is no reason to look once more.
+                self._hover.stop()
 
     def wheelEvent(self, event: Any) -> None:
         """Zoom."""
