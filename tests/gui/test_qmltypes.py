@@ -132,6 +132,7 @@ def test_the_panels_of_the_3d_view_are_known() -> None:
     hidden = {
         "ColorChooser.qml",
         "MarkerMenu.qml",
+        "PlainComboBox.qml",
         "PlainToolTip.qml",
         "SettingEditor.qml",
         "View.qml",

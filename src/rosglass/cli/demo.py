@@ -46,8 +46,6 @@ def run(args: argparse.Namespace) -> int:
     if headless:
         seconds = _HEADLESS_DURATION_S if seconds is None else seconds
         screenshot = screenshot or Path("demo.png")
-    if screenshot is not None and not screenshot.resolve().parent.is_dir():
-        raise Error(f"--screenshot {screenshot}: there is no such directory")
     with ExitStack() as stack:
         if headless:
             _use_virtual_screen(stack, seconds)
