@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from rosglass.comm.handle import check_flag
 from rosglass.comm.names import similar
 from rosglass.errors import ArgumentError, UnsupportedError
+from rosglass.extras import install_command
 from rosglass.interfaces import Library
 from rosglass.ros2.ros_arguments import Arguments
 from rosglass.wires.zenoh.options import ZenohOptions
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from rosglass.comm import Node
     from rosglass.ros2 import Middleware
 
-__all__ = ["connect", "default_url", "explain_missing"]
+__all__ = ["connect", "default_url"]
 
 _SCHEMES = ("dds", "zenoh", "ros1", "local")
 _EXAMPLE = "zenoh://127.0.0.1:7447"
@@ -37,18 +38,6 @@ _MIDDLEWARES = {
     "rmw_fastrtps_dynamic_cpp": "dds://",
     "rmw_connextdds": "dds://",
     "rmw_gurumdds_cpp": "dds://",
-}
-#: Optional packages, and the extra that installs them.
-_EXTRA_OF = {
-    "PySide6": "qml",
-    "zenoh": "zenoh",
-    "xxhash": "zenoh",
-    "cyclonedds": "dds",
-    "cv2": "images",
-    "av": "video",
-    "mcap": "bags",
-    "rosbags": "bags",
-    "argcomplete": "completion",
 }
 _anonymous = itertools.count(1)
 
@@ -214,7 +203,7 @@ def _zenoh(url: str) -> Middleware:
     if find_spec("zenoh") is None or find_spec("xxhash") is None:
         raise UnsupportedError(
             f"cannot connect to {url!r}: Zenoh is not installed; "
-            'install it with: pip install "rosglass[zenoh]"; '
+            f"install it with: {install_command('zenoh')}; "
             "without it, there are dds:// (other ROS 2 robots) and ros1://host:11311 (ROS 1)"
         )
     options = ZenohOptions.parse(url, os.environ)
@@ -227,7 +216,7 @@ def _dds(url: str) -> Middleware:
     if find_spec("cyclonedds") is None:
         raise UnsupportedError(
             f"cannot connect to {url!r}: Cyclone DDS is not installed; "
-            'install it with: pip install "rosglass[dds]"; '
+            f"install it with: {install_command('dds')}; "
             "without it, there are zenoh:// (ROS 2 with rmw_zenoh) and ros1://host:11311 (ROS 1)"
         )
     from rosglass.wires.dds.middleware import DdsMiddleware  # noqa: PLC0415 - an extra
@@ -239,11 +228,3 @@ def _local(url: str) -> Middleware:
     from rosglass.wires.local import LocalMiddleware  # noqa: PLC0415 - for tests
 
     return LocalMiddleware(url)
-
-
-def explain_missing(error: ModuleNotFoundError) -> str:
-    """Return how to install a missing package; empty if no extra installs it."""
-    extra = _EXTRA_OF.get((error.name or "").partition(".")[0])
-    if extra is None:
-        return ""
-    return f'{error.name} is not installed; install it with: pip install "rosglass[{extra}]"'

@@ -11,6 +11,7 @@ import pytest
 
 from rosglass.comm import ConnectionState
 from rosglass.errors import ConnectionLostError, Error, UnsupportedError
+from rosglass.extras import install_command
 from rosglass.qml import IMPORT_PATHS, Session, install
 from rosglass.qml.modules import register
 from rosglass.qt import QtCore, QtQml
@@ -152,7 +153,7 @@ def test_a_package_that_is_missing_is_named_with_what_installs_it(
     session = type(bench.session)("replay:drive.mcap")
     session.init("a")
     wait(lambda: session.state == "failed")
-    assert 'mcap.reader is not installed; install it with: pip install "rosglass[bags]"' in (
+    assert f"mcap.reader is not installed; install it with: {install_command('bags')}" in (
         session.detail
     )
     session.close()

@@ -8,6 +8,7 @@ import pytest
 from local_world import LocalNode, LocalWorld
 
 from rosglass.errors import QmlError
+from rosglass.extras import install_command
 from rosglass.qml import Session
 from rosglass.qml.runner import Runner, needs_widgets
 from rosglass.qml.waiting import wait_for
@@ -367,7 +368,7 @@ def test_errors_name_the_package_that_is_missing(file: Path, module: str) -> Non
     if not QT6:
         assert "apt install qml-module-qt" in text
     elif module == "QtMultimedia":
-        assert text.endswith('to install it: pip install "rosglass[camera]"')
+        assert text.endswith(f"to install it: {install_command('camera')}")
 
 
 def test_a_kiosk_stays_open_and_hides_the_pointer(

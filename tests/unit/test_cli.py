@@ -16,6 +16,7 @@ from rosglass.cli.arguments import COMMANDS
 from rosglass.cli.messages import split_type
 from rosglass.cli.network import interfaces, is_loopback, router_problem
 from rosglass.cli.program import _split, build_parser
+from rosglass.extras import install_command
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -112,7 +113,7 @@ def test_missing_extra_names_the_fix(
 
     monkeypatch.setattr("rosglass.cli.program.import_module", no_module)
     assert main(["router"]) == 1
-    assert 'pip install "rosglass[zenoh]"' in capsys.readouterr().err
+    assert install_command("zenoh") in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

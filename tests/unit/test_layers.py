@@ -21,6 +21,7 @@ ROOT = Path(rosglass.__file__).parent
 RANK = {
     "errors": 0,
     "interrupts": 0,
+    "extras": 0,
     "interfaces": 1,
     "messages": 2,
     "comm": 3,

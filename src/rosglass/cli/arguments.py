@@ -183,7 +183,7 @@ def _add_video(parser: argparse.ArgumentParser) -> None:
         "--record",
         metavar="VIDEO",
         help="record the window as a video (.mp4, .mkv, .webm) until it is closed; needs Qt 6 and "
-        '"rosglass[video]"',
+        "the extra [video]",
     )
 
 

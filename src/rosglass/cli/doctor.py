@@ -31,8 +31,9 @@ from rosglass.cli.network import (
 )
 from rosglass.cli.output import Style
 from rosglass.comm import ConnectionState, anonymous_name
-from rosglass.connection import default_url, explain_missing
+from rosglass.connection import default_url
 from rosglass.errors import ConnectionLostError, ConversionError, Error, MasterError
+from rosglass.extras import explain_missing, install_command
 from rosglass.messages import default_library
 from rosglass.wires.tcpros.address import explain_unreachable, parse_uri
 from rosglass.wires.tcpros.master import call_node
@@ -157,7 +158,7 @@ def _programs() -> Iterator[_Finding]:
         try:
             yield _Finding("ok", package, f"{version(package)}, for {purpose}")
         except PackageNotFoundError:  # noqa: PERF203 - each package is a finding
-            fix = f'pip install "rosglass[{extra}]"'
+            fix = install_command(extra)
             yield _Finding("note", package, f"not installed; needed for {purpose}", fix)
 
 

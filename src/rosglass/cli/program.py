@@ -113,7 +113,7 @@ def _explain(error: Exception) -> int:
     if isinstance(error, rosglass.Error):
         return _fail(str(error))
     if isinstance(error, ModuleNotFoundError):
-        from rosglass.connection import explain_missing  # noqa: PLC0415 - only needed to explain an error
+        from rosglass.extras import explain_missing  # noqa: PLC0415 - only needed to explain an error
 
         missing = explain_missing(error)
         if missing:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.cli.output import note
 from rosglass.errors import Error, QmlError, UnsupportedError
+from rosglass.extras import install_command
 
 if TYPE_CHECKING:
     import argparse
@@ -71,7 +72,7 @@ def make_recorder(args: argparse.Namespace) -> WindowRecorder | None:
     except ModuleNotFoundError as error:
         if not str(error.name).startswith("PySide6"):
             raise
-        raise UnsupportedError('--record needs Qt 6: pip install "rosglass[qml]"') from None
+        raise UnsupportedError(f"--record needs Qt 6: {install_command('qml')}") from None
     return WindowRecorder(args.record)
 
 

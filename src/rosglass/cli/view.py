@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.cli.run import load_qt, make_recorder, show_interface
 from rosglass.errors import UnsupportedError
+from rosglass.extras import install_command
 
 if TYPE_CHECKING:
     import argparse
@@ -46,7 +47,7 @@ def _run(args: argparse.Namespace) -> int:
         if not str(error.name).startswith("PySide6"):
             raise
         raise UnsupportedError(
-            'the 3D view needs Qt 6: pip install "rosglass[qml]" (inside RViz\'s Python there is '
+            f"the 3D view needs Qt 6: {install_command('qml')} (inside RViz's Python there is "
             "Qt 5; use another virtual environment)"
         ) from None
     recorder = make_recorder(args)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rosglass.errors import DecodeError, UnsupportedError
+from rosglass.extras import install_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -244,7 +245,7 @@ def opencv() -> Any:
     except ImportError:
         raise UnsupportedError(
             "this picture needs OpenCV, which is not installed; "
-            'install it with: pip install "rosglass[camera]"'
+            f"install it with: {install_command('camera')}"
         ) from None
 
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rosglass.errors import DecodeError, NoPictureError, UnsupportedError
+from rosglass.extras import install_command
 from rosglass.images.encodings import MAX_PIXELS, RawImage
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def pyav() -> Any:
     except ImportError:
         raise UnsupportedError(
             "this video needs PyAV, which is not installed; "
-            'install it with: pip install "rosglass[video]", or choose another image transport'
+            f"install it with: {install_command('video')}, or choose another image transport"
         ) from None
 
 

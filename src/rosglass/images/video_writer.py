@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rosglass.errors import Error, UnsupportedError
+from rosglass.extras import install_command
 from rosglass.images.video import pyav
 
 if TYPE_CHECKING:
@@ -245,7 +246,7 @@ def _find_encoder(suffix: str) -> tuple[str, dict[str, str]]:
         av = pyav()
     except UnsupportedError:
         raise UnsupportedError(
-            'recording a video needs PyAV: pip install "rosglass[video]"'
+            f"recording a video needs PyAV: {install_command('video')}"
         ) from None
     for name, options in _ENCODERS[suffix]:
         with suppress(av.codec.codec.UnknownCodecError):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rosglass.errors import Error, UnsupportedError
+from rosglass.extras import install_command
 from rosglass.images import DEPTH_ENCODINGS, DepthColors, View, convert, reduce
 from rosglass.images.depth import GreyLevels, GreyRange
 from rosglass.images.encodings import PixelFormat
@@ -89,7 +90,7 @@ class VideoFrame:
         if _MULTIMEDIA is None:
             raise UnsupportedError(
                 "a video sink needs QtMultimedia, which is not installed; install it with: "
-                'pip install "rosglass[camera]", or show the picture in an ImageItem'
+                f"{install_command('camera')}, or show the image in an ImageItem"
             )
         self._video: Any = None
         #: Returns the memory of a new RGBX frame; None if Qt does not allow filling it.

@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.errors import QmlError
+from rosglass.extras import install_command
 from rosglass.qml.log import forget_repeats, log_engine_warnings, plain_path
 from rosglass.qml.modules import import_folder, install, interface_file, is_own_window
-from rosglass.qml.renderer_choice import imports_module
+from rosglass.qml.renderer_choice import imported_modules
 from rosglass.qml.runtime import runtime_of
 from rosglass.qml.watchdog import Watchdog
 from rosglass.qt import QT6, QtCore, QtQml, Signal, address, is_alive
@@ -173,11 +174,11 @@ _IMPORTED_BY = {
     "QtQuick.Window 2.15": {"Window"},
     "RosRviz 1.0": {"AnchoredPopup", "MessageDialog"},
 }
-#: Module -> commands that install it, for Qt 6 and for Qt 5.
+#: Module -> the extra that installs it for Qt 6, and the command for Qt 5.
 _BROUGHT_BY = {
-    "QtMultimedia": ('pip install "rosglass[camera]"', "apt install qml-module-qtmultimedia"),
-    "QtQuick3D": ('pip install "rosglass[camera]"', ""),
-    "QtCharts": ('pip install "rosglass[camera]"', "apt install qml-module-qtcharts"),
+    "QtMultimedia": ("camera", "apt install qml-module-qtmultimedia"),
+    "QtQuick3D": ("camera", ""),
+    "QtCharts": ("camera", "apt install qml-module-qtcharts"),
     "QtQuick.Controls": ("", "apt install qml-module-qtquick-controls2"),
     "QtQuick.Layouts": ("", "apt install qml-module-qtquick-layouts"),
     "QtQuick.Window": ("", "apt install qml-module-qtquick-window2"),
@@ -249,10 +250,14 @@ def _advice(text: str) -> str:
         hint = "this Qt may have another version of it"
     else:
         hint = "folders that hold modules are named with -I FOLDER or in QML_IMPORT_PATH"
-    package = _BROUGHT_BY.get(module, ("", ""))[0 if QT6 else 1]
-    return f"to install it: {package}" if package else hint
+    extra, command = _BROUGHT_BY.get(module, ("", ""))
+    if QT6:
+        command = install_command(extra) if extra else ""
+    return f"to install it: {command}" if command else hint
 
 
+#: Module -> the package above this one that registers its types, once a file imports it.
+_REGISTERED_BY = {"RosScene": "rosglass.scene.modules", "RosglassDemo": "rosglass.demo.app"}
 #: The QML file of a closable item that is only as large as its text.
 PANEL = Path(__file__).with_name("ErrorPanel.qml")
 #: Headings of an ErrorView, for what is below it.
@@ -401,9 +406,9 @@ class LiveFile(QtCore.QObject):
         if runtime is not None:
             runtime.forget_warnings()
         paths = self.engine.importPathList()
-        if QT6 and not self._is_own and imports_module("RosScene", self.path, paths):
-            # A package above this one, which makes the types of this module.
-            import_module("rosglass.scene.modules").register()
+        if QT6 and not self._is_own:
+            for module in sorted(imported_modules(self.path, paths) & _REGISTERED_BY.keys()):
+                import_module(_REGISTERED_BY[module]).register()
         component = QtQml.QQmlComponent(self.engine, QtCore.QUrl.fromLocalFile(str(self.path)))
         root = create(component, self.engine)
         if root is None:

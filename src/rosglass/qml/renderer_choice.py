@@ -29,7 +29,7 @@ __all__ = [
     "RendererChoice",
     "ask_for_software",
     "choice",
-    "imports_module",
+    "imported_modules",
     "need_in_file",
     "need_in_items",
     "taken_renderer",
@@ -98,16 +98,15 @@ def need_in_file(file: Path, import_paths: Sequence[str]) -> str:
     return ""
 
 
-def imports_module(name: str, file: Path, import_paths: Sequence[str]) -> bool:
-    """Return whether a file, or one that it uses, imports a QML module.
+def imported_modules(file: Path, import_paths: Sequence[str]) -> set[str]:
+    """Return the QML modules that a file imports, and those of the files that it uses.
 
     Args:
-        name: The module.
         file: The file.
         import_paths: Folders with QML modules.
     """
     files = _files(file, [Path(folder) for folder in import_paths])
-    return any(name == found for _, text in files for found, _ in _MODULE.findall(text))
+    return {name for _, text in files for name, _ in _MODULE.findall(text)}
 
 
 def _files(file: Path, import_paths: Sequence[Path]) -> Iterator[tuple[Path, str]]:

@@ -21,6 +21,7 @@ from rosglass.comm.graph import ConnectionState, Status
 from rosglass.comm.handle import Executor
 from rosglass.comm.names import validate_namespace, validate_node_name
 from rosglass.errors import ConnectionLostError, Error, InvalidNameError
+from rosglass.extras import explain_missing
 from rosglass.qml.log import QmlRosout, logger_name
 from rosglass.qt import QtCore, Signal, Slot, is_alive
 
@@ -619,7 +620,7 @@ class Session(QtCore.QObject):
             try:
                 return connect(url, name, namespace)
             except ModuleNotFoundError as error:
-                missing = _connection().explain_missing(error)
+                missing = explain_missing(error)
                 if not missing:
                     raise
                 raise Error(missing) from None

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import rosglass
 from rosglass.errors import UnsupportedError
+from rosglass.extras import install_command
 
 __all__ = ["PACKAGES", "require_bindings"]
 
@@ -63,17 +64,14 @@ def _advice(missing: list[str]) -> str:
     if own_python or not installed:
         lines.append(f"Install it (Debian 12): sudo apt install --no-install-recommends {PACKAGES}")
     if not own_python:
-        root = Path(rosglass.__file__).parents[2]
-        checkout = (root / "pyproject.toml").exists()
-        ready = root / ".venv-system" / "bin" / "rosglass"
+        ready = Path(rosglass.__file__).parents[2] / ".venv-system" / "bin" / "rosglass"
         if ready.exists():
             lines.append(f"Run: {ready} rviz ...")
         else:
-            source = f"-e {root}" if checkout else "rosglass"
             lines += [
                 "Create an environment from the system's Python, once:",
                 "    /usr/bin/python3 -m venv --system-site-packages ~/rosglass-rviz",
-                f"    ~/rosglass-rviz/bin/pip install {source}",
+                f"    ~/rosglass-rviz/bin/{install_command('images')}",
                 "Run: ~/rosglass-rviz/bin/rosglass rviz ...",
             ]
     return "\n".join(lines)

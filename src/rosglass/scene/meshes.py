@@ -30,6 +30,7 @@ from urllib.parse import unquote, urlsplit
 import numpy as np
 
 from rosglass.errors import ArgumentError, Error, UnsupportedError
+from rosglass.extras import install_command
 from rosglass.interfaces.type_descriptions import system_cache_folder
 from rosglass.scene.collada import read_collada
 from rosglass.scene.resources import check_texture, locate_resource, make_room
@@ -521,8 +522,8 @@ def _read_with_trimesh(
         trimesh: Any = import_module("trimesh")  # few need it, and it takes long
     except ImportError:
         raise UnsupportedError(
-            f"{name}: {ending} files need trimesh; install rosglass[scene], or convert the mesh to "
-            "STL, DAE or OBJ"
+            f"{name}: {ending} files need trimesh: {install_command('scene')}; or convert the "
+            "mesh to STL, DAE or OBJ"
         ) from None
     is_gltf = ending in {"glb", "gltf"}
     has_normals = _check_gltf(data, name) if is_gltf else _check_header(data, name)

@@ -47,6 +47,7 @@ from rosglass.errors import (
     TimeoutError,  # noqa: A004 - the field's own word
     UnsupportedError,
 )
+from rosglass.extras import install_command
 
 __all__ = [
     "GONE",
@@ -475,7 +476,7 @@ def library_path() -> str:
     Raises:
         UnsupportedError: It is not installed, or its version cannot be used.
     """
-    remedy = 'install it with: pip install "rosglass[dds]"'
+    remedy = f"install it with: {install_command('dds')}"
     try:
         found = distribution("cyclonedds")
     except PackageNotFoundError:
