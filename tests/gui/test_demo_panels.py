@@ -112,3 +112,76 @@ def test_a_picture_that_stands_still_ages_when_the_clock_is_set_back(
     assert not root.isOld()
     clock.milliseconds -= 3_600_000
     wait(root.isOld)
+
+
+def test_a_title_is_shown_whole_beside_and_above_the_age(running: Any) -> None:
+    root = running.load(
+        """Item {
+            Panel { id: panel; title: "Attitude"; width: 160; height: 120; fresh: false; age: -1 }
+            function title() { return panel.children[0] }
+            function age() { return panel.children[1] }
+            function isCut() { return title().truncated }
+            function overlaps() {
+                return age().y < title().y + title().height
+                    && age().x < title().x + title().contentWidth
+            }
+            function widen() { panel.width = 320 }
+            function lines() { return age().y > title().y ? 2 : 1 }
+        }""",
+        f'import QtQuick 2.15\nimport "{COCKPIT.as_uri()}"',
+    )
+    assert not root.isCut()
+    assert not root.overlaps()
+    assert root.lines() == 2
+    root.widen()
+    assert root.lines() == 1
+    assert not root.overlaps()
+
+
+def test_the_knob_stays_in_its_ring_when_the_stick_is_laid_out(running: Any) -> None:
+    root = running.load(
+        """Item {
+            DriveStick {
+                id: stick
+                width: 20
+                height: 20
+                drive: QtObject {
+                    property real left: 0
+                    property real forward: 0
+                    property bool held: false
+                    property bool active: false
+                    function release() {}
+                }
+            }
+            function resize() { stick.width = stick.height = 170 }
+            function offset() {
+                const knob = stick.children.find((item) => item.gradient !== undefined
+                                                           && item.gradient)
+                return Math.max(Math.abs(knob.x + knob.width / 2 - stick.width / 2),
+                                Math.abs(knob.y + knob.height / 2 - stick.height / 2))
+            }
+        }""",
+        f'import QtQuick 2.15\nimport "{COCKPIT.as_uri()}"',
+    )
+    assert root.offset() < 1
+    root.resize()
+    assert root.offset() < 1
+
+
+@pytest.mark.parametrize(("width", "height", "zoom"), [(1340, 752, 1), (3840, 2160, 2)])
+def test_the_cockpit_grows_with_screens_that_report_no_resolution(
+    running: Any, wait: Callable[..., None], width: int, height: int, zoom: float
+) -> None:
+    pytest.importorskip("PySide6.QtMultimedia", reason="the cockpit needs the extra `camera`")
+    from rosglass.demo.app import register
+
+    register()
+    window = running.load(
+        (COCKPIT / "main.qml").read_text().partition("\nWindow {")[2].join(["Window {", ""]),
+        f'import QtQuick\nimport Ros2 1.0\nimport "{COCKPIT.as_uri()}"',
+    )
+    window.setProperty("width", width)
+    window.setProperty("height", height)
+    wait(lambda: window.property("zoom") == zoom)
+    cockpit = window.findChild(QtCore.QObject, "cockpit")
+    wait(lambda: (cockpit.width(), cockpit.height()) == (width / zoom, height / zoom))

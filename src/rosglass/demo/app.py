@@ -27,7 +27,7 @@ from rosglass.qt import QtCore, QtGui, QtQml, QtQuick, optional
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-__all__ = ["AUTOPILOT", "Cockpit", "HeldKeys"]
+__all__ = ["AUTOPILOT", "Cockpit", "HeldKeys", "register"]
 
 _QML = Path(__file__).with_name("cockpit") / "main.qml"
 #: Movements of the stick without an operator: start in seconds, right, down.
@@ -59,14 +59,14 @@ class Cockpit:
         install_message_handler()
         self.app = QtGui.QGuiApplication.instance() or QtGui.QGuiApplication(sys.argv[:1])
         connected()
-        # Native text is sharper, and costs half of distance fields without a graphics card.
-        QtQuick.QQuickWindow.setTextRenderType(
-            QtQuick.QQuickWindow.TextRenderType.NativeTextRendering
-        )
+        # Native text is sharper, and costs half of distance fields without a graphics card. Where
+        # the cockpit is magnified (main.qml), it would be cut.
+        if QtGui.QGuiApplication.primaryScreen().size().width() <= 1920:
+            QtQuick.QQuickWindow.setTextRenderType(
+                QtQuick.QQuickWindow.TextRenderType.NativeTextRendering
+            )
         close_network()
-        pictures.register()
-        register_type: Any = QtQml.qmlRegisterType  # PySide6's annotation wants bytes for names
-        register_type(HeldKeys, "RosglassDemo", 1, 0, "HeldKeys")
+        register()
         self.session = Session(url)
         self._closed = False
         self._runner = Runner(_QML, self.session)
@@ -271,6 +271,13 @@ class HeldKeys(QtCore.QObject):
             if key in self._down:
                 self._down.remove(key)
                 self.lifted.emit(key)
+
+
+def register() -> None:
+    """Register the types of ``import RosglassDemo 1.0`` with Qt."""
+    pictures.register()
+    register_type: Any = QtQml.qmlRegisterType  # PySide6's annotation wants bytes for names
+    register_type(HeldKeys, "RosglassDemo", 1, 0, "HeldKeys")
 
 
 # Imported before QML creates a video sink: PySide supports only types of imported modules.

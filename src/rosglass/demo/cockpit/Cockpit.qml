@@ -159,14 +159,14 @@ Item {
         y: cockpit.wide ? camera.y : camera.y + cockpit.cameraTall + cockpit.strip + Theme.gap
         width: cockpit.wide ? cockpit.sideWidth : cockpit.width - 2 * Theme.gap
         height: cockpit.wide ? cockpit.tall : cockpit.height - y - Theme.gap
-        readonly property real half: (width - Theme.gap) / 2
+        // Whole pixels: a fraction hides the lower edge of a panel.
+        readonly property real half: Math.floor((width - Theme.gap) / 2)
         readonly property real second: half + Theme.gap
-        readonly property real mapTall: cockpit.wide
-            ? Math.min(width * 0.86, height * (height < 560 ? 0.32 : 0.42)) : height - listTall - Theme.gap
-        readonly property real rowTall: cockpit.wide ? (height - mapTall - 3 * Theme.gap - listTall) / 2
-            : (height - Theme.gap) / 2
-        readonly property real listTall: cockpit.wide ? Math.max(80, Math.min(148, height * 0.2))
-            : Math.max(80, Math.min(148, height * 0.4))
+        readonly property real mapTall: Math.floor(cockpit.wide
+            ? Math.min(width * 0.86, height * (height < 560 ? 0.32 : 0.42)) : height - listTall - Theme.gap)
+        readonly property real rowTall: Math.floor(cockpit.wide
+            ? (height - mapTall - 3 * Theme.gap - listTall) / 2 : (height - Theme.gap) / 2)
+        readonly property real listTall: Math.floor(Math.max(80, Math.min(148, height * (cockpit.wide ? 0.2 : 0.4))))
 
         MapView {
             id: map

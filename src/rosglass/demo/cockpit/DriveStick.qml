@@ -57,8 +57,11 @@ Item {
         width: stick.width * 0.38
         height: width
         radius: width / 2
-        x: stick.width / 2 - width / 2 - stick.drive.left * stick.reach
-        y: stick.height / 2 - height / 2 - stick.drive.forward * stick.reach
+        // Animated in units of the stick, so that the knob does not lag behind when it is laid out.
+        property real leftwards: stick.drive.left
+        property real forwards: stick.drive.forward
+        x: stick.width / 2 - width / 2 - leftwards * stick.reach
+        y: stick.height / 2 - height / 2 - forwards * stick.reach
         border { color: Qt.lighter(base, 1.5); width: 1 }
         readonly property color base: !stick.drive.held ? "#4b5d6d"
             : stick.drive.active ? Theme.accent : Theme.bad
@@ -66,8 +69,8 @@ Item {
             GradientStop { position: 0; color: Qt.lighter(knob.base, 1.25) }
             GradientStop { position: 1; color: Qt.darker(knob.base, 1.5) }
         }
-        Behavior on x { enabled: !stick.drive.held; NumberAnimation { duration: 90 } }
-        Behavior on y { enabled: !stick.drive.held; NumberAnimation { duration: 90 } }
+        Behavior on leftwards { enabled: !stick.drive.held; NumberAnimation { duration: 90 } }
+        Behavior on forwards { enabled: !stick.drive.held; NumberAnimation { duration: 90 } }
     }
     MultiPointTouchArea {
         anchors.fill: parent

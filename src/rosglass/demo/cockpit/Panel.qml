@@ -20,8 +20,8 @@ Rectangle {
 
     Text {
         id: heading
-        anchors { left: parent.left; right: aside.left; top: parent.top }
-        anchors { leftMargin: 12; rightMargin: 6; topMargin: panel.small ? 6 : 9 }
+        anchors { left: parent.left; right: parent.right; top: parent.top }
+        anchors { leftMargin: 12; rightMargin: 12; topMargin: panel.small ? 6 : 9 }
         elide: Text.ElideRight
         textFormat: Text.PlainText
         text: panel.title.toUpperCase()
@@ -30,7 +30,11 @@ Rectangle {
     }
     Text {
         id: aside
-        anchors { right: parent.right; baseline: heading.baseline; rightMargin: 12 }
+        x: beside ? parent.width - width - 12 : 12
+        // Beside the title, or below it where both have no room.
+        readonly property bool beside: heading.implicitWidth + implicitWidth + 6 <= heading.width
+        y: heading.y + (beside ? 0 : heading.height)
+        z: 1
         textFormat: Text.PlainText
         text: panel.fresh ? panel.note
             : panel.age < 0 ? "NO DATA YET" : "OLD: " + panel.age.toFixed(0) + " s"

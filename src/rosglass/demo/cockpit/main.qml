@@ -1,4 +1,4 @@
-// The window of `rosglass demo`; also runs by itself: rosglass run main.qml.
+// The window of `rosglass demo`; copy this folder for a cockpit of your own (docs/demo.md).
 import QtQuick
 import Ros2 1.0
 
@@ -7,7 +7,8 @@ Window {
     objectName: "window"
     // Not every window manager brings a window that is larger than the screen back onto it.
     width: Math.min(1340, Screen.width, Screen.desktopAvailableWidth)
-    height: Math.min(800, Screen.height, Screen.desktopAvailableHeight)
+    // 48: for its title bar, which most window managers put above.
+    height: Math.min(800, Screen.height, Screen.desktopAvailableHeight - 48)
     minimumWidth: Math.min(640, Screen.width)
     minimumHeight: Math.min(480, Screen.height)
     visible: true
@@ -16,8 +17,14 @@ Window {
 
     Component.onCompleted: Ros2.init("cockpit")
 
+    // Larger than full HD, everything grows: not all screens report their resolution.
+    readonly property real zoom: Math.max(1, Math.min(width / 1920, height / 1080))
+
     Cockpit {
-        anchors.fill: parent
+        width: window.width / window.zoom
+        height: window.height / window.zoom
+        scale: window.zoom
+        transformOrigin: Item.TopLeft
         inFront: window.active
     }
 }
