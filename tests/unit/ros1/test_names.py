@@ -175,6 +175,23 @@ def test_the_address_towards_the_master_is_announced() -> None:
     assert address.own_address("127.0.0.1") == address.own_address("::1") == address.own_address()
 
 
+@pytest.mark.parametrize(
+    ("host", "interface"),
+    [
+        ("localhost", "127.0.0.1"),
+        ("127.0.0.1", "127.0.0.1"),
+        ("127.0.1.1", "127.0.1.1"),
+        ("::1", "::1"),
+        # What is not this machine's, or may be another address elsewhere.
+        ("192.0.2.7", "0.0.0.0"),
+        ("2001:db8::7", "::"),
+        ("panel", "0.0.0.0"),
+    ],
+)
+def test_a_node_listens_only_where_it_is_announced(host: str, interface: str) -> None:
+    assert address.interface_of(host) == interface
+
+
 def test_addresses_that_others_cannot_reach_are_doubted() -> None:
     # 192.0.2.0/24 is nobody's (RFC 5737).
     told = address.explain_unreachable("192.0.2.7", "ROS_IP", "robot")

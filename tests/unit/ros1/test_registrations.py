@@ -7,12 +7,14 @@ import socket
 import threading
 import time
 import xmlrpc.client
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
 
 import pytest
 from inside import core_of
 from ports import free_port
-from tcpros import node_uri, publisher_links
+from tcpros import node_uri, publisher_address, publisher_links
 from waiting import eventually
 
 import rosglass
@@ -220,6 +222,62 @@ def test_a_new_network_address_is_announced_and_the_node_lives_on(
         assert node.status().state is ConnectionState.CONNECTED
         shut_down(node, "/rosnode", "user request")
         eventually(lambda: node.status().state is ConnectionState.CLOSED)
+
+
+def test_a_node_listens_where_it_is_reached_and_keeps_its_ports(
+    master: FakeMaster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(address, "_route_elsewhere", lambda: "")
+    with rosglass.connect(master.url.partition("?")[0], "panel", own_services=False) as node:
+        node.create_publisher("/a", "std_msgs/Empty")
+        eventually(lambda: "/panel" in master.publishers.get("/a", {}))
+        before = urlsplit(master.publishers["/a"]["/panel"])
+        topics = publisher_address(node, "/a")
+        assert before.hostname == "127.0.0.1"
+        monkeypatch.setattr(address, "_route_elsewhere", lambda: "127.0.0.2")
+        eventually(lambda: "127.0.0.2" in master.publishers["/a"]["/panel"])
+        assert urlsplit(master.publishers["/a"]["/panel"]).port == before.port
+        assert publisher_address(node, "/a") == ("127.0.0.2", topics[1])
+        for port in (before.port, topics[1]):
+            assert port is not None
+            socket.create_connection(("127.0.0.2", port), 10).close()
+            with pytest.raises(ConnectionRefusedError):
+                socket.create_connection(("127.0.0.1", port), 10).close()
+
+
+def test_another_port_is_announced_where_a_program_has_the_nodes_port(
+    master: FakeMaster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(address, "_route_elsewhere", lambda: "")
+    with ExitStack() as stack:
+        node = stack.enter_context(
+            rosglass.connect(master.url.partition("?")[0], "panel", own_services=False)
+        )
+        node.create_publisher("/a", "std_msgs/Empty")
+        eventually(lambda: "/panel" in master.publishers.get("/a", {}))
+        port = urlsplit(master.publishers["/a"]["/panel"]).port
+        stack.enter_context(socket.create_server(("127.0.0.3", port or 0)))
+        monkeypatch.setattr(address, "_route_elsewhere", lambda: "127.0.0.3")
+        eventually(lambda: "127.0.0.3" in master.publishers["/a"]["/panel"])
+        assert urlsplit(master.publishers["/a"]["/panel"]).port != port
+        assert publisher_address(node, "/a")[0] == "127.0.0.3"
+
+
+def test_a_node_whose_port_is_taken_says_so_and_listens_once_it_is_free(
+    master: FakeMaster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(address, "_route_elsewhere", lambda: "")
+    port = free_port()
+    url = f"{master.url.partition('?')[0]}?slave_port={port}"
+    with rosglass.connect(url, "panel", own_services=False) as node:
+        node.create_publisher("/a", "std_msgs/Empty")
+        eventually(lambda: "/panel" in master.publishers.get("/a", {}))
+        with socket.create_server(("127.0.0.4", port)):
+            monkeypatch.setattr(address, "_route_elsewhere", lambda: "127.0.0.4")
+            eventually(lambda: f"cannot listen on port {port}" in node.status().detail)
+        eventually(lambda: "127.0.0.4" in master.publishers["/a"]["/panel"])
+        eventually(lambda: node.status().state is ConnectionState.CONNECTED)
+        assert urlsplit(master.publishers["/a"]["/panel"]).port == port
 
 
 #: The API of a node that was killed: the master lists it, but it does not answer.

@@ -1,4 +1,4 @@
-"""Which hosts may end a node by `shutdown`: its own, by any of its addresses, and the master's."""
+"""Which hosts a node takes `shutdown` and `publisherUpdate` from: its own and the master's."""
 
 from __future__ import annotations
 
@@ -50,17 +50,21 @@ class Core:
     """A node: its master, and what ended it."""
 
     def __init__(self) -> None:
-        self.master = SimpleNamespace(uri=f"http://{MASTER}:11311")
+        self.master = SimpleNamespace(
+            uri=f"http://{MASTER}:11311", reached_at=MASTER, reached_from="192.0.2.7"
+        )
         self.ended: list[tuple[str, str]] = []
 
     def shut_down(self, caller: str, reason: str) -> None:
         self.ended.append((caller, reason))
 
 
-def call_from(peer: str, own: str) -> tuple[list[Any], Core]:
-    """Call a node's `shutdown` between these addresses: the answer, and the node."""
+def call_from(
+    peer: str, own: str, method: str = "shutdown", *arguments: Any, topics: Any = None
+) -> tuple[list[Any], Core]:
+    """Call a method of a node between these addresses: the answer, and the node."""
     core = Core()
-    slave = Slave(core, None, lambda _: None)  # type: ignore[arg-type]
+    slave = Slave(core, topics, lambda _: None)  # type: ignore[arg-type]
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def serve() -> None:
@@ -71,7 +75,8 @@ def call_from(peer: str, own: str) -> tuple[list[Any], Core]:
         thread = threading.Thread(target=serve, daemon=True)
         thread.start()
         with xmlrpc.client.ServerProxy(f"http://127.0.0.1:{server.getsockname()[1]}") as node:
-            answer: Any = node.shutdown("/other", "user request")
+            call = getattr(node, method)
+            answer: Any = call("/other", *(arguments or ("user request",)))
         thread.join(30)
     slave.close()
     return answer, core
@@ -123,3 +128,44 @@ def test_a_node_of_a_machine_that_is_named_127_0_1_1_is_ended(
     with xmlrpc.client.ServerProxy(uri, transport=From(source)) as proxy:
         assert proxy.shutdown("/rosnode", "user request")[0] == 1  # type: ignore[index]
     eventually(lambda: node.status().state is ConnectionState.CLOSED)
+
+
+class Topic:
+    """A topic that a node subscribes to."""
+
+    must_register_again = False
+
+    def __init__(self) -> None:
+        self.publishers: list[str] = []
+
+    def on_publishers_changed(self, uris: list[str]) -> None:
+        self.publishers = uris
+
+
+def update_from(peer: str, own: str, topic: Topic) -> None:
+    """Send a node an update of a topic's publishers."""
+    topics = SimpleNamespace(subscribed=lambda: {"/speed": topic})
+    update = ("/speed", ["http://192.0.2.66:1/"])
+    answer, _ = call_from(peer, own, "publisherUpdate", *update, topics=topics)
+    assert answer[0] == 1
+
+
+@pytest.mark.parametrize("peer", [MASTER, f"::ffff:{MASTER}"])
+def test_the_masters_updates_are_believed(peer: str) -> None:
+    topic = Topic()
+    update_from(peer, "192.0.2.7", topic)
+    assert topic.publishers == ["http://192.0.2.66:1/"]
+    assert not topic.must_register_again
+
+
+@pytest.mark.parametrize(
+    "peer", ["192.0.2.8", "::ffff:192.0.2.8", "198.51.100.2", "127.0.0.1", "192.0.2.7"]
+)
+def test_after_other_updates_the_master_is_asked(
+    peer: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    topic = Topic()
+    update_from(peer, "192.0.2.7", topic)
+    assert topic.publishers == []
+    assert topic.must_register_again
+    assert f"is not the master at {MASTER}, which is asked" in caplog.text

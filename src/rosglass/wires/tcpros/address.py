@@ -6,6 +6,7 @@ else the address of the route to the master.
 
 from __future__ import annotations
 
+import ipaddress
 import re
 import socket
 from typing import TYPE_CHECKING
@@ -21,6 +22,7 @@ __all__ = [
     "check_host",
     "explain_unreachable",
     "given_address",
+    "interface_of",
     "is_loopback",
     "own_address",
 ]
@@ -89,6 +91,25 @@ def explain_unreachable(address: str, source: str, master: str) -> str:
 def is_loopback(host: str) -> bool:
     """Return whether a host is the loopback interface, which other machines cannot reach."""
     return host in ("localhost", "::1") or host.startswith("127.")
+
+
+def interface_of(host: str) -> str:
+    """Return the address to listen on for connections to an announced host.
+
+    Loopback only, if that is announced, and one address of this machine only, if it is; else all
+    interfaces: other machines may know a name, or an address outside a container, as another one.
+    """
+    if host == "localhost":
+        return "127.0.0.1"
+    six = ":" in host
+    every = "::" if six else "0.0.0.0"
+    try:
+        # Not a name: other machines may resolve it to another address.
+        with socket.socket(socket.AF_INET6 if six else socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind((str(ipaddress.ip_address(host)), 0))
+    except (OSError, ValueError):
+        return every
+    return host
 
 
 def bracketed(host: str) -> str:

@@ -13,10 +13,15 @@ from typing import TYPE_CHECKING
 from rosglass.comm import ConnectionState, Status
 from rosglass.comm.core import NodeCore
 from rosglass.comm.types import Types
-from rosglass.errors import DefinitionConflictError, Error, TypeNotFoundError
+from rosglass.errors import (
+    ConnectionLostError,
+    DefinitionConflictError,
+    Error,
+    TypeNotFoundError,
+)
 from rosglass.interfaces import adding_definitions, full_text, join_name, split_name
 from rosglass.messages import MessageType, ServiceType, load
-from rosglass.wires.tcpros.address import bracketed, own_address
+from rosglass.wires.tcpros.address import bracketed, interface_of, own_address
 from rosglass.wires.tcpros.connection import ANY
 from rosglass.wires.tcpros.graph import Graph
 from rosglass.wires.tcpros.io_loop import IoLoop, listen
@@ -105,28 +110,52 @@ class TcprosCore(NodeCore):
         self.lookups = BlockingPool(f"{name.name} lookups")
         self.address, self.uri = ("", 0), ""
         self._status = Status(ConnectionState.CONNECTING, f"looking for {options.master}")
-        sockets: list[socket.socket] = []
-        try:
-            for port in (options.tcpros_port, options.slave_port):
-                sockets += [listen(options.address, port, url)]
-        except BaseException:
-            for sock in sockets:
-                sock.close()
-            raise
-        self._tcpros, self._slave = sockets
+        #: Where connections are accepted, and the node's API is served.
+        self._sockets: list[socket.socket] = []
+        self._ports, self._interface = [options.tcpros_port, options.slave_port], ""
         self.uris: set[str] = set()
         self.set_host(options.address or own_address())
         self.loop = IoLoop(f"{name.name} connections")
 
     def set_host(self, host: str) -> bool:
-        """Set the host or address that the node announces; return whether it has changed."""
-        address = (host, self._tcpros.getsockname()[1])
-        changed = address != self.address
-        if changed:
-            self.address = address
-            self.uri = f"http://{bracketed(host)}:{self._slave.getsockname()[1]}/"
-            self.uris.add(self.uri)
-        return changed
+        """Announce a host or address, and listen there; return whether it has changed.
+
+        Raises:
+            ConnectionLostError: This machine cannot listen for connections.
+        """
+        if host == self.address[0] and self._interface:
+            return False
+        interface = interface_of(host)
+        if interface != self._interface:
+            self._listen(interface)
+        self.address = (host, self._ports[0])
+        self.uri = f"http://{bracketed(host)}:{self._ports[1]}/"
+        self.uris.add(self.uri)
+        return True
+
+    def _listen(self, interface: str) -> None:
+        """Listen at an interface instead, at the same ports if they are free there."""
+        self._close_sockets()
+        for number, fixed in enumerate((self.options.tcpros_port, self.options.slave_port)):
+            try:
+                try:
+                    sock = listen(interface, self._ports[number], self.url)
+                except ConnectionLostError:
+                    if fixed or not self._ports[number]:
+                        raise
+                    sock = listen(interface, 0, self.url)
+            except ConnectionLostError:
+                self._close_sockets()
+                raise
+            self._sockets.append(sock)
+            self._ports[number] = int(sock.getsockname()[1])
+        self._interface = interface
+
+    def _close_sockets(self) -> None:
+        """Stop listening."""
+        for sock in self._sockets:
+            sock.close()
+        self._sockets, self._interface = [], ""
 
     def _state(self) -> Status:
         return self._status

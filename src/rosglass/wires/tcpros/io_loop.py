@@ -15,7 +15,6 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
 
 from rosglass.errors import ConnectionLostError
-from rosglass.wires.tcpros.address import is_loopback
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -257,27 +256,25 @@ _BACKLOG = 128
 _ACCEPT_PAUSE_S = 0.1
 
 
-def listen(address: str, port: int, url: str) -> socket.socket:
-    """Return a listening socket, on the loopback interface only if `address` is on it.
+def listen(interface: str, port: int, url: str) -> socket.socket:
+    """Return a listening socket.
 
     Args:
-        address: Announced address; an IPv6 address makes it listen for both versions.
+        interface: This machine's address to listen on; ``0.0.0.0`` for all of IPv4, ``::`` for all
+            of both versions.
         port: 0 for any.
         url: What the node was connected with, for the error.
 
     Raises:
         ConnectionLostError: The port is taken, or not allowed.
     """
-    six = ":" in address
-    place = ""
-    if is_loopback(address):
-        place = "127.0.0.1" if address == "localhost" else address
+    six = ":" in interface
     sock = socket.socket(socket.AF_INET6 if six else socket.AF_INET, socket.SOCK_STREAM)
     try:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         if six:
             sock.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
-        sock.bind((place, port))
+        sock.bind((interface, port))
         sock.listen(_BACKLOG)
         sock.setblocking(False)
     except OSError as error:

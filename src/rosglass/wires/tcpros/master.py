@@ -96,10 +96,12 @@ class _Connection(http.client.HTTPConnection):
 
     Attributes:
         aborted: Whether it was aborted.
-        sock: Its socket, once it is connected.
+        ends: This machine's and the peer's address, once it has been connected.
+        sock: Its socket, while it is connected.
     """
 
     aborted = False
+    ends: tuple[str, str] | None = None
     sock: _Socket
     _deadline = 0.0
 
@@ -122,6 +124,7 @@ class _Connection(http.client.HTTPConnection):
                     raise OSError("closed")
                 sock.connect(place)
                 sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                self.ends = (str(sock.getsockname()[0]), str(sock.getpeername()[0]))
             except OSError as error:
                 failure = error
                 sock.close()
@@ -328,11 +331,12 @@ class Master:
 
     Attributes:
         reached_from: This machine's address as of the last connection; empty before the first.
+        reached_at: The master's address as of the last connection.
     """
 
     def __init__(self, uri: str, caller: str) -> None:
         self.uri, self.caller = uri, caller
-        self.reached_from = ""
+        self.reached_from = self.reached_at = ""
         self._server = _Server(uri)
         #: At most one connection is kept: a new one each second would cost the master a thread
         #: each. Any thread calls; every use of these is atomic.
@@ -368,9 +372,8 @@ class Master:
             self._idle.pop().close()
 
     def _put_back(self, connection: _Connection, answered: bool) -> None:
-        if connection.sock is not None:
-            with suppress(OSError):
-                self.reached_from = str(connection.sock.getsockname()[0])
+        if connection.ends:
+            self.reached_from, self.reached_at = connection.ends
         self._busy.discard(connection)
         if answered and not self._idle and not self._closed:
             self._idle.append(connection)

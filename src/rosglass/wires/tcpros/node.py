@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import atexit
 import logging
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import TYPE_CHECKING
 
 from rosglass.comm.log_limits import LogOnce
-from rosglass.errors import ServiceError
+from rosglass.errors import ConnectionLostError, ServiceError
 from rosglass.wires.tcpros.connection import Connection, survive_outages
 from rosglass.wires.tcpros.core import TcprosCore
 from rosglass.wires.tcpros.io_loop import Acceptor
@@ -36,6 +38,8 @@ _log = logging.getLogger("rosglass.ros1")
 #: Connections at a time whose peer has not sent its header. More than wait to be accepted
 #: (``_BACKLOG``): after a pause, as many honest ones arrive at once.
 _MAX_SILENT_CONNECTIONS = 300
+#: Seconds that listening at another address may wait for the I/O loop.
+_MOVE_TIMEOUT_S = 2.0
 
 
 class TcprosNode(TcprosCore):
@@ -55,12 +59,14 @@ class TcprosNode(TcprosCore):
         ConnectionLostError: This machine cannot listen for connections.
     """
 
+    #: The node's API, once it is started.
+    _api: Slave | None = None
+
     def __init__(
         self, name: NodeName, url: str, options: TcprosOptions, types: AnnouncedTypes
     ) -> None:
         super().__init__(name, url, options, types)
         self._acceptors: list[Acceptor] = []
-        self._api: Slave | None = None
         #: Accepted connections; those without a header, the oldest first.
         self._connections: set[Connection] = set()
         self._silent: dict[Connection, None] = {}
@@ -76,15 +82,48 @@ class TcprosNode(TcprosCore):
             on_parameter_changed: Called with the name of a subscribed parameter that has changed.
         """
         self._api = Slave(self, self.topics, on_parameter_changed)
-        self._acceptors = [
-            Acceptor(self.loop, self._tcpros, self._accept),
-            Acceptor(self.loop, self._slave, self._api.accept),
-        ]
-        for acceptor in self._acceptors:
-            self.loop.call(acceptor.open)
+        self.loop.call(self._open_acceptors)
         # Threads that deliver messages must not outlive the interpreter.
         atexit.register(self.close)
         self._registrations.start()
+
+    def set_host(self, host: str) -> bool:
+        """Announce a host or address, and listen there; return whether it has changed.
+
+        From the thread that polls the master; waits for the loop.
+
+        Raises:
+            ConnectionLostError: This machine cannot listen for connections.
+        """
+        if self._api is None or host == self.address[0]:
+            return super().set_host(host)
+        changed: Future[bool] = Future()
+        self.loop.call(lambda: self._move(host, changed))
+        try:
+            return changed.result(_MOVE_TIMEOUT_S)
+        except FutureTimeoutError:  # the loop has ended, or a handler blocks it
+            raise ConnectionLostError(f"{self.url}: cannot listen at {host} yet") from None
+
+    def _move(self, host: str, changed: Future[bool]) -> None:
+        """Listen for connections to another host; in the loop's thread."""
+        self._end_acceptors()
+        try:
+            changed.set_result(not self.loop.closed and super().set_host(host))
+        except ConnectionLostError as error:
+            changed.set_exception(error)
+        self._open_acceptors()
+
+    def _open_acceptors(self) -> None:
+        if self._api is None or self.loop.closed:
+            return
+        for sock, accept in zip(self._sockets, (self._accept, self._api.accept), strict=False):
+            self._acceptors.append(Acceptor(self.loop, sock, accept))
+            self._acceptors[-1].open()
+
+    def _end_acceptors(self) -> None:
+        for acceptor in self._acceptors:
+            acceptor.end()
+        self._acceptors.clear()
 
     def create_replier(self, name: str, type: ServiceType, on_request: OnRequest) -> TcprosReplier:
         """Register a service with the master, and return its receiving end.
@@ -133,11 +172,9 @@ class TcprosNode(TcprosCore):
         self._worker.close()
         self.pool.close()
         self.lookups.close()
-        for acceptor in self._acceptors:
-            self.loop.call(acceptor.end)
+        self.loop.call(self._end_acceptors)
         self.loop.close()
-        for sock in (self._tcpros, self._slave):
-            sock.close()  # those of a node that was never started have no acceptor
+        self._close_sockets()  # those of a node that was never started have no acceptor
         if self._api is not None:
             self._api.close()
 

@@ -47,10 +47,13 @@ class Member(NodeMember):
             there. None for members that the graph does not show.
         lists_node: Whether the master lists the node under its name once this is registered: only
             calls with the node's URI take the name from another node.
+        must_register_again: Whether to register it with the next poll, for the master's answer; set
+            by any thread.
     """
 
     endpoint: tuple[EndpointKind, str] | None = None
     lists_node = False
+    must_register_again = False
 
     def register(self, master: Master) -> None:
         """Register it; called on a thread that may wait, again after the master's restart.
@@ -216,8 +219,11 @@ class Registrations:
         """Register members that are not; return why the master refuses some."""
         refused = []
         for member in self._core.members():
-            if not isinstance(member, Member) or member in self._registered:
+            if not isinstance(member, Member):
                 continue
+            if member in self._registered and not member.must_register_again:
+                continue
+            member.must_register_again = False
             # First: the master may know the member although its answer gets lost, and close()
             # looks at these after it has set `_closing`.
             self._tried.add(member)
@@ -277,6 +283,7 @@ class Registrations:
 
     def _on_failure(self, reason: str) -> None:
         core = self._core
+        reason = reason.removeprefix(f"{core.url}: ")
         if self._closing:
             return
         state = ConnectionState.LOST if self._answered else ConnectionState.CONNECTING

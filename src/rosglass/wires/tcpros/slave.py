@@ -175,7 +175,7 @@ class Slave(socketserver.ThreadingMixIn):
         method = self._methods.get(name)
         if method is None:
             raise LookupError(f"the slave API has no method {name!r}")
-        if method == self._shutdown:
+        if method in (self._shutdown, self._update_publishers):
             arguments = (connection, *arguments)
         try:
             return [1, "", method(*arguments)]
@@ -230,9 +230,7 @@ class Slave(socketserver.ThreadingMixIn):
 
     def _shutdown(self, connection: socket.socket, caller: object, reason: object = "") -> int:
         """Close the node: another one has its name now, or a user runs ``rosnode kill``."""
-        peer, own = (_ipv4(end[0]) for end in (connection.getpeername(), connection.getsockname()))
-        # Debian names a machine 127.0.1.1, to which others connect from 127.0.0.1.
-        is_here = peer == own or is_loopback(peer)
+        peer, is_here = _peer(connection)
         if not is_here and peer not in _addresses(self._core.master.uri):
             if self._log_once.is_first(("shutdown", peer)):
                 text = "%s at %s wanted to end this node: only its own and the master's host may"
@@ -247,13 +245,33 @@ class Slave(socketserver.ThreadingMixIn):
         self._on_parameter_changed(_text(name, "parameter_key"))
         return 0
 
-    def _update_publishers(self, caller: object, topic: object, uris: object) -> int:
+    def _update_publishers(
+        self, connection: socket.socket, caller: object, topic: object, uris: object
+    ) -> int:
+        """Connect to a topic's publishers; if the master does not call, it is asked for them."""
         _text(caller, "caller_id")
         shared = self._topics.subscribed().get(_text(topic, "topic"))
         publishers = [_text(uri, "publishers") for uri in _list(uris, "publishers")]
-        if shared is not None:
+        if shared is None:
+            return 0
+        if self._is_master(connection):
             shared.on_publishers_changed(publishers)
+            return 0
+        shared.must_register_again = True
+        peer, _ = _peer(connection)
+        if self._log_once.is_first(("publisherUpdate", peer)):
+            text = "%s at %s lists publishers of %s, and is not the master at %s, which is asked"
+            _log.warning(text, caller, peer, topic, self._core.master.reached_at or "present")
         return 0
+
+    def _is_master(self, connection: socket.socket) -> bool:
+        """Return whether a connection comes from the master's host, as far as this node knows it.
+
+        A master with several addresses may call from another one than it is called at.
+        """
+        peer, is_here = _peer(connection)
+        there, here = _ipv4(self._core.master.reached_at), _ipv4(self._core.master.reached_from)
+        return peer == there or (is_here and (is_loopback(there) or there == here != ""))
 
     def _request_topic(self, caller: object, topic: object, protocols: object) -> list[Any]:
         """Return how to connect to a published topic."""
@@ -269,6 +287,13 @@ class Slave(socketserver.ThreadingMixIn):
                 "let the subscriber ask for it, too"
             )
         return [_PROTOCOL, *self._core.address]
+
+
+def _peer(connection: socket.socket) -> tuple[str, bool]:
+    """Return the address that a connection comes from, and whether it is this machine's."""
+    peer, own = (_ipv4(end[0]) for end in (connection.getpeername(), connection.getsockname()))
+    # Debian names a machine 127.0.1.1, to which others connect from 127.0.0.1.
+    return peer, peer == own or is_loopback(peer)
 
 
 def _addresses(uri: str) -> set[str]:
