@@ -7,6 +7,7 @@ import math
 import os
 import random
 import sys
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -644,6 +645,52 @@ def test_frames_without_a_transform_are_counted(robot: Robot) -> None:
     assert len(display.status_lines) == 22
     robot.view.scene.reset()
     robot.bench.wait(lambda: display.statusLevel == "ok", lambda: display.statusText)
+    robot.check()
+
+
+def test_chains_of_many_frames_are_looked_up_once(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = robot.view.scene
+    display = scene.add("TF")
+    tf = robot.node.create_publisher("/tf", "tf2_msgs/TFMessage")
+    robot.bench.wait(tf.subscription_count)
+    for chain in "xyz":
+        names = [f"{chain}{at}" for at in range(1501)]
+        links = [
+            {
+                "header": {"stamp": {"sec": 5}, "frame_id": parent},
+                "child_frame_id": child,
+                "transform": {"rotation": TURN},
+            }
+            for parent, child in pairwise(names)
+        ]
+        tf.publish({"transforms": links})
+    robot.bench.wait(lambda: "only 2000 of 4505 frames" in display.statusText)
+    assert "Transforms: 1998 frames have no transform" in display.statusText
+    assert set(display.frames) == {"map", "odom"}
+    looks: list[Any] = []
+    look_up_all = scene.look_up_all
+    monkeypatch.setattr(scene, "look_up_all", lambda names: looks.append(0) or look_up_all(names))
+    ticks = scene._ticks
+    robot.bench.wait(lambda: scene._ticks >= ticks + 10)
+    assert not looks, "nothing has come in the meantime"
+    robot.check()
+
+
+def test_names_of_frames_that_are_not_kept_are_reported(robot: Robot) -> None:
+    display = robot.view.scene.add("TF")
+    tf = robot.node.create_publisher("/tf", "tf2_msgs/TFMessage")
+    robot.bench.wait(tf.subscription_count)
+    move = {"header": {"frame_id": "odom"}, "transform": {"rotation": TURN}}
+    tf.publish({"transforms": [{**move, "child_frame_id": "x" * 100_000}]})
+    text = f"ignoring the transform of '{'x' * 50}...' in 'odom'"
+    robot.bench.wait(lambda: text in display.statusText, lambda: display.statusText)
+    assert "at most 255 letters (from /robot)" in display.statusText
+    names = [f"frame{at}" for at in range(10_001)]
+    tf.publish({"transforms": [{**move, "child_frame_id": name} for name in names]})
+    text = "at most 10000 names of frames are kept for each publisher"
+    robot.bench.wait(lambda: text in display.statusText, lambda: display.statusText)
     robot.check()
 
 

@@ -43,6 +43,8 @@ _log = logging.getLogger("rosglass.scene")
 #: Seconds between two looks at transforms that have changed: below 1/30, so that each of 30
 #: messages a second is seen.
 _TRANSFORMS_S = 0.03
+#: Frames that are listed.
+_MAX_FRAMES = 10_000
 _ORIGIN, _UPRIGHT = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 #: Seconds without a change of the robot's time after which a simulation is paused.
 _PAUSED_S = 1.0
@@ -299,9 +301,9 @@ class Scene(Element):
         return None if self._link is None else self._link.buffer
 
     def frames(self) -> list[str]:
-        """Return the names of all frames."""
+        """Return the names of all frames; of more than 10,000, the first ones."""
         buffer = self.transforms
-        return [] if buffer is None else sorted(buffer.frame_names())
+        return [] if buffer is None else sorted(buffer.frame_names()[:_MAX_FRAMES])
 
     def look_up(self, frame: str, stamp: int = 0, target: str = "") -> NDArray[np.float64]:
         """Return the pose of a frame in the fixed frame.

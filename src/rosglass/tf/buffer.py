@@ -317,10 +317,9 @@ class TransformBuffer(Handle):
     Attributes:
         ignored: Number of refused transforms by reason: ``old`` (beyond the cache time),
             ``repeated`` (same frame and stamp), ``self``, ``no name``, ``not finite``,
-            ``not normalised``, ``loop``, ``too deep``.
-
-        last_fault: Why the last transform was refused that was neither old nor repeated; empty for
-            none.
+            ``not normalised``, ``loop``, ``too deep``, ``long name`` (more than 255 letters),
+            ``too many`` (more than 10,000 names of one publisher, or 50,000 of all; names that were
+            not received for longer than the cache time, and have no frames below them, make room).
 
     Raises:
         ArgumentError: The cache time is not above zero.
@@ -334,7 +333,8 @@ class TransformBuffer(Handle):
             raise ArgumentError("cache_time", cache_time, "seconds above zero, or a Duration")
         self.cache_time = kept
         self.ignored: Counter[str] = Counter()
-        self.last_fault = ""
+        #: Why the last transform was refused that was neither old nor repeated, and its publisher.
+        self._fault: tuple[str, object] = ("", "")
         #: Guards the frames, the listeners and the pending lookups.
         self._lock = threading.Lock()
         self._store = FrameStore(kept.nanoseconds)
@@ -398,17 +398,17 @@ class TransformBuffer(Handle):
         changed = set()
         store = self._store
         with self._lock:
-            tree = store.version
+            tree, now = store.version, monotonic()
             for child, stamp, entry in items:
                 kind, name = store.put(child, stamp, entry, static, authority)
                 if kind:
                     refused.append((kind, name, store.describe(kind, name, stamp, entry)))
                 else:
                     changed.add(name)
-            store.arrivals.update(dict.fromkeys(changed, monotonic()))
+                    store.arrivals[name] = now
             self.ignored.update(kind for kind, _, _ in refused)
             faults = [reason for kind, _, reason in refused if kind not in ("old", "repeated")]
-            self.last_fault = faults[-1] if faults else self.last_fault
+            self._fault = (faults[-1], authority) if faults else self._fault
             moved = store.version != tree
             disagreements, store.disagreements = store.disagreements, []
             jumps, store.jumps = store.jumps, []
@@ -431,7 +431,9 @@ class TransformBuffer(Handle):
                 str(jumps[-1][2]) or "an unnamed authority",
             )
         for kind, child, reason in refused:
-            if self._log_once.is_first((kind, child, authority)):
+            # A name that is not kept must not be kept by the log; it may be any number of them.
+            frame = "" if kind in ("long name", "too many") else child
+            if self._log_once.is_first((kind, frame, authority)):
                 level = logging.DEBUG if kind == "repeated" else logging.WARNING
                 _log.log(level, "%s (from %s)", reason, str(authority) or "an unnamed authority")
         if changed:
@@ -439,6 +441,15 @@ class TransformBuffer(Handle):
                 self._pending.retry()
             self._changes.notify(changed, moved)
         return [(kind, reason) for kind, _, reason in refused]
+
+    @property
+    def last_fault(self) -> str:
+        """Why the last transform was refused that was neither old nor repeated, and its publisher.
+
+        Empty if there was none.
+        """
+        reason, authority = self._fault
+        return f"{reason} (from {str(authority) or 'an unnamed authority'})" if reason else ""
 
     def clear(self, *, static: bool = False) -> None:
         """Remove all dynamic transforms, and the static ones if `static`."""

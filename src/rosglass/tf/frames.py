@@ -11,6 +11,7 @@ import json
 import math
 import re
 from bisect import bisect_right
+from collections import Counter
 from dataclasses import dataclass, field
 from time import monotonic
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
@@ -190,6 +191,12 @@ Entry: TypeAlias = tuple[str, float, float, float, float, float, float, float]
 _MAX_DEPTH = 1000
 #: Number of outdated entries to delete at once.
 _PRUNE_SIZE = 256
+#: Letters of a frame's name, and names of one publisher and of all: a peer may send any number.
+_MAX_NAME_LENGTH, _MAX_NAMES, _MAX_ALL_NAMES = 255, 10_000, 50_000
+#: Seconds between two searches for frames that can make room for others.
+_FORGET_PERIOD_S = 1.0
+#: Links that one lookup of many frames follows, far beyond those of a robot.
+_MAX_LINKS = 50_000
 
 
 def clock_text(nanoseconds: int) -> str:
@@ -370,6 +377,8 @@ _PREFIX = {
     "not normalised": "TF_DENORMALIZED_QUATERNION ",
     "loop": "TF_LOOP ",
     "too deep": "",
+    "long name": "",
+    "too many": "",
 }
 _REASON = {
     "repeated": "there is one of the same time already",
@@ -379,6 +388,9 @@ _REASON = {
     "not normalised": "its rotation is no quaternion of length 1; an empty one has w = 1",
     "loop": "the parent is itself placed in the child; find out which of the two is wrong",
     "too deep": f"the parent is below more than {_MAX_DEPTH} other frames; find out who names them",
+    "long name": f"names of frames have at most {_MAX_NAME_LENGTH} letters",
+    "too many": f"at most {_MAX_NAMES} names of frames are kept for each publisher, and "
+    f"{_MAX_ALL_NAMES} for all; let it use names again instead of new ones",
 }
 
 
@@ -397,7 +409,8 @@ class FrameStore:
 
     Attributes:
         caches: The transforms of each frame with a parent.
-        names: All frames, including parents, in order of appearance.
+        names: All frames, including parents, in order of appearance, each with the publisher that
+            named it first.
         authorities: Publisher of the last transform of each frame.
         arrivals: Time of the last transform of each frame, by :func:`time.monotonic`.
         version: Changes when frames appear, disappear, or change their parent.
@@ -410,13 +423,18 @@ class FrameStore:
     def __init__(self, keep: int) -> None:
         self._keep = keep
         self.caches: dict[str, DynamicCache | StaticCache] = {}
-        self.names: dict[str, None] = {}
+        self.names: dict[str, object] = {}
         self.authorities: dict[str, object] = {}
         self.arrivals: dict[str, float] = {}
         self.version = 0
         self.disagreements: list[tuple[str, object, object]] = []
         self.jumps: list[tuple[str, int, object]] = []
         self._behind: dict[str, _Behind] = {}
+        #: Number of names by publisher, and when its outdated ones were last searched.
+        self._counts: Counter[object] = Counter()
+        self._forgot_at: dict[object, float] = {}
+        #: Number of accepted transforms.
+        self._stored = 0
 
     def put(
         self, child: str, stamp: int, entry: Entry, static: bool, authority: object
@@ -446,6 +464,7 @@ class FrameStore:
             self._behind.pop(child, None)
         if not kind:
             self.authorities[child] = authority
+            self._stored += 1
         return kind, child
 
     def _has_jumped(self, child: str, stamp: int) -> bool:
@@ -461,7 +480,8 @@ class FrameStore:
 
     def describe(self, kind: str, child: str, stamp: int, entry: Entry) -> str:
         """Describe why a transform was refused."""
-        what = f"ignoring the transform of '{child}' in '{entry[0]}' at {clock_text(stamp)}: "
+        child_name, parent = _shortened(child), _shortened(entry[0])
+        what = f"ignoring the transform of '{child_name}' in '{parent}' at {clock_text(stamp)}: "
         if kind == "old":
             cache = self.caches[child]
             return (
@@ -476,9 +496,11 @@ class FrameStore:
         gone = {name for name, cache in self.caches.items() if static or not cache.static}
         for name in gone:
             self._remove(name)
-        self.names = {}
+        before, self.names = self.names, {}
         for name, cache in self.caches.items():
-            self.names[cache.parent] = self.names[name] = None
+            for one in (cache.parent, name):
+                self.names[one] = before[one]
+        self._counts = Counter(self.names.values())
         return gone
 
     def info(self, name: str, authority: str) -> FrameInfo:
@@ -497,10 +519,10 @@ class FrameStore:
         """Return a value that is the same while no frame moves; None while one may still move.
 
         The last move of a frame is seen by all lookups once each frame is known at a later time.
-        None as well for more frames than a robot has.
+        For more frames than a robot has, it changes with each transform.
         """
         if len(self.caches) > _MAX_RESTING:
-            return None
+            return self.version, -self._stored
         moving = [cache for cache in self.caches.values() if isinstance(cache, DynamicCache)]
         known = min((cache.latest for cache in moving), default=0)
         if any(cache.moved > known for cache in moving):
@@ -514,7 +536,8 @@ class FrameStore:
             return "no name"
         if child == parent:
             return "self"
-        wrong = _bad_numbers(entry)
+        new = [name for name in (child, parent) if name not in self.names]
+        wrong = _bad_numbers(entry) or (self._find_room(new, authority) if new else "")
         if wrong:
             return wrong
         cache = self.caches.get(child)
@@ -531,9 +554,48 @@ class FrameStore:
             self.caches[child] = cache
         kind = cache.insert(stamp, entry)
         if not kind:
-            self.names[child] = self.names[parent] = None
+            if new:
+                self.names.update(dict.fromkeys(new, authority))
+                self._counts[authority] += len(new)
             self.version += before != (cache.parent, static)
         return kind
+
+    def _find_room(self, new: list[str], authority: object) -> str:
+        """Return why a publisher can add no names; outdated ones are removed for them."""
+        if max(map(len, new)) > _MAX_NAME_LENGTH:
+            return "long name"
+        if self._counts[authority] + len(new) > _MAX_NAMES:
+            self._forget_outdated(authority)
+        elif len(self.names) + len(new) > _MAX_ALL_NAMES:
+            self._forget_outdated(max(self._counts, key=self._counts.__getitem__))
+        has_room = self._counts[authority] + len(new) <= _MAX_NAMES
+        return "" if has_room and len(self.names) + len(new) <= _MAX_ALL_NAMES else "too many"
+
+    def _forget_outdated(self, authority: object) -> None:
+        """Remove a publisher's frames that were not received for longer than transforms are kept.
+
+        Not those in which others are placed.
+        """
+        now = monotonic()
+        if now < self._forgot_at.get(authority, -math.inf) + _FORGET_PERIOD_S:
+            return
+        self._forgot_at[authority] = now
+        used: set[str] = set()
+        for name, cache in self.caches.items():
+            silence = now - self.arrivals.get(name, now)
+            if cache.static or silence * 1e9 <= self._keep or self.names[name] != authority:
+                frame = name
+                while frame not in used:
+                    used.add(frame)
+                    above = self.caches.get(frame)
+                    frame = frame if above is None else above.parent
+        gone = [one for one, owner in self.names.items() if owner == authority and one not in used]
+        for name in gone:
+            del self.names[name]
+            self._behind.pop(name, None)
+            if name in self.caches:
+                self._remove(name)
+        self._counts[authority] -= len(gone)
 
     def _closes_loop(self, child: str, parent: str, stamp: int | None) -> str:
         """Return why a link is refused, as it closes a loop; outdated links are removed for it."""
@@ -559,6 +621,10 @@ class FrameStore:
         self.authorities.pop(name, None)
         self.arrivals.pop(name, None)
         self.version += 1
+
+
+def _shortened(name: str) -> str:
+    return name if len(name) <= _MAX_NAME_LENGTH else f"{name[:50]}..."
 
 
 def _bad_numbers(entry: Entry) -> str:
@@ -620,7 +686,7 @@ def common_time(caches: Mapping[str, DynamicCache | StaticCache], target: str, s
     if found is None:
         for frame in (source, target):
             _check_loop(caches, frame)
-        raise _unconnected(caches, target, source)
+        raise _unconnected(target, source, root_of(caches, target), root_of(caches, source))
     up, down = found
     stamps = [caches[frame].latest for frame in (*up, *down)]
     return min((stamp for stamp in stamps if stamp), default=0)
@@ -686,7 +752,9 @@ def look_up(
         if depth > _MAX_DEPTH:
             raise _loop(frame)
     if frame != top:
-        raise ExtrapolationException(gap) if gap else _unconnected(caches, target, source)
+        if gap:
+            raise ExtrapolationException(gap)
+        raise _unconnected(target, source, root_of(caches, target), root_of(caches, source))
     back = conjugate(tilt)
     between = (moved[0] - offset[0], moved[1] - offset[1], moved[2] - offset[2])
     return rotate(back, between), multiply(back, turned)
@@ -702,33 +770,71 @@ def look_up_newest(
         what these raise.
     """
     found: dict[str, tuple[Vector, Quaternion] | TransformException] = {}
-    below = _FramesBelow(caches, target)
+    frames = _FramesNewest(caches, target)
     for source in sources:
-        pose = below.newest(source)
         try:
-            found[source] = pose or look_up(
-                caches, target, source, common_time(caches, target, source)
-            )
-        except TransformException as error:
+            found[source] = frames.look_up(source)
+        except TransformException as error:  # noqa: PERF203 - the others are looked up
             found[source] = error
     return found
 
 
-class _FramesBelow:
-    """The newest poses of frames that are somewhere below a target, in it."""
+class _Ancestry(NamedTuple):
+    """The links above a frame, up to the target or to the root of the tree.
+
+    Attributes:
+        top: The target, or the root.
+        depth: Number of links.
+        time: The newest time at which all of them are known; 0 for any time.
+    """
+
+    top: str
+    depth: int
+    time: int
+
+
+class _FramesNewest:
+    """The newest poses of frames in a target.
+
+    What frames share is found once, also that nothing connects them with the target: chains of
+    1,000 frames each would keep a 3D view busy otherwise.
+    """
 
     def __init__(self, caches: Mapping[str, DynamicCache | StaticCache], target: str) -> None:
         self._caches, self._target = caches, target
-        #: By frame, the newest time at which all links to the target are known; 0 for any time.
-        self._times = {target: 0}
+        self._ancestry: dict[str, _Ancestry] = {}
+        self._above_target = self._find_ancestry(target)
+        self._ancestry[target] = _Ancestry(target, 0, 0)
         #: By frame and time.
         self._poses: dict[tuple[str, int], tuple[Vector, Quaternion]] = {}
+        #: Number of links that may still be followed.
+        self._links_left = _MAX_LINKS
 
-    def newest(self, source: str) -> tuple[Vector, Quaternion] | None:
-        """Return the newest pose of a frame; None if it takes another way than straight up."""
-        time = self._newest_time(source)
-        if time is None:
-            return None
+    def look_up(self, source: str) -> tuple[Vector, Quaternion]:
+        """Return the newest pose of a frame; raises TransformException."""
+        above, root = self._find_ancestry(source), self._above_target.top
+        is_below = above.top == self._target
+        if above.depth > _MAX_DEPTH:
+            raise _loop(source)
+        if not is_below and self._above_target.depth > _MAX_DEPTH:
+            raise _loop(self._target)
+        if not is_below and above.top != root:
+            raise _unconnected(self._target, source, root, above.top)
+        if self._links_left <= 0:
+            raise TransformException(
+                f"'{source}' is not looked up in '{self._target}': together, there are more than "
+                f"{_MAX_LINKS} links between these frames"
+            )
+        pose = self._pose_below(source, above.time) if is_below else None
+        if pose is None:
+            # It is beside or above the target, or its parent has changed.
+            self._links_left -= above.depth + self._above_target.depth
+            time = common_time(self._caches, self._target, source)
+            pose = look_up(self._caches, self._target, source, time)
+        return pose
+
+    def _pose_below(self, source: str, time: int) -> tuple[Vector, Quaternion] | None:
+        """Return the pose of a frame below the target; None if it was elsewhere at that time."""
         pose: tuple[Vector, Quaternion] | None = (_ORIGIN, _UPRIGHT)
         links: list[tuple[str, Entry]] = []
         frame = source
@@ -742,6 +848,7 @@ class _FramesBelow:
                 return None
             links.append((frame, entry))
             frame = entry[0]
+        self._links_left -= len(links)
         moved, turned = pose or (_ORIGIN, _UPRIGHT)
         for frame, entry in reversed(links):
             x, y, z = rotate(turned, entry[1:4])
@@ -750,20 +857,22 @@ class _FramesBelow:
             self._poses[frame, time] = moved, turned
         return moved, turned
 
-    def _newest_time(self, source: str) -> int | None:
-        """Return the newest time of a frame; None if it is not below the target."""
-        path: list[str] = []
-        frame, times = source, self._times
-        while frame not in times:
+    def _find_ancestry(self, source: str) -> _Ancestry:
+        known, path = self._ancestry, []
+        frame = source
+        while frame not in known:
             cache = self._caches.get(frame)
-            if cache is None or len(path) > _MAX_DEPTH:
-                return None
+            if cache is None:
+                known[frame] = _Ancestry(frame, 0, 0)
+                break
             path.append(frame)
             frame = cache.parent
+        above = known[frame]
         for frame in reversed(path):
-            latest, above = self._caches[frame].latest, times[self._caches[frame].parent]
-            times[frame] = min(latest, above) if latest and above else latest or above
-        return times[source]
+            latest = self._caches[frame].latest
+            time = min(latest, above.time) if latest and above.time else latest or above.time
+            above = known[frame] = _Ancestry(above.top, above.depth + 1, time)
+        return above
 
 
 def _gap(frame: str, gap: str, target: str, source: str) -> str:
@@ -771,13 +880,12 @@ def _gap(frame: str, gap: str, target: str, source: str) -> str:
 
 
 def _unconnected(
-    caches: Mapping[str, DynamicCache | StaticCache], target: str, source: str
+    target: str, source: str, target_root: str, source_root: str
 ) -> TransformException:
     return ConnectivityException(
         f"Could not find a connection between '{target}' and '{source}' because they are not part "
         f"of the same tree. Tf has two or more unconnected trees: '{target}' belongs to "
-        f"'{root_of(caches, target)}', '{source}' to '{root_of(caches, source)}'; "
-        "publish what connects them"
+        f"'{target_root}', '{source}' to '{source_root}'; publish what connects them"
     )
 
 

@@ -18,6 +18,7 @@ from rosglass.errors import (
     ExtrapolationException,
     InvalidArgumentException,
     LookupException,
+    TransformException,
 )
 from rosglass.tf import Transform, TransformBuffer
 
@@ -417,7 +418,7 @@ def test_a_hint_at_similar_frames_is_found_once(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_chains_as_long_as_those_of_tf2_are_followed() -> None:
-    count = 20_000  # without a limit, this takes minutes
+    count = 9_000  # without a limit, this takes minutes
     links = [("base" if not n else f"f{n - 1}", f"f{n}") for n in range(count)]
     for order in (links, list(reversed(links))):
         buffer = TransformBuffer()
@@ -425,17 +426,116 @@ def test_chains_as_long_as_those_of_tf2_are_followed() -> None:
             assert put(buffer, parent, child)
         assert buffer.lookup_transform("base", "f999").translation[0] == 1000
         assert buffer.silence("base", "f999") < 60.0
-        for target, source in (("base", "f1001"), ("f1001", "base"), ("base", "f19999")):
+        for target, source in (("base", "f1001"), ("f1001", "base"), ("base", f"f{count - 1}")):
             with pytest.raises(LookupException, match="a loop, or more than 1000 links"):
                 buffer.lookup_transform(target, source)
             (found,) = buffer.lookup_newest(target, [source]).values()
             assert isinstance(found, LookupException)
-        assert buffer.silence("base", "f19999") == 0.0
-        assert len(buffer.tree().chain("base", "f19999")) == count + 1
+        assert buffer.silence("base", f"f{count - 1}") == 0.0
+        assert len(buffer.tree().chain("base", f"f{count - 1}")) == count + 1
         # Whether this closes a loop is not found out at any length.
         with pytest.raises(InvalidArgumentException, match="below more than 1000 other frames"):
-            put(buffer, "f19998", "f9", 2.0)
+            put(buffer, f"f{count - 2}", "f9", 2.0)
         assert buffer.ignored["too deep"] == 1
+
+
+def test_lookups_of_frames_that_nothing_connects_share_what_they_find() -> None:
+    class Counting(dict[str, Any]):
+        looks = 0
+
+        def get(self, key: str, default: Any = None) -> Any:
+            self.looks += 1
+            return super().get(key, default)
+
+    buffer = TransformBuffer()
+    put(buffer, "map", "odom")
+    for chain in range(3):
+        for number in range(1500):
+            put(buffer, f"chain{chain}_{number}", f"chain{chain}_{number + 1}")
+    caches = buffer._store.caches = Counting(buffer._store.caches)
+    frames = [one for one in buffer.frame_names() if one not in ("map", "odom")]
+    for target in ("map", "chain0_1400"):
+        caches.looks = 0
+        found = buffer.lookup_newest(target, frames)
+        below = sum(not isinstance(one, TransformException) for one in found.values())
+        assert below == (0 if target == "map" else 101)
+        assert caches.looks < 4 * len(frames), "they are walked along again and again"
+
+
+def test_a_lookup_of_many_frames_ends_soon() -> None:
+    # Each link moves at times of its own: no frame shares a pose with another one.
+    buffer = TransformBuffer()
+    count = 900
+    for number in range(count):
+        for second in (1.0, 9.0 - number / count):
+            put(buffer, f"f{number - 1}" if number else "map", f"f{number}", second)
+    found = buffer.lookup_newest("map", [f"f{number}" for number in range(count)])
+    known = [one for one in found.values() if not isinstance(one, TransformException)]
+    assert 100 < len(known) < count
+    assert "more than 50000 links" in str(found[f"f{count - 1}"])
+
+
+def test_names_are_bounded_for_each_publisher(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = 100.0
+    for module in ("buffer", "frames"):
+        monkeypatch.setattr(f"rosglass.tf.{module}.monotonic", lambda: now)
+    buffer = TransformBuffer()
+
+    def send(names: list[str], authority: str, parent: str = "map") -> list[str]:
+        entry = (parent, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        items = [(name, round(now * 1e9), entry) for name in names]
+        return [kind for kind, _ in buffer.set_many(items, authority)]
+
+    assert not send(["odom"], "/robot")
+    assert not send(["base"], "/robot", "odom")
+    assert not send([f"a{number}" for number in range(10_000)], "/one")
+    assert send([f"b{number}" for number in range(5_000)], "/one") == ["too many"] * 5_000
+    assert send(["a0"], "/one", "c0") == ["too many"], "parents are names, too"
+    assert "at most 10000 names of frames are kept for each publisher" in buffer.last_fault
+    assert buffer.last_fault.endswith("(from /one)")
+    assert len(caplog.records) == 1
+    # What is known is followed, other publishers are not affected.
+    now += 5.0
+    assert not send(["a5"], "/one")
+    assert not send([f"d{number}" for number in range(9_000)], "/two")
+    # Names that are not used any more make room, but those that others stand on.
+    now += 5.5
+    assert not send(["leaf"], "/two", "a7")
+    assert not send(["e"], "/one")
+    names = set(buffer.frame_names())
+    assert {"map", "odom", "base", "a5", "a7", "d0", "e", "leaf"} < names
+    assert "a0" not in names
+    assert len(names) == 9_007
+    assert not buffer.has_frame("a0")
+    # All together.
+    for publisher in ("/three", "/four", "/five", "/six"):
+        send([f"{publisher}{number}" for number in range(10_000)], publisher)
+    refused = send([f"late{number}" for number in range(1_000)], "/seven")
+    assert refused == ["too many"] * 7
+    assert len(buffer.frame_names()) == 50_000
+    now += 11.0
+    assert not send(["late"], "/seven")
+    assert len(buffer.frame_names()) == 40_001
+    buffer.clear(static=True)
+    assert buffer.frame_names() == []
+    assert not send([f"g{number}" for number in range(9_999)], "/one")
+
+
+def test_long_names_are_refused_and_not_kept(caplog: pytest.LogCaptureFixture) -> None:
+    buffer = TransformBuffer()
+    long = "x" * 100_000
+    for parent, child in (("map", long), (long, "base"), ("/" + long[:255], "base")):
+        if len(parent) != 256:
+            with pytest.raises(InvalidArgumentException, match="at most 255 letters"):
+                put(buffer, parent, child)
+        else:
+            assert put(buffer, parent, child)
+    assert buffer.ignored == {"long name": 2}
+    assert all(len(record.getMessage()) < 500 for record in caplog.records)
+    assert len(buffer.last_fault) < 500
+    assert sorted(map(len, buffer.frame_names())) == [4, 255]
 
 
 def test_a_tree_of_some_frames() -> None:
@@ -504,4 +604,9 @@ def test_at_rest_no_pose_changes() -> None:
     assert len(states - {None, moved}) == 3
     for number in range(2000):
         put(buffer, "map", f"many{number}", static=True)
-    assert buffer.rest() is None, "a peer may send any number of frames"
+    # A peer may send any number of frames: which of them move is not found out.
+    rest = buffer.rest()
+    assert rest is not None
+    assert buffer.rest() == rest
+    put(buffer, "base", "mast", x=2.0, static=True)
+    assert buffer.rest() != rest

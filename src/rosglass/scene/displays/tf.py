@@ -43,6 +43,8 @@ _SHAFT_COLOR, _HEAD_COLOR = (0.8, 0.8, 0.3, 1.0), (1.0, 0.1, 0.6, 1.0)
 _REFUSED_S = 10.0
 #: Seconds between two looks at frames that are not updated any more.
 _LOOK_S = 0.5
+#: How many times as long as drawing took is left until it is drawn again.
+_PAUSE = 4
 #: The share of its timeout after which a frame begins to fade.
 _FADE_AFTER = 1 / 3
 
@@ -122,8 +124,8 @@ class TFDisplay(Display):
     ) -> None:
         self._axes, self._arrows = AxesShapes(self), ArrowShapes(self)
         self._names = Labels(align="below")
-        #: When frames were looked at last.
-        self._looked_at = -math.inf
+        #: When frames were looked at last, and the seconds that this took.
+        self._looked_at, self._took_s = -math.inf, 0.0
         #: Whether a frame is not static: it fades without a transform.
         self._moves = False
         #: Whether the robot is not connected: all fade then.
@@ -209,8 +211,12 @@ class TFDisplay(Display):
         self._draw_after(0.0)
 
     def _draw_after(self, seconds: float) -> None:
-        """Draw the frames, unless that was done less than so long or the Update Interval ago."""
-        if time.monotonic() - self._looked_at >= max(seconds, self.updateInterval):
+        """Draw the frames, unless that was done less than so long or the Update Interval ago.
+
+        Many frames take long: the rest of the interface has most of the time.
+        """
+        pause = max(seconds, self.updateInterval, _PAUSE * self._took_s)
+        if time.monotonic() - self._looked_at - self._took_s >= pause:
             self._draw()
 
     def on_fixed_frame(self) -> None:
@@ -303,12 +309,13 @@ class TFDisplay(Display):
             if name in unknown or name not in tree:
                 continue
             shown.append(_Frame(name, pose, shares[name], tree[name].parent))
-        self._moves = any(not tree[frame.name].static for frame in shown)
+        self._moves = any(frame.parent and not tree[frame.name].static for frame in shown)
         shown = [frame for frame in shown if frame.share > 0]
         self._fill(shown)
         names = [frame.name for frame in shown]
         if names != self.frames:
             report(self, frames=names)
+        self._took_s = time.monotonic() - self._looked_at
 
     def _report_unknown(self, unknown: Mapping[str, TransformException]) -> None:
         """Say which frames have no transform, a line for each of the first ones."""
