@@ -548,6 +548,31 @@ def test_hints_at_topics_that_were_meant(robot, console, topic, eventually):
     assert subscription.hint == ""
 
 
+def test_hints_at_messages_that_are_kept_for_others(robot, console, topic, eventually, wire):
+    """A volatile subscription receives nothing of a map that was published before."""
+    publisher = robot.create_publisher(topic, TEXT, QoS.latched())
+    publisher.publish(data="yard")
+    eventually(lambda: console.publishers(topic))
+    subscription = console.create_subscription(topic, TEXT)
+    if wire.is_ros1:  # every subscription receives it
+        assert subscription.wait(5).message().data == "yard"
+        return
+    eventually(lambda: "request transient local" in subscription.hint, lambda: subscription.hint)
+    assert f"messages of /{robot.name} are kept" in subscription.hint
+    assert subscription.problem == ""
+    with pytest.raises(rosglass.TimeoutError, match="request transient local durability"):
+        console.wait_for_message(topic, TEXT, timeout=0.01, qos=1)
+    assert console.wait_for_message(topic, TEXT, timeout=5).data == "yard"
+    # A publisher that keeps nothing makes the strongest profile that matches all a volatile one.
+    robot.create_publisher(topic, TEXT)
+    eventually(lambda: len(console.publishers(topic)) == 2)
+    mixed = console.create_subscription(topic, TEXT, qos=QoS.best_available())
+    eventually(lambda: "request transient local" in mixed.hint, lambda: mixed.hint)
+    publisher.publish(data="yard, again")
+    assert subscription.wait(5).message().data == "yard, again"
+    assert subscription.hint == ""
+
+
 def test_waiting_in_vain_says_why(robot, console, topic, eventually):
     with pytest.raises(
         rosglass.TimeoutError, match=f"{topic}: no message within 0.01 s: {topic} has no pub"

@@ -174,7 +174,11 @@ class RealWorld:
 # One world shows what differs between Qt versions.
 @pytest.fixture(scope="module", params=["ros1"] if QT5 else ["zenoh", "ros1"])
 def url(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Where a robot and its operator meet: a Zenoh router, or a ROS 1 master."""
+    """Where a robot and its operator meet: a Zenoh router, a DDS domain, or a ROS 1 master."""
+    if request.param == "dds":
+        pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
+        yield f"dds://?domain={request.getfixturevalue('ros_domains')[0]}"
+        return
     if request.param == "zenoh":
         from rosglass.wires.zenoh.router import Router
 

@@ -9,6 +9,7 @@ import pytest
 from rosglass.comm.qos import BEST_AVAILABLE, Durability, Liveliness, QoS, Reliability
 from rosglass.comm.time import Duration
 
+EVERY_WIRE = pytest.mark.parametrize("url", ["zenoh", "dds", "ros1"], indirect=True, scope="module")
 ALL = """Ros2.QoS().reliable().transient_local().keep_last(7).deadline(250).lifespan(1500.5)
     .liveliness_manual_by_topic().liveliness_lease_duration(2000)"""
 
@@ -128,3 +129,71 @@ def test_a_profile_that_clashes_is_a_problem_on_both_sides(running: Any, wait: A
     clash = "reliability: reliable requested, best effort offered"
     wait(lambda: clash in root.offered() and clash in root.asked())
     assert root.property("told") == 1
+
+
+@EVERY_WIRE
+def test_ros_1_0_receives_what_was_latched_before(live: Any, wait: Any) -> None:
+    """As in ROS 1, of any robot: maps and missions are published once."""
+    latched = live.robot.create_publisher("/map_name", "std_msgs/msg/String", QoS.latched())
+    latched.publish(data="yard")
+    plain = live.robot.create_publisher("/chat", "std_msgs/msg/String", QoS.sensor_data())
+    wait(lambda: len(live.session.node.publishers("/map_name")) == 1)
+    live.module = "Ros 1.0"
+    root: Any = live.load("""QtObject {
+        id: root
+        property Subscriber typed: Subscriber { topic: "/map_name"; messageType: "std_msgs/String" }
+        property Subscriber found: Subscriber { topic: "/map_name"; queueSize: 0 }
+        property var made: Ros.subscribe("/map_name", 1)
+        property Subscriber chat: Subscriber { topic: "/chat" }
+        property var texts: [typed, found, made, chat].map(s => s.message ? s.message.data : "")
+        property var problems: [typed, found, made, chat].map(s => s.problem)
+    }""")
+    wait(lambda: root.property("texts").toVariant()[:3] == ["yard"] * 3)
+    wait(lambda: plain.subscription_count() == 1)
+    plain.publish(data="hello")
+    wait(lambda: root.property("texts").toVariant()[3] == "hello")
+    assert root.property("problems").toVariant() == [""] * 4
+
+
+@EVERY_WIRE
+def test_a_volatile_subscription_says_that_messages_are_kept(live: Any, wait: Any) -> None:
+    latched = live.robot.create_publisher("/map_name", "std_msgs/msg/String", QoS.latched())
+    latched.publish(data="yard")
+    wait(lambda: len(live.session.node.publishers("/map_name")) == 1)
+    root: Any = live.load("""QtObject {
+        property Subscription plain: Subscription { topic: "/map_name" }
+        property Subscription asking: Subscription {
+            topic: "/map_name"; qos: Ros2.QoS().reliable().transient_local()
+        }
+        property var best: Ros2.createSubscription("/map_name", Ros2.BestAvailableQoS())
+        property var texts: [plain, asking, best].map(s => s.message ? s.message.data : "")
+        property string problem: plain.problem
+    }""")
+    if live.session.node.wire == "ros1":
+        wait(lambda: root.property("texts").toVariant() == ["yard"] * 3)
+        assert root.property("problem") == ""
+        return
+    wait(lambda: root.property("texts").toVariant()[1:] == ["yard"] * 2)
+    add = "with qos: Ros2.QoS().reliable().transient_local()"
+    wait(lambda: add in root.property("problem"))
+    assert "of /robot are kept for late subscriptions" in root.property("problem")
+    latched.publish(data="yard, again")
+    wait(lambda: root.property("texts").toVariant() == ["yard, again"] * 3)
+    wait(lambda: root.property("problem") == "")
+
+
+@EVERY_WIRE
+def test_a_picture_that_was_latched_before_is_shown(live: Any, wait: Any) -> None:
+    picture = {"width": 1, "height": 1, "encoding": "rgb8", "step": 3, "data": [1, 2, 3]}
+    publisher = live.robot.create_publisher("/plan", "sensor_msgs/msg/Image", QoS.latched())
+    publisher.publish(picture)
+    wait(lambda: len(live.session.node.publishers("/plan")) == 1)
+    root: Any = live.load(
+        """Item {
+            property bool shown: plan.subscribed && !plan.stale
+            ImageItem { id: view }
+            ImageTransportSubscription { id: plan; topic: "/plan"; videoSink: view.videoSink }
+        }""",
+        "import QtQuick 2.15",
+    )
+    wait(lambda: root.property("shown"))

@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import subprocess
 import sys
+import threading
+from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
+import pytest
 from ports import free_port
+from waiting import eventually
 
 from rosglass.wires.zenoh.router import Router
 
 ROOT = Path(__file__).parents[2]
 #: Seconds for a busy machine to show the robot, and until the picture.
 _SHOWN_S = "12"
+#: Debian's Python, with RViz.
+RVIZ_PYTHON = ROOT / ".venv-system/bin/python"
+#: The panels of the dashboard, the last of which has three pages.
+PANELS = {
+    *("View", "Posture", "Mode", "Battery", "Front camera", "Rear camera"),
+    *("Mission", "Behaviours", "Settings"),
+}
 
 
 def test_it_shows_the_dashboard_over_the_robot_without_warnings(app: Any, tmp_path: Path) -> None:
@@ -28,7 +41,7 @@ def test_it_shows_the_dashboard_over_the_robot_without_warnings(app: Any, tmp_pa
         env={name: value for name, value in os.environ.items() if name != "DISPLAY"},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=100,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -74,3 +87,86 @@ def test_the_example_in_python_shows_a_robot(app: Any) -> None:
             for process in (example, robot):
                 process.kill()
                 process.wait()
+
+
+class Demo:
+    """One of the two demos, and all that the panels of its dashboard have shown.
+
+    Attributes:
+        shown: The texts of each panel by its title, with ``#`` in place of numbers.
+    """
+
+    def __init__(self, python: str, program: str, folder: Path) -> None:
+        start, module = {
+            "view": ("_start_router", "rosglass.demo.view"),
+            "rviz": ("_start_master", "rosglass.demo.rviz"),
+        }[program]
+        overlay, config = ROOT / "tests/scene/DashboardPanels.qml", ROOT / "examples/rviz"
+        command = [program, str(config / "figure1.rviz"), "--overlay", str(overlay)]
+        code = f"""
+import sys
+from pathlib import Path
+from rosglass.demo.rviz import run_station
+from {module} import {start}
+sys.exit(run_station({program!r}, {command!r}, {start}, 600, None, Path("never.png")))
+"""
+        environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "ROS_IP")}
+        environment |= {"HOME": str(folder), "XDG_RUNTIME_DIR": str(folder)}
+        environment["ROSGLASS_QT"] = "pyside2" if program == "rviz" else ""
+        self.shown: dict[str, set[tuple[str, ...]]] = defaultdict(set)
+        self.lines: list[str] = []
+        self._process = subprocess.Popen(
+            [python, "-c", code],
+            cwd=folder,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            _, found, panels = line.partition("PANELS ")
+            if not found:
+                self.lines.append(line)
+                continue
+            for title, texts in json.loads(panels).items():
+                self.shown[title].add(tuple(re.sub(r"-?[0-9]+(\.[0-9]+)?", "#", t) for t in texts))
+
+    def close(self) -> None:
+        """End the demo, and all that it has started."""
+        self._process.terminate()
+        self._process.wait(60)
+
+
+@pytest.mark.skipif(not RVIZ_PYTHON.exists(), reason="RViz's Python is set up by make test")
+def test_each_panel_shows_what_it_shows_over_rviz(tmp_path: Path) -> None:
+    """The same dashboard, of a ROS 1 robot over RViz and of a ROS 2 robot over the 3D view."""
+    folders = [tmp_path / name for name in ("view", "rviz")]
+    for folder in folders:
+        folder.mkdir(mode=0o700)
+    demos = [Demo(sys.executable, "view", folders[0]), Demo(str(RVIZ_PYTHON), "rviz", folders[1])]
+    view, rviz = demos
+
+    def differing() -> list[str]:
+        return [p for p in sorted(PANELS) if not view.shown[p] & rviz.shown[p]]
+
+    def complete() -> bool:
+        mission = view.shown["Mission"] & rviz.shown["Mission"]
+        # Its five waypoints are numbered.
+        return not differing() and any(texts.count("#") == 5 for texts in mission)
+
+    try:
+        eventually(
+            complete,
+            lambda: str([(p, view.shown[p], rviz.shown[p]) for p in differing() or ["Mission"]]),
+            timeout=100,
+        )
+        assert view.shown.keys() == rviz.shown.keys() == PANELS
+        for demo in demos:
+            assert not [line for line in demo.lines if "WARNING rosglass.qml" in line], demo.lines
+    finally:
+        for demo in demos:
+            demo.close()

@@ -138,7 +138,11 @@ class Subscription(TopicEndpoint):
 
     @property
     def hint(self) -> str:
-        """A hint why the topic has no publisher, e.g. a similar topic name; empty if it has one."""
+        """A hint why nothing has been received: empty if something was, or no reason is known.
+
+        The topic has no publisher, and perhaps a similar name; or a publisher keeps its messages
+        for late subscriptions, which this one does not request.
+        """
         return "" if self.closed or self._feed is None else self._feed.hint()
 
     @property
@@ -454,6 +458,13 @@ class TopicMatching(ABC):
         """Return the publishers with incompatible profiles: the conflict in words by policy."""
         return {}
 
+    def find_unrequested_history(
+        self,
+        publishers: Sequence[EndpointInfo],  # noqa: ARG002 - in ROS 1, every subscription gets it
+    ) -> list[EndpointInfo]:
+        """Return the publishers that keep messages for late subscriptions, if not requested."""
+        return []
+
     def find_alive(self, matching: Sequence[EndpointInfo]) -> list[EndpointInfo]:
         """Return the matching publishers that assert their liveliness in time."""
         return list(matching)
@@ -575,9 +586,17 @@ class SubscriptionFeed(NodeMember):
         return len(self._matching.find_matching(self._publishers()))
 
     def hint(self) -> str:
-        """Return a hint why the topic has no publisher; empty if it has one."""
-        if self._publishers() or self.publisher_count():
-            return ""
+        """Return a hint why nothing has been received; empty without one."""
+        publishers = self._publishers()
+        if publishers or self.publisher_count():
+            kept = self._matching.find_unrequested_history(publishers)
+            if not kept or self.subscription.statistics().received:
+                return ""
+            nodes = ", ".join(sorted({one.node.full for one in kept}))
+            return (
+                f"earlier messages of {nodes} are kept for late subscriptions, which this one does "
+                "not ask for, and there has been none since: request transient local durability"
+            )
         topic, graph = self.topic, self._core.graph
         published = [name for name in graph.topics() if graph.endpoints(_PUBLISHER, name)]
         return f"{topic} has no publisher{similar(topic, published)}"

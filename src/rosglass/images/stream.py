@@ -6,13 +6,13 @@ import logging
 import threading
 import time
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosglass.comm.executor import IMMEDIATE
 from rosglass.comm.handle import Handle
-from rosglass.comm.qos import QoS, Reliability
+from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.errors import Error, NodeClosedError, NoPictureError
 from rosglass.images.transports import choose
 
@@ -270,7 +270,7 @@ class ImageStream(Handle):
             subscription = self._node.create_subscription(
                 choice.topic,
                 choice.transport.type,
-                qos=_VIDEO if choice.transport.video else _STILLS,
+                qos=self._profile(choice),
                 raw_callback=partial(self._on_sample, choice.transport),
                 executor=IMMEDIATE,
             )
@@ -286,6 +286,16 @@ class ImageStream(Handle):
             previous.close()
         self._problem = ""
         self._notify()
+
+    def _profile(self, choice: Choice) -> QoS:
+        """Return the profile to request: a picture that was latched is asked for, too."""
+        qos = _VIDEO if choice.transport.video else _STILLS
+        publishers = self._node.publishers(choice.topic)
+        if any(p.qos.durability is not Durability.TRANSIENT_LOCAL for p in publishers):
+            return qos
+        return replace(
+            qos, reliability=Reliability.BEST_AVAILABLE, durability=Durability.BEST_AVAILABLE
+        )
 
     def _decode(self, samples: deque[tuple[Transport, Sample]]) -> None:
         """Decode the received samples, and display the newest image."""

@@ -30,7 +30,7 @@ from rosglass.qml.replay import Replay
 from rosglass.qml.runtime import Runtime, own_runtime
 from rosglass.qml.services import RosServiceServer, Service, server_function
 from rosglass.qml.singleton import ValueFunctions, check_type, is_list, strings
-from rosglass.qml.subscription import DEFAULT_QOS, Subscriber, next_message
+from rosglass.qml.subscription import ROS1_QOS, Subscriber, next_message
 from rosglass.qml.synchronized_subscription import RosSynchronizedSubscription
 from rosglass.qml.tf_buffer import RosTfBuffer, RosTfTransformListener
 from rosglass.qml.tf_transform import RosTfBroadcaster, RosTfTransform
@@ -314,7 +314,7 @@ class Ros(ValueFunctions):
         try:
             texts, rest = _split(given, "Ros.advertise([ns,] type, topic, queueSize, latch)")
             namespace, type_name, topic = texts
-            qos = queue_from_js(rest[0], DEFAULT_QOS)
+            qos = queue_from_js(rest[0], ROS1_QOS)
             size = 0 if qos.history is History.KEEP_ALL else qos.depth
             check_type(type_name, topic)
             topic = within_namespace(namespace, topic)
@@ -335,7 +335,7 @@ class Ros(ValueFunctions):
             names = [value.toString() for value in given[:-1]]
             namespace = names[0] if len(names) > 1 else ""
             self._check_topic(within_namespace(namespace, names[-1]))
-            qos = queue_from_js(given[-1], DEFAULT_QOS)
+            qos = queue_from_js(given[-1], ROS1_QOS)
         except Error as error:
             self._runtime.throw(f"Ros.subscribe: {error}")
             return None

@@ -203,8 +203,8 @@ class Ros2(ValueFunctions):
 
     @Slot(result=QJSValue)
     def BestAvailableQoS(self) -> QJSValue:
-        """Return a profile that matches every publisher: best effort, volatile, the newest 10."""
-        return self._runtime.qos(DEFAULT_QOS.with_depth(10))
+        """Return a profile: the strongest that matches all publishers, the newest 10."""
+        return self._runtime.qos(QoS.best_available())
 
     # Topics.
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.qos import Durability, History, QoS, Reliability
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
@@ -27,7 +27,14 @@ if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
 
 
-__all__ = ["DEFAULT_QOS", "Subscriber", "Subscription", "next_message", "wait_for_message"]
+__all__ = [
+    "DEFAULT_QOS",
+    "ROS1_QOS",
+    "Subscriber",
+    "Subscription",
+    "next_message",
+    "wait_for_message",
+]
 
 _log = logging.getLogger("rosglass.qml")
 #: Topics faster than the throttle rate by these factors are received in batches; the second
@@ -35,6 +42,15 @@ _log = logging.getLogger("rosglass.qml")
 _MUCH_FASTER, _HARDLY_FASTER = 3.0, 1.5
 #: The profile of ``Ros2.QoS()``: matches every publisher, keeps only the newest message.
 DEFAULT_QOS = QoS(depth=1, reliability=Reliability.BEST_EFFORT)
+#: The profile of ``Ros 1.0``: what each publisher offers, as in ROS 1 every subscriber receives
+#: latched messages, and each message that is sent again when it is lost.
+ROS1_QOS = QoS(
+    depth=1,
+    reliability=Reliability.BEST_AVAILABLE,
+    durability=Durability.BEST_AVAILABLE,
+)
+#: Seconds without a message after which messages of the past may be what is missing.
+_NO_MESSAGE_S = 2.0
 
 
 class Subscription(TopicElement):
@@ -63,6 +79,8 @@ class Subscription(TopicElement):
     bandwidth = ReadOnly(float, 0.0, tolerance=0.01)
     dropped = ReadOnly(int, 0)
 
+    #: The profile while QML sets none.
+    _DEFAULT_QOS: ClassVar[QoS] = DEFAULT_QOS
     _HOLDS = ("_sample", "_message", "_value", "_wake")
     _endpoint: TopicSubscription | None
     _timeout: int | None
@@ -77,7 +95,7 @@ class Subscription(TopicElement):
     ) -> None:
         super().__init__(parent, runtime)
         self._wanted_type, self._found_type = "", ""
-        self._profile = DEFAULT_QOS
+        self._profile = self._DEFAULT_QOS
         self._wanted_queue_size: int | None = None
         self._sample: Sample | None = None
         #: The sample's message.
@@ -86,7 +104,9 @@ class Subscription(TopicElement):
         self._current = False
         self._value: QJSValue | None = None
         self._shown_at = self._late = 0.0
-        self._inner_problem = ""
+        self._inner_problem = self._missed = ""
+        #: When the subscription was created.
+        self._created_at = 0.0
         self._timer = single_shot(self, self._deliver)
 
     @property
@@ -121,7 +141,7 @@ class Subscription(TopicElement):
 
     def _set_qos(self, value: QJSValue | None) -> None:
         try:
-            self._set_profile(qos_from_js(value, DEFAULT_QOS))
+            self._set_profile(qos_from_js(value, self._DEFAULT_QOS))
         except ConversionError as error:
             self._refuse(f"{self.label}: {error}")
 
@@ -170,7 +190,7 @@ class Subscription(TopicElement):
         return self._value
 
     def _get_problem(self) -> str:
-        return self._problem or self._inner_problem or self._mixing
+        return self._problem or self._inner_problem or self._missed or self._mixing
 
     @Slot(result=int)
     def getPublisherCount(self) -> int:
@@ -197,6 +217,7 @@ class Subscription(TopicElement):
     def _on_created(self, endpoint: TopicSubscription) -> None:
         executor, on_arrival = self._executor, weak_callback(self._on_arrival)
         self._wake = lambda: executor.post(lambda: on_arrival(endpoint))
+        self._created_at = self._steady()
         self._set_problem("")
         if is_alive(self):
             self._expect_publishers()
@@ -206,7 +227,8 @@ class Subscription(TopicElement):
     def _on_closed(self, endpoint: TopicSubscription | None) -> None:  # noqa: ARG002 - the base's
         self._timer.stop()
         self._no_publisher.stop()
-        self._current, self._inner_problem = False, ""
+        self._current = False
+        self._inner_problem = self._missed = ""
         report(self, subscribed=False)
 
     def _clear_shown(self) -> None:
@@ -316,20 +338,23 @@ class Subscription(TopicElement):
 
     def _recheck_outdated(self) -> None:
         # The publisher that latched the message still exists and would have sent a newer one.
-        latched = self._profile.durability is Durability.TRANSIENT_LOCAL
         connected = self._session is not None and self._session.state == "connected"
-        if latched and connected and self._current and self._has_publisher():
+        if connected and self._current and self._is_latched():
             self._outdated = False
 
-    def _has_publisher(self) -> bool:
-        """Return whether the publisher of the message itself, not a successor, still exists."""
-        node, sample = self.node, self._sample
-        if node is None or sample is None:
+    def _is_latched(self) -> bool:
+        """Return whether the publisher of the message, not a successor, still keeps it for us."""
+        node, sample, endpoint = self.node, self._sample, self._endpoint
+        if node is None or sample is None or endpoint is None:
+            return False
+        if endpoint.qos.durability is not Durability.TRANSIENT_LOCAL:
             return False
         try:
             publishers = node.publishers(self._resolved)
         except Error:
             return False
+        if self._profile.durability is Durability.BEST_AVAILABLE:
+            publishers = [p for p in publishers if p.qos.durability is Durability.TRANSIENT_LOCAL]
         known = [one.gid for one in publishers if one.gid]
         return sample.publisher in known if known else bool(publishers)
 
@@ -352,6 +377,7 @@ class Subscription(TopicElement):
         fast = statistics.frequency > enough * throttle
         subscription.set_batching(throttle > 0 and fast)
         self._inner_problem = subscription.problem
+        self._note_missed_history(subscription)
         self._announce_problem()
         report(
             self,
@@ -363,11 +389,24 @@ class Subscription(TopicElement):
             dropped=statistics.dropped if throttle == 0 else 0,
         )
 
+    def _note_missed_history(self, subscription: TopicSubscription) -> None:
+        """Log and keep that only a message is missing which this subscription did not ask for."""
+        missed = ""
+        waited = self._steady() - self._created_at
+        if not self._current and self._publishers and waited > _NO_MESSAGE_S:
+            missed = subscription.hint
+        if missed and self.DIALECT is Dialect.ROS2:
+            missed += ", with qos: Ros2.QoS().reliable().transient_local()"
+        if missed != self._missed:
+            self._missed = missed
+            self._log(f"{self._resolved}: {missed}" if missed else "", logging.WARNING)
+
 
 class Subscriber(Subscription):
     """The element ``Subscriber`` of ``Ros 1.0``: a :class:`Subscription` within a namespace."""
 
     DIALECT = Dialect.ROS1
+    _DEFAULT_QOS = ROS1_QOS
 
     nsChanged = Signal()
 

@@ -7,7 +7,7 @@ import math
 import threading
 import time
 from collections import deque
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rosglass.comm.approximate_time import ApproximateTime
 from rosglass.comm.executor import Dispatcher
@@ -18,7 +18,7 @@ from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import DEFAULT_TIMEOUT_MS, Element
 from rosglass.qml.js_values import qos_from_js, shown
 from rosglass.qml.properties import ReadOnly, Writable, at_least, report, within
-from rosglass.qml.subscription import DEFAULT_QOS, Subscription
+from rosglass.qml.subscription import DEFAULT_QOS, ROS1_QOS, Subscription
 from rosglass.qt import QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
@@ -184,6 +184,8 @@ class SynchronizedSubscription(Element):
     frequency = ReadOnly(float, 0.0, tolerance=0.01)
     dropped = ReadOnly(int, 0)
 
+    #: The profile of topics that QML gives none.
+    _DEFAULT_QOS: ClassVar[QoS] = DEFAULT_QOS
     _HOLDS = ("_topics", "_subscriptions", "_received", "_value")
     _endpoint: _Matcher | None
     _stale: bool
@@ -220,12 +222,12 @@ class SynchronizedSubscription(Element):
             if isinstance(item_object, Subscription):
                 topic, type_name, qos = item_object.source()
             elif item.isString():
-                topic, type_name, qos = item.toString(), "", DEFAULT_QOS
+                topic, type_name, qos = item.toString(), "", self._DEFAULT_QOS
             elif item.isObject() and item.property("topic").isString():
                 topic = item.property("topic").toString()
                 kind = item.property("type")
                 type_name = "" if kind.isUndefined() else kind.toString()
-                qos = qos_from_js(item.property("qos"), DEFAULT_QOS)
+                qos = qos_from_js(item.property("qos"), self._DEFAULT_QOS)
             else:
                 expected = 'a topic, {topic: "/scan", type: "...", qos: ...}, or a Subscription'
                 raise ConversionError(f"topics[{at}]", shown(item), expected)
@@ -333,3 +335,4 @@ class RosSynchronizedSubscription(SynchronizedSubscription):
     """The element ``SynchronizedSubscription`` of ``Ros 1.0``."""
 
     DIALECT = Dialect.ROS1
+    _DEFAULT_QOS = ROS1_QOS

@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from rosglass.comm import EndpointInfo, EndpointKind, Liveliness, Sample
+from rosglass.comm import Durability, EndpointInfo, EndpointKind, Liveliness, Sample
 from rosglass.comm.events import describe_conflicts, qos_conflicts
 from rosglass.comm.subscription import Problem, TopicMatching
 from rosglass.errors import Error
@@ -111,6 +111,13 @@ class GraphMatching(TopicMatching):
             if self._types.accepts(p)
         }
         return {publisher: policies for publisher, policies in found.items() if policies}
+
+    def find_unrequested_history(self, publishers: Sequence[EndpointInfo]) -> list[EndpointInfo]:
+        """Return the transient local publishers of a volatile subscription."""
+        if self._feed.qos.durability is Durability.TRANSIENT_LOCAL:
+            return []
+        matching = self.find_matching(publishers)
+        return [p for p in matching if p.qos.durability is Durability.TRANSIENT_LOCAL]
 
     def find_alive(self, matching: Sequence[EndpointInfo]) -> list[EndpointInfo]:
         """Return the matching publishers that assert their liveliness in time."""
