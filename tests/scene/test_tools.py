@@ -194,6 +194,38 @@ def test_tools_are_added_and_removed(bench: SceneBench) -> None:
     assert changes[:2] == [9, 8]
 
 
+def test_what_was_removed_at_once_does_not_come_back(
+    bench: SceneBench, hand: Hand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    topics = ["/first", "/second"]
+    goals = [listen(bench, topic, "geometry_msgs/PoseStamped") for topic in topics]
+    for topic in topics:
+        tools = f"[{{Class: rviz/Interact}}, {{Class: rviz/SetGoal, Topic: {topic}}}]"
+        text = f"Visualization Manager: {{Displays: [], Tools: {tools}}}"
+        (tmp_path / f"{topic}.rviz".lstrip("/")).write_text(text)
+    # As right after Application.load(): nothing of it has run in the event loop.
+    with monkeypatch.context() as at_once:
+        at_once.setattr(bench, "wait", lambda *_: None)
+        view = bench.load('GridDisplay { } SetInitialPoseTool { topic: "/own" }')
+    assert [one.TYPE for one in view.scene.displays] == ["Grid"]
+    own = view.tools.find("SetInitialPose")
+    for topic in ("first", "second"):
+        view.load_config(tmp_path / f"{topic}.rviz")
+        view.scene.remove(view.scene.add("Axes"))
+        view.tools.remove(view.tools.add("Measure"))
+        bench.wait.settled(bench.session)
+        assert [tool.TYPE for tool in view.tools] == ["Interact", "SetGoal", "SetInitialPose"]
+        assert view.tools.find("SetInitialPose") is own
+        assert view.scene.displays == []
+    view.tool = "SetGoal"
+    hand.drag(hand.at((0, 0, 0)), hand.at((1, 0, 0)))
+    bench.wait(lambda: goals[1])
+    assert not goals[0]
+    view.tools.clear()
+    bench.wait.settled(bench.session)
+    assert len(view.tools) == 0
+
+
 def test_qml_selects_and_declares_tools(bench: SceneBench, caplog: Any) -> None:
     view = bench.load(
         'tool: "Mark"; property var marks: []\n'

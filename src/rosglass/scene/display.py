@@ -172,6 +172,8 @@ class Display(Configurable, TopicElement):
     ) -> None:
         self.root = Group()
         self.scene: Scene | None = None
+        #: Whether it was removed, and waits to be destroyed.
+        self._is_removed = False
         self.status_lines: dict[str, Status] = {}
         self._name = ""
         #: What a ``.rviz`` file had for it.
@@ -211,7 +213,7 @@ class Display(Configurable, TopicElement):
 
     @Slot()
     def _run_update(self) -> None:
-        if not is_alive(self):
+        if not is_alive(self) or self._is_removed:
             return
         if self.scene is None:
             # Declared in QML inside a view; objects that Python makes are added by it.
@@ -233,7 +235,7 @@ class Display(Configurable, TopicElement):
 
     def join(self, scene: Scene) -> None:
         """Start to be shown in a scene; called by the scene."""
-        self.scene = scene
+        self.scene, self._is_removed = scene, False
         self.root.visible = self.enabled
         (scene.root if self.group is None else self.group.root).add(self.root)
         self._schedule()
@@ -243,7 +245,7 @@ class Display(Configurable, TopicElement):
         """Stop being shown; called by the scene, also for a display that QML has destroyed."""
         self.root.remove()
         self.root.clear()
-        self.scene = None
+        self.scene, self._is_removed = None, True
 
     @property
     def shown(self) -> bool:

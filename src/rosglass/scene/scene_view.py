@@ -17,6 +17,7 @@ from rosglass.errors import ArgumentError, Error, shown
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.rviz.orbit import ease
 from rosglass.scene.camera import interpolate
+from rosglass.scene.display import Display
 from rosglass.scene.display_configs import (
     add_controller,
     check_saved_views,
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
 
     from rosglass.qml.runtime import Runtime
     from rosglass.scene.camera import Camera
-    from rosglass.scene.display import Display
     from rosglass.scene.drawing import Drawable
     from rosglass.scene.picking import Hit
 
@@ -340,11 +340,16 @@ class SceneView(QQuickRhiItem):
     # -- displays and tools ----------------------------------------------------------------------
 
     def componentComplete(self) -> None:
-        """Take the tools that were declared, and select the one that is wanted."""
+        """Take the displays and tools that were declared, and select the tool that is wanted.
+
+        Now, not from the event loop: a program may load a config next, which replaces them.
+        """
         super().componentComplete()
         for child in self.children():
             if isinstance(child, Tool):
                 self.adopt_tool(child)
+            elif isinstance(child, Display):
+                self.adopt_display(child)
         wanted, self._wanted_tool = self._wanted_tool, ""
         if wanted:
             self._set_tool(wanted)

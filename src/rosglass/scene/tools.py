@@ -235,6 +235,8 @@ class Tool(Configurable, Element):
         self._name = ""
         self._key: str | None = None
         self._has_hit = False
+        #: Whether it was removed, and waits to be destroyed.
+        self._is_removed = False
         #: Whether it uses the node; only then it joins the session.
         self._uses_node = False
         #: RViz's class, as the file had it; RViz 2's for new ones.
@@ -302,7 +304,9 @@ class Tool(Configurable, Element):
 
     @Slot()
     def _run_update(self) -> None:
-        if is_alive(self) and self.view is None:
+        if not is_alive(self) or self._is_removed:
+            return
+        if self.view is None:
             # Declared in QML inside a view; the view adds the tools that Python makes.
             view = find_view(self)
             if view is not None:
@@ -409,14 +413,14 @@ class Tool(Configurable, Element):
 
     def join(self, view: ToolView, tools: Tools) -> None:
         """Belong to a view; called by its list of tools."""
-        self.view, self._tools = view, tools
+        self.view, self._tools, self._is_removed = view, tools, False
         view.overlay.add(self.root)
         self._restyle()
 
     def leave(self) -> None:
         """Belong to no view any more; called by its list of tools."""
         self.root.remove()
-        self.view = self._tools = None
+        self.view, self._tools, self._is_removed = None, None, True
 
     def _set_selected(self, selected: bool) -> None:
         if is_alive(self) and report(self, selected=selected):
