@@ -225,3 +225,27 @@ def test_the_virtual_screen_ends_when_its_owner_forgets_it() -> None:
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=30, check=True
     )
     wait_gone([int(result.stdout)], 2.0)
+
+
+def test_a_copy_of_the_cockpit_runs(tmp_path: Path, url: str) -> None:
+    from PySide6.QtGui import QImage
+
+    from rosglass.demo.processes import VirtualScreen
+
+    copied = start(tmp_path, "examples", "mine")
+    output = copied.communicate(timeout=60)[0]
+    assert copied.returncode == 0, output
+    again = start(tmp_path, "examples", "mine")
+    assert "mine exists already: name a new folder" in again.communicate(timeout=60)[0]
+    assert again.returncode == 1
+    shown = re.search(r"rosglass (run mine/cockpit/main\.qml) --watch", output)
+    assert shown is not None, output
+    with VirtualScreen(1340, 800) as screen:
+        arguments = [*shown[1].split(), "--url", url, "--screenshot", "shown.png"]
+        run = start(tmp_path, *arguments, DISPLAY=screen.display)
+        text = run.communicate(timeout=60)[0]
+    assert run.returncode == 0, text
+    assert "WARNING" not in text
+    image = QImage(str(tmp_path / "shown.png"))
+    # Its title bar has room on a screen of 800 pixels.
+    assert (image.width(), image.height()) == (1340, 752)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -47,10 +48,22 @@ def test_the_chart_of_the_page_shows_the_last_values(
     for percentage in (0.1, 0.25, 0.5, 1.0):
         battery.publish(percentage=percentage)
     wait(lambda: [bar.height() for bar in bars()][:3] == [25, 50, 100])
+    assert all(bar.property("color").name() != "#ffffff" for bar in bars() if bar.height())
     history = next(child for child in root.children() if isinstance(child, element))
     assert history.property("values") == [0.25, 0.5, 1.0]
     history.setProperty("length", 2)
     assert history.property("values") == [0.5, 1.0]
+
+
+def test_the_program_of_the_page_shows_the_chart(python: Any, tmp_path: Path) -> None:
+    announced = QML.replace('Ros2.init("chart")', '{ Ros2.init("chart"); console.warn("shown") }')
+    (tmp_path / "chart.qml").write_text(announced, encoding="utf-8")
+    chart = f'"{tmp_path / "chart.qml"}", url="local://chart"'
+    program = python(CODE[0] + CODE[1].replace('"chart.qml"', chart))
+    program.until("shown", 40)
+    program.kill(signal.SIGINT)
+    assert program.end(40) == 0, program.text
+    assert [line for line in program.lines if "WARNING" in line or "Error" in line] == []
 
 
 def test_it_refuses_tells_and_ends_like_every_element(

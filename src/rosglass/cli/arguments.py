@@ -850,6 +850,16 @@ def _router(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _examples(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "folder",
+        nargs="?",
+        default="examples",
+        metavar="FOLDER",
+        help="a new folder for the copies (default: %(default)s)",
+    )
+
+
 def _completion(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("shell", choices=("bash", "zsh", "fish", "tcsh"), help="the shell")
     parser.epilog = (
@@ -878,5 +888,6 @@ COMMANDS = {
     "bridge": (_bridge, "relay topics, services and actions between two graphs"),
     "doctor": (_doctor, "find what blocks the connection to the robot"),
     "router": (_router, "run a Zenoh router for ROS 2 (rmw_zenoh)"),
+    "examples": (_examples, "copy the examples and the demo's cockpit, to start from"),
     "completion": (_completion, "print the shell code for Tab completion"),
 }

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Sequence
 
-__all__ = ["build_parser", "run"]
+__all__ = ["build_parser", "parse", "run"]
 
 #: Commands that load Qt: Ctrl-C ends the process until they handle it themselves.
 _WITH_QT = ("run", "rviz", "view", "demo")
@@ -128,7 +128,8 @@ def _explain(error: Exception) -> int:
     raise error
 
 
-def _run(arguments: list[str]) -> int:
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Return the parsed command line; exits with 2 after a usage error, as argparse does."""
     arguments, ros, rest = _split(arguments)
     arguments = _AS_IN_ROS2.get(tuple(arguments[:2]), arguments[:2]) + arguments[2:]
     command = next((a for a in arguments if not a.startswith("-")), None)
@@ -139,6 +140,11 @@ def _run(arguments: list[str]) -> int:
     if ros and not hasattr(args, "ros_arguments"):
         parser.error(f"{args.command} takes no --ros-args: it is no node of its own")
     args.arguments, args.ros_arguments = rest, ros
+    return args
+
+
+def _run(arguments: list[str]) -> int:
+    args = parse(arguments)
     level = {0: logging.WARNING, 1: logging.INFO}.get(args.verbose, logging.DEBUG)
     logging.basicConfig(level=level, format="%(levelname)s %(name)s: %(message)s")
     if getattr(args, "looks_nearby", False) and not args.url:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.errors import Error
 from rosglass.qml.element import Element
 from rosglass.qml.properties import ReadOnly, Writable, report
-from rosglass.qt import QtCore, Slot, is_alive
+from rosglass.qt import QtCore, QtQml, Slot, is_alive
 from rosglass.rviz.property_values import from_plain, to_plain
 from rosglass.scene.declared import expect_view, find_view
 from rosglass.scene.display import Display
@@ -157,7 +157,7 @@ class OverlayElement(Element):
 
     QML_NAME = "SceneOverlay"
 
-    #: The QML file.
+    #: The QML file, relative to the file that declares the overlay, or ``package://name/path``.
     source = Writable(QtCore.QUrl, QtCore.QUrl())
     #: Its name; by default that of the file.
     name = Writable(str, "")
@@ -202,7 +202,10 @@ class OverlayElement(Element):
             return
         if self.source.isEmpty():
             return
-        file = self.source.toLocalFile() if self.source.isLocalFile() else self.source.toString()
+        # Qt 6 leaves relative URLs as they are written.
+        context = QtQml.QQmlEngine.contextForObject(self)
+        source = self.source if context is None else context.resolvedUrl(self.source)
+        file = source.toLocalFile() if source.isLocalFile() else source.toString()
         try:
             # Later: few views have overlays, which need much that the view does not.
             self.overlay = import_module("rosglass.scene.overlay").add_overlay(
