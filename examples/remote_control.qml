@@ -31,5 +31,10 @@ Item {
         text: "Flashlight: " + (isOn ? "On" : "Off")
         onClicked: pub.publish({data: (isOn = !isOn)})
     }
-    Label { textFormat: Text.PlainText; text: camera.stale ? "NO PICTURE: " + Ros2.connectionDetail : ""; color: "red" }
+    Label {
+        textFormat: Text.PlainText
+        color: "red"
+        text: !camera.stale ? "" : Ros2.connectionState !== "connected" ? "NO PICTURE: " + Ros2.connectionDetail
+            : "NO PICTURE on " + camera.topic + ". " + camera.problem
+    }
 }

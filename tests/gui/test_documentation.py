@@ -1,4 +1,4 @@
-"""The QML of the documentation is loaded as it is printed; parts of files get a file around them."""
+"""The QML of the documentation is loaded as printed; fragments get a file around them."""
 
 from __future__ import annotations
 

@@ -335,6 +335,23 @@ def test_bad_urls_are_shown(start: Any, file: Path) -> None:
     assert program.end() == 5
 
 
+@pytest.mark.parametrize(
+    ("url", "reason"),
+    [("zenho://robot", "did you mean zenoh?"), ("ros1://robot?anonymus=true", "anonymous")],
+)
+def test_a_url_that_can_never_work_ends_it(start: Any, file: Path, url: str, reason: str) -> None:
+    file.write_text(
+        """import QtQuick 2.15
+        import Ros2 1.0
+        Item { Component.onCompleted: Ros2.init("ui") }"""
+    )
+    program = start("run", file, "--url", url)
+    assert program.end() == 1
+    errors = [line for line in program.lines if url in line and "connecting to" not in line]
+    assert len(errors) == 1, program.text
+    assert reason in errors[0]
+
+
 def test_a_program_of_rosglass_reads_no_sources(python: Any) -> None:
     # PySide looks for its features in those of all modules.
     text = (

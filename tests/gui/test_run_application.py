@@ -220,6 +220,22 @@ def test_the_documented_programs_run(python: Any, tmp_path: Path) -> None:
         assert "Traceback" not in program.text
 
 
+@pytest.mark.skipif(not QT6, reason="Qt 5's media backends print nothing")
+def test_media_backends_of_qt_are_quiet(python: Any, tmp_path: Path) -> None:
+    (tmp_path / "cockpit.qml").write_text(
+        """import QtQuick
+        import QtMultimedia
+        Window { visible: true; VideoOutput { }
+            Timer { running: true; interval: 300; onTriggered: Qt.exit(0) }
+        }"""
+    )
+    file = str(tmp_path / "cockpit.qml")
+    program = python(f"from rosglass.qml import Application\nApplication({file!r}).run()")
+    assert program.end(40) == 0
+    # Such as "qt.multimedia.symbolsresolver: Couldn't load pipewire-0.3 library".
+    assert [line for line in program.lines if "Couldn't" in line or "qt.multimedia" in line] == []
+
+
 TYPO = """import QtQuick 2.15
 import Ros2 1.0
 Item {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
@@ -56,10 +57,9 @@ def test_commands_are_accepted(
     arguments: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(ROOT)
-    try:
-        parse(arguments)
-    except SystemExit as end:
-        assert end.code == 0, capsys.readouterr().err
+    with pytest.raises(SystemExit) as end:
+        sys.exit(0 if parse(arguments) else 1)
+    assert end.value.code == 0, capsys.readouterr().err
 
 
 @pytest.mark.parametrize("arguments", [a for _, a in MAKE], ids=[p for p, _ in MAKE])

@@ -9,7 +9,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rosglass.cli.run import QUIET_MEDIA
 from rosglass.demo.processes import DUPLICATE_EXIT, VirtualScreen, start_robot
 from rosglass.errors import Error
 from rosglass.wires.zenoh.options import ZenohOptions
@@ -34,9 +33,6 @@ def run(args: argparse.Namespace) -> int:
         raise Error(f"--seconds {args.seconds:g}: expected 1 to 86400")
     if not args.url.lower().startswith(("dds:", "zenoh:")):
         raise Error(f"--url {args.url}: expected dds:// or zenoh://HOST:PORT")
-    # Qt reads this when it is loaded; its media backends report every library they miss.
-    rules = [QUIET_MEDIA, os.environ.get("QT_LOGGING_RULES", "")]
-    os.environ["QT_LOGGING_RULES"] = ";".join(filter(None, rules))
     # Checked before anything is started, so that nothing is left running.
     import rosglass.qt  # noqa: F401, PLC0415
 

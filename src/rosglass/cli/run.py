@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from rosglass.scene.window_recorder import WindowRecorder
 
 __all__ = [
-    "QUIET_MEDIA",
     "Picture",
     "format_log",
     "load_qt",
@@ -31,8 +30,6 @@ __all__ = [
     "show_interface",
 ]
 
-#: Rules for messages of Qt that are of no use to users of an interface.
-QUIET_MEDIA = "qt.multimedia.symbolsresolver=false;qt.multimedia.ffmpeg*=false;qt.qpa.theme*=false"
 #: Seconds after which garbage is collected, which takes some 20 ms: not before the first frame.
 _FIRST_COLLECTION_S = 1.0
 
@@ -107,11 +104,8 @@ def show_interface(args: argparse.Namespace, file: str, **options: Any) -> int:
 
 
 def load_qt() -> None:
-    """Load Qt for a program of rosglass itself, without messages that are of no use to users."""
-    rules = os.environ.get("QT_LOGGING_RULES", "")
-    if QUIET_MEDIA not in rules:
-        os.environ["QT_LOGGING_RULES"] = ";".join(filter(None, [QUIET_MEDIA, rules]))
-    from rosglass.qt import import_plainly  # noqa: PLC0415 - Qt reads the rules when it is loaded
+    """Load Qt for a program of rosglass itself."""
+    from rosglass.qt import import_plainly  # noqa: PLC0415 - loads Qt
 
     import_plainly()
 
@@ -186,6 +180,14 @@ def _show(
     install_message_handler()
     app = Application(file, **options)
     app.session.longest_script = longest_script
+    url = app.session.url
+
+    def on_connection() -> None:
+        # The URL can never work. Not if QML has set another one, or the file may be corrected.
+        if app.session.state == "failed" and app.session.url == url and not options.get("watch"):
+            app.quit(1)
+
+    app.session.connection_changed.connect(on_connection)
     picture = None if screenshot is None else Picture(screenshot, after)
 
     def shown() -> None:

@@ -19,7 +19,7 @@ from rosglass.demo.camera import CODE_POSITION
 from rosglass.errors import Error, QmlError
 from rosglass.qml import Session
 from rosglass.qml.log import install_message_handler
-from rosglass.qml.process import QuitOnSignal, close_network, require_display
+from rosglass.qml.process import QuitOnSignal, close_network, quiet_qt, require_display
 from rosglass.qml.runner import Runner
 from rosglass.qml.subscription import Subscription
 from rosglass.qt import QtCore, QtGui, QtQml, QtQuick, optional
@@ -55,6 +55,7 @@ class Cockpit:
     """
 
     def __init__(self, url: str, size: tuple[int, int] | None = None) -> None:
+        quiet_qt()
         connected = require_display()
         install_message_handler()
         self.app = QtGui.QGuiApplication.instance() or QtGui.QGuiApplication(sys.argv[:1])

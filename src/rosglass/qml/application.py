@@ -12,7 +12,13 @@ from rosglass.comm.log import warn_on_terminal
 from rosglass.errors import Error
 from rosglass.qml.log import LocationFormatter
 from rosglass.qml.modules import interface_file
-from rosglass.qml.process import QuitOnSignal, close_network, end_process_within, require_display
+from rosglass.qml.process import (
+    QuitOnSignal,
+    close_network,
+    end_process_within,
+    quiet_qt,
+    require_display,
+)
 from rosglass.qml.renderer_choice import choice
 from rosglass.qml.runner import Runner, needs_widgets
 from rosglass.qml.session import Session
@@ -241,6 +247,7 @@ def _signals_deferred() -> Iterator[None]:
 
 
 def _qt_application(file: Path, arguments: Sequence[str]) -> QtGui.QGuiApplication:
+    quiet_qt()
     connected = require_display()
     widgets = optional("QtWidgets") if needs_widgets(file) else None
     kind: Any = QtGui.QGuiApplication if widgets is None else widgets.QApplication

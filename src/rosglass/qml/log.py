@@ -162,7 +162,9 @@ _TYPES = {
     QtCore.QtMsgType.QtFatalMsg: logging.CRITICAL,
 }
 _HINTS = {
-    "ReferenceError: rviz is not defined": "; it is over RViz alone: rosglass rviz --overlay FILE",
+    "ReferenceError: rviz is not defined": (
+        "; only overlays of a 3D view have it: rosglass view --overlay FILE, or rosglass rviz"
+    ),
     "XMLHttpRequest: Tried to use GET on a local file despite being disabled.": (
         " Set QML_XHR_ALLOW_FILE_READ to 1 to enable this feature."
     ),

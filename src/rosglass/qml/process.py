@@ -36,6 +36,7 @@ __all__ = [
     "close_network",
     "end_process_within",
     "is_network_closed",
+    "quiet_qt",
     "require_display",
 ]
 
@@ -43,6 +44,21 @@ _ADVICE = (
     "run it where there is a screen, over `ssh -X`, or on a virtual screen: "
     "xvfb-run -s '-screen 0 1280x800x24' rosglass ..."
 )
+
+
+#: Rules for messages of Qt that are of no use to users: its media backends name each library that
+#: they look for.
+_QUIET_RULES = """
+qt.multimedia.symbolsresolver=false
+qt.multimedia.ffmpeg*=false
+qt.qpa.theme*=false
+"""
+
+
+def quiet_qt() -> None:
+    """Hide such messages of Qt in programs that this package creates; QT_LOGGING_RULES decides."""
+    if QT6:
+        QtCore.QLoggingCategory.setFilterRules(_QUIET_RULES)
 
 
 def require_display() -> Callable[[], None]:

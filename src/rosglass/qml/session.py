@@ -640,7 +640,8 @@ class Session(QtCore.QObject):
     def _connect_failed(self, error: Error, generation: int) -> None:
         retry = isinstance(error, ConnectionLostError)
         self._failed = not retry
-        _log.error("%s", error)
+        if retry:
+            _log.error("%s", error)
         state = ConnectionState.CONNECTING if retry else ConnectionState.LOST
         self._set_status(Status(state, str(error)))
         if retry:
@@ -749,7 +750,8 @@ class Session(QtCore.QObject):
         if (self.state, self.detail) != before or not self.is_initialized:
             state, detail = self.state, self.detail
             text = detail if detail.startswith(state) else ": ".join(filter(None, (state, detail)))
-            _log.log(logging.INFO if self.is_initialized else logging.DEBUG, "%s", text)
+            level = logging.INFO if self.is_initialized else logging.DEBUG
+            _log.log(logging.ERROR if state == "failed" else level, "%s", text)
             self.connection_changed.emit()
 
 

@@ -603,5 +603,5 @@ class PublishPointTool(PublishingTool):
         if point is None:
             self.set_status("Move over an object to select the target point.", hit=False)
         else:
-            text = f"<b>Left-Click:</b> Select this point. {point_text(point)}"
+            text = f"Left-Click: Select this point. {point_text(point)}"
             self.set_status(text, hit=True)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import logging
 from functools import cached_property
-from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from rosglass.comm.names import similar
@@ -762,8 +761,7 @@ class Tools(QtCore.QObject):
         if not is_alive(self):
             return
         if self.outcome and self._outcome_end.isActive():
-            # Names and errors are the robot's: they must not become tags.
-            text = escape(self.outcome, quote=False)
+            text = self.outcome
         else:
             report(self, outcome="")
             tool = self._current

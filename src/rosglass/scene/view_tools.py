@@ -163,15 +163,15 @@ class FocusCameraTool(Tool):
 
     def activate(self) -> None:
         """Say what to do."""
-        self.set_status("<b>Left-Click:</b> Focus on a point.", hit=False)
+        self.set_status("Left-Click: Focus on a point.", hit=False)
 
     def on_move(self, event: PointerEvent) -> None:
         """Show the point."""
         if event.point is None:
-            self.set_status("<b>Left-Click:</b> Look in this direction.", hit=False)
+            self.set_status("Left-Click: Look in this direction.", hit=False)
         else:
             point = point_text(event.point)
-            self.set_status(f"<b>Left-Click:</b> Focus on this point. {point}", hit=True)
+            self.set_status(f"Left-Click: Focus on this point. {point}", hit=True)
 
     def on_release(self, event: PointerEvent) -> None:
         """Look at the point; where there is none, in its direction."""
@@ -285,8 +285,8 @@ class SelectTool(Tool):
     TYPE, NAME, KEY = "Select", "Select", "s"
     DESCRIPTION = "Selects what is in a rectangle. Shift adds, Ctrl removes, Alt moves the camera."
     _HELP = (
-        "<b>Left-Click:</b> Select.  <b>Shift:</b> Add.  <b>Ctrl:</b> Remove.  "
-        "<b>Alt:</b> Move the camera.  <b>F:</b> Look at the selection."
+        "Left-Click: Select.  Shift: Add.  Ctrl: Remove.  "
+        "Alt: Move the camera.  F: Look at the selection."
     )
     #: Units of the view within which a drag counts as a click.
     _CLICK = 3.0

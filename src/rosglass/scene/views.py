@@ -453,10 +453,10 @@ class OrbitView(ViewController):
     )
     _HELP = (
         (
-            "<b>Left-Click:</b> Rotate.  <b>Middle-Click:</b> Move X/Y.  "
-            "<b>Right-Click/Mouse Wheel:</b> Zoom.  <b>Shift:</b> More options."
+            "Left-Click: Rotate.  Middle-Click: Move X/Y.  "
+            "Right-Click/Mouse Wheel: Zoom.  Shift: More options."
         ),
-        "<b>Left-Click:</b> Move X/Y.  <b>Right-Click/Mouse Wheel:</b> Move Z.",
+        "Left-Click: Move X/Y.  Right-Click/Mouse Wheel: Move Z.",
     )
     #: Of the focal shape, RGBA.
     _COLOR = (1.0, 1.0, 0.0, 0.5)
@@ -576,7 +576,7 @@ class XYOrbitView(OrbitView):
         "Makes it easy to move around a given point on the XY plane, looking at it from any angle."
     )
     _RIGHT = (Action.ZOOM, Action.ZOOM)
-    _HELP = (OrbitView._HELP[0], "<b>Left-Click:</b> Move X/Y.  <b>Right-Click:</b> Zoom.")
+    _HELP = (OrbitView._HELP[0], "Left-Click: Move X/Y.  Right-Click: Zoom.")
     _COLOR = (0.0, 1.0, 1.0, 0.5)
 
     def _eye_pose(self) -> Matrix:
@@ -663,13 +663,13 @@ class FPSView(ViewController):
         super().__init__(class_id)
         rolls = self.class_id.startswith("rviz/")
         self._LEFT = (Action.ROTATE_3D, Action.ROTATE_2D if rolls else Action.MOVE_XY)
-        with_shift = "Rotate Roll.  <b>Middle-Click:</b> Move X/Y." if rolls else "Move X/Y."
+        with_shift = "Rotate Roll.  Middle-Click: Move X/Y." if rolls else "Move X/Y."
         self._HELP = (
             (
-                "<b>Left-Click:</b> Rotate.  <b>Middle-Click:</b> Move X/Y.  "
-                "<b>Right-Click:</b> Move Z.  <b>Shift:</b> More options."
+                "Left-Click: Rotate.  Middle-Click: Move X/Y.  "
+                "Right-Click: Move Z.  Shift: More options."
             ),
-            f"<b>Left-Click:</b> {with_shift}  <b>Right-Click:</b> Move Z.",
+            f"Left-Click: {with_shift}  Right-Click: Move Z.",
         )
 
     def on_wheel(self, wheel: Wheel) -> None:
@@ -832,10 +832,10 @@ class TopDownOrthoView(ViewController):
     _RIGHT = (Action.ZOOM, Action.ZOOM)
     _HELP = (
         (
-            "<b>Left-Click:</b> Rotate.  <b>Middle-Click:</b> Move X/Y.  "
-            "<b>Right-Click/Mouse Wheel:</b> Zoom.  <b>Shift:</b> More options."
+            "Left-Click: Rotate.  Middle-Click: Move X/Y.  "
+            "Right-Click/Mouse Wheel: Zoom.  Shift: More options."
         ),
-        "<b>Left-Click:</b> Move X/Y.  <b>Right-Click/Mouse Wheel:</b> Zoom.",
+        "Left-Click: Move X/Y.  Right-Click/Mouse Wheel: Zoom.",
     )
 
     scale = ScaleSetting(

@@ -337,8 +337,8 @@ def test_cursors_and_help_are_rviz_s() -> None:
     assert TopDownOrthoView().action(LEFT, none) is Action.ROTATE_2D
     for name in ALL:
         view = create_view(name)
-        assert view.help(none).startswith("<b>Left-Click:</b> Rotate.")
-        assert view.help(SHIFT).startswith("<b>Left-Click:</b> Move X/Y.")
+        assert view.help(none).startswith("Left-Click: Rotate.")
+        assert view.help(SHIFT).startswith("Left-Click: Move X/Y.")
         assert view.DESCRIPTION.endswith(".")
 
 

@@ -117,7 +117,7 @@ class Control:
         """What the mouse does, for the status bar."""
         text = HELP.get(self.record.mode, "")
         if self.marker.record.menu and self.record.mode != MENU:
-            text += " <b>Right-Click:</b> Show context menu."
+            text += " Right-Click: Show context menu."
         return text
 
     # -- drawing ---------------------------------------------------------------------------------

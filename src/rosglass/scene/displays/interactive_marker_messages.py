@@ -45,17 +45,17 @@ NONE, MENU, BUTTON, MOVE_AXIS, MOVE_PLANE, ROTATE_AXIS, MOVE_ROTATE = range(7)
 MOVE_3D, ROTATE_3D, MOVE_ROTATE_3D = range(7, 10)
 #: What the mouse does, as RViz says it in its status bar.
 HELP = {
-    MENU: "<b>Left-Click:</b> Show menu.",
-    BUTTON: "<b>Left-Click:</b> Activate.",
-    MOVE_AXIS: "<b>Left-Click:</b> Move.",
-    MOVE_PLANE: "<b>Left-Click:</b> Move.",
-    ROTATE_AXIS: "<b>Left-Click:</b> Rotate.",
-    MOVE_ROTATE: "<b>Left-Click:</b> Move / Rotate.",
-    MOVE_3D: "<b>Left-Click:</b> Move X/Y. <b>Shift:</b> Move Z.",
-    ROTATE_3D: "<b>Left-Click:</b> Rotate around X/Y. <b>Shift:</b> Rotate around Z.",
+    MENU: "Left-Click: Show menu.",
+    BUTTON: "Left-Click: Activate.",
+    MOVE_AXIS: "Left-Click: Move.",
+    MOVE_PLANE: "Left-Click: Move.",
+    ROTATE_AXIS: "Left-Click: Rotate.",
+    MOVE_ROTATE: "Left-Click: Move / Rotate.",
+    MOVE_3D: "Left-Click: Move X/Y. Shift: Move Z.",
+    ROTATE_3D: "Left-Click: Rotate around X/Y. Shift: Rotate around Z.",
     MOVE_ROTATE_3D: (
-        "<b>Left-Click:</b> Move X/Y. <b>Shift:</b> Move Z. <b>Ctrl:</b> Rotate around X/Y. "
-        "<b>Ctrl + Shift:</b> Rotate around Z."
+        "Left-Click: Move X/Y. Shift: Move Z. Ctrl: Rotate around X/Y. "
+        "Ctrl + Shift: Rotate around Z."
     ),
 }
 _MAX_CONTROLS, _MAX_SHAPES = 1000, 10_000

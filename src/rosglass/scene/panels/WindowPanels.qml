@@ -181,7 +181,7 @@ Page {
             Label { text: program.time; textFormat: Text.PlainText }
             ToolSeparator { }
             // What was sent to the robot, or was not, comes first.
-            Label { objectName: "status"; Layout.fillWidth: true; text: page.scene.tools.outcome || program.message || page.scene.statusText.replace(/<[^>]*>/g, "").replace(/&lt;/g, "<").replace(/&amp;/g, "&"); textFormat: Text.PlainText; elide: Text.ElideRight }
+            Label { objectName: "status"; Layout.fillWidth: true; text: page.scene.tools.outcome || program.message || page.scene.statusText; textFormat: Text.PlainText; elide: Text.ElideRight }
             Label { objectName: "recording"; visible: text !== ""; text: program.recording; textFormat: Text.PlainText; color: "#c02020" }
             Label { text: program.frameRate + " fps"; textFormat: Text.PlainText }
         }
