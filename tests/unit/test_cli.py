@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import shlex
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -15,8 +16,12 @@ from rosglass.cli import main
 from rosglass.cli.arguments import COMMANDS
 from rosglass.cli.messages import split_type
 from rosglass.cli.network import interfaces, is_loopback, router_problem
-from rosglass.cli.program import _split, build_parser
+from rosglass.cli.parser import EXAMPLES
+from rosglass.cli.program import _split, build_parser, parse
 from rosglass.extras import install_command
+
+if TYPE_CHECKING:
+    import argparse
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -75,6 +80,40 @@ def test_help_and_options_load_no_more_than_the_parser(monkeypatch: pytest.Monke
     assert done.stdout == str(
         ["rosglass.cli", *(f"rosglass.cli.{name}" for name in loaded), "rosglass.errors"]
     )
+
+
+def leaves() -> dict[str, argparse.ArgumentParser]:
+    """Return the parsers of all commands that have no subcommands."""
+    found = {}
+    for name, parser in subparsers_of(build_parser("*")).items():
+        inner = subparsers_of(parser)
+        found |= {f"{name} {what}": sub for what, sub in inner.items()} or {name: parser}
+    return found
+
+
+#: Whose arguments need no explanation: their values are listed.
+PLAIN = {"completion"}
+
+
+@pytest.mark.parametrize("command", sorted(leaves()))
+def test_every_argument_is_described_and_every_command_has_an_example(command: str) -> None:
+    parser = leaves()[command]
+    for action in parser._actions:
+        assert action.help, f"rosglass {command}: {action.dest}"
+    if command in PLAIN:
+        return
+    examples = EXAMPLES[parser.prog.removeprefix("rosglass ")]
+    shown = parser.format_help().partition("\nexample")[2]
+    for example in examples:
+        line = f"{parser.prog} {example}".rstrip()
+        assert f"  {line}\n" in shown
+        parse(shlex.split(line)[1:])
+
+
+def test_no_example_is_left_over() -> None:
+    assert EXAMPLES.keys() <= {
+        parser.prog.removeprefix("rosglass ") for parser in leaves().values()
+    }
 
 
 @pytest.mark.parametrize("arguments", [[], ["fly"], ["robot", "--no-such-option"]])

@@ -39,6 +39,13 @@ _WINDOW = 10_000
 #: The router of ``rosglass demo`` and ``rosglass robot``, unless the environment names another.
 _DEMO_URL = "zenoh://127.0.0.1:7447"
 
+#: What an argument names -> its help.
+_HELP = {
+    "topics": "name of the topic, e.g. /odom",
+    "services": "name of the service, e.g. /reset",
+    "actions": "name of the action, e.g. /dock",
+    "nodes": "name of the node, e.g. /camera",
+}
 _rate = number(0, 10_000, "a rate above 0 and up to 10000", above=True)
 _time_within_a_day = number(0, 86_400, "a number of seconds from 0 to 86400")
 
@@ -53,6 +60,7 @@ def _add_common(parser: argparse.ArgumentParser, timeout: float | None = TIMEOUT
 
 def _add_name(parser: argparse.ArgumentParser, name: str, what: str, **options: Any) -> None:
     """Declare an argument that Tab completes; `what` as for :func:`complete`."""
+    options.setdefault("help", _HELP.get(what))
     complete(parser.add_argument(name, **options), what)
 
 
@@ -427,9 +435,19 @@ def _topic(parser: argparse.ArgumentParser) -> None:
             "--window",
             type=positive_int,
             default=_WINDOW,
-            help="number of messages to average over",
+            metavar="N",
+            help="number of messages to average over (default: %(default)s)",
         )
-        sub.add_argument("-d", "--duration", type=seconds, help="exit after this time in seconds")
+        sub.add_argument(
+            "-d", "--duration", type=seconds, metavar="SECONDS", help="exit after this time"
+        )
+        sub.add_argument(
+            "-n",
+            "--count",
+            type=positive_int,
+            metavar="N",
+            help="exit after this number of messages",
+        )
         _add_qos(sub, "best_available")
         _add_common(sub)
     sub = add("pub", "publish messages on a topic", "publish")
@@ -455,7 +473,7 @@ def _topic(parser: argparse.ArgumentParser) -> None:
 
 def _add_topic_and_type(parser: argparse.ArgumentParser) -> None:
     _add_name(parser, "topic", "topics")
-    _add_name(parser, "type", "messages", nargs="?", help="default: the published type")
+    _add_name(parser, "type", "messages", nargs="?", help="its type (default: the published one)")
 
 
 def _add_count(parser: argparse.ArgumentParser, verb: str) -> None:
@@ -545,7 +563,7 @@ def _param(parser: argparse.ArgumentParser) -> None:
         "list",
         "list the parameters of a node, or of all nodes",
         nargs="?",
-        help="default: all nodes",
+        help="name of the node (default: all nodes)",
     )
     _add_common(sub)
     for name, summary in (
@@ -555,17 +573,21 @@ def _param(parser: argparse.ArgumentParser) -> None:
         ("delete", "delete a parameter that was set without being declared"),
     ):
         sub = add(name, summary)
-        sub.add_argument("parameter", nargs="?", help="ROS 1: may be part of the node argument")
+        sub.add_argument(
+            "parameter",
+            nargs="?",
+            help="name of the parameter, e.g. exposure; in ROS 1 also part of the node argument",
+        )
         if name == "set":
             sub.add_argument("value", nargs="?", help="as in YAML: 1.5, true, hello, [1, 2]")
         _add_common(sub)
     summary = "print all parameters of a node as a parameter file"
-    sub = add("dump", summary, nargs="?", help="ROS 1: default: all")
+    sub = add("dump", summary, nargs="?", help="name of the node; in ROS 1 optional: all")
     sub.add_argument("-o", "--output", metavar="FILE", help="write to a file")
     _add_common(sub)
     summary = "set the parameters of a node from a file"
-    sub = add("load", summary, help="ROS 1: optional, also after the file")
-    sub.add_argument("file", metavar="FILE.yaml", nargs="?")
+    sub = add("load", summary, help="name of the node; in ROS 1 optional, also after the file")
+    sub.add_argument("file", metavar="FILE.yaml", nargs="?", help="a parameter file")
     _add_common(sub)
 
 
@@ -584,7 +606,12 @@ def _node(parser: argparse.ArgumentParser) -> None:
     sub = add("ping", "ping a node repeatedly (ROS 1)", "ping")
     _add_name(sub, "node", "nodes")
     sub.add_argument(
-        "-c", "--count", type=positive_int, metavar="N", help="exit after this number of pings"
+        "-n",
+        "-c",
+        "--count",
+        type=positive_int,
+        metavar="N",
+        help="exit after this number of pings",
     )
     _add_common(sub)
     sub = add("kill", "shut nodes down (ROS 1)", "kill")
@@ -856,7 +883,7 @@ def _examples(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         default="examples",
         metavar="FOLDER",
-        help="a new folder for the copies (default: %(default)s)",
+        help="a new folder for the copies (default: examples)",
     )
 
 

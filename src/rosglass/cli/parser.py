@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 __all__ = [
+    "EXAMPLES",
     "TIMEOUT_S",
     "Parser",
     "Subcommands",
@@ -32,6 +33,51 @@ __all__ = [
 
 #: Default of --timeout.
 TIMEOUT_S = 10.0
+#: Command -> the examples that end its --help.
+EXAMPLES = {
+    "action info": ("/dock",),
+    "action list": ("-t",),
+    "action send": ("/dock '{station: 3}' --feedback",),
+    "bridge": ("ros1://robot:11311 zenoh://127.0.0.1:7447 -t '/camera/*->' -t '/cmd_vel<-'",),
+    "demo": ("", "--no-robot --url zenoh://robot.local:7447"),
+    "doctor": ("--url zenoh://robot.local:7447", "--scan"),
+    "examples": ("mine",),
+    "interface list": ("Pose --kind msg",),
+    "interface show": ("geometry_msgs/msg/Twist", "my_robot_msgs/msg/State --template"),
+    "node cleanup": ("--url ros1://robot:11311",),
+    "node info": ("/camera",),
+    "node kill": ("/camera /lidar",),
+    "node list": ("--url ros1://robot:11311",),
+    "node ping": ("/camera -n 3",),
+    "param delete": ("/camera exposure",),
+    "param describe": ("/camera exposure",),
+    "param dump": ("/camera -o camera.yaml",),
+    "param get": ("/camera exposure",),
+    "param list": ("/camera",),
+    "param load": ("/camera camera.yaml",),
+    "param set": ("/camera exposure 0.02",),
+    "play": ("drive.mcap --clock --rate 2", "drive.mcap --topics /odom /scan --start 30"),
+    "qml-path": ("--qmlls-ini",),
+    "record": ("-o drive.mcap", "/odom /scan -d 60"),
+    "robot": ("--url zenoh://127.0.0.1:7447",),
+    "router": ("", "--listen tcp/192.168.1.5:7447"),
+    "run": ("cockpit.qml --url zenoh://robot.local:7447 --watch", "panel.qml --kiosk"),
+    "rviz": ("robot.rviz --overlay dashboard.qml --watch",),
+    "service call": ("/reset '{}'", "/add '{a: 1, b: 2}'"),
+    "service info": ("/reset",),
+    "service list": ("-t",),
+    "topic bw": ("/camera/image_raw -n 100",),
+    "topic delay": ("/scan",),
+    "topic echo": ("/odom -f pose.pose.position", "/battery_state -n 1 --json"),
+    "topic hz": ("/scan", "/scan -n 100"),
+    "topic info": ("/scan",),
+    "topic list": ("-t",),
+    "topic pub": (
+        "/cmd_vel '{linear: {x: 0.2}}' --rate 10",
+        "/chat std_msgs/msg/String '{data: hi}' -1",
+    ),
+    "view": ("robot.rviz --url dds://", "--overlay dashboard.qml --watch"),
+}
 
 
 class Parser(argparse.ArgumentParser):
@@ -41,6 +87,13 @@ class Parser(argparse.ArgumentParser):
     """
 
     _mixing = False
+
+    def format_help(self) -> str:
+        """Return the help, which ends with the examples of the command."""
+        examples = EXAMPLES.get(self.prog.removeprefix("rosglass "), ())
+        lines = "".join(f"  {self.prog} {example}".rstrip() + "\n" for example in examples)
+        noun = "examples" if len(examples) > 1 else "example"
+        return super().format_help() + (f"\n{noun}:\n{lines}" if lines else "")
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """See argparse."""

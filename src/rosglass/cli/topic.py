@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import math
 import statistics
@@ -224,13 +225,19 @@ class _Seen(NamedTuple):
 
 
 def measure(args: argparse.Namespace) -> int:
-    """Print a figure each second, until Ctrl-C or the end of the duration."""
+    """Print a figure each second, until Ctrl-C or the end of the duration or count."""
     seen: deque[_Seen] = deque(maxlen=args.window)
     lock = threading.Lock()
     wants_stamp = args.what == "delay"
     failure: list[str] = []
+    wanted, counted = args.count or math.inf, itertools.count(1)
+    is_complete = threading.Event()
 
     def receive(sample: Sample) -> None:
+        if is_complete.is_set():
+            return
+        if next(counted) >= wanted:
+            is_complete.set()
         delay = _delay(sample, failure) if wants_stamp else None
         with lock:
             seen.append(_Seen(sample.received_ns, len(sample.data), delay))
@@ -261,6 +268,8 @@ def measure(args: argparse.Namespace) -> int:
                     shown = total
                     result = _FIGURES[args.what](samples)
                     print(to_json(result) if args.json else result.pop("text"), flush=True)
+                    if is_complete.is_set():
+                        break
                 elif reasons.report() and total:
                     # Start over after an interruption.
                     with lock:

@@ -156,6 +156,15 @@ def test_measurements(run: Any, what: str) -> None:
         assert 0 <= found["mean"] < 1
 
 
+@pytest.mark.parametrize("what", ["hz", "bw", "delay"])
+def test_measurements_of_a_number_of_messages(run: Any, what: str) -> None:
+    code, out, err = run("topic", what, "/lab/chatter", "-n", "5", "--json")
+    assert code == 0, err
+    found = [json.loads(line) for line in out.splitlines()]
+    assert found[-1]["window"] == 5
+    assert all(one["window"] <= 5 for one in found)
+
+
 def test_delay_of_what_has_no_stamp(run: Any) -> None:
     code, _, err = run("topic", "delay", "/lab/plain", "-d", "1")
     assert code == 1
