@@ -19,6 +19,7 @@ from rosglass.comm import Durability, Duration, Handle, History, Liveliness, QoS
 from rosglass.comm.text_files import load_yaml
 from rosglass.errors import BagError, DefinitionError, Error
 from rosglass.messages import MessageType, OpaqueType, load
+from rosglass.messages.types import mend
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -71,36 +72,42 @@ class Channel:
     def type(self, library: Library | None = None) -> MessageType:
         """Return the type, from the recording or else from `library`; opaque if neither has it.
 
+        If the recorded definition cannot be used, a definition in `library` with the recorded hash
+        replaces it.
+
         Raises:
-            DefinitionError: The recorded definition has an error.
+            DefinitionError: The recorded definition has an error, and there is no hash.
         """
         ros = 1 if self.wire == "ros1" else 2
-        if self.text and self.encoding == "msg":
-            return self._by_text(ros)
+        known = "" if self.type_hash == "*" else self.type_hash
+        reason = "the recording has no definition of it"
+        if self.text:
+            try:
+                found = MessageType.from_text(
+                    self.type_name, self.text, ros, encoding=self.encoding
+                )
+            except DefinitionError as error:
+                if not known:
+                    raise
+                reason = str(error)
+            else:
+                if ros == 2 or known in ("", found.md5):
+                    return found
+                reason = f"the recording says md5 {known}, its definition has {found.md5}"
         try:
-            wanted = self.type_hash if ros == 1 else ""
-            known = load(self.type_name, ros=ros, library=library, hash=wanted)
+            loaded = load(self.type_name, ros=ros, library=library, hash=known)
         except Error as error:
-            if ros == 1 and not self.type_hash:
+            if ros == 1 and not known:
                 raise
-            reason = f"the recording has no definition of it, and {error}"
-            return OpaqueType(self.type_name, self.type_hash, reason, ros=ros)
-        assert isinstance(known, MessageType)
-        return known
-
-    def _by_text(self, ros: int) -> MessageType:
-        try:
-            found = MessageType.from_text(self.type_name, self.text, ros=ros)
-        except DefinitionError as error:
-            if ros == 2 or not self.type_hash:
-                raise
-            reason = str(error)
-        else:
-            if ros == 2 or self.type_hash in ("", "*", found.md5):
-                return found
-            reason = f"the recording says md5 {self.type_hash}, its definition has {found.md5}"
-        # ROS 1 messages can be forwarded with any definition that their publisher sent.
-        return OpaqueType(self.type_name, self.type_hash, reason, text=self.text, ros=1)
+            mended = mend(self.type_name, self.text, known, library) if ros == 1 else None
+            if mended is not None:
+                return mended
+            # Its messages can still be forwarded with the definition that their publisher sent.
+            text = self.text if ros == 1 else ""
+            reason = f"{reason}, and {error}"
+            return OpaqueType(self.type_name, known, reason, text=text, ros=ros)
+        assert isinstance(loaded, MessageType)
+        return loaded
 
     def profile(self) -> QoS:
         """Return a profile compatible with all subscriptions to the recorded publishers."""

@@ -32,7 +32,7 @@ from rosglass.bags.bag import (
 )
 from rosglass.comm import Durability, QoS
 from rosglass.errors import BagError, InvalidNameError
-from rosglass.interfaces import full_text, ros1_name
+from rosglass.interfaces import ros1_name, schema_text
 from rosglass.interfaces.names import join_name
 from rosglass.messages import OpaqueType
 
@@ -280,9 +280,13 @@ class McapFile(RecordingFile):
     ) -> int:
         """Add a channel; see :meth:`RecordingFile.channel`."""
         ros1 = self._wire == "ros1"
-        name, language = (ros1_name(kind.name), "ros1msg") if ros1 else (kind.name, "ros2msg")
-        text = kind.text if isinstance(kind, OpaqueType) else full_text(kind.definition)
-        schema = self._writer.register_schema(name, language if text else "", text.encode())
+        name = ros1_name(kind.name) if ros1 else kind.name
+        if isinstance(kind, OpaqueType):
+            language, text = "msg", kind.text
+        else:
+            language, text = schema_text(kind.definition)
+        encoding = f"{'ros1' if ros1 else 'ros2'}{language}" if text else ""
+        schema = self._writer.register_schema(name, encoding, text.encode())
         metadata: dict[str, Any] = {}
         if ros1:
             latched = any(qos.durability is Durability.TRANSIENT_LOCAL for qos in offered)

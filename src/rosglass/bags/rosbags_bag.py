@@ -11,9 +11,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-from rosbags.highlevel import AnyReader
-from rosbags.rosbag1 import Reader
+from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.rosbag1.reader import decompressors
+from rosbags.rosbag2 import Reader as Ros2Reader
 from rosbags.rosbag2 import reader as rosbag2_reader
 from rosbags.rosbag2 import storage_mcap
 
@@ -49,7 +49,8 @@ class RosbagsBag(Bag):
             _check_metadata(path / "metadata.yaml")
             _check_databases(path)
             # AnyReader refuses a whole bag for one missing or wrong definition.
-            self._reader: Any = Reader(path) if path.suffix == ".bag" else AnyReader([path])
+            reader = Ros1Reader if path.suffix == ".bag" else Ros2Reader
+            self._reader: Any = reader(path)
             self._reader.open()
         except BagError:
             raise
@@ -70,20 +71,19 @@ class RosbagsBag(Bag):
     def _limit_decompression(self) -> None:
         """Decompress chunks and messages here, within the limit."""
         self._by_message = False
-        if isinstance(self._reader, Reader):
+        if isinstance(self._reader, Ros1Reader):
             self._reader.chunks = {
                 offset: chunk._replace(decompressor=partial(_chunk, offset, chunk.decompressor))
                 for offset, chunk in self._reader.chunks.items()
             }
             return
-        for reader in self._reader.readers:
-            metadata = reader.storage.metadata
-            if metadata.compression_mode == "message":
-                self._by_message = True
-                reader.storage.metadata = metadata._replace(compression_mode=None)
+        metadata = self._reader.storage.metadata
+        if metadata.compression_mode == "message":
+            self._by_message = True
+            self._reader.storage.metadata = metadata._replace(compression_mode=None)
 
     def _index(self) -> None:
-        wire = "ros1" if isinstance(self._reader, Reader) or not self._reader.is2 else "cdr"
+        wire = "ros1" if isinstance(self._reader, Ros1Reader) else "cdr"
         grouped: dict[Channel, list[Any]] = {}
         for connection in self._reader.connections:
             grouped.setdefault(_channel(connection, wire), []).append(connection)

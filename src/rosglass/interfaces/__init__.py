@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from rosglass.interfaces.derived import service_event
     from rosglass.interfaces.hashes import (
         announced_hashes,
-        full_text,
         md5,
         rihs01,
         type_description,
@@ -46,6 +45,7 @@ if TYPE_CHECKING:
         Provider,
         workspace,
     )
+    from rosglass.interfaces.texts import full_text, schema_text
     from rosglass.interfaces.type_descriptions import (
         TypeCache,
         add_type_sources,
@@ -92,6 +92,7 @@ __all__ = [
     "parse_type_description",
     "rihs01",
     "ros1_name",
+    "schema_text",
     "service_event",
     "split_name",
     "type_description",
@@ -120,7 +121,6 @@ _HOMES = {
     "derived": ("service_event",),
     "hashes": (
         "announced_hashes",
-        "full_text",
         "md5",
         "rihs01",
         "type_description",
@@ -149,6 +149,7 @@ _HOMES = {
         "Provider",
         "workspace",
     ),
+    "texts": ("full_text", "schema_text"),
     "type_descriptions": (
         "TypeCache",
         "add_type_sources",

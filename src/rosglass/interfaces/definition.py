@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 __all__ = [
+    "PLACEHOLDER",
     "ActionDefinition",
     "ArrayKind",
     "Constant",
@@ -29,6 +30,10 @@ __all__ = [
 
 #: A constant's or default's value; lists only as defaults of array fields.
 Value = bool | int | float | str | tuple[bool | int | float | str, ...]
+
+
+#: The field that rosidl adds to empty messages.
+PLACEHOLDER = "structure_needs_at_least_one_member"
 
 
 class ArrayKind(Enum):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import DefinitionError, UnsupportedError
 from rosglass.interfaces.definition import (
+    PLACEHOLDER,
     ActionDefinition,
     ArrayKind,
     Definition,
@@ -19,11 +20,18 @@ from rosglass.interfaces.derived import derive, service_event
 from rosglass.interfaces.parser import parse_message
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from rosglass.interfaces.definition import Field, InterfaceDefinition
 
-__all__ = ["announced_hashes", "full_text", "load_json", "md5", "rihs01", "type_description"]
+__all__ = [
+    "announced_hashes",
+    "load_json",
+    "md5",
+    "nested_definition",
+    "rihs01",
+    "type_description",
+]
 
 # type_description_interfaces/msg/FieldType's constants. rosidl turns a .msg file's char into IDL's
 # uint8, so its id is 3 (AddTwoInts' official hash depends on it); IDL's own has FIELD_TYPE_CHAR.
@@ -41,7 +49,6 @@ _ARRAY_OFFSETS = {
     ArrayKind.BOUNDED: 96,
     ArrayKind.UNBOUNDED: 144,
 }
-_PLACEHOLDER = "structure_needs_at_least_one_member"
 
 # Types that rosidl and actionlib add to services and actions; fixed parts of the hashes.
 _BUILT_IN = {
@@ -116,7 +123,7 @@ def _md5_text(
             lines.append(f"{field.type} {field.name}")
             continue
         if name not in sums:
-            sums[name] = _md5(_md5_text(_nested(definition, field, nested), nested, sums))
+            sums[name] = _md5(_md5_text(nested_definition(definition, field, nested), nested, sums))
         lines.append(f"{sums[name]} {field.name}")
     return "\n".join(lines).strip()
 
@@ -245,14 +252,14 @@ def _describe_message(
         default = "" if field.default is None else str(field.default)
         if kind.is_compound:
             fields.append(_field(field.name, _NESTED_ID + offset, capacity, nested=kind.name))
-            _describe_message(_nested(definition, field, nested), nested, described)
+            _describe_message(nested_definition(definition, field, nested), nested, described)
             continue
         bound = kind.string_bound or 0
         basic = _LETTER_ID if kind.letter else _TYPE_IDS[kind.name]
         type_id = basic + offset + (_BOUNDED_STRING_OFFSET if bound else 0)
         fields.append(_field(field.name, type_id, capacity, bound, default=default))
     if not fields:
-        fields.append(_field(_PLACEHOLDER, _TYPE_IDS["uint8"]))
+        fields.append(_field(PLACEHOLDER, _TYPE_IDS["uint8"]))
 
 
 def _field(
@@ -275,7 +282,10 @@ def _field(
     }
 
 
-def _nested(owner: Definition, field: Field, nested: Mapping[str, Definition]) -> Definition:
+def nested_definition(
+    owner: Definition, field: Field, nested: Mapping[str, Definition]
+) -> Definition:
+    """Return the message of a field, which the resolved `owner` has or ROS itself adds."""
     name = field.type.name
     found = nested.get(name)
     if found is None:
@@ -289,44 +299,3 @@ def _nested(owner: Definition, field: Field, nested: Mapping[str, Definition]) -
             )
         found = parse_message(text, name, ros=owner.ros)
     return found
-
-
-def full_text(definition: InterfaceDefinition) -> str:
-    """Return the definition followed by those that it uses, as in ROS 1 connection headers.
-
-    Raises:
-        UnsupportedError: `definition` is no definition.
-        DefinitionError: `definition` is not resolved.
-    """
-    check_definition(definition)
-    if isinstance(definition, ServiceDefinition):
-        parts: Iterable[Definition] = (definition.request, definition.response)
-    elif isinstance(definition, ActionDefinition):
-        parts = (definition.goal, definition.result, definition.feedback)
-    else:
-        parts = (definition,)
-    needed: dict[str, Definition] = {}
-    for part in parts:
-        for field in part.fields:
-            if field.type.is_compound:
-                _collect(part, field, part.nested, needed)
-    texts = [definition.text]
-    for name, nested in needed.items():
-        package, _, base = name.split("/")
-        texts.append(f"{'=' * 80}\nMSG: {package}/{base}\n{nested.text}")
-    return "\n".join(texts)
-
-
-def _collect(
-    owner: Definition,
-    field: Field,
-    nested: Mapping[str, Definition],
-    needed: dict[str, Definition],
-) -> None:
-    if field.type.name in needed:
-        return
-    definition = _nested(owner, field, nested)
-    needed[definition.name] = definition
-    for inner in definition.fields:
-        if inner.type.is_compound:
-            _collect(definition, inner, nested, needed)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rosglass.errors import DefinitionError
 from rosglass.interfaces.definition import (
+    PLACEHOLDER,
     ActionDefinition,
     ArrayKind,
     Constant,
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 
 __all__ = ["parse_idl"]
 
+_HEADER = r"(?m)^={3,}[ \t]*\r?\n[ \t]*IDL:[ \t]*(\S{1,255})[ \t]*\r?$"
 # A generated file has a few hundred.
 _MAX_TOKENS = 250_000
 
@@ -152,7 +154,6 @@ class Lexer:
 
 _MAX_COUNT = 2**32 - 1
 _MAX_MODULES = 16
-_PLACEHOLDER = "structure_needs_at_least_one_member"
 
 _BASIC = {
     "boolean": "bool",
@@ -196,13 +197,14 @@ def parse_idl(
     """Parse an IDL file of ROS 2.
 
     Args:
-        text: The IDL; its includes are not read, types are looked up by name.
+        text: The IDL; its includes are not read, types are looked up by name. It may be several
+            files, each after a ``===`` line and ``IDL: pkg/msg/Type``, as recordings have them.
         name: Full name of the type to return; ``pkg/Type`` means a message.
         file: Label for error messages, by default the name in angle brackets.
         provider: Recorded in the definition's source.
 
     Returns:
-        The definition, not resolved; ``nested`` holds the other messages in the file.
+        The definition, not resolved; ``nested`` holds the other messages in the text.
 
     Raises:
         DefinitionError: The text is not IDL, uses a feature ROS 2 lacks, or has no such type.
@@ -218,8 +220,10 @@ def parse_idl(
         raise DefinitionError(
             f"the definition has {len(text)} characters, the limit is {MAX_TEXT}", source.file
         )
-    parser = _Parser(Lexer(text.removeprefix("\ufeff"), source.file))
-    messages = parser.messages(text, source)
+    # One mapping for all, so that many structs don't take quadratic memory.
+    messages: dict[str, Definition] = {}
+    for label, part_text in _split_files(text.removeprefix("\ufeff"), source.file):
+        _Parser(Lexer(part_text, label)).read(part_text, Source(provider, label), messages)
 
     def part(suffix: str) -> Definition:
         found = messages.get(f"{full}{suffix}")
@@ -237,6 +241,16 @@ def parse_idl(
     return part("")
 
 
+def _split_files(text: str, file: str) -> Iterator[tuple[str, str]]:
+    """Yield a label and the text of each file; without ``===`` lines, the text is one."""
+    start, label = 0, file
+    for header in re.finditer(_HEADER, text):
+        if text[start : header.start()].strip():
+            yield label, text[start : header.start()]
+        start, label = header.end(), f"<{header.group(1)}>"
+    yield label, text[start:]
+
+
 class _Parser:
     """Parses a file; scoped names are tuples of their parts."""
 
@@ -247,28 +261,28 @@ class _Parser:
         self._typedefs: dict[tuple[str, ...], FieldType] = {}
         self._constants: dict[tuple[str, ...], Constant] = {}
 
-    def messages(self, text: str, source: Source) -> dict[str, Definition]:
-        """Parse the file; returns its structs by full name, each with all of them as nested."""
+    def read(self, text: str, source: Source, messages: dict[str, Definition]) -> None:
+        """Parse the file; adds its structs by full name, each with all of `messages` as nested."""
         while self._lexer.token.kind != "end":
             self._definition()
         constants: dict[tuple[str, ...], list[Constant]] = {}
         for scope, constant in self._constants.items():
             constants.setdefault(scope[:-1], []).append(constant)
-        # One mapping for all, so that many structs don't take quadratic memory.
-        messages: dict[str, Definition] = {}
         for scope, struct in self._structs.items():
             name = "/".join(scope)
-            messages[name] = Definition(
+            read = Definition(
                 name=name,
                 ros=2,
-                fields=tuple(field for field in struct.fields if field.name != _PLACEHOLDER),
+                fields=tuple(field for field in struct.fields if field.name != PLACEHOLDER),
                 constants=tuple(constants.get((*scope[:-1], f"{scope[-1]}_Constants"), ())),
                 text=text,
                 source=source,
                 nested=messages,
                 comment=struct.comment,
             )
-        return messages
+            known = messages.setdefault(name, read)
+            if (known.fields, known.constants) != (read.fields, read.constants):
+                raise DefinitionError(f"{name} is defined twice, differently", source.file)
 
     def _definition(self) -> None:
         notes = self._annotations()

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import DefinitionError, Error, InvalidNameError
 from rosglass.interfaces.definition import (
+    PLACEHOLDER,
     ActionDefinition,
     ArrayKind,
     Definition,
@@ -43,92 +44,21 @@ from rosglass.interfaces.names import (
 )
 from rosglass.interfaces.parser import MAX_TEXT, LiteralError, parse, parse_default
 from rosglass.interfaces.resolver import MAX_TYPES, Resolver
+from rosglass.interfaces.texts import message_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable
 
-    from rosglass.interfaces.definition import Constant, InterfaceDefinition, Value
+    from rosglass.interfaces.definition import InterfaceDefinition, Value
 
 __all__ = [
     "CACHE_VARIABLE",
     "TypeCache",
     "add_type_sources",
     "cache_folder",
-    "message_text",
     "parse_type_description",
     "type_sources",
 ]
-
-
-_ESCAPES = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"}
-
-
-def message_text(definition: Definition) -> str:
-    """Return `definition` as the text of a ROS 2 ``.msg`` file, with comments and constants.
-
-    Parsing the text gives the same fields, defaults and constants.
-    """
-    head = definition.comment
-    members: list[Constant | Field] = [*definition.constants, *definition.fields]
-    # A head comment that touches the first member also belongs to that member.
-    shared = bool(head and members and _begins(members[0].comment, head))
-    touching = shared and "\n" not in _own(members[0].comment, head)
-    lines = list(_comment(head))
-    if head and not touching:
-        lines.append("")
-
-    def write(member: Constant | Field, code: str) -> None:
-        own = _own(member.comment, head)
-        if touching and member is members[0]:
-            lines.append(f"{code}  # {own}" if own else code)
-        else:
-            lines.extend((*_comment(own), code))
-
-    for constant in definition.constants:
-        write(constant, f"{constant.type} {constant.name}={_value(constant.value)}")
-    if definition.constants and definition.fields:
-        lines.append("")
-    for field in definition.fields:
-        default = "" if field.default is None else f" {_value(field.default)}"
-        write(field, f"{_type(field.type)} {field.name}{default}")
-    return "\n".join(lines)
-
-
-def _begins(comment: str, head: str) -> bool:
-    """Return whether a member's comment begins with the adjacent one of the message."""
-    return f"{comment}\n".startswith(f"{head}\n")
-
-
-def _own(comment: str, head: str) -> str:
-    """Return a member's comment without the message's at its beginning."""
-    return comment[len(head) :].lstrip("\n") if head and _begins(comment, head) else comment
-
-
-def _comment(text: str) -> Iterator[str]:
-    return (f"# {line}".rstrip() for line in text.splitlines())
-
-
-def _type(kind: FieldType) -> str:
-    if not kind.is_compound:
-        return str(kind)
-    package, folder, base = split_name(kind.name)
-    short = f"{package}/{base}" if folder == "msg" else kind.name
-    return str(kind).replace(kind.name, short, 1)
-
-
-def _value(value: Value) -> str:
-    if isinstance(value, tuple):
-        return f"[{', '.join(_value(element) for element in value)}]"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if not isinstance(value, str):
-        return repr(value)
-    return f'"{"".join(_character(sign) for sign in value)}"'
-
-
-def _character(sign: str) -> str:
-    known = _ESCAPES.get(sign)
-    return known or (sign if sign.isprintable() else f"\\U{ord(sign):08x}")
 
 
 #: The encoding of types that have no text of their own: requests, goals and the like.
@@ -344,7 +274,6 @@ _FOREIGN = {
     19: "strings of fixed length",
     20: "wide strings of fixed length",
 }
-_PLACEHOLDER = "structure_needs_at_least_one_member"
 _MAX_COUNT = 2**32 - 1
 #: Number of fields of a description in total; real ones have less than a thousand.
 _MAX_FIELDS = 50_000
@@ -452,7 +381,7 @@ class _Reader:
             if twice in seen:
                 raise DefinitionError(f"field {twice} appears twice", label)
             seen.add(twice)
-        if names == [_PLACEHOLDER] and fields[0].type == FieldType("uint8"):
+        if names == [PLACEHOLDER] and fields[0].type == FieldType("uint8"):
             fields = ()  # rosidl's placeholder in empty structs
         source = Source(self._provider, f"<{name} from {self._provider}>")
         definition = Definition(name, 2, fields, source=source)

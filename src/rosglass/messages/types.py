@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import threading
 import weakref
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -45,6 +46,7 @@ __all__ = [
     "ServiceType",
     "default_library",
     "load",
+    "mend",
     "portable",
     "type_of",
 ]
@@ -63,6 +65,8 @@ _PADDING = 3
 #: Limits of bytes and values for which decoding at once is faster than in two steps.
 _SMALL, _FEW_LEAVES = 1024, 16
 _MOST_PATHS = 1000
+#: Lines of a definition that are left out to get the md5 sum that its publisher announced.
+_MAX_BROKEN_LINES = 10
 
 
 class Constants(dict[str, Any]):
@@ -109,14 +113,30 @@ class MessageType:
         self._paths: dict[Any, Callable[[Any], Any]] = {}
 
     @classmethod
-    def from_text(cls, name: str, text: str, ros: int = 2) -> MessageType:
+    def from_text(cls, name: str, text: str, ros: int = 2, *, encoding: str = "msg") -> MessageType:
         """Create the type from a text, which includes all types that it uses after ``===`` lines.
+
+        Args:
+            name: ``pkg/msg/Type``.
+            text: The definitions.
+            ros: 1 or 2.
+            encoding: Language of the text, ``msg`` or (ROS 2) ``idl``.
 
         Raises:
             DefinitionError: The text breaks a rule, or needs a type it does not contain.
-            InvalidNameError: `name` is not a type name.
+            InvalidNameError: `name` is not a message type's name.
+            UnsupportedError: There is no such encoding.
         """
-        parsed = interfaces.parse_message(text, name, ros=ros)
+        if encoding not in ("msg", "idl") or (encoding, ros) == ("idl", 1):
+            raise UnsupportedError(
+                f"{name}: a definition is in 'msg', or 'idl' in ROS 2, not in {encoding!r}"
+            )
+        if encoding == "idl":
+            parsed = interfaces.parse_idl(text, name)
+        else:
+            parsed = interfaces.parse_message(text, name, ros=ros)
+        if not isinstance(parsed, Definition):
+            raise InvalidNameError(f"{name!r} is no message type; write pkg/msg/Type")
 
         def find(wanted: str, owner: Definition, field: Field) -> Definition:
             if wanted not in parsed.nested:
@@ -794,6 +814,47 @@ def load(
         if found is None or found.definition is not definition:
             found = types[name, ros, hash] = made
     return found
+
+
+def mend(name: str, text: str, md5: str, library: Library | None = None) -> MessageType | None:
+    """Create a ROS 1 type from a text with lines that are no definition, or without nested types.
+
+    Args:
+        name: ``pkg/msg/Type``.
+        text: As for :meth:`MessageType.from_text`.
+        md5: The sum that its publisher announced.
+        library: Has nested types that the text lacks; None for :func:`default_library`.
+
+    Returns:
+        The type; None unless it has that sum.
+    """
+    source = default_library() if library is None else library
+    parsed = _without_broken_lines(name, text)
+    if parsed is None:
+        return None
+
+    def find(wanted: str, owner: Definition, field: Field) -> Definition:
+        found = parsed.nested.get(wanted) or source.definition(wanted, ros=1)
+        if not isinstance(found, Definition):
+            raise DefinitionError(f"{owner.name}.{field.name}: {wanted} is not a message")
+        return found
+
+    with suppress(Error):
+        made = MessageType(Resolver(find).message(parsed))
+        return made if made.md5 == md5 else None
+    return None
+
+
+def _without_broken_lines(name: str, text: str) -> Definition | None:
+    lines = text.splitlines()
+    for _ in range(_MAX_BROKEN_LINES):
+        try:
+            return interfaces.parse_message("\n".join(lines), name, ros=1)
+        except DefinitionError as error:  # noqa: PERF203 - a few at most
+            if not 0 < error.line <= len(lines):
+                return None
+            lines[error.line - 1] = ""
+    return None
 
 
 def _make(definition: InterfaceDefinition) -> MessageType | ServiceType | ActionType:

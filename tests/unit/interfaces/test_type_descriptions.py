@@ -24,7 +24,7 @@ from rosglass.interfaces import (
     type_description,
     type_sources,
 )
-from rosglass.interfaces.type_descriptions import message_text
+from rosglass.interfaces.texts import message_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -16,11 +16,13 @@ from rosglass.comm.types import Types
 from rosglass.errors import (
     ConnectionLostError,
     DefinitionConflictError,
+    DefinitionError,
     Error,
     TypeNotFoundError,
 )
 from rosglass.interfaces import adding_definitions, full_text, join_name, split_name
 from rosglass.messages import MessageType, ServiceType, load
+from rosglass.messages.types import mend
 from rosglass.wires.tcpros.address import bracketed, interface_of, own_address
 from rosglass.wires.tcpros.connection import ANY
 from rosglass.wires.tcpros.graph import Graph
@@ -370,7 +372,13 @@ class AnnouncedTypes(Types):
                 f"{full}: its publisher sends no definition, and no other one with md5 {md5} is "
                 f"known; {adding_definitions(full, 1)}"
             )
-        found = MessageType.from_text(full, text, ros=1)
+        try:
+            found = MessageType.from_text(full, text, ros=1)
+        except DefinitionError:
+            mended = mend(full, text, md5, self.library)
+            if mended is None:
+                raise
+            found = mended
         if found.md5 != md5:
             raise TypeNotFoundError(
                 f"{full}: its publisher announces md5 {md5}, but the definition it sends has "
