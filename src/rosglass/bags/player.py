@@ -374,7 +374,8 @@ class Player(Handle):
         """Play from a position to the end; return the target of a seek, if there was one."""
         again_at = time.monotonic() + _MIN_LOOP_S
         for message in self._bag.messages(self.channels, start, self._end):
-            if not self._wait_for(message.time):
+            # A damaged index may name an end before the last messages.
+            if not self._wait_for(min(message.time, self._bag.end)):
                 return self._take_target()
             self._publish(message)
         if self._loop and not self._wait_for_loop(again_at):

@@ -65,21 +65,22 @@ class Ros1CutBag(ScannedBag):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        counts: dict[int, int] = {}
-        first = last = -1
+        # By number: a connection may stand behind its messages.
+        found: dict[int, tuple[int, int, int]] = {}
         for number, time, _ in self._scan():
-            counts[number] = counts.get(number, 0) + 1
-            first = time if first < 0 else min(first, time)
-            last = max(last, time)
+            count, first, last = found.get(number, (0, time, time))
+            found[number] = count + 1, min(first, time), max(last, time)
         if not self._known:
             why = f": {self._left_out.words()}" if self._left_out.words() else ""
             raise BagError(
                 f"{path} is a ROS 1 bag that ends, or is damaged, before its messages{why}"
             )
         for number, channel in self._known.items():
-            self._known[number] = replace(channel, count=counts.get(number, 0))
+            self._known[number] = replace(channel, count=found.get(number, (0, 0, 0))[0])
         self._merge_channels()
-        self.start, self.end = max(first, 0), max(last, 0)
+        known = [found[number] for number in self._known if number in found]
+        self.start = min((first for _, first, _ in known), default=0)
+        self.end = max((last for _, _, last in known), default=0)
         cut = "it was not closed properly: its index is missing or damaged"
         self.problem = "; ".join(filter(None, (cut, self._left_out.words())))
         _log.warning("%s: %s", path, self.problem)
@@ -115,7 +116,7 @@ class Ros1CutBag(ScannedBag):
             elif record.kind == _MESSAGE:
                 number = _number(record.fields.get(b"conn", b""))
                 time = record.fields.get(b"time", b"")
-                if number in self._known and len(time) == _time.size:
+                if number >= 0 and len(time) == _time.size:
                     seconds, nanoseconds = _time.unpack(time)
                     yield number, seconds * 10**9 + nanoseconds, record.data
 

@@ -685,7 +685,7 @@ def _record(parser: argparse.ArgumentParser) -> None:
 
 
 def _play(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help="MCAP file, ROS 2 bag or ROS 1 bag")
+    parser.add_argument("file", metavar="FILE", nargs="?", help="MCAP file, ROS 2 bag or ROS 1 bag")
     parser.add_argument(
         "--list", action="store_true", help="list the contents of the recording and exit"
     )
@@ -712,7 +712,6 @@ def _play(parser: argparse.ArgumentParser) -> None:
         "--remap",
         nargs="+",
         default=[],
-        type=pair("/old:=/new"),
         metavar="OLD:=NEW",
         help="publish a topic under another name",
     )

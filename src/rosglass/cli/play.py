@@ -16,6 +16,7 @@ from rosglass.bags import Player, open_bag
 from rosglass.cli.arguments import PLAY_KEYS
 from rosglass.cli.connecting import End, connect
 from rosglass.cli.output import CLEAR_LINE, note
+from rosglass.errors import Error
 from rosglass.interfaces import ros1_name
 
 if sys.platform != "win32":
@@ -36,7 +37,8 @@ _JUMPS = {"\033[D": -10.0, "\033[C": 10.0}
 
 def run(args: argparse.Namespace) -> int:
     """Play until the end, Ctrl-C or SIGTERM."""
-    with open_bag(args.file) as bag:
+    file, renamed = _arguments(args)
+    with open_bag(file) as bag:
         if args.list:
             print(json.dumps(_summary(bag), indent=2) if args.json else _listing(bag))
             return 0
@@ -50,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
                 bag,
                 topics=args.topics,
                 exclude=args.exclude,
-                remap=dict(args.remap),
+                remap=renamed,
                 rate=args.rate,
                 loop=args.loop,
                 clock=args.clock,
@@ -63,9 +65,11 @@ def run(args: argparse.Namespace) -> int:
             end = End()
             topics = len({channel.topic for channel in player.channels})
             print(
-                f"playing {topics} topics of {args.file} ({bag.duration:.1f} s) to {node.url}",
+                f"playing {topics} topics of {file} ({bag.duration:.1f} s) to {node.url}",
                 flush=True,
             )
+            if not any(channel.count for channel in player.channels):
+                note(f"{file} holds no messages" + (" of these" if args.topics else ""))
             printed: dict[str, str] = {}
             try:
                 _watch(player, bag, end, printed, keys=not args.no_keys)
@@ -74,6 +78,24 @@ def run(args: argparse.Namespace) -> int:
                 sent = player.status().sent
                 print(f"{sent} messages sent", flush=True)
             return end.code or (0 if sent else 1)
+
+
+def _arguments(args: argparse.Namespace) -> tuple[str, dict[str, str]]:
+    """Return FILE and the new names; behind ``-t`` or ``-m``, FILE is the last of their values."""
+    file, names, new = args.file, args.topics, args.remap
+    if file is None and new and ":=" not in new[-1]:
+        file = new.pop()
+    elif file is None and len(names) > 1:
+        file = names.pop()
+    if file is None:
+        raise Error("FILE is missing: rosglass play FILE [OPTIONS]")
+    renamed = {}
+    for text in new:
+        before, separator, after = text.partition(":=")
+        if not (before and separator and after):
+            raise Error(f"--remap {text!r} is not of the form /old:=/new")
+        renamed[before] = after
+    return file, renamed
 
 
 def _print_problems(player: Player, printed: dict[str, str], *, last: bool = False) -> None:

@@ -5,13 +5,19 @@ from __future__ import annotations
 from random import Random
 
 import pytest
+from mcap import writer as mcap_writer
 from rosbags.rosbag1 import Reader
+from waiting import eventually
 
+import rosglass
 from rosglass import load
-from rosglass.bags import open_bag
+from rosglass.bags import Player, open_bag
 from rosglass.bags.recorder import create
+from rosglass.cli import main
 from rosglass.comm import QoS, Sample
 from rosglass.errors import BagError
+from rosglass.messages import MessageType, OpaqueType
+from rosglass.messages.types import mend
 
 STRING = load("std_msgs/String", ros=1)
 
@@ -124,6 +130,149 @@ def test_a_damaged_bag_is_read_or_refused(tmp_path, caplog):
     # Most of the damage costs a chunk at most.
     assert read > 100 * 50
     assert refused < 50
+
+
+def test_messages_before_their_connection_are_counted_and_played(tmp_path, caplog):
+    """A chunk with the connection is damaged, and the end of the file repeats the connection."""
+    path = tmp_path / "a.bag"
+    file = create(path, "ros1", "bz2")
+    words = file.channel("/words", STRING, [], b"/talker")
+    for number in range(30):
+        file.write(words, sample(number))
+        if number % 10 == 9:
+            file.flush()
+    file.finish()
+    file.close()
+    data = bytearray(path.read_bytes())
+    start = data.index(b"BZh")
+    data[start + 20 : start + 40] = bytes(20)
+    # Without the index, the file is read from its start.
+    index = data.index(b"index_pos=") + len(b"index_pos=")
+    data[index : index + 8] = (2**40).to_bytes(8, "little")
+    path.write_bytes(data)
+    found: list[str] = []
+    with open_bag(path) as bag, rosglass.connect("local://before_connection") as node:
+        (channel,) = bag.channels
+        assert channel.count == 20
+        assert (bag.start, bag.end) == (10**9 + 10 * 10**6, 10**9 + 29 * 10**6)
+        wanted = texts(bag)
+        assert len(wanted) == 20
+        with Player(node, bag, delay=0.0, paused=True) as player:
+            node.create_subscription("/words", callback=lambda m: found.append(m.data), qos=100)
+            player.resume()
+            assert player.wait(30)
+        eventually(lambda: found == wanted)
+
+
+def test_an_end_that_lies_before_the_messages_ends_playing(tmp_path):
+    writer = mcap_writer.Writer(str(tmp_path / "a.mcap"), use_statistics=True)
+    writer.start("ros1")
+    schema = writer.register_schema("std_msgs/String", "ros1msg", b"string data\n")
+    number = writer.register_channel("/words", "ros1", schema)
+    data = STRING.encode(data="late", wire="ros1")
+    for time in (10**18, 2 * 10**18):
+        writer.add_message(number, time, data, time)
+    writer._Writer__statistics.message_end_time = 10**18
+    writer.finish()
+    with open_bag(tmp_path / "a.mcap") as bag, rosglass.connect("local://early_end") as node:
+        assert bag.duration == 0.0
+        with Player(node, bag, delay=0.0) as player:
+            assert player.wait(30)
+            assert player.status().sent == 2
+
+
+#: Texts as recorders in the field wrote them, each with the md5 sum of what was meant.
+BROKEN = {
+    "a line that is no definition": ("Header header\nfloat64 data\n\\n\n\n", "own_msgs/Level"),
+    "a comment on two lines": (
+        "Header header\n# \note this\nfloat64 temperature\nfloat64 variance\n",
+        "sensor_msgs/Temperature",
+    ),
+    "no nested types": ("Vector3  linear\nVector3  angular\n", "geometry_msgs/Twist"),
+}
+HEADER = "===\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
+
+
+@pytest.mark.parametrize("case", BROKEN)
+@pytest.mark.parametrize("finished", [True, False])
+def test_a_broken_definition_is_replaced_by_that_with_its_md5(tmp_path, caplog, case, finished):
+    text, name = BROKEN[case]
+    if name.startswith("own_msgs"):
+        wanted = MessageType.from_text(name, f"Header header\nfloat64 data\n{HEADER}", ros=1)
+    else:
+        wanted = load(name, ros=1)
+    path = tmp_path / "a.bag"
+    file = create(path, "ros1", "none")
+    kind = OpaqueType(name, wanted.md5, text=text, ros=1)
+    number = file.channel("/t", kind, [], b"/talker")
+    data = wanted.encode()
+    file.write(number, Sample(data, "ros1", kind, 10**9, None, b"/talker"))
+    file.flush()
+    if finished:
+        file.finish()
+    file.close()
+    with open_bag(path) as bag:
+        found = bag.channels[0].type()
+        assert not isinstance(found, OpaqueType)
+        assert found.md5 == wanted.md5
+        assert [found.decode_all(m.data) for m in bag.messages()] == [found.create()]
+
+
+def test_a_broken_definition_with_another_md5_stays_bytes(tmp_path):
+    path = tmp_path / "a.bag"
+    file = create(path, "ros1", "none")
+    kind = OpaqueType("own_msgs/Level", "a" * 32, text="float64 data\noops\n", ros=1)
+    file.channel("/t", kind, [], b"/talker")
+    file.finish()
+    file.close()
+    with open_bag(path) as bag:
+        found = bag.channels[0].type()
+    assert isinstance(found, OpaqueType)
+    assert "own_msgs/msg/Level>:2:1" in found.reason
+    assert "no definition of own_msgs/msg/Level (ROS 1) was found" in found.reason
+
+
+def test_a_definition_of_broken_lines_alone_is_given_up():
+    assert mend("own_msgs/msg/Level", "oops\n" * 10_000, "a" * 32) is None
+    assert mend("own_msgs/msg/Level", "x" * (2 << 20), "a" * 32) is None
+
+
+def play(capsys, *arguments):
+    code = main(["play", *map(str, arguments), "--url", "local://play_command", "-d", "0"])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def test_play_of_a_bag_without_messages_ends(tmp_path, capsys):
+    file = create(tmp_path / "a.bag", "ros1", "none")
+    file.channel("/words", STRING, [], b"/talker")
+    file.finish()
+    file.close()
+    code, out, err = play(capsys, tmp_path / "a.bag")
+    assert (code, "0 messages sent" in out, "holds no messages" in err) == (1, True, True)
+
+
+def test_play_takes_its_file_behind_names_of_topics(tmp_path, capsys):
+    path = unfinished(tmp_path / "a.bag")
+    lines = (
+        ("-t", "/words", path),
+        (path, "-t", "/words"),
+        ("-t", "/words", "-m", "/words:=/w", path),
+        ("-m", "/words:=/w", "/kept:=/k", "-t", "/words", path),
+        ("-t", "/words", "--rate", "2", path),
+    )
+    for line in lines:
+        code, out, _ = play(capsys, *line)
+        assert code == 0
+        assert "playing 1 topics" in out
+        assert "67 messages sent" in out
+    for line in (("-t", "/words"), ("-m", "/words:=/w"), ()):
+        code, _, err = play(capsys, *line)
+        assert code == 1
+        assert "FILE is missing: rosglass play FILE" in err
+    code, _, err = play(capsys, path, "-m", "/words")
+    assert code == 1
+    assert "--remap '/words' is not of the form /old:=/new" in err
 
 
 def test_what_a_format_cannot_hold_is_refused(tmp_path):
