@@ -193,6 +193,13 @@ class ReplayNode(Ros2Node):
             ignore_local=ignore_local,
         )
 
+    def _receive(
+        self, subscription: Subscription, type: str | MessageType | None, ignore_local: bool
+    ) -> None:
+        # By its name, so that the subscription reports why the recording cannot be decoded.
+        wanted = type.name if isinstance(type, OpaqueType) else type
+        super()._receive(subscription, wanted, ignore_local)
+
     def fetch_type(
         self,
         name: str,

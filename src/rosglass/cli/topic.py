@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from rosglass.comm import Node, Sample, Subscription
+    from rosglass.messages import MessageType
 
 __all__ = ["echo", "info", "list_topics", "measure", "publish"]
 
@@ -165,6 +166,7 @@ def echo(args: argparse.Namespace) -> int:
                     continue
                 received += 1
                 reasons.on_count(received)
+                reasons.on_sample(sample)
                 due = time.monotonic() + (math.inf if args.timeout is None else args.timeout)
                 if args.stamps and not args.json:
                     print(style(f"# received {sample.received.seconds:.6f}", "dim"))
@@ -439,6 +441,7 @@ class _SilenceReasons:
         self._received = 0
         self._pause = 0.0
         self._printed = ""
+        self._unreadable: set[MessageType] = set()
         self._log = logging.getLogger("rosglass.comm")
         self._quiet = not args.verbose
 
@@ -458,6 +461,13 @@ class _SilenceReasons:
         self._pause = (now - self._began) / count
         self._received, self._received_at, self._printed = count, now, ""
 
+    def on_sample(self, sample: Sample) -> None:
+        """Print why a message is shown as bytes, once for each type."""
+        kind = sample.type
+        if isinstance(kind, OpaqueType) and kind not in self._unreadable:
+            self._unreadable.add(kind)
+            self._print(f"{kind.name} is shown as bytes: {kind.reason}")
+
     def report(self, *, last: bool = False) -> str:
         """Print the reason if it is new, and return it; empty if there is none.
 
@@ -474,10 +484,13 @@ class _SilenceReasons:
         reason = self._reason(silent)
         if reason and reason != self._printed:
             self._printed = reason
-            # Conflicting definitions take pages.
-            shown = reason.partition("\n")[0].rstrip() if self._quiet else reason
-            note(f"{self._subscription.topic}: {spelled(self._node, shown)}")
+            self._print(reason)
         return reason
+
+    def _print(self, reason: str) -> None:
+        # Conflicting definitions take pages.
+        shown = reason.partition("\n")[0].rstrip() if self._quiet else reason
+        note(f"{self._subscription.topic}: {spelled(self._node, shown)}")
 
     def _reason(self, silent: float) -> str:
         found = self._subscription

@@ -13,6 +13,7 @@ from rosglass.comm.events import describe_conflicts, qos_conflicts
 from rosglass.comm.subscription import Problem, TopicMatching
 from rosglass.errors import Error
 from rosglass.interfaces import join_name
+from rosglass.messages import OpaqueType
 from rosglass.ros2.announced import nodes_of
 
 if TYPE_CHECKING:
@@ -378,7 +379,7 @@ class TopicTypes:
         topic: The topic, for messages.
         types: Finds definitions.
         wanted: A type, which is fixed; a type's name; or None to accept the published type.
-        known: The type of that name, if the library has it.
+        known: The type of that name, if the library has it; may be opaque.
         opaque: Whether the subscription accepts bytes that cannot be decoded.
         changed: Called, from any thread, when :meth:`follow` should be called again.
 
@@ -415,6 +416,7 @@ class TopicTypes:
         self.problems: list[str] = []
         if known is not None:
             self._take(known)
+            self._provisional = not self._fixed and isinstance(known, OpaqueType)
 
     def accepts(self, endpoint: EndpointInfo) -> bool:
         """Return whether a publisher's samples are accepted, as far as it announces its type."""

@@ -194,6 +194,15 @@ def test_what_nobody_can_define_is_passed_on_as_it_came(connect):
         relay.create_publisher("/nothing", OpaqueType("secret_msgs/Thing", ros=1))
 
 
+def test_a_definition_with_a_broken_line_is_used_if_the_rest_has_its_md5(connect):
+    source, sink = connect("source"), connect("sink")
+    whole = MessageType.from_text("secret_msgs/Level", "float64 data\n", ros=1)
+    broken = OpaqueType("secret_msgs/Level", whole.md5, text="float64 data\n\\n\n", ros=1)
+    sent = source.create_publisher("/broken", broken, rosglass.QoS.latched())
+    sent.publish_serialized(whole.encode(data=2.5))
+    assert sink.create_subscription("/broken").wait(30).message().data == 2.5
+
+
 def test_each_latched_publisher_of_a_node_is_heard_by_who_comes_late(connect):
     node = connect("static")
     first = node.create_publisher("/static", STRING, rosglass.QoS.latched())

@@ -15,6 +15,7 @@ from waiting import eventually
 import rosglass
 from rosglass import load
 from rosglass.bags import Player, ReplayNode, open_bag
+from rosglass.cli import main
 from rosglass.comm import ConnectionState, Duration, QoS, Time
 from rosglass.errors import BagError, ConversionError, NodeClosedError, UnsupportedError
 from rosglass.interfaces import full_text
@@ -311,13 +312,32 @@ def test_types_that_only_the_recording_knows(tmp_path, play):
     assert node.fetch_type("own_msgs/msg/Height").fields[0].name == "metres"
     heights = [node.create_subscription("/height", given) for given in (None, own.name)]
     lost = node.create_subscription("/lost", callback=lambda _: None)
-    samples = node.create_subscription("/lost")
-    eventually(lambda: "the recording has no definition of it" in lost.problem)
-    eventually(lambda: samples.type is not None)
+    # Those that take bytes, as interfaces and commands do, report the same.
+    samples = [node.create_subscription("/lost", given) for given in (None, "own_msgs/Lost")]
+    for each in (lost, *samples):
+        eventually(lambda each=each: "the recording has no definition of it" in each.problem)
+        assert "Library.add_path('own_msgs')" in each.problem
+    eventually(lambda: all(each.type is not None for each in samples))
     node.playback.play()
     assert [height.wait(30).message().metres for height in heights] == [2.5, 2.5]
-    assert samples.wait(30).data == b"\0\1\0\0abcd"
-    assert isinstance(samples.type, OpaqueType)
+    assert [each.wait(30).data for each in samples] == [b"\0\1\0\0abcd"] * 2
+    assert all(isinstance(each.type, OpaqueType) for each in samples)
+
+
+def test_a_ros_1_definition_with_another_md5_is_reported(tmp_path, play, capsys):
+    path = tmp_path / "own.mcap"
+    writer = mcap_writer.Writer(str(path))
+    writer.start("ros1")
+    schema = writer.register_schema("own_msgs/Gear", "ros1msg", b"float32 x\n")
+    number = writer.register_channel("/gear", "ros1", schema, {"md5sum": "0" * 32})
+    writer.add_message(number, START, b"abcd", START)
+    writer.finish()
+    subscription = play(path, "?paused=true").create_subscription("/gear")
+    eventually(lambda: f"the recording says md5 {'0' * 32}" in subscription.problem)
+    assert main(["topic", "echo", "/gear", "--once", "--url", f"replay:{path}"]) == 0
+    out, err = capsys.readouterr()
+    assert out == "61626364\n---\n"
+    assert f"/gear: own_msgs/Gear is shown as bytes: the recording says md5 {'0' * 32}" in err
 
 
 @pytest.mark.parametrize(
