@@ -9,7 +9,7 @@ from documentation import BLOCK, ROOT, Reader
 from waiting import eventually
 
 import rosglass
-from rosglass.images import DepthColors
+from rosglass.images import DepthColors, RawImage
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -67,14 +67,12 @@ def given(
     monkeypatch.setattr(rosglass, "connect", to_master)
     node = to_master("ros1://robot", "reader")
     eventually(lambda: node.status().state.value == "connected", node.status)
-    image_type = rosglass.load("sensor_msgs/Image", ros=1)
     return {
         "DepthColors": DepthColors,
         "__name__": "reader",
         "node": node,
-        "picture": image_type.decode(
-            image_type.encode(encoding="16UC1", width=2, height=1, step=4, data=[0, 1, 0, 2])
-        ),
+        # What an ImageStream gives to the function of the block before.
+        "picture": RawImage(2, 1, "16UC1", 4, b"\0\1\0\2"),
         "rosglass": rosglass,
         "server": getattr(node, "parameter_server", None),
     }
