@@ -151,6 +151,29 @@ def test_throttling_shows_the_first_at_once_and_then_the_newest(
     assert root.property("sub").property("dropped") == 0
 
 
+def test_throttling_keeps_its_rate(live: Any, wait: Any) -> None:
+    """Also where a fast topic is received in batches; each 30th of a second, not each 20th."""
+    publisher, ended = live.robot.create_publisher("/chat", TEXT), threading.Event()
+
+    def publish() -> None:
+        while not ended.wait(0.003):
+            publisher.publish(data="x")
+
+    thread = threading.Thread(target=publish)
+    root = load(live, 'topic: "/chat"; throttleRate: 30')
+    times: list[float] = []
+    root.property("sub").messageChanged.connect(lambda: times.append(time.monotonic()))
+    thread.start()
+    try:
+        # In any second; a busy machine has slow ones.
+        wait(lambda: times and time.monotonic() - times[0] > 3)  # by then, in batches
+        wait(lambda: sum(time.monotonic() - at < 1 for at in times) >= 29)
+        assert len(times) <= (time.monotonic() - times[0]) * 30 + 2
+    finally:
+        ended.set()
+        thread.join()
+
+
 def test_what_a_full_queue_drops_is_counted(running: Any, chat: Any, wait: Any) -> None:
     root = load(running, 'topic: "/chat"; throttleRate: 0; queueSize: 2')
     sub = root.property("sub")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -157,6 +158,54 @@ def test_static_transforms_stay_fresh(live: Bench, robot: Robot, wait: Any) -> N
     wait(lambda: root.shown() == "true,false,-1,0.5")
     wait.nothing_happens(0.5)
     assert root.shown() == "true,false,-1,0.5"
+
+
+def test_the_rate_is_kept(live: Bench, wait: Any) -> None:
+    root: Any = live.load("""
+        QtObject {
+            property TfTransform tf: TfTransform {
+                sourceFrame: "base"; targetFrame: "map"; rate: 120
+                onMessageChanged: times.push(Date.now())
+            }
+            property var times: []
+            function total() { return times.length }
+            function seconds() { return (Date.now() - times[0]) / 1000 }
+            function recent() {
+                const now = Date.now()
+                return times.filter(t => now - t < 1000).length
+            }
+            property TfBroadcaster sent: TfBroadcaster {
+                frameId: "map"; childFrameId: "camera"; rate: 400
+            }
+        }
+    """)
+    sender, ended = TransformBroadcaster(live.robot), threading.Event()
+    sent: list[float] = []
+
+    def move() -> None:
+        x = 0.0
+        while not ended.wait(1 / 300):
+            x += 0.001
+            sender.send_transform(
+                Transform((x, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), Time.now(), "map", "base")
+            )
+
+    def on_tf(message: Any) -> None:
+        if message.transforms[0].child_frame_id == "camera":
+            sent.append(time.monotonic())
+
+    live.robot.create_subscription("/tf", "tf2_msgs/msg/TFMessage", on_tf)
+    thread = threading.Thread(target=move)
+    thread.start()
+    try:
+        # In any second; a busy machine has slow ones.
+        wait(lambda: root.recent() >= 110)
+        wait(lambda: len(sent) > 400)
+        assert root.total() <= root.seconds() * 120 + 2
+        assert len(sent) <= (time.monotonic() - sent[0]) * 400 * 1.05 + 2
+    finally:
+        ended.set()
+        thread.join()
 
 
 def test_enabled_frames_and_rate(live: Bench, robot: Robot, wait: Any) -> None:

@@ -10,10 +10,10 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.executor import Dispatcher
-from rosglass.comm.statistics import note_time, rate_of
+from rosglass.comm.statistics import Pace, note_time, rate_of
 from rosglass.errors import Error
 from rosglass.qml.dialect import Dialect
-from rosglass.qml.element import Element
+from rosglass.qml.element import Element, single_shot
 from rosglass.qml.from_js import fields_from_js, numpy
 from rosglass.qml.image_sinks import window_of
 from rosglass.qml.log import log_from_qml
@@ -208,8 +208,8 @@ class ImagePublisher(Element):
         self._converting = self._again = False
         self._sent: deque[float] = deque(maxlen=_MARKS)
         self._worker: Dispatcher | None = None
-        self._timer = QtCore.QTimer(self)
-        self._timer.timeout.connect(self._on_time)
+        self._pace = Pace()
+        self._timer = single_shot(self, self._on_time)
 
     def _on_info_changed(self) -> None:
         self._info_fields = None
@@ -246,7 +246,8 @@ class ImagePublisher(Element):
 
     def _run_timer(self) -> None:
         if self._endpoint is not None and self.rate:
-            self._timer.start(max(1, round(1000 / self.rate)))
+            self._pace = Pace()
+            self._timer.start(self._pace.take_ms(self.rate))
         else:
             self._timer.stop()
 
@@ -281,6 +282,8 @@ class ImagePublisher(Element):
 
     @Slot()
     def _on_time(self) -> None:
+        if self.rate:  # otherwise 0 since just now
+            self._timer.start(self._pace.take_ms(self.rate))
         if self._is_wanted():
             self._take()
 

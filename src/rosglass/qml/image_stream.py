@@ -8,7 +8,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from rosglass.comm.statistics import note_time, rate_of
+from rosglass.comm.statistics import Pace, note_time, rate_of
 from rosglass.comm.time import Time
 from rosglass.images import ImageStream
 from rosglass.qml.image_rendering import Look, Picture, Renderer
@@ -57,17 +57,16 @@ class Channel:
         self.last: Picture | None = None
         #: Why the pictures cannot be shown with this look, though with others; empty if they can.
         self.problem = ""
-        self._due = 0.0
+        self._pace = Pace()
         self._arrivals: deque[float] = deque(maxlen=_RATE_WINDOW)
 
     def is_due(self, now: float) -> bool:
         """Return whether the next picture is due."""
-        return now >= self._due
+        return self._pace.wait(self.look.interval, now) <= 0
 
     def take(self, now: float) -> None:
         """Count a picture, so that the mean rate does not exceed the requested one."""
-        interval = self.look.interval
-        self._due = (self._due if now - self._due < interval else now) + interval
+        self._pace.take(self.look.interval, now)
 
     def show(self, picture: Picture) -> None:
         """Show a picture to all viewers."""

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.qos import Durability, History, QoS, Reliability
+from rosglass.comm.statistics import Pace
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
 from rosglass.qml.callbacks import Deferred, call_back, weak_callback
 from rosglass.qml.dialect import Dialect
@@ -104,6 +105,7 @@ class Subscription(TopicElement):
         self._current = False
         self._value: QJSValue | None = None
         self._shown_at = self._late = 0.0
+        self._pace = Pace()
         self._inner_problem = self._missed = ""
         #: When the subscription was created.
         self._created_at = 0.0
@@ -246,13 +248,18 @@ class Subscription(TopicElement):
     def _on_arrival(self, endpoint: TopicSubscription) -> None:
         if not is_alive(self) or endpoint is not self._endpoint:
             return
-        wait = 0.0
-        if self.throttleRate:
-            wait = self._shown_at + 1 / self.throttleRate - self._steady()
-        if wait > 0.0005:
-            self._timer.start(math.ceil(wait * 1000))
+        wait = self._wait_ms()
+        if wait > 0:
+            self._timer.start(wait)
         else:
             self._deliver()
+
+    def _wait_ms(self) -> int:
+        """Return the milliseconds until a message may be shown."""
+        if not self.throttleRate:
+            return 0
+        wait = self._pace.wait(1 / self.throttleRate, self._steady())
+        return math.ceil(wait * 1000) if wait > 0.0005 else 0
 
     @Slot()
     def _deliver(self) -> None:
@@ -260,8 +267,12 @@ class Subscription(TopicElement):
         if endpoint is None:
             return
         samples = list(iter(endpoint.take, None))
+        if samples and self.throttleRate:
+            self._pace.take(1 / self.throttleRate, self._steady())
         # Not after showing them: a handler may wait in an event loop of its own.
-        if not endpoint.add_waiter(self._wake) and not endpoint.closed:
+        if samples and self.throttleRate and endpoint.batching:
+            self._timer.start(self._wait_ms())  # batches come too rarely to wait for
+        elif not endpoint.add_waiter(self._wake) and not endpoint.closed:
             self._wake()
         for sample in samples if self.throttleRate == 0 else samples[-1:]:
             self._show(sample)

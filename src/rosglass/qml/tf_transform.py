@@ -8,6 +8,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import rosglass
+from rosglass.comm.statistics import Pace
 from rosglass.comm.time import Time
 from rosglass.errors import Error, TransformException
 from rosglass.qml.callbacks import weak_callback
@@ -88,7 +89,7 @@ class TfTransform(Element):
         self._transform: Transform | None = None
         self._exception, self._why = "Uninitialized", "nothing was looked up yet"
         self._shown: QJSValue | None = None
-        self._updated = 0.0
+        self._updated, self._pace = 0.0, Pace()
         #: When the transform last changed; None before.
         self._arrived: float | None = None
         #: When the connection was lost; later transforms are live, e.g. without a ROS 1 master.
@@ -192,7 +193,7 @@ class TfTransform(Element):
             return
         if self._timer.isActive():
             return
-        wait = self._updated + self._interval - time.monotonic()
+        wait = self._pace.wait(self._interval, time.monotonic())
         if wait > 0.0005:
             self._timer.start(math.ceil(wait * 1000))
         else:
@@ -213,6 +214,7 @@ class TfTransform(Element):
             return
         buffer, target, source = self._config
         self._updated = time.monotonic()
+        self._pace.take(self._interval, self._updated)
         try:
             found = buffer.lookup_transform(target, source)
         except TransformException as error:
@@ -314,8 +316,8 @@ class TfBroadcaster(Element):
         self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
     ) -> None:
         super().__init__(parent, runtime)
-        self._timer = QtCore.QTimer(self)
-        self._timer.timeout.connect(self._send_current)
+        self._pace = Pace()
+        self._timer = single_shot(self, self._send_next)
 
     def _value(self, value: Any) -> QJSValue:
         runtime = self._find_runtime()
@@ -380,6 +382,12 @@ class TfBroadcaster(Element):
         if self.enabled and self.frameId and self.childFrameId:
             self._send([self._current()])
 
+    @Slot()
+    def _send_next(self) -> None:
+        if self.rate:  # otherwise 0 since just now
+            self._timer.start(self._pace.take_ms(self.rate))
+            self._send_current()
+
     def _send_static(self) -> None:
         if self.isStatic and self._endpoint is not None:
             self._send_current()
@@ -413,7 +421,8 @@ class TfBroadcaster(Element):
         if self._endpoint is None or self.isStatic or not self.rate:
             self._timer.stop()
         else:
-            self._timer.start(round(1000 / self.rate))
+            self._pace = Pace()
+            self._timer.start(self._pace.take_ms(self.rate))
 
 
 def _numbers(value: QJSValue, type_name: str, what: str, names: str) -> tuple[float, ...]:
