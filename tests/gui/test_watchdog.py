@@ -170,6 +170,32 @@ def test_a_slow_function_in_python_is_told_and_what_called_it_goes_on(
         assert f"called at {runner.file}:{LINE} (loop)" in caplog.text
 
 
+def test_qml_of_rosglass_itself_is_never_ended(
+    run: Callable[..., Runner],
+    wait: Callable[..., None],
+    caplog: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("rosglass.qml.watchdog._OURS", str(tmp_path))
+    runner = run("helper.compute(3)", 0.5)
+    QtCore.QMetaObject.invokeMethod(runner.root, "begin")
+    wait(lambda: "after" in done(runner))
+    assert done(runner) == ["begun", "went on", "after"]
+    assert not panel(runner)
+    wait(lambda: "stood still for" in caplog.text)
+    # A function of the user's that it calls is.
+    other = tmp_path.parent / f"{tmp_path.name}_user"
+    other.mkdir()
+    (other / "User.qml").write_text(
+        "import QtQuick 2.15\nItem { function loop() { while (true) {} } }\n"
+    )
+    source = f'"file:{other}/User.qml"'
+    runner = run(f"var made = Qt.createComponent({source}).createObject(); made.loop()", 0.5)
+    QtCore.QMetaObject.invokeMethod(runner.root, "begin")
+    wait(lambda: "User.qml" in panel(runner))
+
+
 def test_a_call_that_waits_while_the_screen_lives_is_not_ended(
     run: Callable[..., Runner], wait: Callable[..., None], caplog: Any
 ) -> None:

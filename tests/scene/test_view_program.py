@@ -663,6 +663,28 @@ class Rows:
         self._test.keyClick(self.window, getattr(Qt.Key, f"Key_{name}"), held)
 
 
+def test_a_large_config_is_announced_once(bench: SceneBench, window: Any, tmp_path: Path) -> None:
+    from PySide6.QtCore import QObject
+
+    scene = window.findChild(QObject, "scene").scene
+    grids = [f"{{Class: rviz/Grid, Name: g{number}}}" for number in range(400)]
+    text = ", ".join([*grids, "{Class: rviz/Image, Name: Camera, Enabled: true}"])
+    (tmp_path / "large.rviz").write_text(f"Visualization Manager: {{Displays: [{text}]}}")
+    changes: list[int] = []
+    scene.displaysChanged.connect(lambda: changes.append(len(scene.displays)))
+    window.findChild(QObject, "scene").load_config(tmp_path / "large.rviz")
+    assert changes == [401], "each change costs as much as there are displays"
+    # Panels of pictures are not made anew as others come and go.
+    panels = window.findChild(QObject, "imagePanels")
+    bench.wait(lambda: panels.property("item") is not None)
+    (panel,) = panels.property("item").childItems()[:1]
+    scene.remove(scene.displays[0])
+    assert changes == [401, 400]
+    assert panels.property("item").childItems()[0] is panel
+    scene.remove(scene.find("Camera"))
+    bench.wait(lambda: panels.property("item") is None)
+
+
 def test_a_display_is_dragged_by_the_mouse(bench: SceneBench, window: Any) -> None:
     rows = Rows(window)
     rows.scene.add("Group", "Robot")

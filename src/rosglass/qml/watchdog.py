@@ -270,6 +270,8 @@ _LOAD_FACTOR = 4
 #: Seconds within which the next JavaScript function cannot start.
 _LATE = 30e-6
 _OURS = str(Path(__file__).parents[1])
+#: Where Qt's own QML files are.
+_QT_FILES = ("qrc:/qt-project.org/", "qrc:/qt/qml/")
 _LIBRARIES = (sysconfig.get_paths()["stdlib"], *{sysconfig.get_paths()[p] for p in ("purelib",)})
 _ADVICE = "let it end, or do its work in pieces by a Timer"
 _AND_OTHERS = "; the machine is busy, so what came right after it may have ended early, too"
@@ -350,8 +352,8 @@ class Watchdog(QtCore.QObject):
 
     Lives on the GUI thread, where a timer is the heartbeat. A separate thread checks it. While it
     is missing, this thread adds up the processor time that the GUI thread spends in JavaScript, and
-    ends the JavaScript after :attr:`Session.longest_script`. Native code and Python are only
-    reported.
+    ends the JavaScript after :attr:`Session.longest_script`. Native code, Python and rosglass's own
+    QML are only reported.
 
     JavaScript cannot be ended while a function of Qt that called it holds the GIL, because then no
     other Python thread runs: QObject.setProperty, QQmlComponent.create (instead, use ``create`` of
@@ -509,7 +511,8 @@ class Watchdog(QtCore.QObject):
                 script = (script if handler == last else 0.0) + computed + ready / _LOAD_FACTOR
                 if script < limit:
                     continue
-                if self._beaten == beaten and self._end_script(innermost, script):
+                is_own = _are_own(innermost.stack.callers())
+                if self._beaten == beaten and not is_own and self._end_script(innermost, script):
                     return
             if self._lives and still >= limit and not self._report and self._beaten == beaten:
                 self._tell_still(still, innermost)
@@ -583,6 +586,18 @@ class Watchdog(QtCore.QObject):
                 watched.tell(text)
 
         self._session.executor.post(show)
+
+
+def _are_own(callers: list[Caller]) -> bool:
+    """Return whether only rosglass's own QML runs, with Qt's, and nothing of the user's.
+
+    It ends: Python or Qt is at work for it, and what came after it would be missing.
+    """
+    files = [caller.file for caller in callers]
+    own = tuple(f"{_OURS}{separator}" for separator in {os.sep, "/"})
+    return any(one.startswith(own) for one in files) and all(
+        one.startswith((*own, *_QT_FILES)) for one in files
+    )
 
 
 def _place(caller: Caller) -> str:

@@ -94,17 +94,18 @@ def show_displays(scene: Scene, config: RvizConfig) -> list[str]:
         What was left out, a line each.
     """
     notes = list(config.warnings)
-    for display in scene.displays:
-        if display.group is None:
-            scene.remove(display)
-    try:
-        scene.fixed_frame = config.fixed_frame or "map"
-    except Error as error:
-        notes.append(f"Fixed Frame: {error}")
-    for one in config.displays:
-        _add(scene, one, None, notes)
-    if config.current_view is not None:
-        add_controller(scene, config.current_view, notes)
+    with scene.changing():
+        for display in scene.displays:
+            if display.group is None:
+                scene.remove(display)
+        try:
+            scene.fixed_frame = config.fixed_frame or "map"
+        except Error as error:
+            notes.append(f"Fixed Frame: {error}")
+        for one in config.displays:
+            _add(scene, one, None, notes)
+        if config.current_view is not None:
+            add_controller(scene, config.current_view, notes)
     return notes
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -70,6 +70,8 @@ class Scene(Element):
     fixedFrameChanged = Signal()
     #: Displays were added, removed or moved.
     displaysChanged = Signal()
+    #: Displays of pictures were.
+    picturesChanged = Signal()
     #: Transforms were received, or data has to be placed anew.
     placed = Signal()
 
@@ -86,6 +88,9 @@ class Scene(Element):
         self._resources: list[ResourceRetriever] = []
         self._fixed_frame = "map"
         self._displays: list[Display] = []
+        self._pictures: list[Display] = []
+        #: How many callers of :meth:`changing` there are, and whether displays have changed since.
+        self._changing, self._has_changed = 0, False
         self._link: TfLink | None = None
         self._watch: Any = None
         self._loader: Dispatcher | None = None
@@ -126,6 +131,31 @@ class Scene(Element):
 
     #: All displays, for QML.
     displayList = Property(list, lambda self: list(self._alive()), notify=displaysChanged)
+    #: Those that have a picture, for an ``ImagePanel``.
+    pictureList = Property(
+        list, lambda self: list(filter(is_alive, self._pictures)), notify=picturesChanged
+    )
+
+    @contextmanager
+    def changing(self) -> Iterator[None]:
+        """Announce all changes of displays at the end, once: each costs as much as there are."""
+        self._changing += 1
+        try:
+            yield
+        finally:
+            self._changing -= 1
+            if self._has_changed and not self._changing:
+                self._announce_displays()
+
+    def _announce_displays(self) -> None:
+        self._has_changed = bool(self._changing)
+        if self._has_changed or not is_alive(self):
+            return
+        pictures = [one for one in self._alive() if hasattr(one, "isPicture")]
+        before, self._pictures = self._pictures, pictures
+        self.displaysChanged.emit()
+        if pictures != before:
+            self.picturesChanged.emit()
 
     def add(self, kind: str | Display, name: str = "", **settings: Any) -> Display:
         """Add a display.
@@ -190,11 +220,7 @@ class Scene(Element):
             # The others are shown all the same.
             _log.exception("%s", display.label)
             display.set_status("Setup", "error", repr(error))
-        self.displaysChanged.emit()
-
-    def _announce_displays(self) -> None:
-        if is_alive(self):
-            self.displaysChanged.emit()
+        self._announce_displays()
 
     def remove(self, display: Display) -> None:
         """Remove a display, and if it is a group, the displays in it.
@@ -208,7 +234,7 @@ class Scene(Element):
                 self.remove(inner)
         self._displays.remove(display)
         display.leave()
-        self.displaysChanged.emit()
+        self._announce_displays()
         display.deleteLater()
 
     def move(
@@ -249,7 +275,7 @@ class Scene(Element):
         (self.root if group is None else group.root).add(display.root)
         if display.shown != was_shown:
             display.on_group_enabled()
-        self.displaysChanged.emit()
+        self._announce_displays()
 
     def _check_own(self, display: Display) -> None:
         if display not in self._displays:

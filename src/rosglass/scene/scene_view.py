@@ -345,11 +345,12 @@ class SceneView(QQuickRhiItem):
         Now, not from the event loop: a program may load a config next, which replaces them.
         """
         super().componentComplete()
-        for child in self.children():
-            if isinstance(child, Tool):
-                self.adopt_tool(child)
-            elif isinstance(child, Display):
-                self.adopt_display(child)
+        with self.scene.changing():
+            for child in self.children():
+                if isinstance(child, Tool):
+                    self.adopt_tool(child)
+                elif isinstance(child, Display):
+                    self.adopt_display(child)
         wanted, self._wanted_tool = self._wanted_tool, ""
         if wanted:
             self._set_tool(wanted)

@@ -9,7 +9,7 @@ Item {
     property SceneView view: null
 
     Repeater {
-        model: area.view ? area.view.scene.displayList.filter(one => one.isPicture === true) : []
+        model: area.view ? area.view.scene.pictureList : []
         ImagePanel {
             id: panel
             required property int index

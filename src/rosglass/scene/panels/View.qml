@@ -46,7 +46,7 @@ Window {
         Loader {
             objectName: "imagePanels"
             anchors.fill: parent
-            active: scene.scene.displayList.some(one => one.isPicture === true)
+            active: scene.scene.pictureList.length > 0
             source: "ImagePanels.qml"
             onLoaded: item.view = scene
         }
