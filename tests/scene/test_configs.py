@@ -270,6 +270,50 @@ NEWER = {
 }
 
 
+def test_what_rosglass_cannot_use_comes_back(bench: SceneBench, tmp_path: Path) -> None:
+    file, again = tmp_path / "some.rviz", tmp_path / "again.rviz"
+    view = {"Class": "some_lab/FancyView", "Name": "Current View", "Secret": 42,
+            "Target Frame": "base_link", "Distance": 3}  # fmt: skip
+    displays = [
+        {"Class": "rviz/PointCloud2", "Name": "all", "Topic": "/c", "Queue Size": 0},
+        {"Class": "rviz/PointCloud2", "Name": "many", "Topic": "/c", "Queue Size": 100_000},
+        {
+            "Class": "rviz_default_plugins/Path",
+            "Name": "deep",
+            "Topic": {"Value": "/p", "Depth": 0},
+        },
+        {"Class": "rviz/Grid", "Name": "odd", "Cell Size": -4, "Plane": "AB"},
+    ]
+    manager = {"Displays": displays, "Views": {"Current": view}}
+    file.write_text(yaml.safe_dump({"Visualization Manager": manager}))
+    shown = bench.load()
+    notes = shown.load_config(file)
+    assert any("view some_lab/FancyView: rosglass has none" in note for note in notes)
+    shown.controller.set("Yaw", 1.0)
+    shown.save_config(again)
+
+    def saved() -> tuple[Any, ...]:
+        manager = yaml.safe_load(again.read_text())["Visualization Manager"]
+        return manager["Views"]["Current"], {one["Name"]: one for one in manager["Displays"]}
+
+    current, kept = saved()
+    assert current == view
+    assert (kept["all"]["Queue Size"], kept["many"]["Queue Size"]) == (0, 100_000)
+    assert kept["deep"]["Queue Size"] == 0
+    assert (kept["odd"]["Cell Size"], kept["odd"]["Plane"]) == (-4, "AB")
+    # What the user chooses is written.
+    for name in ("all", "many", "deep"):
+        shown.scene.find(name).depth = 7
+    shown.scene.find("odd").cellSize = 2.0
+    shown.select_view("TopDownOrtho")
+    shown.save_config(again)
+    current, kept = saved()
+    assert current["Class"].endswith("/TopDownOrtho")
+    assert kept["all"]["Queue Size"] == kept["many"]["Queue Size"] == 7
+    assert kept["deep"]["Queue Size"] == 7
+    assert (kept["odd"]["Cell Size"], kept["odd"]["Plane"]) == (2, "AB")
+
+
 def test_settings_have_the_names_that_rviz_writes(bench: SceneBench) -> None:
     (file,) = (file for file in FILES if file.stem == "ros1_all_displays")
     before = RvizConfig.load(file)

@@ -457,7 +457,7 @@ def test_settings_of_rviz_files(bench: SceneBench, load: Callable[..., Any]) -> 
     assert display.load_settings(saved) == []
     assert (display.topic, display.transport, display.depth) == ("/rear/image", "compressed", 7)
     assert (display.imageRendering, display.zoomFactor) == ("overlay", 2)
-    assert display.hiddenDisplays == ["Grid", "TF"]
+    assert display.hiddenDisplays == ["/Grid", "/Robot/TF"]
     assert display.panelGeometry.getRect() == (30, 125, 180, 135)
     kept = display.save_settings({"Class": "rviz/Camera"}, 1)
     assert (kept["Image Topic"], kept["Queue Size"]) == ("/rear/image", 7)
@@ -469,18 +469,39 @@ def test_settings_of_rviz_files(bench: SceneBench, load: Callable[..., Any]) -> 
     scene.move(scene.add("TF"), group=group)
     kept = display.save_settings(saved, 1)
     assert kept["Visibility"] == saved["Visibility"]
-    display.parts.set_enabled("TF", True)
+    display.parts.set_enabled("Robot/TF", True)
     display.parts.set_enabled("Robot", False)
-    assert display.hiddenDisplays == ["Grid", "Robot"]
+    assert display.hiddenDisplays == ["/Grid", "/Robot"]
     inner = {"Value": False, "TF": True}
     assert display.save_settings(saved, 1)["Visibility"] == {
         "Grid": False,
         "Robot": inner,
         "Value": True,
     }
-    assert display.parts.names() == ["Grid", "Robot", "TF"]
+    assert display.parts.names() == ["Grid", "Robot", "Robot/TF"]
     (refused,) = display.load_settings({"Panel Geometry": {**place, "Width": "wide"}})
     assert "Panel Geometry/Width: expected a" in refused
+
+
+def test_displays_of_one_name_are_hidden_one_by_one(
+    bench: SceneBench, load: Callable[..., Any]
+) -> None:
+    display, _ = load(CAMERA)
+    scene = display.scene
+    for group in ("A", "B", "C"):
+        scene.move(scene.add("Grid", "Map"), group=scene.add("Group", group))
+    maps = [one for one in scene.displays if one.name == "Map"]
+    shown = {"Map": True, "Value": True}
+    saved = {"A": {**shown, "Map": False}, "B": shown, "C": shown, "Value": True}
+    display.load_settings({"Visibility": saved})
+    assert [display.hides(one) for one in maps] == [True, False, False]
+    assert display.save_settings({}, 2)["Visibility"] == saved
+    # A name is that of all of them, until one of them is switched.
+    display.hiddenDisplays = ["Map"]
+    assert [display.parts.is_enabled(f"{group}/Map") for group in "ABC"] == [False] * 3
+    display.parts.set_enabled("B/Map", True)
+    assert [display.hides(one) for one in maps] == [True, False, True]
+    assert display.hiddenDisplays == ["/A/Map", "/C/Map"]
 
 
 @pytest.mark.parametrize("ros", [1, 2])

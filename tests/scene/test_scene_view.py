@@ -1287,7 +1287,7 @@ def test_a_depth_that_a_config_may_not_have_is_named(bench: SceneBench) -> None:
     view = bench.load('PathDisplay { topic: "/path" }')
     (display,) = view.scene.displays
     notes = display.load_settings({"Topic": {"Value": "/path", "Depth": 5000}})
-    assert notes == ["Depth: 5000 is out of range; 1000 is used"]
+    assert notes == ["Depth: 5000 is out of range; 1000 is used, and the file keeps it"]
     assert display.depth == 1000
     assert display.load_settings({"Topic": {"Value": "/path", "Depth": 20}}) == []
 

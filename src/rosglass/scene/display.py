@@ -610,6 +610,8 @@ class OneTopicDisplay(Display):
     received = ReadOnly(int, 0)
     #: Whether the topic has had the time to be found.
     _is_searched = False
+    #: The depth of a file, and the one that is used for it: RViz has no limit, and 0 for any.
+    _depth_of_file: tuple[int | None, int | None] = (None, None)
 
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
         """Take the settings of a file of either RViz, which write topics differently."""
@@ -618,7 +620,8 @@ class OneTopicDisplay(Display):
             given = read_topic(saved)
             self._load_topic(given)
             if given.depth and given.depth != self.depth:
-                refused.append(f"Depth: {given.depth} is out of range; {self.depth} is used")
+                text = f"Depth: {given.depth} is out of range; {self.depth} is used"
+                refused.append(f"{text}, and the file keeps it")
         except Error as error:
             refused.append(str(error))
         return refused
@@ -638,9 +641,13 @@ class OneTopicDisplay(Display):
         if given.depth:
             limits = self.SETTINGS["Topic/Depth"].kind.options
             self.depth = min(max(given.depth, limits["min"]), limits["max"])
+        self._depth_of_file = (given.depth, self.depth)
 
     def _saved_topic(self) -> TopicSetting:
-        return TopicSetting(self.topic, self.depth)
+        given, used = self._depth_of_file
+        return TopicSetting(
+            self.topic, self.depth if given is None or self.depth != used else given
+        )
 
     def suggested(self, path: str) -> tuple[str, ...]:  # noqa: ARG002 - for subclasses
         """Return the types of the topics that panels suggest for a setting."""
@@ -787,7 +794,8 @@ class TopicDisplay(OneTopicDisplay):
             "" if value == BEST_AVAILABLE else str(value)
             for value in (self.reliability, self.durability)
         )
-        return TopicSetting(self.topic, self.depth, reliability, durability)
+        saved = super()._saved_topic()
+        return saved._replace(reliability=reliability, durability=durability)
 
     # -- the subscription ------------------------------------------------------------------------
 

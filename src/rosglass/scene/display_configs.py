@@ -179,7 +179,10 @@ def create_saved_view(saved: ViewConfig, notes: list[str]) -> ViewController | N
         return _orbit_of_hector(saved, notes)
     kind = view_type(saved.class_id)
     if kind not in VIEWS:
-        notes.append(f"view {saved.class_id}: rosglass has none; the view stays as it is")
+        notes.append(
+            f"view {saved.class_id}: rosglass has none; the view stays as it is, and the file "
+            "keeps its own until another one is chosen"
+        )
         return None
     made = create_view(saved.class_id)
     notes += [f"view {kind}: {text}" for text in made.restore(saved.settings)]

@@ -135,6 +135,8 @@ class SceneView(QQuickRhiItem):
         self._painted = 0
         #: The config that was loaded; None before.
         self.config: RvizConfig | None = None
+        #: Whether its view is of an unknown type, and is kept until another one is chosen.
+        self._keeps_view = False
         #: What the program around it keeps in ``Window Geometry`` of configs.
         self.window_geometry: dict[str, Any] = {}
         self._view: ViewController = create_view("Orbit")
@@ -382,6 +384,7 @@ class SceneView(QQuickRhiItem):
             Error: There is no such type.
         """
         made = create_view(name)
+        self._keeps_view = False
         if type(made) is not type(self._view):
             made.mimic(self._view)
             self.show_view(made)
@@ -394,6 +397,7 @@ class SceneView(QQuickRhiItem):
         """
         if not isinstance(view, ViewController):
             raise ArgumentError("view", view, "a view controller; select_view() takes its type")
+        self._keeps_view = False
         self._view.on_change = self._view.on_target = None
         self._view = view
         view.on_change, view.on_target = self.camera_moved, self._on_placed
@@ -575,6 +579,7 @@ class SceneView(QQuickRhiItem):
         made = None if saved is None else create_saved_view(saved, notes)
         if made is not None:
             self.show_view(made)
+        self._keeps_view = saved is not None and made is None
         notes += check_saved_views(config)
         self.config = config
         self.savedViewsChanged.emit()
@@ -596,10 +601,11 @@ class SceneView(QQuickRhiItem):
             before = config.root.get("Window Geometry")
             geometry = before if isinstance(before, dict) else {}
             config.root["Window Geometry"] = {**geometry, **self.window_geometry}
-        current = config.current_view
-        before = {} if current is None else current.settings
-        state = self._view_config(self._view.name, config.ros).settings
-        config.current_view = ViewConfig({**before, **state})
+        if not self._keeps_view:
+            current = config.current_view
+            before = {} if current is None else current.settings
+            state = self._view_config(self._view.name, config.ros).settings
+            config.current_view = ViewConfig({**before, **state})
         return config
 
     def save_config(self, path: str | os.PathLike[str] = "") -> None:

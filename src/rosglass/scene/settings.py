@@ -128,6 +128,8 @@ class Configurable:
     """
 
     SETTINGS: ClassVar[dict[str, Setting]] = {}
+    #: Values of settings whose value in a file did not fit, as they were set instead.
+    _instead: Mapping[str, Any] = {}
 
     def _setting(self, path: str) -> Setting:
         found = self.SETTINGS.get(path)
@@ -185,6 +187,7 @@ class Configurable:
             What was left out, in words: values that do not fit.
         """
         refused = []
+        instead = self._instead = {}
         for path, setting in self.SETTINGS.items():
             value: Any = saved
             for part in path.split("/"):
@@ -197,6 +200,7 @@ class Configurable:
                 setattr(self, setting.name, setting.restore(value))
             except Error as error:
                 refused.append(f"{path}: {error}")
+                instead[path] = getattr(self, setting.name)
         return refused
 
     def save_settings(
@@ -207,7 +211,8 @@ class Configurable:
         """Return the settings as a ``.rviz`` file keeps them.
 
         Args:
-            older: What a file had; what is not a setting stays in it as it is.
+            older: What a file had; what is not a setting, or did not fit and was not changed, stays
+                in it as it is.
             ros: The RViz that the file is for, 1 or 2.
         """
         kept: dict[str, Any] = dict(older or {})
@@ -223,8 +228,10 @@ class Configurable:
                 )
                 place[part] = inner
                 place = inner
-            value = setting.saved(getattr(self, setting.name))
-            before = place.get(last)
+            now, before = getattr(self, setting.name), place.get(last)
+            if before is not None and path in self._instead and self._instead[path] == now:
+                continue
+            value = setting.saved(now)
             if isinstance(before, dict) and not isinstance(value, dict):
                 place[last] = {**before, "Value": value}
             else:

@@ -37,7 +37,7 @@ from rosglass.scene.scene_view import SceneView
 from rosglass.scene.settings import Setting
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -456,7 +456,7 @@ class CameraDisplay(PictureDisplay):
         "Zoom Factor", "float", 1.0, "Above 1 magnifies, below 1 shows more around the picture.",
         min=1e-5, max=1e5, then="_emit_changed",
     )  # fmt: skip
-    #: Names of displays that are not drawn from the camera.
+    #: Displays that are not drawn from the camera: names, or paths as ``/Group/Name``.
     hiddenDisplays = Writable(list, [], then="_on_hidden")
 
     isCamera = Property(bool, lambda _: True, constant=True)
@@ -479,7 +479,7 @@ class CameraDisplay(PictureDisplay):
     def load_settings(self, saved: Mapping[str, Any]) -> list[str]:
         """Take the settings of a file, with the displays that are hidden."""
         refused = super().load_settings(saved)
-        self.hiddenDisplays = list(_hidden_names(saved.get("Visibility")))
+        self.hiddenDisplays = list(_hidden_paths(saved.get("Visibility")))
         return refused
 
     def save_settings(self, older: Mapping[str, Any] | None = None, ros: int = 2) -> dict[str, Any]:
@@ -494,13 +494,17 @@ class CameraDisplay(PictureDisplay):
         for one in self.scene.displays if self.scene is not None else ():
             if one.group is not group or one is self:
                 continue
-            shown = self.parts.is_enabled(one.name)
+            shown = not self.hides(one)
             if one.TYPE == "Group":
                 inner = self._visibility(found.get(one.name), one)
                 found[one.name] = {**inner, "Value": shown}
             else:
                 found[one.name] = shown
         return found
+
+    def hides(self, display: Display) -> bool:
+        """Return whether a display is not drawn from the camera; those in groups, by themselves."""
+        return display.name in self.hiddenDisplays or _path_of(display) in self.hiddenDisplays
 
     # -- CameraInfo ------------------------------------------------------------------------------
 
@@ -636,8 +640,9 @@ class CameraDisplay(PictureDisplay):
         if not is_alive(self) or self.scene is None:
             return
         names = [one.name for one in self.scene.displays]
+        paths = [_path_of(one) for one in self.scene.displays]
         for name in self.hiddenDisplays:
-            if name not in names:
+            if name not in (*names, *paths):
                 hint = similar(str(name), names)
                 text = f"{self.label}: hiddenDisplays: there is no display {name!r}{hint}"
                 self._log(text, logging.ERROR)
@@ -704,31 +709,50 @@ class _Visibility(Parts):
 
     def _others(self) -> list[str]:
         scene = self._camera.scene
-        names = [] if scene is None else [one.name for one in scene.displays]
-        return [name for name in dict.fromkeys(names) if name != self._camera.name]
+        displays = (
+            [] if scene is None else [one for one in scene.displays if one is not self._camera]
+        )
+        return [_path_of(one).removeprefix("/") for one in displays]
 
     def is_enabled(self, name: str) -> bool:
-        """Return whether displays of a name are shown."""
-        return name not in self._camera.hiddenDisplays
+        """Return whether a display is shown, by its path without the first slash."""
+        return not any(map(self._camera.hides, self._find(name)))
 
     def set_enabled(self, name: str, enabled: bool) -> None:
-        """Show or hide the displays of a name."""
-        others = [one for one in self._camera.hiddenDisplays if one != name]
-        self._camera.hiddenDisplays = others if enabled else [*others, name]
+        """Show or hide a display, by its path without the first slash."""
+        path = f"/{name}"
+        hidden = [one for one in self._camera.hiddenDisplays if one != path]
+        for one in self._find(name) if enabled else ():
+            if one.name in hidden:
+                # Others of its name stay hidden.
+                others = (other for other in self._displays() if other.name == one.name)
+                hidden = [other for other in hidden if other != one.name]
+                hidden += [place for place in map(_path_of, others) if place != path]
+        self._camera.hiddenDisplays = hidden if enabled else [*hidden, path]
+
+    def _find(self, name: str) -> list[Display]:
+        return [one for one in self._displays() if _path_of(one) == f"/{name}"]
+
+    def _displays(self) -> list[Display]:
+        scene = self._camera.scene
+        return [] if scene is None else scene.displays
 
 
-def _hidden_names(saved: Any) -> list[str]:
-    """Return the displays that a file's Visibility hides, also those in groups."""
-    names: list[str] = []
-    if not isinstance(saved, dict):
-        return names
-    for name, value in saved.items():
+def _path_of(display: Display) -> str:
+    """Return the names of the groups that a display is in, and its own, as ``/Group/Name``."""
+    above = "" if display.group is None else _path_of(display.group)
+    return f"{above}/{display.name}"
+
+
+def _hidden_paths(saved: Any, above: str = "") -> Iterator[str]:
+    """Iterate over the displays that a file's Visibility hides, also those in groups."""
+    for name, value in saved.items() if isinstance(saved, dict) else ():
         if name == "Value":
             continue
+        path = f"{above}/{name}"
         if value is False or (isinstance(value, dict) and value.get("Value") is False):
-            names.append(str(name))
-        names += _hidden_names(value)
-    return names
+            yield path
+        yield from _hidden_paths(value, path)
 
 
 def _placed(width: float, height: float, aspect: float, zoom: float) -> QtCore.QRectF:
@@ -861,8 +885,7 @@ class CameraView(SceneView):
             return frame
         if not isinstance(frame.camera, PinholeCamera):
             return frame._replace(drawables=[])
-        names = set(display.hiddenDisplays)
-        hidden = {one.root for one in self.scene.displays if one.name in names}
+        hidden = {one.root for one in self.scene.displays if display.hides(one)}
         if not hidden:
             return frame
         return frame._replace(
