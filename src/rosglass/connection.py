@@ -13,7 +13,7 @@ from rosglass.errors import ArgumentError, UnsupportedError
 from rosglass.extras import install_command
 from rosglass.interfaces import Library
 from rosglass.ros2.ros_arguments import Arguments
-from rosglass.wires.zenoh.options import ZenohOptions
+from rosglass.wires.zenoh.options import ZenohOptions, shown_url
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -71,6 +71,8 @@ def connect(
             ROS_DOMAIN_ID, or 0), ``mode`` (``peer`` links directly with other nodes, ``client``
             only with the router), ``distro=humble`` (announce types as in Humble),
             ``shm=true`` (shared memory between programs of one machine that both allow it).
+            ``zenoh://NAME:PASSWORD@host`` for routers with users; ``tls=true``, ``ca=FILE``,
+            ``cert=FILE`` and ``key=FILE`` for those with TLS.
             ``zenoh://`` alone means the router that ZENOH_SESSION_CONFIG_URI names, or one on this
             machine.
 
@@ -142,7 +144,7 @@ def connect(
             hint = f"; did you mean ros1://{rest}?"
         known = f"{hint} Known" if hint else "; known"
         raise UnsupportedError(
-            f"cannot connect to {url!r}: {reason}{known}: {_KNOWN}, e.g. {_EXAMPLES}"
+            f"cannot connect to {shown_url(url)!r}: {reason}{known}: {_KNOWN}, e.g. {_EXAMPLES}"
         )
     if scheme == "ros1":
         from rosglass.ros1.node import connect_ros1  # noqa: PLC0415 - a program uses one ROS
@@ -153,7 +155,8 @@ def connect(
     middleware = {"dds": _dds, "zenoh": _zenoh, "local": _local}[scheme](url)
     from rosglass.ros2.node import Ros2Node  # noqa: PLC0415 - a program uses one ROS
 
-    return Ros2Node(middleware, url, name, namespace, library, parsed, own_services=own_services)
+    shown = shown_url(url)
+    return Ros2Node(middleware, shown, name, namespace, library, parsed, own_services=own_services)
 
 
 def _resolve_name(
@@ -202,7 +205,7 @@ def default_url(env: Mapping[str, str]) -> str:
 def _zenoh(url: str) -> Middleware:
     if find_spec("zenoh") is None or find_spec("xxhash") is None:
         raise UnsupportedError(
-            f"cannot connect to {url!r}: Zenoh is not installed; "
+            f"cannot connect to {shown_url(url)!r}: Zenoh is not installed; "
             f"install it with: {install_command('zenoh')}; "
             "without it, there are dds:// (other ROS 2 robots) and ros1://host:11311 (ROS 1)"
         )

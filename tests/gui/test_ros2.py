@@ -194,6 +194,8 @@ def test_the_address_can_be_changed_while_running(running: Any, wait: Any) -> No
     wait(lambda: root.property("s").property("subscribed"))
     assert len(running.world.nodes) == 2
     assert running.run("return Ros2.url") == "memory://other"
+    running.run("Ros2.url = 'memory://operator:secret@other'")
+    assert running.run("return Ros2.url") == "memory://operator:***@other"
 
 
 def engine_with(session: Session, tmp_path: Any) -> Any:

@@ -319,7 +319,8 @@ def _demo(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--url",
         default=os.environ.get("ROSGLASS_URL") or _DEMO_URL,
-        help="dds://, or a Zenoh router, which is started if none answers (default: %(default)s)",
+        help="dds://, or a Zenoh router, which is started if none answers "
+        f"(default: {_shown(os.environ.get('ROSGLASS_URL') or _DEMO_URL)})",
     )
     parser.add_argument(
         "--no-robot", action="store_true", help="use a robot that is running already"
@@ -343,6 +344,11 @@ def _demo(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _shown(url: str) -> str:
+    """Return a URL for a help text: without password, and percent signs twice."""
+    return "that of ROSGLASS_URL" if "@" in url else url.replace("%", "%%")
+
+
 def _robot_url() -> str:
     """Return the default of ``rosglass robot --url``, which its help shows."""
     # Spares help and completion a slow import.
@@ -358,7 +364,7 @@ def _robot(parser: argparse.ArgumentParser) -> None:
         "--url",
         default=_robot_url(),
         help="URL of the graph (default: ROSGLASS_URL, or the ROS 1 master that "
-        "ROS_MASTER_URI names, or zenoh://127.0.0.1:7447; here: %(default)s)",
+        f"ROS_MASTER_URI names, or zenoh://127.0.0.1:7447; here: {_shown(_robot_url())})",
     )
     parser.add_argument("--name", default="robot", help="name of the node (default: %(default)s)")
     parser.add_argument(
@@ -863,9 +869,9 @@ def _router(parser: argparse.ArgumentParser) -> None:
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
         "--listen",
-        default="tcp/127.0.0.1:7447",
         metavar="tcp/HOST:PORT",
-        help="endpoint to listen on (default: %(default)s, this machine only; port 0: a free one)",
+        help="endpoint to listen on, or tls/HOST:PORT (default: that of the configuration, or "
+        "tcp/127.0.0.1:7447, this machine only; port 0: a free one)",
     )
     where.add_argument(
         "--open",
@@ -874,6 +880,13 @@ def _router(parser: argparse.ArgumentParser) -> None:
         dest="listen",
         help="listen on all interfaces, as ROS 2's own router does: tcp/[::]:7447",
     )
+    parser.add_argument(
+        "--config",
+        metavar="FILE",
+        help="Zenoh configuration (JSON5), as rmw_zenoh has it: users, TLS, access control "
+        "(default: ZENOH_ROUTER_CONFIG_URI)",
+    )
+    parser.epilog = "docs/security.md in the source has a configuration with users and TLS."
 
 
 def _examples(parser: argparse.ArgumentParser) -> None:

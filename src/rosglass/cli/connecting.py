@@ -295,6 +295,7 @@ def _wait_for_connection(node: Node, timeout: float, wait_for_start: bool) -> No
         on_status(node.status())
         if connected.wait(min(_PROBE_DELAY_S, timeout)):
             return
+        problem = ""
         refusal = refused(node.url)
         if refusal is not None:
             problem = f"{node.url}: {refusal[0]}; {refusal[1]}"
@@ -307,6 +308,8 @@ def _wait_for_connection(node: Node, timeout: float, wait_for_start: bool) -> No
             note(f"{node.url}: {node.status().detail}")
         if connected.wait(max(0.0, deadline - time.monotonic())):
             return
+    if problem:
+        raise ConnectionLostError(f"{problem}; no answer within {timeout:g} s")
     raise ConnectionLostError(
         f"{node.url}: {node.status().detail}; no answer within {timeout:g} s. Is the robot "
         "on, and the address right? rosglass doctor looks for the reason"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.demo.processes import DUPLICATE_EXIT, VirtualScreen, start_robot
 from rosglass.errors import Error
-from rosglass.wires.zenoh.options import ZenohOptions
+from rosglass.wires.zenoh.options import ZenohOptions, locator, shown_url
 
 if TYPE_CHECKING:
     import argparse
@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     if args.seconds is not None and not 1 <= args.seconds <= 86400:
         raise Error(f"--seconds {args.seconds:g}: expected 1 to 86400")
     if not args.url.lower().startswith(("dds:", "zenoh:")):
-        raise Error(f"--url {args.url}: expected dds:// or zenoh://HOST:PORT")
+        raise Error(f"--url {shown_url(args.url)}: expected dds:// or zenoh://HOST:PORT")
     # Checked before anything is started, so that nothing is left running.
     import rosglass.qt  # noqa: F401, PLC0415
 
@@ -141,17 +141,22 @@ def _find_router(stack: ExitStack, url: str) -> str:
 
     if url.lower().startswith("dds:"):
         return url  # where nodes find each other without one
+    shown = shown_url(url)
     if is_router_reachable(url):
-        print(f"using the Zenoh router at {url}", flush=True)
+        print(f"using the Zenoh router at {shown}", flush=True)
         return url
-    host = ZenohOptions.parse(url, os.environ).host or "127.0.0.1"
+    options = ZenohOptions.parse(url, os.environ)
+    host = options.host or "127.0.0.1"
     if not re.fullmatch(r"localhost|127(\.\d+){3}|::1", host):
-        print(f"no Zenoh router at {url} yet: the cockpit keeps trying", flush=True)
+        print(f"no Zenoh router at {shown} yet: the cockpit keeps trying", flush=True)
         return url
-    listen = "tcp/" + url.removeprefix("zenoh://").partition("?")[0].rstrip("/")
-    router = Router(listen)
+    config = os.environ.get("ZENOH_ROUTER_CONFIG_URI") or None
+    if config is None and (options.user or options.tls):
+        fix = "start one that has the user or the certificate: rosglass router --config FILE"
+        raise Error(f"no Zenoh router at {shown}; {fix}")
+    router = Router(locator(host, options.port, "tls" if options.tls else "tcp"), config)
     stack.callback(router.close)
-    print(f"no Zenoh router at {url}: started one, on {router.listen}", flush=True)
+    print(f"no Zenoh router at {shown}: started one, on {router.listen}", flush=True)
     return url
 
 
@@ -160,7 +165,7 @@ def _start_robot(stack: ExitStack, url: str) -> Child:
     stack.callback(robot.close)
     print(
         f"started the robot, process {robot.pid}; to see how the cockpit takes its loss: "
-        f"kill -9 {robot.pid}, and then: rosglass robot --url '{url}'",
+        f"kill -9 {robot.pid}, and then: rosglass robot --url '{shown_url(url)}'",
         flush=True,
     )
     return robot

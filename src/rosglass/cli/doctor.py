@@ -25,6 +25,7 @@ from rosglass.cli.messages import print_json
 from rosglass.cli.network import (
     interfaces,
     is_loopback,
+    refused,
     ros1_options,
     router_problem,
     start_master,
@@ -37,6 +38,7 @@ from rosglass.extras import explain_missing, install_command
 from rosglass.messages import default_library
 from rosglass.wires.tcpros.address import explain_unreachable, parse_uri
 from rosglass.wires.tcpros.master import call_node
+from rosglass.wires.zenoh.options import shown_url
 
 if TYPE_CHECKING:
     import argparse
@@ -112,7 +114,8 @@ def run(args: argparse.Namespace) -> int:
         "error": style("error  ", "red", "bold"),
     }
     found = []
-    for finding in _findings(args):
+    for result in _findings(args):
+        finding = replace(result, area=shown_url(result.area))
         found.append(finding)
         if args.json:
             continue
@@ -260,7 +263,7 @@ def _robot(url: str, timeout: float) -> Iterator[_Finding]:
         if status.state is not ConnectionState.CONNECTED:
             # A configuration file may name another router.
             asks = url.startswith("zenoh:") and not os.environ.get("ZENOH_SESSION_CONFIG_URI")
-            text, fix = router_problem(url, timeout) if asks else ("", "")
+            text, fix = refused(url) or (router_problem(url, timeout) if asks else ("", ""))
             yield _Finding("error", url, text or status.detail, fix or _advice(url))
             return
         yield _Finding("ok", url, status.detail or "connected")

@@ -14,6 +14,7 @@ from urllib.parse import urlsplit
 from rosglass.connection import default_url
 from rosglass.errors import Error
 from rosglass.wires.tcpros import address
+from rosglass.wires.zenoh.options import ZenohOptions
 
 if sys.platform == "linux":
     import fcntl
@@ -117,10 +118,14 @@ def start_master(host: str, port: int) -> str:
 
 
 def refused(url: str) -> tuple[str, str] | None:
-    """Return the problem and its fix if nothing listens at a URL; else None.
+    """Return the problem and its fix if nothing listens at a URL, or a router refuses; else None.
 
     None as well without any answer: that takes longer to distinguish from a slow network.
     """
+    if url.startswith("zenoh:"):
+        refusal = _refusal(url, _CONNECT_TIMEOUT_S)
+        if refusal is not None:
+            return refusal
     if url.startswith("ros1:"):
         host, port = address.parse_uri(ros1_options(url).master, "master")
     elif url.startswith("zenoh:") and (
@@ -141,6 +146,14 @@ def refused(url: str) -> tuple[str, str] | None:
         return router_problem(url, _CONNECT_TIMEOUT_S)
     text = f"no master runs: {host} is there, but nothing listens on its port {port}"
     return text, start_master(host, port)
+
+
+def _refusal(url: str, timeout: float) -> tuple[str, str] | None:
+    """Return why the router of a ``zenoh://`` URL refuses sessions, and the fix; None otherwise."""
+    # An extra that the node has loaded.
+    from rosglass.wires.zenoh.refusal import find_refusal  # noqa: PLC0415
+
+    return find_refusal(ZenohOptions.parse(url, os.environ), timeout)
 
 
 def router_problem(url: str, timeout: float) -> tuple[str, str]:

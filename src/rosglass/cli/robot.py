@@ -53,11 +53,14 @@ def run(args: argparse.Namespace) -> int:
         try:
             node.on_status_change(_print_status)
             full = f"{node.namespace.rstrip('/')}/{node.name}"
-            print(f"robot: simulated, node {full} on {args.url}; Ctrl-C ends it", flush=True)
+            print(
+                f"robot: simulated, node {full} on {node.url}; Ctrl-C ends it",
+                flush=True,
+            )
             _print_status(node.status())
             refusal = refused(args.url)
             if refusal is not None:
-                note(f"{args.url}: {refusal[0]}; {refusal[1]}. Waiting for it")
+                note(f"{node.url}: {refusal[0]}; {refusal[1]}. Waiting for it")
             duplicate = threading.Event()
             last_seen: dict[bytes, float] = {}
 
@@ -82,7 +85,11 @@ def run(args: argparse.Namespace) -> int:
                 if time.monotonic() > watched_until + _YIELD_S * bool(last_seen):
                     watch.close()
             if duplicate.is_set():
-                print(f"rosglass: {_duplicate(full, args.url)}", file=sys.stderr, flush=True)
+                print(
+                    f"rosglass: {_duplicate(full, node.url)}",
+                    file=sys.stderr,
+                    flush=True,
+                )
                 return DUPLICATE_EXIT
             failed = not end.is_set()
         finally:

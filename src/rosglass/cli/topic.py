@@ -43,6 +43,7 @@ from rosglass.comm import IMMEDIATE, ConnectionState
 from rosglass.comm.names import similar
 from rosglass.errors import Error, TypeNotFoundError
 from rosglass.messages import OpaqueType
+from rosglass.wires.zenoh.options import shown_url
 
 if TYPE_CHECKING:
     import argparse
@@ -92,7 +93,8 @@ def list_topics(args: argparse.Namespace) -> int:
         shown = style(f" [{_types(node, types)}]", "dim") if args.types else several
         print(topic + shown)
     if not found:
-        note(f"there are no topics on {args.url or 'this graph'}; rosglass doctor looks why")
+        graph = shown_url(args.url or "this graph")
+        note(f"there are no topics on {graph}; rosglass doctor looks why")
     return 0
 
 

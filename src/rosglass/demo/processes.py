@@ -14,7 +14,7 @@ from rosglass.comm import Handle
 from rosglass.errors import Error
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
 __all__ = ["DUPLICATE_EXIT", "LEASH", "Child", "VirtualScreen", "start_robot"]
 
@@ -35,16 +35,24 @@ class Child(Handle):
     Args:
         command: Program and arguments.
         name: Name for messages.
+        env: Variables of its environment beside this program's.
 
     Raises:
         Error: The program cannot be started.
     """
 
-    def __init__(self, command: Sequence[str], name: str) -> None:
+    def __init__(
+        self, command: Sequence[str], name: str, env: Mapping[str, str] | None = None
+    ) -> None:
         self.name = name
         try:
             # A session of its own: only this program gets Ctrl-C, and ends its children in order.
-            self._process = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True)
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                start_new_session=True,
+                env={**os.environ, **(env or {})},
+            )
         except OSError as error:
             raise Error(f"cannot start {name} ({command[0]}): {error}") from error
 
@@ -71,8 +79,9 @@ def start_robot(url: str, options: Sequence[str] = ()) -> Child:
         url: URL of the graph.
         options: Further options of the command.
     """
-    command = [sys.executable, "-m", "rosglass", "robot", "--url", url, "--leash", *options]
-    return Child(command, "the robot")
+    command = [sys.executable, "-m", "rosglass", "robot", "--leash", *options]
+    # Not as an argument, which every user of this machine can read: it may have a password.
+    return Child(command, "the robot", {"ROSGLASS_URL": url})
 
 
 class VirtualScreen(Handle):

@@ -24,6 +24,7 @@ from rosglass.errors import ConnectionLostError, Error, InvalidNameError
 from rosglass.extras import explain_missing
 from rosglass.qml.log import QmlRosout, logger_name
 from rosglass.qt import QtCore, Signal, Slot, is_alive
+from rosglass.wires.zenoh.options import shown_url
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -612,7 +613,9 @@ class Session(QtCore.QObject):
         if arguments:
             connect = partial(connect, arguments=arguments)
         self._failed = False
-        self._set_status(Status(ConnectionState.CONNECTING, f"connecting to {url or 'the robot'}"))
+        self._set_status(
+            Status(ConnectionState.CONNECTING, f"connecting to {shown_url(url or 'the robot')}")
+        )
         if self._deferred:
             return
 

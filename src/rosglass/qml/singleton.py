@@ -21,6 +21,7 @@ from rosglass.qml.runtime import Runtime, own_runtime
 from rosglass.qml.to_js import constants_of
 from rosglass.qml.yaml_io import Io
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
+from rosglass.wires.zenoh.options import shown_url
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -128,7 +129,7 @@ class RosSingleton(QtCore.QObject):
     def _set_url(self, url: str) -> None:
         self._session.url = url
 
-    url = Writable(str, read=lambda self: self._session.url, write="_set_url")
+    url = Writable(str, read=lambda self: shown_url(self._session.url), write="_set_url")
     connectionState = ReadOnly(
         str, read=lambda self: self._session.state, notify="connectionChanged"
     )

@@ -46,7 +46,7 @@ def test_the_environment_fills_what_the_url_leaves_out():
         ("zenoh://[::1:7447", "url: expected a URL as in zenoh://127.0.0.1:7447?domain=0"),
         ("zenoh://my robot", "host: expected a host name or an address, got 'my robot'"),
         ("zenoh://r/path", "nothing but host, port and options"),
-        ("zenoh://user@r", "nothing but host, port and options"),
+        ("zenoh://user@r", "user: expected a name and a password"),
         ("zenoh://r#x", "nothing but host, port and options"),
         ("zenoh://r?domain=x", "zenoh://r?domain=x: domain: expected a ROS domain"),
         ("zenoh://r?domain=-1", "domain: expected a ROS domain"),
@@ -55,7 +55,10 @@ def test_the_environment_fills_what_the_url_leaves_out():
         ("zenoh://r?mode=router", "mode: expected one of peer, client, got 'router'"),
         ("zenoh://r?distro=noetic", "distro: expected one of humble, iron"),
         ("zenoh://r?shm=1", "shm: expected one of true, false"),
-        ("zenoh://r?color=red", "option: expected one of domain, mode, distro, shm, got 'color'"),
+        (
+            "zenoh://r?color=red",
+            "option: expected one of domain, mode, distro, shm, tls, ca, cert, key, got 'color'",
+        ),
         ("zenoh://r?mode=peer&mode=client", "to be given once"),
     ],
 )

@@ -6,7 +6,7 @@ import pytest
 import zenoh
 
 import rosglass
-from rosglass.wires.zenoh.options import ZenohOptions
+from rosglass.wires.zenoh.options import ZenohOptions, shown_url
 from rosglass.wires.zenoh.session import reason, router_config, session_config
 
 RMW_FILE = """
@@ -125,3 +125,99 @@ def test_a_router_listens_where_it_is_told_and_nowhere_else():
 def test_zenohs_own_source_is_not_quoted():
     error = zenoh.ZError("no (os error 99) at /root/.cargo/git/zenoh-9c/io/tcp.rs:61.] at /x.rs:3.")
     assert reason(error) == "no (os error 99)]"
+
+
+@pytest.mark.parametrize(
+    ("url", "shown"),
+    [
+        ("zenoh://operator:secret@robot:7447?tls=true", "zenoh://operator:***@robot:7447?tls=true"),
+        ("zenoh://operator:s:e@c@robot", "zenoh://operator:***@robot"),
+        ("zenoh://operator:se/cret@robot", "zenoh://operator:***@robot"),
+        ("ros1://:secret@robot", "ros1://:***@robot"),
+        (
+            "zenoh://robot:7447?ca=/home/me@work/ca.pem",
+            "zenoh://robot:7447?ca=/home/me@work/ca.pem",
+        ),
+        ("zenoh://[::1]:7447", "zenoh://[::1]:7447"),
+        ("the robot", "the robot"),
+    ],
+)
+def test_a_url_is_shown_without_its_password(url, shown):
+    assert shown_url(url) == shown
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "zenoh://operator:secret@robot/path",
+        "zenoh://operator:sec/ret@robot",
+        "zenoh://operator:secret@robot:x",
+        "zenoh://operator:secret@",
+        "zenoh://operator:secret@[robot",
+        "zenoh://operator:secret@robot?tls=maybe",
+        "zenoh://operator:secret@robot?x=1",
+        "zenoh://:secret@robot",
+        "zenoh://operator:secret@robot?ca=/nowhere",
+        "znoh://operator:secret@robot",
+    ],
+)
+def test_errors_of_urls_do_not_show_the_password(url):
+    with pytest.raises(rosglass.Error) as error:
+        rosglass.connect(url)
+    assert "sec" not in str(error.value)
+
+
+def test_users_and_certificates_by_url(tmp_path):
+    options = ZenohOptions.parse("zenoh://o%40:s%2Fe@robot?tls=true", {})
+    assert (options.user, options.tls) == (("o@", "s/e"), True)
+    assert "s/e" not in repr(options)
+    config, address = session_config(options)
+    assert address == "tls/robot:7447"
+    assert setting(config, "transport/auth/usrpwd/user") == "o@"
+    assert setting(config, "transport/auth/usrpwd/password") == "s/e"
+    assert setting(config, "mode") == "client"
+    # Peers with users could not link with each other.
+    local, address = session_config(ZenohOptions.parse("zenoh://a:b@127.0.0.1", {}))
+    assert (setting(local, "mode"), address) == ("client", "tcp/127.0.0.1:7447")
+    file = tmp_path / "ca.pem"
+    file.touch()
+    assert session_config(ZenohOptions.parse(f"zenoh://?ca={file}", {}))[1] == "tls/127.0.0.1:7447"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("tls=false&ca=x", "ca: expected no file without TLS: remove tls=false"),
+        ("cert=x", "key: expected a file: a certificate needs its key"),
+        ("key=x", "cert: expected a file: a certificate needs its key"),
+        ("ca=", "ca: expected a file"),
+        ("tls=1", "tls: expected one of true, false"),
+    ],
+)
+def test_options_of_tls_that_contradict_are_named(options, message):
+    with pytest.raises(rosglass.ArgumentError, match=message):
+        ZenohOptions.parse(f"zenoh://robot?{options}", {})
+
+
+def test_tls_needs_a_host_beside_a_file(rmw_file):
+    with pytest.raises(rosglass.ArgumentError, match="tls: expected a URL with the router's host"):
+        session_config(ZenohOptions(tls=True, config_file=rmw_file))
+
+
+@pytest.mark.parametrize(
+    ("settings", "address"),
+    [
+        ("connect: { endpoints: ['tls/far:1'] }", "tls/near:7447"),
+        ("connect: { endpoints: { client: ['tls/far:1'] } }, mode: 'client'", "tls/near:7447"),
+        ("transport: { link: { tls: { root_ca_certificate: 'ca.pem' } } }", "tls/near:7447"),
+        ("connect: { endpoints: ['tcp/far:1'] }", "tcp/near:7447"),
+        ("mode: 'client'", "tcp/near:7447"),
+    ],
+)
+def test_a_host_is_connected_to_as_the_file_connects(tmp_path, settings, address):
+    file = tmp_path / "session.json5"
+    file.write_text(f"{{ {settings} }}")
+    given = ZenohOptions("near", config_file=str(file))
+    assert session_config(given)[1] == address
+    plain = ZenohOptions("near", config_file=str(file), tls=False)
+    assert session_config(plain)[1] == "tcp/near:7447"

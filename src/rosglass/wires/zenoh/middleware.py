@@ -22,7 +22,7 @@ from rosglass.comm import (
     NodeName,
     Status,
 )
-from rosglass.errors import ConnectionLostError, NodeClosedError
+from rosglass.errors import ConnectionLostError, Error, NodeClosedError
 from rosglass.wires.base import (
     Middleware,
     OnReply,
@@ -44,6 +44,7 @@ from rosglass.wires.zenoh.endpoints import (
 )
 from rosglass.wires.zenoh.keys import Token, gid_of, graph_key
 from rosglass.wires.zenoh.reader import Drain, ZenohReader
+from rosglass.wires.zenoh.refusal import find_refusal
 from rosglass.wires.zenoh.services import ZenohReplier, ZenohRequester
 from rosglass.wires.zenoh.session import (
     Heartbeat,
@@ -74,6 +75,8 @@ _HEARTBEAT_INTERVAL_S = 0.9
 _HISTORY_TIMEOUT_S = 20.0
 #: Number of invalid tokens to log.
 _MAX_LOGGED = 100
+#: Seconds without a router until the reason is looked for, between two times, and for its answer.
+_REFUSAL_DELAY_S, _REFUSAL_INTERVAL_S, _REFUSAL_TIMEOUT_S = 2.0, 3.0, 2.0
 #: Seconds without a new link before a peer's session is closed: a link that is opened at that
 #: moment is never closed (eclipse-zenoh 1.10.2), nor are its sockets.
 _SETTLING_TIME_S = 0.2
@@ -110,6 +113,10 @@ class ZenohMiddleware(Middleware):
         #: A query that ends after the tokens that the router had when it was linked.
         self._history: Any = None
         self._next_beat = 0.0
+        #: Why the router refuses the session, and when to look for that again.
+        self._refusal, self._next_refusal = "", time.monotonic() + _REFUSAL_DELAY_S
+        self._found_refusal: tuple[str, str] | None = None
+        self._looks_for_refusal = False
         self._pumps: list[Pump] = []
         self._shared: SharedMemory | None = None
         if json.loads(self._config.get_json("transport/shared_memory/enabled")):
@@ -152,13 +159,16 @@ class ZenohMiddleware(Middleware):
             missing = (
                 f"the router at {self._address} is silent"
                 if routers
-                else (f"no router at {self._address}, {retry}")
+                else f"{self._refusal or f'no router at {self._address}'}, {retry}"
             )
             detail = f"linked with other nodes, but {missing}"
             return Status(ConnectionState.CONNECTED, detail)
         if routers:
             detail = f"connected to {self._address}, which is silent, waiting for it"
             return Status(ConnectionState.LOST, detail)
+        if self._refusal:
+            state = ConnectionState.LOST if was_connected else ConnectionState.CONNECTING
+            return Status(state, f"{self._refusal}; {retry}")
         if was_connected:
             detail = f"connection to {self._address} lost, {retry}"
             return Status(ConnectionState.LOST, detail)
@@ -208,6 +218,7 @@ class ZenohMiddleware(Middleware):
         if self._retries_open:
             self._open()
         self._watch_links()
+        self._look_for_refusal()
         for declaration in self._declared_of(Declaration):  # type: ignore[type-abstract]
             declaration.poll()
 
@@ -323,6 +334,29 @@ class ZenohMiddleware(Middleware):
             self._heartbeat.beat(session, now)
             if self._heartbeat.silent:
                 self._increase_version()
+
+    def _look_for_refusal(self) -> None:
+        """Look why there is no router, in a thread of its own: it may wait for a name server."""
+        with self._lock:
+            linked, now = any(self._links.values()), time.monotonic()
+            if linked:
+                self._refusal, self._next_refusal = "", now + _REFUSAL_DELAY_S
+                self._found_refusal = None
+            if linked or now < self._next_refusal or self._looks_for_refusal:
+                return
+            self._next_refusal, self._looks_for_refusal = now + _REFUSAL_INTERVAL_S, True
+
+        def look() -> None:
+            found = None
+            with suppress(Error):  # a file is missing by now
+                found = find_refusal(self.options, _REFUSAL_TIMEOUT_S, tries=False)
+            before, self._found_refusal = self._found_refusal, found
+            # Found once, the session may be about to open: the network is back.
+            self._refusal = ": ".join(found) if found is not None and found == before else ""
+            self._looks_for_refusal = False
+            self._changed()
+
+        threading.Thread(target=look, name=f"{self._address} refusal", daemon=True).start()
 
     def _await_history(self, session: zenoh.Session) -> None:
         """Send a query without result to a router; it ends after all tokens sent before it."""

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import parse_qsl, unquote, urlsplit
 
 from rosglass.errors import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-__all__ = ["DEFAULT_PORT", "ZenohOptions", "locator"]
+__all__ = ["DEFAULT_PORT", "ZenohOptions", "locator", "shown_url"]
 
 #: The port of rmw_zenoh's routers.
 DEFAULT_PORT = 7447
@@ -26,7 +26,11 @@ _CHOICES: dict[str, dict[str, str | bool]] = {
         **dict.fromkeys(("iron", "jazzy", "kilted", "lyrical", "rolling"), False),
     },
     "shm": {"true": True, "false": False},
+    "tls": {"true": True, "false": False},
 }
+_FILES = ("ca", "cert", "key")
+#: Also a password with characters that end the host's part of a URL, unless it may be the port.
+_PASSWORD = re.compile(r"(//[^/?#@]*?:)(?:[^/?#]*|(?!\d+(?:[/?#]|$)).*)@")
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,12 @@ class ZenohOptions:
         shared_memory: Whether messages from 3 kB on use shared memory between programs of one
             machine that both allow it; None for that of `config_file`, or false.
         config_file: Zenoh configuration to start from, as in ``ZENOH_SESSION_CONFIG_URI``.
+        user: Name and password for a router that asks for them; None for those of `config_file`.
+        tls: Whether to connect by TLS; None for how `config_file` connects, or plain TCP.
+        ca: File with the certificates that the router's is checked by; None for that of
+            `config_file`, or the web's authorities.
+        cert: File with this program's certificate, for a router that asks for one.
+        key: File with the private key of `cert`.
     """
 
     host: str | None = None
@@ -52,6 +62,11 @@ class ZenohOptions:
     humble: bool = False
     shared_memory: bool | None = None
     config_file: str | None = None
+    user: tuple[str, str] | None = field(default=None, repr=False)
+    tls: bool | None = None
+    ca: str | None = None
+    cert: str | None = None
+    key: str | None = None
 
     @classmethod
     def parse(cls, url: str, env: Mapping[str, str]) -> ZenohOptions:
@@ -61,13 +76,23 @@ class ZenohOptions:
             ArgumentError: A part of the URL, or ROS_DOMAIN_ID, is not valid.
         """
         example = "as in zenoh://127.0.0.1:7447?domain=0"
+        given_url, url = url, shown_url(url)
         try:
-            parts = urlsplit(url)
+            parts = urlsplit(given_url)
             host = parts.hostname
-        except ValueError as error:
-            raise ArgumentError("url", url, f"a URL {example} ({error})") from error
-        if parts.path not in ("", "/") or parts.fragment or parts.username is not None:
-            raise ArgumentError("url", url, f"nothing but host, port and options, {example}")
+        except ValueError:
+            raise ArgumentError("url", url, f"a URL {example}") from None
+        if parts.path not in ("", "/") or parts.fragment:
+            # Also where a password has a character that ends the host's part of a URL.
+            hint = "; in a password, write / as %2F, ? as %3F, # as %23, @ as %40"
+            raise ArgumentError(
+                "url", url, f"nothing but host, port and options, {example}{hint * ('@' in url)}"
+            )
+        user = None
+        if parts.username is not None:
+            if not parts.username or not parts.password:
+                raise ArgumentError("user", url, "a name and a password, zenoh://NAME:PASSWORD@...")
+            user = (unquote(parts.username), unquote(parts.password))
         if host is not None and not _HOST.match(host):
             raise ArgumentError("host", host, "a host name or an address", url)
         try:
@@ -75,10 +100,11 @@ class ZenohOptions:
         except ValueError:
             port = 0
         if port == 0 or (host is None and parts.netloc):
-            raise ArgumentError("address", parts.netloc, f"host:port, port 1 to 65535, {example}")
+            where = parts.netloc.rpartition("@")[2]
+            raise ArgumentError("address", where, f"host:port, port 1 to 65535, {example}", url)
         given = parse_qsl(parts.query, keep_blank_values=True)
         options = dict(given)
-        known = ("domain", *_CHOICES)
+        known = ("domain", *_CHOICES, *_FILES)
         for key, value in given:
             if key not in known:
                 raise ArgumentError("option", key, f"one of {', '.join(known)}", url)
@@ -89,6 +115,7 @@ class ZenohOptions:
         else:
             domain = _parse_domain(env.get("ROS_DOMAIN_ID") or "0", "ROS_DOMAIN_ID", "environment")
         mode = _parse_choice(options, "mode", url)
+        tls = _parse_tls(options, url)
         return cls(
             host=host,
             port=port,
@@ -99,12 +126,34 @@ class ZenohOptions:
             if "shm" not in options
             else bool(_parse_choice(options, "shm", url)),
             config_file=env.get("ZENOH_SESSION_CONFIG_URI") or None,
+            user=user,
+            tls=tls,
+            **{name: options.get(name) for name in _FILES},
         )
 
 
-def locator(host: str, port: int) -> str:
-    """Return the Zenoh locator of a TCP address, with brackets around IPv6 addresses."""
-    return f"tcp/[{host}]:{port}" if ":" in host else f"tcp/{host}:{port}"
+def locator(host: str, port: int, protocol: str = "tcp") -> str:
+    """Return the Zenoh locator of an address, with brackets around IPv6 addresses."""
+    return f"{protocol}/[{host}]:{port}" if ":" in host else f"{protocol}/{host}:{port}"
+
+
+def shown_url(url: str) -> str:
+    """Return a URL as it may be shown and logged: without its password."""
+    return _PASSWORD.sub(r"\1***@", url)
+
+
+def _parse_tls(options: Mapping[str, str], url: str) -> bool | None:
+    tls = _parse_choice(options, "tls", url)
+    files = [name for name in _FILES if name in options]
+    for name in files:
+        if not options[name]:
+            raise ArgumentError(name, "", "a file", url)
+        if tls is False:
+            raise ArgumentError(name, options[name], "no file without TLS: remove tls=false", url)
+    if ("cert" in options) != ("key" in options):
+        missing = "key" if "cert" in options else "cert"
+        raise ArgumentError(missing, "", "a file: a certificate needs its key, cert and key", url)
+    return True if files else None if tls is None else bool(tls)
 
 
 def _parse_domain(text: str, what: str, where: str) -> int:

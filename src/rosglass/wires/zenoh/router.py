@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import atexit
+import json
 import os
 import re
 import socket
 import time
+from dataclasses import replace
 
 import zenoh
 
@@ -14,8 +16,10 @@ from rosglass.comm import Handle
 from rosglass.errors import ArgumentError, ConnectionLostError
 from rosglass.wires.zenoh.endpoints import CHANNEL, Pump
 from rosglass.wires.zenoh.options import DEFAULT_PORT, ZenohOptions, locator
+from rosglass.wires.zenoh.refusal import find_refusal
 from rosglass.wires.zenoh.session import (
     close_session,
+    endpoints,
     limit_silence,
     open_session,
     reason,
@@ -29,37 +33,52 @@ __all__ = ["DEFAULT_LISTEN", "Router", "is_router_reachable"]
 DEFAULT_LISTEN = f"tcp/127.0.0.1:{DEFAULT_PORT}"
 
 _LOCATOR = re.compile(
-    r"tcp/(?:\[(?P<six>[0-9A-Fa-f:.]+)\]|(?P<host>[A-Za-z0-9_.-]+)):(?P<port>\d+)"
+    r"(?P<protocol>tcp|tls)/"
+    r"(?:\[(?P<six>[0-9A-Fa-f:.]+)\]|(?P<host>[A-Za-z0-9_.-]+)):(?P<port>\d+)"
 )
 _LOOPBACK = re.compile(r"localhost|127(?:\.\d+){3}|::1")
+_ENCRYPTED = ("tls/", "quic/")
 
 
 class Router(Handle):
     """A router in this process, running from creation to :meth:`close`.
 
     Args:
-        listen: Address to listen on, ``tcp/HOST:PORT``; port 0 chooses a free one.
+        listen: Address to listen on, ``tcp/HOST:PORT`` or ``tls/HOST:PORT``; port 0 chooses a free
+            one. None for those of `config_file`, or ``tcp/127.0.0.1:7447`` without a file.
+        config_file: Zenoh configuration, as in ``ZENOH_ROUTER_CONFIG_URI``: users, certificates,
+            access control; None for none.
 
     Attributes:
-        listen: The address, with the actual port.
-        url: URL for :func:`rosglass.connect`.
+        listen: The addresses, with the actual port.
+        url: URL for :func:`rosglass.connect`, without user; empty if there is none for the address.
         is_local: Whether only programs on this machine can connect.
+        is_restricted: Whether programs need a password or a certificate to connect.
+        is_encrypted: Whether all connections are encrypted.
 
     Raises:
-        ArgumentError: `listen` is not an address.
-        ConnectionLostError: The address is in use, or does not belong to this machine.
+        ArgumentError: `listen` is not an address, or `config_file` cannot be read.
+        ConnectionLostError: The address is in use, or does not belong to this machine; or a file of
+            the configuration is invalid.
     """
 
-    def __init__(self, listen: str = DEFAULT_LISTEN) -> None:
-        host, port = _parse(listen)
-        port = port or _free_port(host)
-        self.listen = locator(host, port)
-        reachable = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
-        self.url = "zenoh://" + locator(reachable, port).removeprefix("tcp/")
-        self.is_local = _LOOPBACK.fullmatch(host) is not None
+    def __init__(self, listen: str | None = None, config_file: str | None = None) -> None:
+        if listen is None and config_file is None:
+            listen = DEFAULT_LISTEN
+        if listen is not None:
+            protocol, host, port = _parse(listen)
+            listen = locator(host, port or _free_port(host), protocol)
+        config = router_config(listen, config_file)
+        addresses = endpoints(config, "listen")
+        self.listen, self.url = ", ".join(addresses), _url(addresses)
+        self.is_local = all(_is_loopback(address) for address in addresses)
+        self.is_encrypted = all(address.startswith(_ENCRYPTED) for address in addresses)
+        has_users = json.loads(config.get_json("transport/auth/usrpwd/dictionary_file"))
+        has_certificates = json.loads(config.get_json("transport/link/tls/enable_mtls"))
+        self.is_restricted = bool(has_users or (has_certificates and self.is_encrypted))
         self._session: zenoh.Session | None = None
         try:
-            self._session = open_session(router_config(self.listen))
+            self._session = open_session(config)
         except zenoh.ZError as error:
             raise ConnectionLostError(self._explain(error)) from error
         self._pump = None if self.is_local else self._watch(self._session)
@@ -84,9 +103,14 @@ class Router(Handle):
     def _explain(self, error: zenoh.ZError) -> str:
         problem = f"cannot run a router at {self.listen}"
         other = "choose another port with --listen tcp/127.0.0.1:PORT"
-        if "in use" not in str(error):
-            return f"{problem}: {reason(error)}; name an address of this machine"
-        if is_router_reachable(self.url):
+        text = reason(error)
+        if "Missing TLS" in text:
+            needed = "listen_certificate and listen_private_key in its transport.link.tls"
+            return f"{problem}: {text.rstrip('.')}; give --config FILE with {needed}"
+        if "in use" not in text:
+            address = "; name an address of this machine" if "ssign" in text else ""
+            return f"{problem}: {text}{address}"
+        if self.url and is_router_reachable(self.url):
             return f"{problem}: a Zenoh router runs there already; use that one, or {other}"
         return f"{problem}: another program uses the port; {other}"
 
@@ -109,27 +133,45 @@ def is_router_reachable(url: str, timeout: float = 0.5) -> bool:
         socket.create_connection((host, options.port), timeout).close()
     except OSError:
         return False
-    config, _ = session_config(ZenohOptions(host, options.port, mode="client"))
+    config, _ = session_config(replace(options, host=host, mode="client"))
     remaining = max(1, int((deadline - time.monotonic()) * 1000))
     config.insert_json5("transport/unicast/open_timeout", str(remaining))
     config.insert_json5("connect/timeout_ms", str(remaining))
     try:
         session = open_session(config)
     except zenoh.ZError:
-        return False
+        # One that refuses this program is there, too.
+        return find_refusal(options, timeout) is not None
     try:
         return bool(session.info.routers_zid())
     finally:
         close_session(session)
 
 
-def _parse(listen: str) -> tuple[str, int]:
+def _parse(listen: str) -> tuple[str, str, int]:
     match = _LOCATOR.fullmatch(listen) if isinstance(listen, str) else None
     if match is None or int(match["port"]) > 65535:
         raise ArgumentError(
-            "listen", listen, "an address such as tcp/127.0.0.1:7447, port 0 to 65535"
+            "listen",
+            listen,
+            "an address such as tcp/127.0.0.1:7447 or tls/[::]:7447, port 0 to 65535",
         )
-    return match["six"] or match["host"], int(match["port"])
+    return match["protocol"], match["six"] or match["host"], int(match["port"])
+
+
+def _url(addresses: list[str]) -> str:
+    """Return the URL of the first address that a URL can name; empty for none."""
+    for match in filter(None, map(_LOCATOR.fullmatch, addresses)):
+        host = match["six"] or match["host"]
+        reachable = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+        tls = "?tls=true" if match["protocol"] == "tls" else ""
+        return "zenoh://" + locator(reachable, int(match["port"])).removeprefix("tcp/") + tls
+    return ""
+
+
+def _is_loopback(address: str) -> bool:
+    match = _LOCATOR.fullmatch(address)
+    return match is not None and _LOOPBACK.fullmatch(match["six"] or match["host"]) is not None
 
 
 def _free_port(host: str) -> int:

@@ -34,6 +34,7 @@ __all__ = [
     "Heartbeat",
     "check_process",
     "close_session",
+    "endpoints",
     "is_local",
     "limit_silence",
     "open_session",
@@ -75,9 +76,12 @@ def session_config(options: ZenohOptions) -> tuple[zenoh.Config, str]:
         # zeros.
         "id": "f" + secrets.token_hex(16)[1:],
     }
+    settings |= _credentials(options)
     if options.config_file is None:
         config = zenoh.Config()
-        settings["mode"] = options.mode or ("peer" if is_local(options.host) else "client")
+        # Peers would link with each other without TLS and, with a user, not at all.
+        alone = is_local(options.host) and options.user is None and not options.tls
+        settings["mode"] = options.mode or ("peer" if alone else "client")
         settings["listen/endpoints"] = ["tcp/127.0.0.1:0"] if settings["mode"] == "peer" else []
         if is_local(options.host):
             settings["transport/link/tx/queue/size/data"] = _LOCAL_QUEUE_SIZE
@@ -87,37 +91,88 @@ def session_config(options: ZenohOptions) -> tuple[zenoh.Config, str]:
         settings["connect/retry"] = _RETRY
         settings["transport/unicast/open_timeout"] = _OPEN_TIMEOUT_MS
         if settings["mode"] == "client":
-            settings["connect/timeout_ms"] = _OPEN_TIMEOUT_MS
+            settings["connect/timeout_ms"] = 0  # one attempt: the middleware tries again
         settings["transport/shared_memory/enabled"] = bool(options.shared_memory)
         host = options.host or "127.0.0.1"
     else:
-        config = _read(options.config_file)
+        config = _read(options.config_file, "ZENOH_SESSION_CONFIG_URI")
         if options.mode is not None:
             settings["mode"] = options.mode
         if options.shared_memory is not None:
             settings["transport/shared_memory/enabled"] = options.shared_memory
         host = options.host or ""
     if host:
-        settings["connect/endpoints"] = [locator(host, options.port)]
+        protocol = _protocol(config) if options.tls is None else "tls" if options.tls else "tcp"
+        settings["connect/endpoints"] = [locator(host, options.port, protocol)]
+    elif options.tls is not None:
+        raise ArgumentError(
+            "tls", options.tls, "a URL with the router's host: the addresses are those of the file",
+            f"ZENOH_SESSION_CONFIG_URI={options.config_file}",
+        )  # fmt: skip
     _apply(config, settings)
-    return config, _endpoints(config)
+    return config, ", ".join(endpoints(config)) or "any address (none is configured)"
 
 
-def router_config(listen: str) -> zenoh.Config:
-    """Return the configuration of a router that listens at a locator such as ``tcp/[::]:7447``."""
-    config: zenoh.Config = zenoh.Config()
+def router_config(listen: str | None, config_file: str | None = None) -> zenoh.Config:
+    """Return the configuration of a router.
+
+    Args:
+        listen: Locator such as ``tcp/[::]:7447``; None for those of `config_file`.
+        config_file: Zenoh configuration to start from, as in ``ZENOH_ROUTER_CONFIG_URI``.
+
+    Raises:
+        ArgumentError: The configuration file cannot be read, or Zenoh rejects it.
+    """
     settings: dict[str, Any] = {
         "mode": "router",
-        "listen/endpoints": [listen],
         "listen/exit_on_failure": True,
-        "connect/endpoints": [],
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": True,
         "timestamping/enabled": True,
         "open/return_conditions/connect_scouted": False,
     }
+    config: zenoh.Config
+    if config_file is None:
+        config = zenoh.Config()
+        settings["connect/endpoints"] = []
+        settings["scouting/multicast/enabled"] = False
+        settings["scouting/gossip/enabled"] = True
+    else:
+        config = _read(config_file, "ZENOH_ROUTER_CONFIG_URI")
+    if listen is not None:
+        settings["listen/endpoints"] = [listen]
     _apply(config, settings)
     return config
+
+
+def _credentials(options: ZenohOptions) -> dict[str, Any]:
+    """Return the settings for users and certificates; raises ArgumentError for a missing file."""
+    settings: dict[str, Any] = {}
+    if options.user is not None:
+        user, password = options.user
+        settings |= {"transport/auth/usrpwd/user": user, "transport/auth/usrpwd/password": password}
+    for name, file, setting in (
+        ("ca", options.ca, "root_ca_certificate"),
+        ("cert", options.cert, "connect_certificate"),
+        ("key", options.key, "connect_private_key"),
+    ):
+        if file is None:
+            continue
+        try:
+            Path(file).open("rb").close()
+        except OSError as error:  # Zenoh would connect for ever
+            reason = f"a file that can be read ({error.strerror})"
+            raise ArgumentError(name, file, reason, "zenoh:// URL") from None
+        settings[f"transport/link/tls/{setting}"] = str(Path(file).resolve())
+    if options.cert is not None:
+        settings["transport/link/tls/enable_mtls"] = True
+    return settings
+
+
+def _protocol(config: zenoh.Config) -> str:
+    """Return how a configuration connects: the protocol of its first address, or by its files."""
+    for endpoint in endpoints(config):
+        return endpoint.partition("/")[0]
+    tls = json.loads(config.get_json("transport/link/tls"))
+    return "tls" if tls["root_ca_certificate"] or tls["connect_certificate"] else "tcp"
 
 
 def _apply(config: zenoh.Config, settings: dict[str, Any]) -> None:
@@ -200,24 +255,32 @@ def reason(error: zenoh.ZError) -> str:
     return re.sub(r" at /\S+?\.rs:\d+\.?", "", str(error)).strip()
 
 
-def _read(file: str) -> zenoh.Config:
+def _read(file: str, source: str) -> zenoh.Config:
     path = Path(file.removeprefix("file://"))
     try:
         config: zenoh.Config = zenoh.Config.from_file(path)
     except zenoh.ZError as error:
         raise ArgumentError(
-            "ZENOH_SESSION_CONFIG_URI",
+            source,
             file,
             f"a Zenoh configuration file that can be read ({path}: {reason(error)})",
         ) from error
     return config
 
 
-def _endpoints(config: zenoh.Config) -> str:
-    endpoints = json.loads(config.get_json("connect/endpoints"))
-    if isinstance(endpoints, dict):
-        endpoints = endpoints.get(json.loads(config.get_json("mode")) or "peer", [])
-    return ", ".join(map(str, endpoints)) or "any address (none is configured)"
+def endpoints(config: zenoh.Config, use: str = "connect") -> list[str]:
+    """Return a configuration's addresses, without their own settings.
+
+    Args:
+        config: The configuration.
+        use: ``connect`` or ``listen``.
+    """
+    found = json.loads(config.get_json(f"{use}/endpoints"))
+    if isinstance(found, dict):
+        found = found.get(json.loads(config.get_json("mode")) or "peer") or []
+    groups = [item["locators"] if isinstance(item, dict) else [item] for item in found]
+    flat = [one for group in groups for one in group]
+    return [re.split(r"[?#]", str(one))[0] for one in flat]
 
 
 #: Seconds after which a router that does not answer counts as silent.
