@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import logging
 import os
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["connect", "default_url"]
 
+_log = logging.getLogger("rosglass.ros2")
 _SCHEMES = ("dds", "zenoh", "ros1", "local")
 _EXAMPLE = "zenoh://127.0.0.1:7447"
 _EXAMPLES = "zenoh://127.0.0.1:7447, dds://?domain=0 or ros1://robot:11311"
@@ -222,6 +224,14 @@ def _dds(url: str) -> Middleware:
             f"install it with: {install_command('dds')}; "
             "without it, there are zenoh:// (ROS 2 with rmw_zenoh) and ros1://host:11311 (ROS 1)"
         )
+    if os.environ.get("ROS_SECURITY_ENABLE") == "true":
+        text = "DDS Security (SROS2, ROS_SECURITY_ENABLE=true) is not supported"
+        if os.environ.get("ROS_SECURITY_STRATEGY") == "Enforce":
+            raise UnsupportedError(
+                f"{text}, and ROS_SECURITY_STRATEGY=Enforce forbids to connect without; unset "
+                "it to join the nodes without security, or use Zenoh with TLS"
+            )
+        _log.warning("%s: connecting without it, to nodes without it", text)
     from rosglass.wires.dds.middleware import DdsMiddleware  # noqa: PLC0415 - an extra
 
     return DdsMiddleware.from_url(url, os.environ)

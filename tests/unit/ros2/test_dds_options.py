@@ -134,3 +134,14 @@ def test_bad_variables_are_named(env, told):
 def test_named_peers_contradict_a_range_from_the_environment():
     with pytest.raises(rosglass.ConversionError, match="ROS_AUTOMATIC_DISCOVERY_RANGE=off"):
         options("dds://robot", ROS_AUTOMATIC_DISCOVERY_RANGE="OFF")
+
+
+def test_enforced_security_is_refused_and_not_left_out(monkeypatch, caplog):
+    pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
+    monkeypatch.setenv("ROS_SECURITY_ENABLE", "true")
+    monkeypatch.setenv("ROS_SECURITY_STRATEGY", "Enforce")
+    with pytest.raises(rosglass.UnsupportedError, match=r"SROS2.*Enforce forbids to connect"):
+        rosglass.connect("dds://?range=off")
+    monkeypatch.setenv("ROS_SECURITY_STRATEGY", "Permissive")
+    with rosglass.connect("dds://?range=off", own_services=False):
+        assert "connecting without it, to nodes without it" in caplog.text
