@@ -47,6 +47,7 @@ _MAX_NODE_DEPTH = 256
 
 #: COLLADA's transforms, and how many numbers they have. lookat and skew are of cameras and art.
 _TRANSFORMS = {"matrix": 16, "translate": 3, "rotate": 4, "scale": 3}
+_ARRAYS = ("float_array", "int_array")
 _PRIMITIVES = frozenset({"triangles", "polylist", "polygons", "tristrips", "trifans"})
 
 _log = logging.getLogger("rosglass.scene")
@@ -64,7 +65,7 @@ def read_collada(data: bytes, name: str, base: str) -> list[MeshPart]:
         MeshError: It is corrupt, or has more than 10 million triangles.
     """
     try:
-        root = read_xml(data, name, _MAX_FILE_BYTES)
+        root = read_xml(data, name, _MAX_FILE_BYTES, _log.warning)
     except XmlError as error:
         raise MeshError(str(error)) from None
     if root.tag != "COLLADA":
@@ -75,13 +76,22 @@ def read_collada(data: bytes, name: str, base: str) -> list[MeshPart]:
 class _Collada:
     def __init__(self, root: XmlElement, name: str, base: str) -> None:
         self._root, self._name, self._base = root, name, base
-        self._ids: dict[str, Element] = {}
-        for element in root.iter():
-            if "id" in element.keys():  # noqa: SIM118 - an Element is no dict
-                self._ids.setdefault(element.get("id", ""), element)
-        self._sources: dict[tuple[str, int], Floats] = {}
-        self._geometries: dict[str, list[tuple[str, MeshPart]]] = {}
+        #: Elements by tag and id: exporters use an id for a geometry and its node, too.
+        self._ids = _by_id(root)
+        #: The same of the geometry that is read: its sources may have the ids of another's.
+        self._own_ids: dict[tuple[str, str], Element] = {}
+        self._sources: dict[tuple[Element, int], Floats] = {}
+        self._geometries: dict[Element, list[tuple[str, MeshPart]]] = {}
         self._materials: dict[str, tuple[Color | None, str | None]] = {}
+        #: The material of parts whose own is not in the file: as in assimp, the first by its id.
+        self._first_material = min(
+            (
+                key
+                for (tag, key), found in self._ids.items()
+                if tag == "material" and found.find("instance_effect") is not None
+            ),
+            default="",
+        )
         self._triangles = 0
 
     def parts(self) -> list[MeshPart]:
@@ -105,7 +115,7 @@ class _Collada:
                 if child.tag == "node":
                     pending.append((child, matrix, depth + 1))
                 elif child.tag == "instance_node":
-                    pending.append((self._target(child, "url"), matrix, depth + 1))
+                    pending.append((self._target(child, "url", "node"), matrix, depth + 1))
         return parts
 
     def _unit(self) -> float:
@@ -124,7 +134,7 @@ class _Collada:
     def _scene(self) -> Element:
         instance = self._root.find("scene/instance_visual_scene")
         if instance is not None:
-            return self._target(instance, "url")
+            return self._target(instance, "url", "visual_scene")
         scene = self._root.find("library_visual_scenes/visual_scene")
         if scene is None:
             self._refuse(self._root, "the file has no <visual_scene>, so nothing to show")
@@ -153,33 +163,33 @@ class _Collada:
 
     def _instance(self, instance: Element) -> Iterator[MeshPart]:
         """Yield the parts of a geometry, with the materials that a node binds to it."""
-        target = self._target(instance, "url")
+        target = self._target(instance, "url", "geometry", "controller")
         for _ in range(3):  # a controller's skin or morph, and what that deforms
             deformer = target.find("skin") if target.tag == "controller" else None
             deformer = target.find("morph") if deformer is None else deformer
             if deformer is None:
                 break
-            target = self._target(deformer, "source")
+            target = self._target(deformer, "source", "geometry", "controller")
         bindings = {
             bound.get("symbol", ""): bound.get("target", "").removeprefix("#")
             for bound in instance.iterfind("bind_material/technique_common/instance_material")
         }
-        # As in assimp, a material that is not bound is the first one that is.
-        default = next(iter(bindings.values()), "")
         for symbol, part in self._geometry(target):
             self._triangles += part.triangles
             check_count(self._name, self._triangles)
-            color, texture = self._material(bindings.get(symbol, default))
+            # As in assimp, what is not bound has the first material that is, or that of its name.
+            first = bindings[min(bindings)] if bindings else symbol
+            color, texture = self._material(bindings.get(symbol, first))
             yield replace(part, color=color, texture=None if part.uv is None else texture)
 
     def _geometry(self, geometry: Element) -> list[tuple[str, MeshPart]]:
-        key = geometry.get("id", "")
-        if key not in self._geometries:
+        if geometry not in self._geometries:
             mesh = geometry.find("mesh")
             found = [] if mesh is None else [p for p in mesh if p.tag in _PRIMITIVES]
+            self._own_ids = _by_id(geometry)
             read = ((p.get("material", ""), self._primitive(p)) for p in found)
-            self._geometries[key] = [(symbol, part) for symbol, part in read if part is not None]
-        return self._geometries[key]
+            self._geometries[geometry] = [(name, part) for name, part in read if part is not None]
+        return self._geometries[geometry]
 
     def _primitive(self, element: Element) -> MeshPart | None:
         inputs, width = self._inputs(element)
@@ -231,14 +241,17 @@ class _Collada:
             if not 0 <= offset < 64:
                 self._refuse(found, "expected an offset from 0 to 63 and a whole number as set")
             width = max(width, offset + 1)
-            semantic, source = found.get("semantic", ""), self._target(found, "source")
+            semantic, source = (
+                found.get("semantic", ""),
+                self._target(found, "source", "source", "vertices"),
+            )
             own = source.iterfind("input") if semantic == "VERTEX" else (found,)
             for entry in own:
                 meaning = entry.get("semantic", "")
                 # Of several, the first set of texture coordinates is used, as in RViz.
                 if number < sets.get(meaning, 1 << 31):
                     sets[meaning] = number
-                    target = source if entry is found else self._target(entry, "source")
+                    target = source if entry is found else self._target(entry, "source", "source")
                     if meaning in {"POSITION", "NORMAL", "TEXCOORD"}:
                         inputs[meaning] = (target, offset)
         return inputs, width
@@ -275,13 +288,13 @@ class _Collada:
 
     def _source(self, source: Element, width: int) -> Floats:
         """Return the rows of a ``<source>``."""
-        key = (source.get("id", ""), width)
+        key = (source, width)
         if key in self._sources:
             return self._sources[key]
         accessor = source.find("technique_common/accessor")
         if accessor is None:
             self._refuse(source, "<source> has no <accessor>")
-        values = self._array(self._target(accessor, "source"), np.float32)
+        values = self._array(self._target(accessor, "source", *_ARRAYS), np.float32)
         try:
             count, stride, offset = (
                 int(accessor.get(name, default))
@@ -311,13 +324,15 @@ class _Collada:
     # -- materials -----------------------------------------------------------------------------
 
     def _material(self, key: str) -> tuple[Color | None, str | None]:
-        """Return the colour and texture of a material by its id."""
+        """Return the colour and texture of a material by its id, or of the file's first one."""
         if key not in self._materials:
-            material = self._ids.get(key)
+            material = self._ids.get(("material", key))
             instance = None if material is None else material.find("instance_effect")
             found: tuple[Color | None, str | None] = (None, None)
             if instance is not None:
-                found = self._effect(self._target(instance, "url"))
+                found = self._effect(self._target(instance, "url", "effect"))
+            elif key != self._first_material:
+                found = self._material(self._first_material)
             self._materials[key] = found
         return self._materials[key]
 
@@ -379,7 +394,7 @@ class _Collada:
                 found = parameter.find(path)
                 if found is not None:
                     key = (found.text or found.get("url") or "").strip().removeprefix("#")
-        image = self._ids.get(key)
+        image = self._ids.get(("image", key))
         source = None if image is None else image.find("init_from/ref")  # of COLLADA 1.5
         if source is None and image is not None:
             source = image.find("init_from")
@@ -391,18 +406,28 @@ class _Collada:
 
     # ------------------------------------------------------------------------------------------
 
-    def _target(self, element: Element, attribute: str) -> Element:
-        """Return the element that another one refers to."""
+    def _target(self, element: Element, attribute: str, *tags: str) -> Element:
+        """Return the element with one of these tags that another one refers to."""
         url = element.get(attribute, "")
-        target = self._ids.get(url[1:]) if url.startswith("#") else None
-        if target is None:
-            self._refuse(
-                element, f"{attribute} of <{element.tag}>: there is no {url!r} in the file"
-            )
-        return target
+        places = [(ids, (tag, url[1:])) for ids in (self._own_ids, self._ids) for tag in tags]
+        for ids, key in places if url.startswith("#") else ():
+            if key in ids:
+                return ids[key]
+        return self._refuse(
+            element, f"{attribute} of <{element.tag}>: there is no {url!r} in the file"
+        )
 
     def _refuse(self, element: Element, reason: str) -> NoReturn:
         raise MeshError(f"{self._name}:{getattr(element, 'line', 0)}: {reason}")
+
+
+def _by_id(root: Element) -> dict[tuple[str, str], Element]:
+    """Return the elements with an id by tag and id, the first of each."""
+    found: dict[tuple[str, str], Element] = {}
+    for element in root.iter():
+        if "id" in element.keys():  # noqa: SIM118 - an Element is no dict
+            found.setdefault((element.tag, element.get("id", "")), element)
+    return found
 
 
 def _strips(lengths: Integers, is_strip: bool) -> Integers:

@@ -75,6 +75,7 @@ __all__ = [
 _MAX_FILE_BYTES = 512 << 20
 #: Of glTF.
 _MAX_NODES = 100_000
+_QUANTISED = "quantised glTF is not read; save it with floats (gltf-transform dequantize)"
 
 _log = logging.getLogger("rosglass.scene")
 
@@ -228,7 +229,7 @@ def _file_beside(
 # -- the cache -----------------------------------------------------------------------------------
 
 #: Of the files: counts changes of what the readers make.
-_CACHE_VERSION = 1
+_CACHE_VERSION = 2
 _MAX_CACHE_BYTES = 512 << 20
 #: Files of materials that an OBJ file can name.
 _MAX_LIBRARIES = 16
@@ -427,11 +428,13 @@ class _Obj:
     def _scan(self, text: str) -> None:
         material: str | None = None
         for line in text.replace("\\\n", " ").replace("\\\r\n", " ").splitlines():
-            key, _, rest = line.lstrip().partition(" ")
+            key, rest = _split_key(line)
             if key in self._rows:
                 self._rows[key].append(rest)
             elif key == "f":
-                rest = rest.partition("#")[0]
+                rest = rest.partition("#")[0].rstrip()
+                if "/ " in rest or rest.endswith("/"):  # v/ or v/vt/ is v or v/vt
+                    rest = re.sub(r"/+(?=\s|$)", "", rest)
                 if "-" in rest:
                     rest = self._absolute(rest)
                 count, slashes = len(rest.split()), rest.count("/")
@@ -488,7 +491,7 @@ class _Obj:
             return
         material: str | None = None
         for line in data.decode("utf-8", "replace").splitlines():
-            key, _, rest = line.strip().partition(" ")
+            key, rest = _split_key(line)
             rest = rest.strip()
             if key == "newmtl":
                 material = rest
@@ -509,6 +512,12 @@ class _Obj:
                 # Options such as -s 1 1 1 stand before the name, which may have spaces.
                 path = re.sub(r"^(?:-[a-z]+(?:\s+(?:on|off|[-+.\d]\S*))*\s+)*", "", rest)
                 self._materials[material] = (color, relative(self._base, path))
+
+
+def _split_key(line: str) -> tuple[str, str]:
+    """Return the first word of a line, and the rest of it."""
+    words = line.split(None, 1)
+    return (words[0], words[1] if len(words) > 1 else "") if words else ("", "")
 
 
 # -- glTF, PLY and OFF, through trimesh ----------------------------------------------------------
@@ -538,9 +547,10 @@ def _read_with_trimesh(
     except Error:
         raise
     except Exception as error:  # what trimesh raises for a corrupt file
-        raise MeshError(
-            f"{name}: the mesh can't be read: {type(error).__name__}: {error}"
-        ) from None
+        reason = str(error) or f"trimesh gives no reason ({type(error).__name__})"
+        if b"KHR_mesh_quantization" in data:
+            reason = f"{reason}; {_QUANTISED}"
+        raise MeshError(f"{name}: the mesh can't be read: {reason}") from None
     # glTF's y axis points up, that of ROS to the side: x, y, z -> x, -z, y, as in RViz 2.
     up = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], np.float64)
     parts: list[MeshPart] = []
@@ -638,8 +648,12 @@ def _check_gltf(data: bytes, name: str) -> bool:
                 raise MeshError(
                     f"{name}: accessor {index} has {accessor['count']} elements in {size} bytes"
                 )
-        meshes = about.get("meshes", ())
-        return all("NORMAL" in p["attributes"] for mesh in meshes for p in mesh["primitives"])
+        found = [p["attributes"] for mesh in about.get("meshes", ()) for p in mesh["primitives"]]
+        accessors = about.get("accessors", ())
+        positions = [attributes["POSITION"] for attributes in found if "POSITION" in attributes]
+        if any(accessors[index].get("normalized") for index in positions):
+            raise UnsupportedError(f"{name}: {_QUANTISED}")
+        return all("NORMAL" in attributes for attributes in found)
     except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         raise MeshError(
             f"{name}: the glTF file is corrupt: {type(error).__name__}: {error}"

@@ -279,11 +279,12 @@ def parse_urdf(text: str | bytes, source: str = "robot_description") -> Robot:
     """
     if not isinstance(text, (str, bytes)):
         raise ArgumentError(source, text, "the text of a URDF")
+    warnings: list[str] = []
     try:
-        root = read_xml(text, source, _MAX_TEXT_BYTES)
+        root = read_xml(text, source, _MAX_TEXT_BYTES, warnings.append)
     except XmlError as error:
         raise UrdfError(str(error)) from None
-    return _Parser(source).robot(root)
+    return _Parser(source, warnings).robot(root)
 
 
 class _Broken(Exception):  # noqa: N818 - never leaves this file
@@ -295,9 +296,10 @@ class _Broken(Exception):  # noqa: N818 - never leaves this file
 
 
 class _Parser:
-    def __init__(self, source: str) -> None:
-        self._source = source
-        self._warnings: list[str] = []
+    def __init__(self, source: str, warnings: list[str]) -> None:
+        self._source, self._warnings = source, warnings
+        #: What to do about tags of xacro, for errors that they may have caused.
+        self._hint = ""
         self._materials: dict[str, Material] = {}
         #: The elements of links and joints by name.
         self._link_elements: dict[str, XmlElement] = {}
@@ -311,7 +313,8 @@ class _Parser:
             self._check_mimics(joints)
             top, tree = self._tree(links, joints)
         except _Broken as broken:
-            raise UrdfError(f"{self._source}:{broken.line}: {broken.reason}") from None
+            text = f"{self._source}:{broken.line}: {broken.reason}{self._hint}"
+            raise UrdfError(text) from None
         name = root.get("name", "")
         if not name:
             self._warn(root, "<robot> has no name; give it one: <robot name=...>")
@@ -322,17 +325,19 @@ class _Parser:
 
     def _check_root(self, root: XmlElement) -> None:
         where = f"{self._source}:{root.line}"
-        for element in root.iter():
-            if element.tag.startswith("xacro:"):
-                line = getattr(element, "line", 0)
-                raise UrdfError(
-                    f"{self._source}:{line}: <{element.tag}> is xacro, not URDF; expand the file "
-                    "first: xacro FILE.xacro > FILE.urdf"
-                )
         if root.tag == "sdf":
             raise UrdfError(f"{where}: this is SDF, of Gazebo; expected URDF: <robot name=...>")
         if root.tag != "robot":
             raise UrdfError(f"{where}: expected <robot name=...>, got <{root.tag}>")
+        left = [element for element in root.iter() if element.tag.startswith("xacro:")]
+        if left:
+            tags = ", ".join(dict.fromkeys(f"<{element.tag}>" for element in left[:_MAX_WARNINGS]))
+            line = getattr(left[0], "line", 0)
+            advice = "expand the file first: xacro FILE.xacro > FILE.urdf"
+            self._warnings.append(
+                f"{self._source}:{line}: {tags} is xacro, not URDF, and is left out; {advice}"
+            )
+            self._hint = f"; {tags} in line {line} is xacro: {advice}"
 
     # -- links ------------------------------------------------------------------------------------
 

@@ -198,12 +198,45 @@ def test_joints_that_are_not_one_number_stay_at_their_origin() -> None:
             links("a", "b") + joint("a", "b", '<axis xyz="0 1"/>', type="continuous"),
             r"joint 'b_joint': xyz of <axis>: expected 3 finite numbers, got '0 1'",
         ),
-        ("<xacro:macro/>" + links("a"), r"test.urdf:.: .*"),
+        (
+            links("a", "b") + "\n<xacro:joint/>",
+            r"test.urdf:.: .*; <xacro:joint> in line 3 is xacro: expand the file first",
+        ),
     ],
 )
 def test_what_is_refused(body: str, message: str) -> None:
     with pytest.raises(UrdfError, match=message):
         robot(body)
+
+
+def test_what_is_left_of_xacro_costs_only_itself() -> None:
+    found = robot(
+        '<xacro:property name="r" value="1"/>\n<xacro:include/><xacro:include/>' + links("a")
+    )
+    assert list(found.links) == ["a"]
+    (warning,) = found.warnings
+    assert warning == (
+        "test.urdf:2: <xacro:property>, <xacro:include> is xacro, not URDF, and is left out; "
+        "expand the file first: xacro FILE.xacro > FILE.urdf"
+    )
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\n<?xml version='1.0'?><robot name='r'><link name='a'/></robot>",
+        "<!-- a --><?xml version='1.0'?><robot name='r'><link name='a'/></robot>",
+        b"\xef\xbb\xbf\n<?xml version='1.0'?><robot name='r'><link name='a'/></robot>",
+        b"<robot name='r'><!-- M\xfcller -- and Co --><link name='a'/></robot>",
+        "<robot name='r'><!-- a -- b --><link name='a'/></robot>",
+        "<robot name='r'><link name='a'/></robot>\0\0",
+    ],
+)
+def test_xml_that_urdfdom_reads_as_well(text: str | bytes) -> None:
+    found = parse_urdf(text, "source")
+    assert list(found.links) == ["a"]
+    (warning,) = found.warnings
+    assert "the text is not well-formed XML" in warning
 
 
 @pytest.mark.parametrize(
@@ -215,10 +248,13 @@ def test_what_is_refused(body: str, message: str) -> None:
         ("<robot>\n</link>", r"source:2: the text is not well-formed XML: mismatched tag"),
         ("<sdf version='1.6'/>", r"source:1: this is SDF"),
         ("<html/>", r"source:1: expected <robot name=...>, got <html>"),
-        ("\n\n<robot xmlns:xacro='x'>\n<xacro:include/></robot>", r"source:4: .* expand the file"),
+        (
+            "\n\n<robot xmlns:xacro='x'>\n<xacro:include/></robot>",
+            r"source:3: .* line 4 is xacro: expand",
+        ),
         ('<!DOCTYPE robot SYSTEM "file:///etc/passwd"><robot/>', r"source:1: a document type"),
         (b"<?xml version='1.0' encoding='klingon'?><robot/>", r"can't be decoded|unknown encoding"),
-        (b"<robot name='\xff'/>", r"source:1: the text is not well-formed XML"),
+        (b"<robot name='\xff'><", r"source:1: the text is not well-formed XML"),
         ("<robot name='\ud800'/>", r"can't be decoded"),
         ("<robot>" + "<a>" * 5000, r"source:1: <a> is inside more than 200 other elements"),
         ("<robot name='r'>" + "x" * (21 << 20) + "</robot>", r"bytes of XML; the limit is"),
