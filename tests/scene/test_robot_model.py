@@ -204,17 +204,51 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.delenv(variable, raising=False)
 
 
-@pytest.mark.usefixtures("cache")
-def test_meshes_and_what_they_name_come_from_the_robot(bench: SceneBench) -> None:
+def picture(width: int, height: int, color: int) -> bytes:
+    """Return a PNG of one colour."""
     from PySide6.QtCore import QBuffer, QByteArray, QIODevice
     from PySide6.QtGui import QImage
 
-    picture, file = QImage(4, 4, QImage.Format.Format_RGB32), QByteArray()
-    picture.fill(0x00FF00)
+    image, file = QImage(width, height, QImage.Format.Format_RGB32), QByteArray()
+    image.fill(color)
     buffer = QBuffer(file)
     buffer.open(QIODevice.OpenModeFlag.WriteOnly)
-    assert picture.save(buffer, "PNG")
-    files = {"arm.obj": OBJ, "paint.mtl": MTL, "textures/wood.png": bytes(file.data())}
+    assert image.save(buffer, "PNG")
+    return bytes(file.data())
+
+
+def test_textures_beyond_the_limit_are_scaled_down(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Of ANYmal's 17 textures of 2048 x 2048 pixels, the last one was lost."""
+    from rosglass.scene.displays import robot_model
+    from rosglass.scene.drawing import Mesh
+
+    monkeypatch.setattr(robot_model, "MAX_PIXELS", 16 * 64 * 64)
+    files = robot_model.MeshFiles(None)  # type: ignore[arg-type] - it reads no file
+    meshes = [Mesh(BOX) for _ in range(19)]
+    for number, mesh in enumerate(meshes[:17]):
+        files.paint(mesh, picture(64, 64, 0x804000 + number), "anymal.dae")
+    files.paint(meshes[17], picture(1, 63, 0x804000), "anymal.dae")
+    files.paint(meshes[18], picture(64, 64, 0x804000), "anymal.dae")  # a second use of the first
+    sizes = [mesh.texture.shape[:2] for mesh in meshes if mesh.texture is not None]
+    assert len(sizes) == 19
+    assert sorted(sizes[:17]) == [(32, 32)] * 2 + [(64, 64)] * 15
+    assert sizes[17] == (63, 1)
+    assert meshes[18].texture is meshes[0].texture
+    for number, mesh in enumerate(meshes[:17]):
+        assert mesh.texture is not None
+        assert (mesh.texture == (0x80, 0x40, number, 255)).all()
+    assert caplog.text.count("the largest are shown with half of their resolution") == 1
+    # Ever smaller, if it has to be.
+    for number in range(100):
+        files.paint(Mesh(BOX), picture(63, 1000, number), "anymal.dae")
+    assert files._pixels <= 16 * 64 * 64
+
+
+@pytest.mark.usefixtures("cache")
+def test_meshes_and_what_they_name_come_from_the_robot(bench: SceneBench) -> None:
+    files = {"arm.obj": OBJ, "paint.mtl": MTL, "textures/wood.png": picture(4, 4, 0x00FF00)}
 
     def answer(request: Any) -> dict[str, Any]:
         found = files.get(request.path.removeprefix("package://far/meshes/"))

@@ -64,7 +64,7 @@ def _read_mesh(uri: str, resources: ResourceRetriever) -> _MeshFile:
         mesh = Mesh(shape)
         if part.texture is not None:
             try:
-                mesh.set_texture(files.texture(part.texture, uri))
+                files.paint(mesh, part.texture, uri)
             except (Error, OSError) as error:
                 problem = str(error)
         made.append((mesh, None if is_stl else material_of(part)))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections import deque
@@ -56,6 +57,7 @@ __all__ = [
     "read_texture",
 ]
 
+_log = logging.getLogger("rosglass.scene")
 _T = TypeVar("_T")
 #: Milliseconds until a parameter that is not there is looked up again.
 _RETRY_MS = 2000
@@ -221,7 +223,10 @@ class MeshFiles:
         #: What was read, or why it was not.
         self._meshes: dict[Any, list[tuple[MeshPart, Shape]] | Exception] = {}
         self._textures: dict[str | bytes, NDArray[np.uint8] | Exception] = {}
+        #: The drawables of each texture.
+        self._painted: dict[str | bytes, list[Mesh]] = {}
         self._triangles = self._pixels = 0
+        self._halves = False
 
     def mesh(
         self, uri: str, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -246,24 +251,58 @@ class MeshFiles:
         self._triangles += triangles
         return [(part, _shape_of(part, scale)) for part in parts]
 
-    def texture(self, source: str | bytes, name: str) -> NDArray[np.uint8]:
-        """Return the pixels of a picture, (h, w, 4); see :func:`read_texture`.
+    def paint(self, mesh: Mesh, source: str | bytes, name: str) -> None:
+        """Give a drawable a texture; see :func:`read_texture`.
+
+        All textures have at most 2^26 pixels: the largest ones are halved until they fit.
 
         Raises:
-            Error: It cannot be read, or has more pixels than are left of 2^26 for all.
+            Error: It cannot be read.
         """
-        return _once(self._textures, source, lambda: self._read_texture(source, name))
+        pixels = _once(self._textures, source, lambda: self._read_texture(source, name))
+        self._painted.setdefault(source, []).append(mesh)
+        mesh.set_texture(pixels)
+        if self._pixels > MAX_PIXELS:
+            self._halve_textures()
 
     def _read_texture(self, source: str | bytes, name: str) -> NDArray[np.uint8]:
         found = read_texture(source, name, self._resources)
-        pixels = found.shape[0] * found.shape[1]
-        if self._pixels + pixels > MAX_PIXELS:
-            raise Error(
-                f"{name}: with its {pixels} pixels, all textures have more than {MAX_PIXELS}; "
-                "reduce them"
-            )
-        self._pixels += pixels
+        self._pixels += _pixels_of(found)
         return found
+
+    def _halve_textures(self) -> None:
+        if not self._halves:
+            self._halves = True
+            _log.warning(
+                "the textures have more than %d pixels; the largest are shown with half of their "
+                "resolution", MAX_PIXELS,
+            )  # fmt: skip
+        while self._pixels > MAX_PIXELS:
+            source = max(self._painted, key=lambda key: _pixels_of(self._textures[key]))
+            found = self._textures[source]
+            assert not isinstance(found, Exception)
+            smaller = _halved(found)
+            self._pixels -= _pixels_of(found) - _pixels_of(smaller)
+            self._textures[source] = smaller
+            for mesh in self._painted[source]:
+                mesh.set_texture(smaller)
+
+
+def _pixels_of(texture: NDArray[np.uint8] | Exception) -> int:
+    return 0 if isinstance(texture, Exception) else texture.shape[0] * texture.shape[1]
+
+
+def _halved(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a picture with half the width and height, each pixel the mean of four."""
+    for axis in (0, 1):
+        even = pixels.shape[axis] // 2 * 2
+        if even:
+            first, second = (
+                np.take(pixels, np.arange(start, even, 2), axis).astype(np.uint16)
+                for start in (0, 1)
+            )
+            pixels = ((first + second) // 2).astype(np.uint8)
+    return np.ascontiguousarray(pixels)
 
 
 def _once(known: dict[Any, _T | Exception], key: Any, read: Callable[[], _T]) -> _T:
@@ -319,9 +358,8 @@ def link_drawables(visual: Visual, problems: dict[str, str], files: MeshFiles) -
         made += _mesh_drawables(visual, geometry, own, problems, files)
     elif material is not None and material.texture:
         try:
-            pixels = files.texture(material.texture, material.texture)
             for mesh in made:
-                mesh.set_texture(pixels)
+                files.paint(mesh, material.texture, material.texture)
                 # RViz uses one or the other.
                 mesh.set_look(color=(1.0, 1.0, 1.0, 1.0))
         except (Error, OSError) as error:
@@ -349,7 +387,7 @@ def _mesh_drawables(
         mesh.set_instances(visual.origin[np.newaxis])
         if part.texture is not None:
             try:
-                mesh.set_texture(files.texture(part.texture, geometry.uri))
+                files.paint(mesh, part.texture, geometry.uri)
             except (Error, OSError) as error:
                 problems[geometry.uri] = str(error)
         made.append(mesh)
