@@ -18,7 +18,7 @@ from reference_members import NOTES, REFERENCE
 
 from rosglass.qml import ros1, ros2
 from rosglass.qml.action_client import ActionClient, RosActionClient
-from rosglass.qml.goal_handle import GoalHandle, RosGoalHandle
+from rosglass.qml.goal_handle import GoalHandle, RosGoalHandle, ServerGoalHandle
 from rosglass.qml.logger import Console, Logger
 from rosglass.qml.publisher import Publisher, RosPublisher
 from rosglass.qml.ros1 import Package
@@ -39,6 +39,7 @@ RETURNED = {
     },
     "Ros2": {
         "ActionClient": ActionClient,
+        "ActionServerGoalHandle": ServerGoalHandle,
         "GoalHandle": GoalHandle,
         "IO": Io,
         "Logger": Logger,

@@ -1,7 +1,7 @@
 """The members of the reference plugins' types, and how ours differ where they do.
 
-Reference: qml_ros_plugin 1.0.0 (``Ros``), qml_ros2_plugin 2.26 and qml6_ros2_plugin 4.26
-(``Ros2``), their public QML interfaces.
+Reference: qml_ros_plugin 1.0.0 (``Ros``), qml_ros2_plugin 2.26.30 and qml6_ros2_plugin 4.26.42
+(``Ros2``), and the servers of the latter's main branch; their public QML interfaces.
 """
 
 from __future__ import annotations
@@ -64,6 +64,10 @@ REFERENCE = {
         "ActionClient": "ready serverReadyChanged name type actionType connectionTimeout "
         "isServerReady sendGoalAsync cancelAllGoals cancelGoalsBefore",
         "GoalHandle": "status goalId goalStamp isActive cancel",
+        "ServiceServer": "name type qos processRequest advertised sendResponse",
+        "ActionServer": "name type handleGoal handleCancel advertised goalAccepted",
+        "ActionServerGoalHandle": "goal goalId isCanceling isActive isExecuting succeed abort "
+        "canceled publishFeedback cancelRequested terminated",
         "TfTransformListener": f"initialize {_TF} {_FRAMES}",
         "TfBuffer": f"ns clear {_TF} {_FRAMES}",
         "TfTransform": "sourceFrame targetFrame enabled transform message translation rotation "
@@ -120,6 +124,20 @@ NOTES = {
         f"the callback is optional; {_THROWS}",
     ),
     ("Ros2", "ActionClient", "ready"): ("better", _LOST),
+    ("Ros2", "ServiceServer", "processRequest"): (
+        "better",
+        "or a promise; without it, or if it fails, clients are answered at once",
+    ),
+    ("Ros2", "ServiceServer", "sendResponse"): ("better", _THROWS),
+    ("Ros2", "ServiceServer", "advertised"): ("better", "true again after a shutdown and init"),
+    ("Ros2", "ActionServer", "goalAccepted"): (
+        "better",
+        "a goal whose handler throws, or is missing, is aborted at once",
+    ),
+    ("Ros2", "ActionServerGoalHandle", "goalId"): (
+        "better",
+        "as in ROS 2's tools, with the digits in order",
+    ),
     ("Ros2", "GoalHandle", "goalId"): ("better", "as in ROS 2's tools, with the digits in order"),
     ("Ros2", "Ros2", "queryServices"): ("better", "hides the services of actions"),
     ("Ros2", "Ros2", "init"): (

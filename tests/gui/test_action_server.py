@@ -16,6 +16,7 @@ from rosglass.errors import GoalRejectedError
 if TYPE_CHECKING:
     from rosglass.comm import ClientGoal
 
+EVERY_WIRE = pytest.mark.parametrize("url", ["zenoh", "dds", "ros1"], indirect=True, scope="module")
 SUCCEEDED, CANCELED, ABORTED = GoalStatus.SUCCEEDED, GoalStatus.CANCELED, GoalStatus.ABORTED
 
 
@@ -202,6 +203,155 @@ def test_a_goal_is_accepted_by_true_alone(
     assert isinstance(goal.done.exception(), GoalRejectedError)
     assert root.property("asked") == 0
     assert "returned neither true nor false" in caplog.text
+
+
+def offer_by_signal(live: Bench, robot: Robot, body: str) -> Any:
+    """Offer an action in the way of qml6_ros2_plugin."""
+    return live.load(f"""
+        QtObject {{
+            id: root
+            property var handle
+            property var seen: []
+            property var label: handle ? missing.name : ""
+            property ActionServer server: ActionServer {{
+                name: "/count"; type: "{robot.type}"
+                {body}
+            }}
+            function run(script) {{ return JSON.stringify(eval(script)) }}
+            function note(what) {{ seen = seen.concat([what]) }}
+        }}
+    """)
+
+
+@EVERY_WIRE
+def test_a_server_in_the_way_of_qml6_ros2_plugin(live: Bench, robot: Robot, wait: Any) -> None:
+    root = offer_by_signal(
+        live,
+        robot,
+        """
+        handleGoal: function (goal, id) {
+            note("goal " + goal.order + " " + typeof id)
+            return goal.order < 9
+        }
+        handleCancel: function (h) { note("cancel " + (h === handle)); return true }
+        onAdvertisedChanged: note("advertised " + advertised)
+        onGoalAccepted: function (h) {
+            root.handle = h
+            note([h.goal.order, h.isActive, h.isExecuting, h.isCanceling].join())
+            h.statusChanged.connect(() => note([h.isActive, h.isExecuting, h.isCanceling].join()))
+            h.cancelRequested.connect(() => {
+                note("cancelRequested " + h.isCanceling)
+                h.canceled({sequence: [3]})
+            })
+            h.terminated.connect(() => note("terminated"))
+            h.publishFeedback({sequence: [0, 1]})
+        }
+        """,
+    )
+    wait(lambda: run(root, "server.advertised && server.actionType === server.type"))
+    refused = robot.send(9)
+    wait(refused.done.done)
+    assert isinstance(refused.done.exception(), GoalRejectedError)
+    goal = robot.send(4)
+    wait(lambda: run(root, "Boolean(handle)"))
+    wait(lambda: robot.feedback == [[0, 1]])
+    run(root, "handle.succeed({sequence: [1, 2]})")
+    assert robot.end(goal) == (SUCCEEDED, [1, 2])
+    # Later calls are logged and ignored.
+    assert (
+        run(root, "handle.succeed({sequence: []}); handle.publishFeedback({}); 'went on'")
+        == "went on"
+    )
+    wait(lambda: "terminated" in run(root, "seen"))
+    seen = run(root, "seen")
+    assert seen[:4] == ["advertised true", "goal 9 string", "goal 4 string", "4,true,true,false"]
+    assert seen[-1] == "terminated"
+    run(root, "seen = []; handle = null")
+    goal = robot.send(5)
+    wait(lambda: run(root, "Boolean(handle)"))
+    goal.cancel()
+    assert robot.end(goal) == (CANCELED, [3])
+    wait(lambda: "terminated" in run(root, "seen"))
+    seen = run(root, "seen")
+    assert "cancel true" in seen
+    assert seen.index("cancel true") < seen.index("cancelRequested true") < seen.index("terminated")
+    assert "true,false,true" in seen
+
+
+@EVERY_WIRE
+@pytest.mark.parametrize(
+    "cancel", ["", "handleCancel: h => {}", "handleCancel: h => { throw new Error('odd') }"]
+)
+def test_without_handle_cancel_a_cancel_is_refused(
+    live: Bench, robot: Robot, wait: Any, cancel: str
+) -> None:
+    root = offer_by_signal(live, robot, f"{cancel}\nonGoalAccepted: h => {{ root.handle = h }}")
+    goal = robot.send(5)
+    wait(lambda: run(root, "Boolean(handle)"))
+    answer = goal.cancel()
+    if not robot.ros1:  # in ROS 1, requests to cancel are not answered
+        wait(answer.done)
+        assert not answer.result().accepted
+    wait.settled(live.session)
+    assert run(root, "[handle.isCanceling, handle.isCancelRequested]") == [False, False]
+    run(root, "handle.succeed({sequence: [1]})")
+    assert robot.end(goal) == (SUCCEEDED, [1])
+
+
+@EVERY_WIRE
+@pytest.mark.parametrize(
+    ("body", "reason"),
+    [
+        ("onGoalAccepted: function (h) { throw new Error('no power') }", "no power"),
+        ("onGoalAccepted: function (h) { h.succed({}) }", "TypeError"),
+        ("Component.onCompleted: goalAccepted.connect(h => { missing.field })", "ReferenceError"),
+        ("", "goalAccepted is not connected"),
+        ("onGoalAccepted: function (h) { h.succeed({sequnce: []}) }", "sequnce"),
+        ("onGoalAccepted: function (h) { Qt.callLater(h.succeed, {sequnce: []}) }", "sequnce"),
+    ],
+)
+def test_goals_that_no_handler_ends_are_aborted_at_once(
+    live: Bench, robot: Robot, wait: Any, caplog: Any, body: str, reason: str
+) -> None:
+    root = offer_by_signal(live, robot, body)
+    goal = robot.send(5)
+    assert robot.end(goal) == (ABORTED, [])
+    wait(lambda: reason in caplog.text)
+    wait(lambda: run(root, "server.activeGoals") == 0)
+
+
+def test_an_error_of_a_binding_ends_no_goal(live: Bench, robot: Robot, wait: Any) -> None:
+    """It belongs to a label, not to the handler that changed what the label shows."""
+    root = offer_by_signal(live, robot, "onGoalAccepted: h => { root.handle = h }")
+    goal = robot.send(5)
+    wait(lambda: run(root, "Boolean(handle)"))
+    wait.settled(live.session)
+    assert run(root, "handle.isActive")
+    run(root, "handle.succeed()")
+    assert robot.end(goal) == (SUCCEEDED, [])
+
+
+def test_both_ways_in_one_server(live: Bench, robot: Robot, wait: Any) -> None:
+    """Goals go to execute if it is set; then a cancel without a handler is granted."""
+    root = offer_by_signal(
+        live,
+        robot,
+        """
+        handleGoal: (goal, id) => goal.order < 9
+        onGoalAccepted: h => note("accepted " + h.goalId.length)
+        execute: function (goal, h) { handle = h }
+        """,
+    )
+    refused = robot.send(9)
+    wait(refused.done.done)
+    assert isinstance(refused.done.exception(), GoalRejectedError)
+    goal = robot.send(5)
+    wait(lambda: run(root, "Boolean(handle)"))
+    assert len(run(root, "seen")) == 1
+    goal.cancel()
+    wait(lambda: run(root, "handle.isCanceling"))
+    run(root, "handle.canceled({sequence: [1]})")
+    assert robot.end(goal) == (CANCELED, [1])
 
 
 def test_withdrawing_ends_the_goals(live: Bench, robot: Robot, wait: Any) -> None:

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from conftest import Bench
 
 
+EVERY_WIRE = pytest.mark.parametrize("url", ["zenoh", "dds", "ros1"], indirect=True, scope="module")
+
+
 def test_a_client(live: Bench, wait: Any) -> None:
     live.robot.create_service_server(
         "/lamp", "std_srvs/srv/SetBool", lambda request: {"message": f"{request.data}"}
@@ -145,30 +148,128 @@ def test_a_server(live: Bench, wait: Any, handler: str, message: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("handler", "reason"),
+    ("answer", "reason"),
     [
-        ("function (r) { throw new Error('no power') }", "no power"),
-        ("function (r) { return {sucess: true} }", "sucess"),
-        ("function (r) { return false }", "returned false"),
-        ("function (r) { return new Promise(function (a, reject) { reject('no bulb') }) }", "bulb"),
+        ("handler: function (r) { throw new Error('no power') }", "no power"),
+        ("handler: function (r) { return {sucess: true} }", "sucess"),
+        ("handler: function (r) { return [1] }", "expected"),
+        ("handler: function (r) { return 5 }", "expected"),
+        ("handler: function (r) { return false }", "returned false"),
+        ("handler: function (r) { return new Promise((a, no) => no('no bulb')) }", "bulb"),
+        ("handler: null", "is not a function"),
+        ("processRequest: function (r, id) { throw new Error('no power') }", "no power"),
+        ("processRequest: function (r, id) { return {sucess: true} }", "sucess"),
+        ("processRequest: function (r, id) { return [1] }", "expected"),
+        ("processRequest: function (r, id) { return 5 }", "which is not a response"),
+        ("processRequest: function (r, id) { return null }", "which is not a response"),
+        ("processRequest: function (r, id) { return Promise.reject('no bulb') }", "bulb"),
+        (
+            "processRequest: function (r, id) { Qt.callLater(sendResponse, id, {sucess: true}) }",
+            "sucess",
+        ),
     ],
 )
-def test_failing_handlers(live: Bench, wait: Any, handler: str, reason: str, caplog: Any) -> None:
-    """They are logged; over ROS 1 the caller is told, over ROS 2 nobody can be."""
+@EVERY_WIRE
+def test_failing_handlers_are_answered_at_once(
+    live: Bench, wait: Any, answer: str, reason: str, caplog: Any
+) -> None:
+    """They are logged; clients are told where the wire can, or receive a default response."""
+    kind = "type" if answer.startswith("processRequest") else "serviceType"
     root: Any = live.load(f"""
         QtObject {{
-            property var server: Ros2.createServiceServer("/lamp", "std_srvs/SetBool", {handler})
+            property ServiceServer server: ServiceServer {{
+                name: "/lamp"; {kind}: "std_srvs/srv/SetBool"; {answer}
+            }}
         }}
     """)
+    caplog.set_level("INFO")
     client = live.robot.create_service_client("/lamp", "std_srvs/srv/SetBool")
-    call = client.call_async({"data": True}, timeout=20)
-    if live.session.url.startswith("ros1"):
-        wait(call.done)
+    call = client.call_async({"data": True}, timeout=None)
+    wait(call.done)
+    if live.session.url.startswith("dds"):
+        response = call.result()
+        assert (response.success, response.message) == (False, "")
+    else:
         with pytest.raises(Error, match=reason):
             call.result()
-    else:
-        wait(lambda: reason in caplog.text)
+    wait(lambda: reason in caplog.text)
     assert root is not None
+
+
+def test_open_requests_are_limited(live: Bench, wait: Any, monkeypatch: Any) -> None:
+    monkeypatch.setattr("rosglass.qml.callbacks._MAX_OPEN", 2)
+    root: Any = live.load("""
+        QtObject {
+            property var open: []
+            property ServiceServer server: ServiceServer {
+                name: "/lamp"; type: "std_srvs/srv/SetBool"
+                processRequest: function (request, id) { open = open.concat([id]) }
+            }
+        }
+    """)
+    client = live.robot.create_service_client("/lamp", "std_srvs/srv/SetBool")
+    calls = [client.call_async({"data": True}, timeout=None) for _ in range(3)]
+    wait(calls[2].done)
+    with pytest.raises(Error, match="2 requests open"):
+        calls[2].result()
+    assert root.property("open").toVariant() == [1, 2]
+    assert [call.done() for call in calls[:2]] == [False, False]
+
+
+@EVERY_WIRE
+def test_servers_in_the_way_of_qml6_ros2_plugin(live: Bench, wait: Any, caplog: Any) -> None:
+    root: Any = live.load("""
+        QtObject {
+            id: root
+            property var open: []
+            property bool offered: first.advertised && second.advertised
+            property ServiceServer first: ServiceServer {
+                name: "/at_once"; type: "std_srvs/srv/SetBool"; qos: Ros2.ServicesQoS()
+                processRequest: function (request, id) {
+                    return {success: request.data, message: "number " + id}
+                }
+            }
+            property ServiceServer second: ServiceServer {
+                id: second
+                name: "/later"; type: "std_srvs/srv/SetBool"
+                processRequest: function (request, id) { root.open = root.open.concat([id]) }
+                onAdvertisedChanged: console.log("advertised", advertised)
+                onTypeChanged: console.log("type", type, serviceType)
+            }
+            property ServiceServer ours: ServiceServer {
+                name: "/ours"; serviceType: "std_srvs/srv/SetBool"
+                handler: function (request) { return {message: "ours"} }
+            }
+            function answer(at, text) { second.sendResponse(open[at], {message: text}) }
+            function withdraw() { second.enabled = false }
+        }
+    """)
+    clients = {
+        name: live.robot.create_service_client(name, "std_srvs/srv/SetBool")
+        for name in ("/at_once", "/later", "/ours")
+    }
+    at_once = clients["/at_once"].call_async({"data": True}, timeout=20)
+    ours = clients["/ours"].call_async({"data": True}, timeout=20)
+    wait(lambda: at_once.done() and ours.done())
+    assert (at_once.result().success, at_once.result().message) == (True, "number 1")
+    assert ours.result().message == "ours"
+    assert root.property("offered")
+    first, second, third = (
+        clients["/later"].call_async({"data": True}, timeout=20) for _ in range(3)
+    )
+    wait(lambda: root.property("open").toVariant() == [1, 2, 3])
+    root.answer(1, "second")
+    root.answer(0, "first")
+    wait(lambda: first.done() and second.done())
+    assert [first.result().message, second.result().message] == ["first", "second"]
+    root.answer(0, "again")
+    wait(lambda: "there is no open request 1" in caplog.text)
+    # A withdrawn server leaves no client waiting.
+    assert not third.done()
+    root.withdraw()
+    wait(third.done)
+    error = third.exception()
+    assert third.result().message == "" if error is None else "closed" in str(error)
 
 
 def test_misused_makers_throw(live: Bench) -> None:

@@ -7,6 +7,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from concurrent.futures import Future, wait
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from rosglass.comm.time import Time
     from rosglass.messages import ActionType, Message
 
-__all__ = ["ActionServer", "ActionServerProtocol", "Result", "ServerGoal"]
+__all__ = ["ActionServer", "ActionServerProtocol", "Result", "ServerGoal", "TakesGoal"]
 
 _Goal = TypeVar("_Goal", bound="ServerGoal")
 #: The result that `execute` returns.
@@ -304,6 +305,17 @@ class ServerGoal(Handle):
         return Error(f"{where} has ended as {self._status.value} already: {what}")
 
 
+@dataclass(frozen=True)
+class TakesGoal:
+    """An `accept` callback that receives the goal itself, not only its message."""
+
+    callback: Callable[[ServerGoal], bool]
+
+    def __call__(self, goal: Any) -> bool:
+        """Return whether to accept the goal."""
+        return self.callback(goal)
+
+
 @hint_at_members
 class ActionServer(Handle):
     """Serves an action; created by :meth:`Node.create_action_server`.
@@ -412,7 +424,8 @@ class ActionServer(Handle):
             return
 
         def decide() -> None:
-            accepted = self._ask_user(goal, "accept", lambda: accept(goal.goal), False, "rejecting")
+            given: Any = goal if isinstance(accept, TakesGoal) else goal.goal
+            accepted = self._ask_user(goal, "accept", lambda: accept(given), False, "rejecting")
             refusal = "" if accepted else "It is not accepted"
             self._protocol.post(lambda: self._on_decision(goal, refusal))
 

@@ -202,6 +202,7 @@ class Node(Handle):
         qos: QoS | None = None,
         *,
         executor: Executor | None = None,
+        answers_failures: bool = False,
     ) -> ServiceServer:
         """Offer a service.
 
@@ -215,6 +216,8 @@ class Node(Handle):
                 in the event loop in which the server is created.
             qos: Profile of requests and replies; None for ROS's default for services.
             executor: Runs `callback`; None for the node's own dispatcher thread.
+            answers_failures: Whether a client that the wire cannot report an exception to
+                receives a response with all defaults, instead of waiting for ever.
 
         Raises:
             InvalidNameError: The name breaks ROS's rules.

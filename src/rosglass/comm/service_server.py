@@ -50,6 +50,7 @@ class ServiceServer(Handle):
             `callback` is a coroutine function.
         create_replier: Announces the service; called with the handler of its requests, and whether
             that handler only passes them to another thread (:attr:`Replier.quick`).
+        answers_failures: See :meth:`Node.create_service_server`.
 
     Attributes:
         name: Absolute service name.
@@ -66,6 +67,8 @@ class ServiceServer(Handle):
         qos: QoS,
         executor: Executor | None,
         create_replier: Callable[[OnRequest, bool], Replier],
+        *,
+        answers_failures: bool = False,
     ) -> None:
         self._core, self.name, self.type, self.qos = core, name, type, qos
         self._executor = executor_for(callback, executor, core.dispatcher, name)
@@ -76,6 +79,8 @@ class ServiceServer(Handle):
         self._waiting = 0
         self._running: set[Future[Any]] = set()
         self._log_once = LogOnce()
+        #: The response to a request that failed, where the wire cannot report that.
+        self._instead = type.response.encode(None) if answers_failures else None
         #: Requests received before the replier is set; None from then on.
         self._early: deque[tuple[RequestId, bytes]] | None = deque()
         # Other executors may block.
@@ -210,7 +215,7 @@ class ServiceServer(Handle):
                 error,
                 self._failure_effect,
             )
-            self._replier.fail(request, f"the server returned no valid response: {error}")
+            self._fail(request, f"the server returned no valid response: {error}")
             return
         try:
             self._replier.reply(request, data)
@@ -225,8 +230,11 @@ class ServiceServer(Handle):
     @property
     def _failure_effect(self) -> str:
         """The effect of a failure on the client, for log lines."""
-        reported = self._replier.tells_failures
-        return "it receives the error instead" if reported else "it gets no response, and waits"
+        if self._replier.tells_failures:
+            return "it receives the error instead"
+        if self._instead is not None:
+            return "it gets a response with all defaults, as ROS 2 has no errors"
+        return "it gets no response, and waits"
 
     def _on_failure(self, request: RequestId, error: Exception) -> None:
         """Log that the callback failed, and report it to the client if the wire can."""
@@ -245,14 +253,24 @@ class ServiceServer(Handle):
                 reason,
                 exc_info=None if reason else error,
             )
-        self._replier.fail(request, self._replier.describe_failure(error))
+        self._fail(request, self._replier.describe_failure(error))
 
     def _refuse(self, request: RequestId, reason: str) -> None:
         """Refuse an invalid request, and log that once per client."""
         if self._log_once.is_first(request.client):
             client = self._replier.client_name(request)
             _log.warning("%s: refusing requests of %s: %s", self.name, client, reason)
-        self._replier.fail(request, reason)
+        self._fail(request, reason)
+
+    def _fail(self, request: RequestId, reason: str) -> None:
+        """Report a failure to the client; ignored once the server is closed by another thread."""
+        try:
+            self._replier.fail(request, reason, self._instead)
+        except NodeClosedError:
+            pass
+        except Error as error:
+            client = self._replier.client_name(request)
+            _log.error("%s: cannot answer %s: %s", self.name, client, error)
 
 
 def decode_checked(kind: MessageType, data: bytes | memoryview) -> Message:

@@ -8,6 +8,7 @@ import re
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any
 
+from rosglass.comm.action_server import TakesGoal
 from rosglass.errors import Error
 from rosglass.qml.callbacks import Answers, call_back, weak_callback
 from rosglass.qml.dialect import Dialect
@@ -16,7 +17,7 @@ from rosglass.qml.goal_handle import ServerGoalHandle
 from rosglass.qml.js_values import properties_of
 from rosglass.qml.properties import ReadOnly, Writable, function, report
 from rosglass.qml.singleton import full_type
-from rosglass.qt import QJSValue, is_alive
+from rosglass.qt import QJSValue, QtCore, Signal, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from rosglass.comm.action_server import ActionServer as Server
     from rosglass.comm.action_server import ServerGoal
     from rosglass.comm.node import Node
-    from rosglass.messages import Message
+    from rosglass.qml.runtime import Runtime
 
 __all__ = ["ActionServer", "RosActionServer", "action_type", "server_functions"]
 
@@ -57,20 +58,42 @@ class _Goals:
 
 
 class ActionServer(Element):
-    """Offers an action while it is enabled. See its page in ``docs/elements``."""
+    """Offers an action while it is enabled. See its page in ``docs/elements``.
+
+    Goals are executed by the function ``execute``; without it, by what is connected to the signal
+    ``goalAccepted``, as in qml6_ros2_plugin, of which it has all members.
+    """
+
+    typeChanged = Signal()
+    advertisedChanged = Signal()
+    #: A goal was accepted; the argument is its handle.
+    goalAccepted = Signal(QJSValue, arguments=["handle"])
 
     name = Writable(str, "")
     actionType = Writable(str, "")
+    type = Writable(str, read=lambda self: self.actionType, write="_set_type")
     accept = Writable(QJSValue, accept=function, then="")
+    handleGoal = Writable(QJSValue, accept=function, then="")
     execute = Writable(QJSValue, accept=function)
     cancel = Writable(QJSValue, accept=function, then="")
+    handleCancel = Writable(QJSValue, accept=function, then="")
     enabled = Writable(bool, True)
     ready = ReadOnly(bool, False)
+    advertised = ReadOnly(bool, read=lambda self: self.ready)
     activeGoals = ReadOnly(int, 0)
 
-    _HOLDS = ("_accept", "_execute", "_cancel", "_goals")
+    _HOLDS = ("_accept", "_handleGoal", "_execute", "_cancel", "_handleCancel", "_goals")
     _endpoint: Server | None
     _goals: _Goals | None = None
+    #: Whether QML has set ``type``, so that the action is offered without ``execute``.
+    _by_signal = False
+
+    def __init__(
+        self, parent: QtCore.QObject | None = None, runtime: Runtime | None = None
+    ) -> None:
+        super().__init__(parent, runtime)
+        self.actionTypeChanged.connect(self.typeChanged)  # type: ignore[attr-defined]
+        self.readyChanged.connect(self.advertisedChanged)  # type: ignore[attr-defined]
 
     def configure(self, name: str, type_name: str, functions: dict[str, QJSValue]) -> None:
         """Set the arguments of ``Ros2.createActionServer``."""
@@ -83,12 +106,23 @@ class ActionServer(Element):
         """The element's name in error messages."""
         return f"action {self.name}"
 
+    def _set_type(self, name: str) -> None:
+        self._by_signal = True
+        self.actionType = name
+        self._schedule()
+
+    def _has_listeners(self) -> bool:
+        """Return whether goalAccepted is connected."""
+        meta = self.metaObject()
+        return self.isSignalConnected(meta.method(meta.indexOfSignal("goalAccepted(QJSValue)")))
+
     def _full_type(self) -> str:
         return full_type(self.actionType, "action")
 
     def _wanted(self) -> tuple[Node, str, str] | None:
         node = self.node
-        complete = self.name and self.actionType and self.execute.isCallable()
+        executes = self.execute.isCallable() or self._by_signal or self._has_listeners()
+        complete = self.name and self.actionType and executes
         if node is None or not (self.enabled and complete):
             return None
         return node, self.name, self._full_type()
@@ -109,7 +143,7 @@ class ActionServer(Element):
             name,
             type_name,
             lambda goal: on_goal(key, goal),
-            accept=lambda goal: accepts(key, goal),
+            accept=TakesGoal(lambda goal: accepts(key, goal)),
             cancel=lambda goal: allows(key, goal),
             executor=executor,
         )
@@ -136,13 +170,16 @@ class ActionServer(Element):
         goals = self._goals if is_alive(self) else None
         return goals if goals is not None and goals.key is key else None
 
-    def _accepts(self, key: object, goal: Message) -> bool:
+    def _accepts(self, key: object, goal: ServerGoal) -> bool:
         runtime = self._runtime
         if self._goals_of(key) is None or runtime is None:
             return False
+        message = runtime.message(goal.goal, self.DIALECT)
         if not self.accept.isCallable():
-            return True
-        answer = call_back(runtime, self.accept, runtime.message(goal, self.DIALECT))
+            if not self.handleGoal.isCallable():
+                return True
+            return call_back(runtime, self.handleGoal, message, QJSValue(goal.id_text)).toBool()
+        answer = call_back(runtime, self.accept, message)
         if not answer.isBool():
             _log.error("accept of %s returned neither true nor false: rejecting", self.label)
         return answer.isBool() and answer.toBool()
@@ -150,9 +187,15 @@ class ActionServer(Element):
     def _allows(self, key: object, goal: ServerGoal) -> bool:
         runtime, goals = self._runtime, self._goals_of(key)
         handle = goals.handles.get(goal.id) if goals is not None else None
+        if not (self.execute.isCallable() or self.cancel.isCallable()):
+            # As in qml6_ros2_plugin: a goal that no handler can end is not cancelled.
+            if runtime is None or handle is None or not handle.isActive:
+                return False
+            return call_back(runtime, self.handleCancel, handle.js).toBool()
         if runtime is None or handle is None:
             return True
-        answer = call_back(runtime, self.cancel, handle.js)
+        decide = self.cancel if self.cancel.isCallable() else self.handleCancel
+        answer = call_back(runtime, decide, handle.js)
         return not answer.isBool() or answer.toBool()
 
     def _on_goal(self, key: object, goal: ServerGoal) -> Any:
@@ -176,13 +219,21 @@ class ActionServer(Element):
             if goals.handles.pop(goal.id, None) is handle and is_alive(self):
                 report(self, activeGoals=len(goals.handles))
 
-        handle = ServerGoalHandle(runtime, goal, server.type, self.DIALECT, forget)
+        by_signal = not self.execute.isCallable()
+        handle = ServerGoalHandle(runtime, goal, server.type, self.DIALECT, forget, by_signal)
         if ended is not None:
             handle.ended = ended
         goals.handles[goal.id] = handle
         report(self, activeGoals=len(goals.handles))
         arguments = [runtime.message(goal.goal, self.DIALECT), handle.js]
         waiting = handle.ended
+        thrown = runtime.errors_of(lambda: self.goalAccepted.emit(handle.js))
+        if by_signal:
+            if not thrown and not self._has_listeners():
+                thrown = ["there is no function execute, and goalAccepted is not connected"]
+            if thrown and is_alive(self):
+                handle.fail(Error(f"{self.label}: {thrown[0]}"))
+            return waiting
         try:
             answer = goals.answers.ask(self.execute, arguments, handle.take)
         except Error as error:

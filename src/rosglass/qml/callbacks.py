@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rosglass.qt import QtQml
 
 
-__all__ = ["Answers", "Deferred", "JsCalls", "call_back", "weak_callback"]
+__all__ = ["Answers", "Deferred", "JsCalls", "call_back", "pass_on", "weak_callback"]
 
 _SCRIPT = """(function (calls, jobs) {
     function thrown(value) {
@@ -34,6 +34,8 @@ _SCRIPT = """(function (calls, jobs) {
         job.done = true
     })
 })"""
+#: Maximum number of open answers of one function; more requests are refused.
+_MAX_OPEN = 1000
 _ENDED = "new Error('the function was ended because it blocked the interface')"
 
 
@@ -223,19 +225,28 @@ class Answers:
             answer = promise
         if not answer.property("then").isCallable():
             return take(answer)
-        future: Future[Any] = Future()
-        self._pending.add(future)
-        future.add_done_callback(self._pending.discard)
+        future = self.open()
         settler = engine.newQObject(_Settler(self._runtime, take, future))
         functions = [settler.property("settle"), settler.property("fail")]
         answer.property("then").callWithInstance(answer, functions)
         return future
 
-    def later(self, queue: list[Callable[[], None]], ask: Callable[[], Any]) -> Future[Any]:
-        """Queue a call of `ask`; return a future of its result or error."""
+    def open(self) -> Future[Any]:
+        """Return a future of a later answer, which fails when the function no longer exists.
+
+        Raises:
+            Error: Too many answers are open.
+        """
+        if len(self._pending) >= _MAX_OPEN:
+            raise Error(f"{self._what} has {_MAX_OPEN} requests open: answer them first")
         future: Future[Any] = Future()
         self._pending.add(future)
         future.add_done_callback(self._pending.discard)
+        return future
+
+    def later(self, queue: list[Callable[[], None]], ask: Callable[[], Any]) -> Future[Any]:
+        """Queue a call of `ask`; return a future of its result or error."""
+        future = self.open()
 
         def run() -> None:
             if future.done():
@@ -246,7 +257,7 @@ class Answers:
                 future.set_exception(error)
                 return
             if isinstance(answer, Future):
-                answer.add_done_callback(lambda done: _pass_on(done, future))
+                answer.add_done_callback(lambda done: pass_on(done, future))
             else:
                 future.set_result(answer)
 
@@ -260,7 +271,8 @@ class Answers:
                 future.set_exception(Error(f"{self._what} was closed before it answered"))
 
 
-def _pass_on(done: Future[Any], future: Future[Any]) -> None:
+def pass_on(done: Future[Any], future: Future[Any]) -> None:
+    """Give a future the outcome of another one, unless it has one."""
     if future.done():
         return
     error = done.exception()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.action_client import GoalStatus
 from rosglass.comm.time import Time
-from rosglass.errors import Error
+from rosglass.errors import ConversionError, Error
 from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import given_fields, named
 from rosglass.qml.log import log_from_qml
@@ -184,6 +184,8 @@ class GoalHandle(QtCore.QObject):
         dialect: The module whose format feedback and result have.
         timeout_ms: Milliseconds for a server to appear and to answer; 0 for no limit.
         forget: Called when the goal has ended.
+        tolerant: Whether functions after the end, and results that do not fit, are logged instead
+            of thrown; such a result aborts the goal, so that its client does not wait.
     """
 
     #: The status, given as the argument, or ``isActive`` changed.
@@ -568,9 +570,23 @@ class ServerGoalHandle(QtCore.QObject):
     #: The status changed to the argument.
     statusChanged = Signal(int)
     cancelRequestedChanged = Signal()
+    #: A request to cancel the goal was accepted.
+    cancelRequested = Signal()
+    #: The goal has ended.
+    terminated = Signal()
 
     status = ReadOnly(int, read=lambda self: int(status_code(self._goal.status)))
     isActive = ReadOnly(bool, read=lambda self: self._goal.status.is_active, notify="statusChanged")
+    isExecuting = ReadOnly(
+        bool,
+        read=lambda self: self._goal.status is GoalStatus.EXECUTING,
+        notify="statusChanged",
+    )
+    isCanceling = ReadOnly(
+        bool,
+        read=lambda self: self._goal.status is GoalStatus.CANCELING,
+        notify="statusChanged",
+    )
     goalId = Property(str, lambda self: self._goal.id_text, constant=True)
     goalStamp = Property(
         QJSValue, lambda self: self._runtime.time(self._goal.accepted, self._dialect), constant=True
@@ -584,12 +600,14 @@ class ServerGoalHandle(QtCore.QObject):
         type: ActionType,
         dialect: Dialect,
         forget: Callable[[ServerGoalHandle], None],
+        tolerant: bool = False,
     ) -> None:
         super().__init__()
         self._runtime, self._goal, self._type, self._dialect = runtime, goal, type, dialect
+        self._tolerant = tolerant
         self._forget, self._status, self._requested = forget, goal.status, False
         self._asked: QJSValue | None = None
-        self._abandoned = False
+        self._abandoned = self._over = False
         self._caller = runtime.caller()
         #: The node waits for this: the fields of the result, or None for an empty result.
         self.ended: Future[Any] = Future()
@@ -643,8 +661,18 @@ class ServerGoalHandle(QtCore.QObject):
         try:
             do(given_fields(QJSValue() if value is None else value, kind, self._dialect))
         except Error as error:
-            self._runtime.throw(f"{what} of {self._label}: {error}")
+            text = f"{what} of {self._label}: {error}"
+            if not self._tolerant:
+                self._runtime.throw(text)
+            elif isinstance(error, ConversionError) and kind is self._type.result:
+                self._log(f"{text}; the goal is aborted", logging.ERROR)
+                self.fail(error)
+            else:
+                self._log(text, logging.WARNING)
         self.refresh()
+
+    def _log(self, text: str, level: int) -> None:
+        log_from_qml("", level, text, self._runtime.caller())
 
     # For its server.
 
@@ -703,8 +731,15 @@ class ServerGoalHandle(QtCore.QObject):
             self._requested = True
             self.cancelRequestedChanged.emit()
             QtCore.QTimer.singleShot(_REMINDER, self._remind)
+        canceling = status is GoalStatus.CANCELING and self._status is not GoalStatus.CANCELING
         self._tell(self._goal.status)
+        # Unless a handler has ended it.
+        if canceling and is_alive(self) and self.isCanceling:
+            self.cancelRequested.emit()
         if not status.is_active:
+            ended, self._over = not self._over, True
+            if ended and is_alive(self):
+                self.terminated.emit()
             self.js = QJSValue()
 
     @Slot()

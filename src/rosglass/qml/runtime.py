@@ -19,7 +19,7 @@ from rosglass.qml.to_js import describe, exact, is_duration, milliseconds, reade
 from rosglass.qt import QT6, QJSValue, QtCore, QtQml, Slot, is_alive
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from rosglass.comm.qos import QoS
     from rosglass.comm.time import Duration, Time
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 __all__ = ["UNPREPARED", "Host", "LongArrays", "Runtime", "own_runtime", "runtime_of"]
 
 _NS = 1_000_000_000
+#: The file of a caller that is not QML.
+_NO_FILE = "<python>"
 #: Largest number of whole seconds that a double holds exactly, in nanoseconds.
 _LONGEST = 2**53 * _NS
 
@@ -237,6 +239,28 @@ class Runtime(QtCore.QObject):
             raise Error("the QML engine of this function is gone")
         return self._calls.call(function, arguments)
 
+    def errors_of(self, emit: Callable[[], None]) -> list[str]:
+        """Emit a signal; return the errors that QML's handlers of it threw, with file and line.
+
+        Errors of bindings that change while a handler runs are not among them.
+        """
+        found: list[str] = []
+
+        def note(warnings: Sequence[QtQml.QQmlError]) -> None:
+            if self.caller().file == _NO_FILE:  # no handler is running: it has been left
+                found.extend(warning.toString() for warning in warnings)
+
+        engine = self.engine
+        if engine is None:
+            return found
+        engine.warnings.connect(note)
+        try:
+            emit()
+        finally:
+            if is_alive(engine):
+                engine.warnings.disconnect(note)
+        return found
+
     @property
     def engine(self) -> QtQml.QQmlEngine | None:
         """The engine; None if it no longer exists."""
@@ -258,7 +282,7 @@ class Runtime(QtCore.QObject):
             path = plain_path(file)
             if line.lstrip("-").isdigit() and not path.startswith(_OWN_SCRIPTS):
                 return Caller(path, max(int(line), 0), function)
-        return Caller("<python>", 0, "")
+        return Caller(_NO_FILE, 0, "")
 
     def forget_warnings(self) -> None:
         """Allow warnings about missing fields to be repeated, as the files may have changed."""

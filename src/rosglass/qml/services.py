@@ -5,27 +5,29 @@ from __future__ import annotations
 
 import logging
 import time
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from rosglass.errors import Error, ServiceError, ServiceUnavailableError
-from rosglass.qml.callbacks import Answers, Deferred, call_back, weak_callback
+from rosglass.comm.qos import QoS
+from rosglass.errors import ConversionError, Error, ServiceError, ServiceUnavailableError
+from rosglass.qml.callbacks import Answers, Deferred, call_back, pass_on, weak_callback
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.element import CONNECTION_TIMEOUT_MS, ClientElement, Element, given_fields, named
 from rosglass.qml.from_js import fields_from_js
+from rosglass.qml.js_values import qos_from_js, shown
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.properties import ReadOnly, Writable, at_least, function, report
 from rosglass.qml.runtime import own_runtime
 from rosglass.qml.session import NOT_INITIALIZED
 from rosglass.qml.singleton import full_type
 from rosglass.qml.waiting import MOST_WAITING, wait_for
-from rosglass.qt import Property, QJSValue, QtCore, Slot, is_alive
+from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm.node import Node
-    from rosglass.comm.qos import QoS
     from rosglass.comm.service_client import Call
     from rosglass.comm.service_client import ServiceClient as Caller_
     from rosglass.comm.service_server import ServiceServer as Server
@@ -340,15 +342,26 @@ _GONE = "the interface that offered this service is gone"
 
 
 class ServiceServer(Element):
-    """Offers a service while it is enabled. See its page in ``docs/elements``."""
+    """Offers a service while it is enabled. See its page in ``docs/elements``.
+
+    It has the members of qml6_ros2_plugin's, too: ``type``, ``processRequest`` and ``advertised``.
+    """
+
+    qosChanged = Signal()
+    typeChanged = Signal()
+    advertisedChanged = Signal()
 
     name = Writable(str, "")
     serviceType = Writable(str, "")
+    type = Writable(str, read=lambda self: self.serviceType, write="_set_type")
+    qos = Writable(QJSValue, read="_get_qos", write="_set_qos")
     handler = Writable(QJSValue, accept=function, then="")
+    processRequest = Writable(QJSValue, accept=function, then="")
     enabled = Writable(bool, True)
     ready = ReadOnly(bool, False)
+    advertised = ReadOnly(bool, read=lambda self: self.ready)
 
-    _HOLDS = ("_handler", "_answers", "_early")
+    _HOLDS = ("_handler", "_processRequest", "_answers", "_early", "_open")
     _endpoint: Server | None
 
     def __init__(
@@ -358,29 +371,62 @@ class ServiceServer(Element):
         self._answers: Answers | None = None
         #: Requests that arrived before the worker thread had returned the server.
         self._early: list[Callable[[], None]] = []
+        #: The answers that processRequest owes, by the number of the request.
+        self._open: dict[int, tuple[Future[Any], Callable[[QJSValue], Any]]] = {}
+        self._number = 0
+        self._profile = QoS.services()
+        self.serviceTypeChanged.connect(self.typeChanged)  # type: ignore[attr-defined]
+        self.readyChanged.connect(self.advertisedChanged)  # type: ignore[attr-defined]
 
     def configure(self, name: str, type_name: str, handler: QJSValue) -> None:
         """Set the arguments of ``Ros2.createServiceServer``."""
         self.name, self.serviceType, self.handler = name, type_name, handler
+
+    def _set_type(self, name: str) -> None:
+        self.serviceType = name
+
+    def _get_qos(self) -> QJSValue:
+        runtime = self._find_runtime()
+        return runtime.qos(self._profile) if runtime is not None else QJSValue()
+
+    def _set_qos(self, value: QJSValue | None) -> None:
+        try:
+            profile = qos_from_js(value, QoS.services())
+        except ConversionError as error:
+            self._refuse(f"{self.label}: {error}")
+            return
+        if profile != self._profile:
+            self._profile = profile
+            self.qosChanged.emit()
+            self._schedule()
 
     @property
     def label(self) -> str:
         """The element's name in error messages."""
         return f"service {self.name}"
 
-    def _wanted(self) -> tuple[Node, str, str] | None:
+    def _wanted(self) -> tuple[Node, str, str, QoS] | None:
         node = self.node
         if node is None or not (self.enabled and self.name and self.serviceType):
             return None
-        return node, self.name, full_type(self.serviceType, "srv")
+        return node, self.name, full_type(self.serviceType, "srv"), self._profile
 
-    def _factory(self, node: Node, name: str, type_name: str) -> Callable[[], Server]:
+    def _factory(self, node: Node, name: str, type_name: str, qos: QoS) -> Callable[[], Server]:
         runtime, executor = self._find_runtime(), self._executor
         assert runtime is not None
         answers = self._answers = Answers(runtime, f"the handler of {self.label}")
         self._cleanup["answers"] = answers.give_up
         on_request = weak_callback(self._on_request, ServiceError(_GONE))
-        return lambda: node.create_service_server(name, type_name, on_request, executor=executor)
+        # ROS 2 has no errors: a client would wait for ever.
+        return lambda: node.create_service_server(
+            name, type_name, on_request, qos, executor=executor, answers_failures=True
+        )
+
+    def _close_endpoint(self) -> None:
+        # While the server exists, so that the clients of open requests are answered.
+        if self._answers is not None:
+            self._answers.give_up()
+        super()._close_endpoint()
 
     def _on_created(self, endpoint: Server) -> None:
         self._set_problem(endpoint.problem)
@@ -390,9 +436,7 @@ class ServiceServer(Element):
             answer()
 
     def _on_closed(self, endpoint: Server | None) -> None:  # noqa: ARG002 - the base's signature
-        answers, self._answers, self._early = self._answers, None, []
-        if answers is not None:
-            answers.give_up()
+        self._answers, self._early = None, []
         report(self, ready=False)
 
     def _on_request(self, request: Message) -> Any:
@@ -415,7 +459,63 @@ class ServiceServer(Element):
                 return None
             return fields_from_js(value, kind, dialect=self.DIALECT)
 
-        return answers.ask(self.handler, [runtime.message(request, self.DIALECT)], take)
+        value = runtime.message(request, self.DIALECT)
+        if self.handler.isCallable() or not self.processRequest.isCallable():
+            return answers.ask(self.handler, [value], take)
+        return self._process(value, answers, take)
+
+    def _process(self, request: QJSValue, answers: Answers, take: Callable[[QJSValue], Any]) -> Any:
+        """Return the answer of processRequest: at once, or by sendResponse after undefined."""
+        runtime, answered = self._runtime, answers.open()
+        assert runtime is not None
+        number = self._number = (self._number + 1) % 2**31
+        self._open[number] = answered, take
+        answered.add_done_callback(lambda _: self._open.pop(number, None))
+
+        def settle(value: QJSValue) -> Any:
+            return None if value.isUndefined() else _plain(value, take)
+
+        try:
+            answer = answers.ask(self.processRequest, [request, runtime.value(number)], settle)
+        except Error as error:
+            if not answered.done():
+                answered.set_exception(error)
+            return answered
+        if isinstance(answer, Future):  # of a promise
+            answer.add_done_callback(lambda done: pass_on(done, answered))
+        elif answer is not None and not answered.done():
+            answered.set_result(answer)
+        return answered
+
+    @Slot(int)
+    @Slot(int, QJSValue)
+    def sendResponse(self, id: int, response: QJSValue | None = None) -> None:
+        """Answer a request for which processRequest returned undefined.
+
+        A response that does not fit throws a JavaScript Error, and fails the request.
+
+        Args:
+            id: The second argument of processRequest.
+            response: The response; without it, one with all defaults.
+        """
+        answered, take = self._open.pop(id, (None, None))
+        if answered is None or take is None or answered.done():
+            text = f"{self.label}: there is no open request {id}; it may have been answered already"
+            log_from_qml("", logging.WARNING, text, self._caller())
+            return
+        try:
+            answered.set_result(take(QJSValue() if response is None else response))
+        except Error as error:
+            answered.set_exception(error)
+            if self._runtime is not None:
+                self._runtime.throw(f"sendResponse of {self.label}: {error}")
+
+
+def _plain(value: QJSValue, take: Callable[[QJSValue], Any]) -> Any:
+    """Return the fields of a response; raises Error for all other values."""
+    if not value.isObject():
+        raise Error(f"processRequest returned {shown(value)!r}, which is not a response")
+    return take(value)
 
 
 def server_function(given: QJSValue) -> QJSValue:

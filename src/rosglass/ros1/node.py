@@ -201,6 +201,7 @@ class Ros1Node(Node):
         qos: QoS | None = None,
         *,
         executor: Executor | None = None,
+        answers_failures: bool = False,
     ) -> ServiceServer:
         """Offer a service; see :meth:`rosglass.comm.Node.create_service_server`.
 
@@ -209,6 +210,7 @@ class Ros1Node(Node):
         """
         self._core.check_open()
         check_order("create_service_server", name, type)
+        check_flag(answers_failures, "answers_failures", name)
         return self._services.serve(self.resolve(name), type, callback, qos, executor)
 
     # -- actions ---------------------------------------------------------------------------------

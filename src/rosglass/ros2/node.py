@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm import IMMEDIATE, Node, NodeName, QoS, Subscription
 from rosglass.comm.action_server import ActionServer
 from rosglass.comm.builtin_services import USE_SIM_TIME, BuiltinProtocol, BuiltinServices, SimTime
+from rosglass.comm.handle import check_flag
 from rosglass.comm.lifecycle import LifecycleClient
 from rosglass.comm.log import NodeLog, RosoutTopic, clean, message_of
 from rosglass.comm.names import validate_namespace, validate_node_name
@@ -124,14 +125,18 @@ class Ros2Node(Node):
         qos: QoS | None = None,
         *,
         executor: Executor | None = None,
+        answers_failures: bool = False,
     ) -> ServiceServer:
         """Offer a service; see :meth:`rosglass.comm.Node.create_service_server`."""
         self._core.check_open()
         check_order("create_service_server", name, type)
         self._core.types.ensure(type)
+        check_flag(answers_failures, "answers_failures", name)
         profile = _service_profile(qos, name)
         full = self._core.resolve(name, "service")
-        return create_service_server(self._core, full, type, callback, profile, executor)
+        return create_service_server(
+            self._core, full, type, callback, profile, executor, answers_failures
+        )
 
     def create_action_client(self, name: str, type: str | ActionType | None = None) -> ActionClient:
         """Return a client; see :meth:`rosglass.comm.Node.create_action_client`."""

@@ -468,6 +468,7 @@ def create_service_server(
     callback: Callable[[Message], Answer | Awaitable[Answer]],
     qos: QoS | None = None,
     executor: Executor | None = None,
+    answers_failures: bool = False,
 ) -> ServiceServer:
     """Return a service server for a ROS 2 node.
 
@@ -479,10 +480,13 @@ def create_service_server(
         qos: Profile of requests and replies; None for the default.
         executor: Runs `callback`; None for the node's dispatcher, or for the running event loop if
             `callback` is a coroutine function.
+        answers_failures: See :meth:`Node.create_service_server`.
     """
     kind, profile = core.types.service(type), qos or QoS.services()
     create = partial(Ros2Replier, core, name, kind, profile)
-    return ServiceServer(core, name, kind, callback, profile, executor, create)
+    return ServiceServer(
+        core, name, kind, callback, profile, executor, create, answers_failures=answers_failures
+    )
 
 
 class Ros2Replier(Replier, NodeMember):
@@ -559,23 +563,31 @@ class Ros2Replier(Replier, NodeMember):
 
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:
         """Send a reply, as soon as its client can take it."""
-        if self._pacer.on_reply(request.client):
-            self._replier.reply(request, data)
-        else:
-            self._pacer.send_later(request.client, lambda: self._reply_later(request, data))
+        self._pace(request, lambda: self._replier.reply(request, data))
 
-    def _reply_later(self, request: RequestId, data: bytes | bytearray) -> None:
+    def _send_later(self, request: RequestId, send: Callable[[], None]) -> None:
         try:
-            self._replier.reply(request, data)
+            send()
         except NodeClosedError:
             pass  # closed by another thread
         except Error as error:
             _log.error("%s: cannot answer %s: %s", self._name, self.client_name(request), error)
 
-    def fail(self, request: RequestId, reason: str) -> None:
-        """Report to the client that no response will be sent, if the middleware can."""
-        self._pacer.on_failure(request.client)
-        self._replier.fail(request, reason)
+    def fail(
+        self, request: RequestId, reason: str, instead: bytes | bytearray | None = None
+    ) -> None:
+        """Report a failure, or send a response instead, as soon as the client can take it."""
+        if instead is not None:
+            self._pace(request, lambda: self._replier.fail(request, reason, instead))
+        else:
+            self._pacer.on_failure(request.client)
+            self._replier.fail(request, reason)
+
+    def _pace(self, request: RequestId, send: Callable[[], None]) -> None:
+        if self._pacer.on_reply(request.client):
+            send()
+        else:
+            self._pacer.send_later(request.client, lambda: self._send_later(request, send))
 
     def client_name(self, request: RequestId) -> str:
         """Return the name of a request's client, for messages."""

@@ -239,8 +239,18 @@ class Replier(Handle):
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:
         """Answer a request; ignores clients that have left."""
 
-    def fail(self, request: RequestId, reason: str) -> None:
-        """Report to the client that there will be no response, if the wire can."""
+    def fail(
+        self, request: RequestId, reason: str, instead: bytes | bytearray | None = None
+    ) -> None:
+        """Report to the client that the service failed, if the wire can.
+
+        Args:
+            request: The request.
+            reason: What failed.
+            instead: A response to clients that no failure reaches; None to let them wait.
+        """
+        if instead is not None:
+            self.reply(request, instead)
 
     def describe_failure(self, error: Exception) -> str:
         """Return the reason given to :meth:`fail` for an exception of the service's callback."""

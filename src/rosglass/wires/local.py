@@ -415,7 +415,12 @@ class LocalReplier(_Endpoint[LocalRequester], Replier):
         if isinstance(request.handle, LocalRequester):
             request.handle.handle_reply(request.sequence, bytes(data))
 
-    def fail(self, request: RequestId, reason: str) -> None:
+    def fail(
+        self,
+        request: RequestId,
+        reason: str,
+        instead: bytes | bytearray | None = None,  # noqa: ARG002 - it reaches every client
+    ) -> None:
         """Fail a request: no response will be sent."""
         if isinstance(request.handle, LocalRequester):
             request.handle.handle_refusal(request.sequence, self, reason)

@@ -11,10 +11,12 @@ from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
+import zenoh
 from waiting import eventually
 
 import rosglass
 from rosglass.errors import ConnectionLostError, TimeoutError  # noqa: A004
+from rosglass.wires.zenoh.keys import Attachment
 
 PEERS = Path(__file__).parent / "peers"
 ADD = "example_interfaces/srv/AddTwoInts"
@@ -135,6 +137,33 @@ def test_the_peer_is_told_when_our_callback_fails(node, kind, run_peer):
     process = run_peer(kind, do="call", service="/broken", pairs=[[1, 2]])
     assert process.event("failed", timeout=30)
     process.end()
+
+
+def test_a_client_that_ignores_errors_receives_a_response(node, kind, run_peer, router):
+    """rmw_zenoh's clients log an error, and go on waiting for a response."""
+
+    def fail(request):
+        raise ValueError("out of order")
+
+    node.create_service_server("/broken_too", ADD, fail, answers_failures=True)
+    process = run_peer(kind, do="call", service="/broken_too", pairs=[[1, 2]])
+    assert process.event("failed")  # it takes the error
+    process.end()
+    # A query as rmw_zenoh sends it.
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([router.listen]))
+    add = rosglass.load(ADD)
+    key = f"11/broken_too/example_interfaces::srv::dds_::AddTwoInts_/{add.rihs01}"
+    note = Attachment(1, time.time_ns(), bytes(16)).encode()
+    with zenoh.open(config) as session:
+        given = add.request.encode({"a": 1, "b": 2})
+        replies = list(session.get(key, payload=given, attachment=note))
+    assert replies[0].err is not None
+    assert b"out of order" in replies[0].err.payload.to_bytes()
+    assert replies[1].ok is not None
+    assert add.response.decode(replies[1].ok.payload.to_bytes()).sum == 0
+    assert len(replies) == 2
 
 
 def test_a_peer_that_is_killed_in_mid_call(node, kind, run_peer):

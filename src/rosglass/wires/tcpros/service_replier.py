@@ -97,7 +97,12 @@ class TcprosReplier(Replier, Member):
         """Send a response; ignored when the client has left."""
         _session_of(request).answer(True, data)
 
-    def fail(self, request: RequestId, reason: str) -> None:
+    def fail(
+        self,
+        request: RequestId,
+        reason: str,
+        instead: bytes | bytearray | None = None,  # noqa: ARG002 - it reaches every client
+    ) -> None:
         """Send the client the reason why there is no response."""
         _session_of(request).answer(False, reason.encode("utf-8", "replace"))
 

@@ -227,7 +227,7 @@ class ZenohRequester(Declaration, Requester):
         for replier in own:
             request = OpenRequest(
                 partial(self.on_response, number),
-                partial(self.on_refusal, number, replier.gid),
+                partial(self._on_local_refusal, number, replier.gid),
                 lambda: None,  # the client notices that the server has left
             )
             replier.on_local_request(RequestId(self._gid, number, request), bytes(data))
@@ -289,6 +289,9 @@ class ZenohRequester(Declaration, Requester):
             call.servers.discard(server)
             if not call.servers:
                 self._fail(number, f"its server answered with an error: {reason}")
+
+    def _on_local_refusal(self, number: int, server: bytes, reason: str, _: object) -> None:
+        self.on_refusal(number, server, reason)
 
     def _query(
         self,
@@ -373,7 +376,7 @@ class OpenRequest:
 
     Args:
         answer: Sends the response.
-        refuse: Reports that there will be no response.
+        refuse: Reports a failure, and sends the response to clients that ignore that.
         release: Releases the client.
     """
 
@@ -382,7 +385,7 @@ class OpenRequest:
     def __init__(
         self,
         answer: Callable[[bytes | bytearray], None],
-        refuse: Callable[[str], None],
+        refuse: Callable[[str, bytes | bytearray | None], None],
         release: Callable[[], None],
     ) -> None:
         self._ends: tuple[Any, ...] = answer, refuse, release
@@ -391,9 +394,9 @@ class OpenRequest:
         """Send the response."""
         self._end(0, data)
 
-    def refuse(self, reason: str) -> None:
-        """Report that there will be no response."""
-        self._end(1, reason)
+    def refuse(self, reason: str, instead: bytes | bytearray | None = None) -> None:
+        """Report a failure, and send a response to clients that ignore that."""
+        self._end(1, reason, instead)
 
     def release(self) -> None:
         """Release the client, which then detects the end of the call."""
@@ -418,10 +421,13 @@ def _open_query(query: Any, note: Attachment, name: str) -> OpenRequest:
 
         send(reply, len(data), f"{name} reply")
 
-    def refuse(reason: str) -> None:
+    def refuse(reason: str, instead: bytes | bytearray | None) -> None:
         with suppress(zenoh.ZError):
             query.reply_err(reason.encode())
-        query.drop()
+        if instead is None:
+            query.drop()
+        else:
+            answer(instead)
 
     return OpenRequest(answer, refuse, query.drop)
 
@@ -507,10 +513,16 @@ class ZenohReplier(Declaration, Replier):
         if isinstance(request.handle, OpenRequest):
             request.handle.answer(data)
 
-    def fail(self, request: RequestId, reason: str) -> None:
-        """Report to the client that there will be no response."""
+    def fail(
+        self, request: RequestId, reason: str, instead: bytes | bytearray | None = None
+    ) -> None:
+        """Report the failure, and send the response to clients that ignore errors.
+
+        rmw_zenoh logs an error and goes on waiting for a response; rosglass takes the error, and
+        ignores what follows.
+        """
         if isinstance(request.handle, OpenRequest):
-            request.handle.refuse(reason)
+            request.handle.refuse(reason, instead)
 
     def close(self) -> None:
         """Undeclare the server, and end its open requests."""
