@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import cv2
@@ -11,7 +12,7 @@ import pytest
 
 import rosglass
 from rosglass.comm import Sample
-from rosglass.comm.qos import Reliability
+from rosglass.comm.qos import QoS, Reliability
 from rosglass.errors import DecodeError, NoPictureError
 from rosglass.images import ImageStream, RawImage, Transport
 from rosglass.images import stream as stream_module
@@ -63,8 +64,8 @@ class FakeNode:
     def topics(self) -> dict[str, list[str]]:
         return {self.topic: [self.type]}
 
-    def publishers(self, topic: str) -> list[str]:
-        return ["camera"]
+    def publishers(self, topic: str) -> list[SimpleNamespace]:
+        return [SimpleNamespace(node="camera", qos=QoS())]
 
     def on_graph_change(self, *_: Any) -> FakeNode:
         return self

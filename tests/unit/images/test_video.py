@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from fractions import Fraction
 from functools import cache
@@ -14,6 +15,7 @@ import pytest
 import rosglass
 from rosglass.comm import Sample
 from rosglass.errors import DecodeError, Error, NoPictureError, UnsupportedError
+from rosglass.extras import install_command
 from rosglass.images import TRANSPORTS, PixelFormat, RawImage, convert
 from rosglass.images import video as video_module
 
@@ -251,7 +253,7 @@ def test_without_pyav_the_fix_is_named(monkeypatch: pytest.MonkeyPatch, transpor
             theora(camera, number)
 
     try:
-        with pytest.raises(UnsupportedError, match=r'pip install "rosglass\[video\]"'):
+        with pytest.raises(UnsupportedError, match=re.escape(install_command("video"))):
             read()
     finally:
         video_module.pyav.cache_clear()

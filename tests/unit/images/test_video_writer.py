@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from rosglass.errors import Error, UnsupportedError
+from rosglass.extras import install_command
 from rosglass.images import video_writer
 from rosglass.images.video_writer import VideoWriter
 
@@ -135,7 +137,7 @@ def test_without_pyav_the_error_says_how_to_install_it(
         raise UnsupportedError("no PyAV")
 
     monkeypatch.setattr(video_writer, "pyav", missing)
-    with pytest.raises(UnsupportedError, match=r'pip install "rosglass\[video\]"'):
+    with pytest.raises(UnsupportedError, match=re.escape(install_command("video"))):
         VideoWriter(tmp_path / "video.mp4")
 
 

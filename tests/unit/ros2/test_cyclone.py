@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import importlib.metadata
+import re
 
 import pytest
 
@@ -14,6 +15,7 @@ from rosglass.errors import (
     TimeoutError,  # noqa: A004 - the field's own word
     UnsupportedError,
 )
+from rosglass.extras import install_command
 
 pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
 from rosglass.wires.dds import cyclone
@@ -120,7 +122,7 @@ def test_a_missing_package_is_told_with_the_remedy(fresh, monkeypatch):
         raise importlib.metadata.PackageNotFoundError(name)
 
     monkeypatch.setattr(cyclone, "distribution", missing)
-    with pytest.raises(UnsupportedError, match=r'pip install "rosglass\[dds\]"'):
+    with pytest.raises(UnsupportedError, match=re.escape(install_command("dds"))):
         cyclone.library()
 
 

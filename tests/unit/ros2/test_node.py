@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import re
 import threading
 
 import pytest
 
 import rosglass
 from rosglass.comm import ConnectionState, EndpointKind
+from rosglass.extras import install_command
 from rosglass.interfaces import Library
 from rosglass.ros2 import Ros2Node
 
@@ -184,7 +186,7 @@ def test_a_middleware_that_cannot_start_leaves_no_thread(middleware):
 
 def test_connect_says_what_is_not_installed(monkeypatch):
     monkeypatch.setattr("rosglass.connection.find_spec", lambda name: None)
-    with pytest.raises(rosglass.UnsupportedError, match=r'pip install "rosglass\[zenoh\]"'):
+    with pytest.raises(rosglass.UnsupportedError, match=re.escape(install_command("zenoh"))):
         rosglass.connect("ZENOH://127.0.0.1:7447")
 
 
