@@ -1,4 +1,4 @@
-"""The transports ``compressed`` (JPEG, PNG) and ``compressedDepth`` (PNG, RVL), and compression.
+"""Compression, and the transports ``compressed`` and ``compressedDepth``.
 
 The ``format`` field's grammar is that of ROS's compressed_image_transport: ``jpeg``, ``png``, or
 ``<encoding of the camera>; jpeg compressed <order of the encoded channels>``. It is filled in the
@@ -44,10 +44,12 @@ __all__ = [
 
 _TYPE = "sensor_msgs/msg/CompressedImage"
 _JPEG, _PNG = b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"
+_TIFF = (b"II*\0", b"MM\0*")
 #: Largest compression ratio. Deflate reaches 1032; JPEG's end-of-block runs reach more, but no
 #: camera image does.
 _MAX_RATIO = 4096
 _COLOR = re.compile(r"^(rgb|bgr)a?(8|16)$")
+_MOSAIC = re.compile(r"^(bayer_(?:rggb|bggr|gbrg|grbg))(8|16)$")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +57,7 @@ class PictureHeader:
     """The header of an image file.
 
     Attributes:
-        kind: ``jpeg`` or ``png``.
+        kind: ``jpeg``, ``png`` or ``tiff``.
         width: Number of columns in pixels.
         height: Number of rows in pixels.
     """
@@ -69,7 +71,7 @@ def read_header(data: Any) -> PictureHeader:
     """Read an image's kind and size without decoding it.
 
     Raises:
-        UnsupportedError: It is neither JPEG nor PNG.
+        UnsupportedError: It is neither JPEG, PNG nor TIFF.
         DecodeError: It is truncated or malformed.
     """
     view = memoryview(data).cast("B")
@@ -79,11 +81,13 @@ def read_header(data: Any) -> PictureHeader:
         if len(view) < 33 or bytes(view[12:16]) != b"IHDR":
             raise DecodeError(_TYPE, "the PNG file has no complete header", "data", len(view))
         return PictureHeader("png", *struct.unpack_from(">II", view, 16))
+    if bytes(view[:4]) in _TIFF:
+        return _tiff_header(view)
     if not view:
         raise DecodeError(_TYPE, "the picture is empty", "data", 0)
     start = bytes(view[:4]).hex(" ")
     raise UnsupportedError(
-        f"compressed pictures must be JPEG or PNG; this one starts with the bytes {start}"
+        f"compressed pictures must be JPEG, PNG or TIFF; this one starts with the bytes {start}"
     )
 
 
@@ -104,6 +108,43 @@ def _jpeg_header(view: memoryview) -> PictureHeader:
     raise DecodeError(_TYPE, "the JPEG file is cut off before its size", "data", len(view))
 
 
+#: Fields of a TIFF image (TIFF 6.0), and the sizes of their values' types.
+_WIDTH, _HEIGHT, _BITS, _SAMPLES, _TILE_WIDTH, _TILE_HEIGHT = 256, 257, 258, 277, 322, 323
+_SHORT, _LONG = 3, 4
+_MAX_TIFF_FIELDS = 1000
+
+
+def _tiff_header(view: memoryview) -> PictureHeader:
+    """Read the fields of the first image that decide how much memory it takes."""
+    order = "<" if view[:1] == b"I" else ">"
+    values = {_WIDTH: 0, _HEIGHT: 0, _BITS: 1, _SAMPLES: 1, _TILE_WIDTH: 0, _TILE_HEIGHT: 0}
+    try:
+        (start,) = struct.unpack_from(f"{order}I", view, 4)
+        (count,) = struct.unpack_from(f"{order}H", view, start)
+        for number in range(min(count, _MAX_TIFF_FIELDS)):
+            at = start + 2 + 12 * number
+            field, kind, length = struct.unpack_from(f"{order}HHI", view, at)
+            if field in values and length and kind in (_SHORT, _LONG):
+                code = "H" if kind == _SHORT else "I"
+                at += 8
+                if length * struct.calcsize(f"={code}") > 4:
+                    (at,) = struct.unpack_from(f"{order}I", view, at)
+                values[field] = max(struct.unpack_from(f"{order}{min(length, 4)}{code}", view, at))
+    except struct.error:
+        raise DecodeError(_TYPE, "the TIFF file is cut off", "data", len(view)) from None
+    width, height = values[_WIDTH], values[_HEIGHT]
+    area = max(width * height, values[_TILE_WIDTH] * values[_TILE_HEIGHT])
+    if area * values[_BITS] * values[_SAMPLES] > 32 * MAX_PIXELS:
+        raise DecodeError(
+            _TYPE,
+            f"the TIFF file declares {width}x{height} pixels of {values[_SAMPLES]} times "
+            f"{values[_BITS]} bits, in tiles of {values[_TILE_WIDTH]}x{values[_TILE_HEIGHT]}; "
+            f"{4 * MAX_PIXELS} bytes are the most",
+            "data",
+        )
+    return PictureHeader("tiff", width, height)
+
+
 def _check(header: PictureHeader, view: memoryview) -> None:
     pixels = header.width * header.height
     size = f"{header.width}x{header.height}"
@@ -114,23 +155,59 @@ def _check(header: PictureHeader, view: memoryview) -> None:
             _TYPE, f"{len(view)} bytes cannot be a picture of {size} pixels", "data", 0
         )
     # libjpeg fills a truncated image with grey and reports success.
-    if header.kind == "jpeg" and bytes(view[-64:]).rfind(b"\xff\xd9") < 0:
+    if header.kind == "jpeg" and not _has_end(view):
         raise DecodeError(_TYPE, "the JPEG file is cut off", "data", len(view))
+
+
+#: A marker among compressed pixels: neither a stuffed 0xFF byte, nor a restart, nor a fill byte.
+_MARKER = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
+_NO_FILL = re.compile(rb"[^\xff]")
+_START_OF_SCAN, _END = 0xDA, 0xD9
+#: Real images have less than a thousand.
+_MAX_MARKERS = 20_000
+#: Markers between two scans that have a length.
+_SEGMENTS = frozenset({0xC4, 0xDA, 0xDB, 0xDC, 0xDD, *range(0xE0, 0xF0), 0xFE})
+
+
+def _has_end(view: memoryview) -> bool:
+    """Return whether a JPEG image has its end marker, whatever stands behind that.
+
+    Segments are skipped by their length: thumbnails in them have ends of their own.
+    """
+    at, in_pixels = 2, False
+    for _ in range(_MAX_MARKERS):
+        if in_pixels:
+            found = _MARKER.search(view, at)
+            place = -1 if found is None else found.end() - 1
+        else:
+            found = _NO_FILL.search(view, at)
+            place = -1 if found is None or found.start() == at else found.start()
+        if place < 0:
+            break
+        marker = view[place]
+        if marker == _END:
+            return True
+        at = place + 1
+        if not in_pixels or marker in _SEGMENTS:
+            at += int.from_bytes(view[at : at + 2], "big")
+        in_pixels = in_pixels or marker == _START_OF_SCAN
+    return False
 
 
 def decompress(
     data: Any, format: str = "", stamp: Time | None = None, frame_id: str = ""
 ) -> RawImage:
-    """Decode a JPEG or PNG image.
+    """Decode a JPEG, PNG or TIFF image.
 
     Args:
         data: The bytes of the file.
-        format: The message's ``format`` field, with the order of the color channels.
+        format: The message's ``format`` field, with the order of the color channels, or the
+            camera's Bayer pattern.
         stamp: Time of the image.
         frame_id: Coordinate frame of the camera.
 
     Raises:
-        UnsupportedError: It is neither JPEG nor PNG, or OpenCV is not installed.
+        UnsupportedError: It is neither JPEG, PNG nor TIFF, or OpenCV is not installed.
         DecodeError: It is corrupt, or declares a size that is too large for its data.
     """
     view = memoryview(data).cast("B")
@@ -158,11 +235,17 @@ def decompress(
 def _encoding(format: str, channels: int, size: int) -> str:
     """Return the encoding of decoded pixels, of which OpenCV returns blue first."""
     bits = 8 * size
+    camera, separator, coded = format.partition(";")
+    if channels == 1 and bits == 32:
+        return "32FC1"  # only TIFF has it
     if channels == 1:
+        # A camera's mosaic is compressed as it is.
+        mosaic = _MOSAIC.match(camera.strip())
+        if mosaic and separator and "compressed mono" not in coded:
+            return f"{mosaic[1]}{bits}"
         return f"mono{bits}"
     # Publishers without "compressed bgr..." encoded red-first pixels unchanged, so that the decoded
     # "blue" is red.
-    camera, separator, coded = format.partition(";")
     swapped = bool(separator) and _COLOR.match(camera.strip()) and "compressed bgr" not in coded
     order = "rgb" if swapped and camera.strip().startswith("rgb") else "bgr"
     return f"{order}{'a' if channels == 4 else ''}{bits}"

@@ -200,6 +200,8 @@ def _size(data: bytes, name: str) -> tuple[int, int]:
         if data[:2] != b"\xff\xd8" and data[:1] != b"\x89" and _is_tga(data):
             return struct.unpack_from("<HH", data, 12)
         header = read_header(data)
+        if header.kind not in {"jpeg", "png"}:
+            raise UnsupportedError(header.kind)
     except struct.error:
         raise ResourceError(f"{name}: the picture is cut off") from None
     except DecodeError as error:

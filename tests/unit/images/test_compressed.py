@@ -38,7 +38,7 @@ def shown(data: bytes, format: str) -> np.ndarray:
     "format",
     ["jpeg", "png", "rgb8; jpeg compressed bgr8", "bgr8; png compressed bgr8", "", "mono8; jpeg"],
 )
-@pytest.mark.parametrize("suffix", [".jpg", ".png"])
+@pytest.mark.parametrize("suffix", [".jpg", ".png", ".tiff"])
 def test_colours(suffix: str, format: str) -> None:
     out = shown(encode(suffix, picture()), format)
     np.testing.assert_allclose(out.astype(int), np.broadcast_to(RED, out.shape), atol=4)
@@ -61,10 +61,131 @@ def test_alpha_and_deep_greys_are_kept() -> None:
     np.testing.assert_array_equal(convert(raw).planes[0].view(np.uint16), deep)
 
 
-@pytest.mark.parametrize("suffix", [".jpg", ".png"])
+def noise(*shape: int) -> np.ndarray:
+    return np.random.default_rng(1).integers(0, 255, shape, np.uint8)
+
+
+def thumbnail() -> bytes:
+    """Return an APP1 segment with a JPEG file of its own, as cameras write it."""
+    inner = b"Exif\0\0" + encode(".jpg", noise(8, 8))
+    return b"\xff\xe1" + struct.pack(">H", 2 + len(inner)) + inner
+
+
+#: What cameras append to a complete image.
+TAILS = {
+    "nothing": b"",
+    "padding to a block": bytes(4096),
+    "fill": b"\xff" * 4096,
+    "text": b"made by a camera\n" * 100,
+    "a second image": encode(".jpg", noise(16, 24)),
+    "a part of a second image": encode(".jpg", noise(16, 24))[:200],
+}
+
+
+@pytest.mark.parametrize("tail", TAILS)
+@pytest.mark.parametrize("head", ["plain", "thumbnail", "fill bytes", "restarts", "progressive"])
+def test_complete_jpegs_with_bytes_behind_their_end_are_shown(tail: str, head: str) -> None:
+    pixels = noise(64, 64, 3)
+    settings = {
+        "restarts": [cv2.IMWRITE_JPEG_RST_INTERVAL, 1],
+        "progressive": [cv2.IMWRITE_JPEG_PROGRESSIVE, 1],
+    }
+    data = cv2.imencode(".jpg", pixels, settings.get(head, []))[1].tobytes()
+    if head == "thumbnail":
+        data = data[:2] + thumbnail() + data[2:]
+    elif head == "fill bytes":
+        data = data[:-2] + b"\xff\xff\xff\xd9"
+    wanted = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    found = decompress(data + TAILS[tail])
+    np.testing.assert_array_equal(np.reshape(found.data, wanted.shape), wanted)
+    # Without its end, it is cut off, whatever stands behind.
+    for length in (len(data) - 4, len(data) // 2):
+        with pytest.raises(DecodeError):
+            decompress(data[:length])
+        if "second" not in tail:
+            with pytest.raises(DecodeError, match="cut off"):
+                decompress(data[:length] + TAILS[tail])
+
+
+@pytest.mark.parametrize(
+    "data",
+    [b"\xff" * 10**7, b"\xff\xc4" * 5 * 10**6, b"\xff\xda\0\0" * 10**6, b"\xff\xe0\0\2" * 10**6],
+)
+def test_markers_without_end_take_no_time(data: bytes) -> None:
+    good = encode(".jpg", noise(64, 64, 3))
+    with pytest.raises(DecodeError, match="cut off"):
+        decompress(good[:-2] + data)
+
+
+@pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
+@pytest.mark.parametrize(("suffix", "dtype"), [(".jpg", np.uint8), (".png", np.uint16)])
+def test_a_bayer_pattern_in_the_format_is_restored(pattern: str, suffix: str, dtype: type) -> None:
+    scale = 257 if dtype is np.uint16 else 1
+    mosaic = np.zeros((16, 24), dtype)
+    for place, channel in enumerate(pattern):
+        mosaic[place // 2 :: 2, place % 2 :: 2] = RED["rgb".index(channel)] * scale
+    bits = 16 if dtype is np.uint16 else 8
+    data, kind = encode(suffix, mosaic), suffix[1:].replace("jpg", "jpeg")
+    for coded in (f"{kind} compressed ", f"{kind} compressed bayer_{pattern}{bits}"):
+        for camera in (f"bayer_{pattern}8", f"bayer_{pattern}16"):
+            text = f"{camera}; {coded}"
+            assert decompress(data, text).encoding == f"bayer_{pattern}{bits}"
+            middle = shown(data, text)[4:-4, 4:-4].astype(int)
+            np.testing.assert_allclose(middle, np.broadcast_to(RED, middle.shape), atol=40)
+    # What was compressed is no mosaic.
+    for text in (f"bayer_{pattern}8; {kind} compressed mono8", f"bayer_{pattern}8", "bayer; x"):
+        assert decompress(data, text).encoding == f"mono{bits}"
+    colors = encode(suffix, picture())
+    assert decompress(colors, f"bayer_{pattern}8; {kind} compressed bgr8").encoding == "bgr8"
+
+
+@pytest.mark.parametrize(
+    ("dtype", "encoding"), [(np.uint8, "mono8"), (np.uint16, "mono16"), (np.float32, "32FC1")]
+)
+def test_tiff(dtype: type, encoding: str) -> None:
+    pixels = np.arange(24 * 16).reshape(16, 24).astype(dtype)
+    found = decompress(encode(".tiff", pixels), "32FC1; tiff compressed ")
+    assert (found.encoding, found.width, found.height) == (encoding, 24, 16)
+    np.testing.assert_array_equal(found.data.view(dtype).reshape(16, 24), pixels)
+
+
+def tiff(order: str, fields: dict[int, tuple[int, int, int]], size: int = 100) -> bytes:
+    """Return a TIFF file of zeros with fields: type, count and value by number."""
+    data = (b"II*\0" if order == "<" else b"MM\0*") + struct.pack(f"{order}IH", 8, len(fields))
+    for field, (kind, count, value) in fields.items():
+        code = "H2x" if kind == 3 else "I"
+        data += struct.pack(f"{order}HHI{code}", field, kind, count, value)
+    return data + bytes(size)
+
+
+@pytest.mark.parametrize("order", "<>")
+@pytest.mark.parametrize(
+    ("fields", "reason"),
+    [
+        ({256: (4, 1, 60_000), 257: (4, 1, 60_000)}, "declares 60000x60000 pixels"),
+        ({256: (3, 1, 9), 257: (3, 1, 9), 322: (4, 1, 1 << 20), 323: (4, 1, 1 << 20)}, "in tiles"),
+        ({256: (3, 1, 8000), 257: (3, 1, 8000), 258: (3, 1, 64), 277: (3, 1, 4)}, "of 4 times 64"),
+        ({256: (3, 1, 9), 257: (3, 1, 0)}, "the picture is 9x0 pixels"),
+        ({256: (3, 1, 2000), 257: (3, 1, 2000)}, "cannot be a picture of 2000x2000"),
+        ({256: (3, 1, 9), 257: (3, 1, 9), 258: (3, 4, 1 << 15)}, "the TIFF file is cut off"),
+        ({256: (3, 1, 9), 257: (3, 1, 9)}, "the tiff file is corrupt"),
+    ],
+)
+def test_tiff_claiming_too_much_is_not_allocated(
+    order: str, fields: dict[int, tuple[int, int, int]], reason: str
+) -> None:
+    tracemalloc.start()
+    try:
+        with pytest.raises(DecodeError, match=reason):
+            decompress(tiff(order, fields))
+        assert tracemalloc.get_traced_memory()[1] < 1_000_000
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".png", ".tiff"])
 def test_cut_off_files_are_refused_at_every_length(suffix: str) -> None:
-    noise = np.random.default_rng(1).integers(0, 255, (16, 24, 3), np.uint8)
-    data = encode(suffix, noise)
+    data = encode(suffix, noise(16, 24, 3))
     for length in range(0, len(data) - 16, 7):
         with pytest.raises((DecodeError, UnsupportedError)):
             decompress(data[:length])
@@ -114,12 +235,11 @@ def test_jpeg_claiming_a_huge_size_is_refused() -> None:
 
 def test_mutated_files_never_crash() -> None:
     rng = np.random.default_rng(7)
-    good = [
-        encode(suffix, rng.integers(0, 255, (16, 24, 3), np.uint8)) for suffix in (".jpg", ".png")
-    ]
+    suffixes = (".jpg", ".png", ".tiff")
+    good = [encode(suffix, rng.integers(0, 255, (16, 24, 3), np.uint8)) for suffix in suffixes]
     refused = 0
-    for round_ in range(300):
-        data = bytearray(good[round_ % 2])
+    for round_ in range(450):
+        data = bytearray(good[round_ % 3])
         for at in rng.integers(0, len(data), 4):
             data[at] = rng.integers(0, 256)
         try:
