@@ -15,10 +15,17 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 COCKPIT = Path(rosglass.demo.__file__).with_name("cockpit")
-pytestmark = pytest.mark.skipif(not QT6, reason="the demo's cockpit is for Qt 6")
+CONTROLS = Path(__file__).with_name("controls_with_texts.qml")
+#: Debian's Qt 5 lacks QtGraphicalEffects, which its style Imagine needs.
+STYLES = (
+    ["Basic", "Fusion", "Imagine", "Material", "Universal", "FluentWinUI3"]
+    if QT6
+    else ["Default", "Fusion", "Material", "Universal"]
+)
 HOSTILE = "<img src='http://0.0.0.0:9/a.png'><b>all good</b>"
 
 
+@pytest.mark.skipif(not QT6, reason="the demo's cockpit is for Qt 6")
 def test_a_status_that_looks_like_html_is_shown_as_it_is(
     running: Any, wait: Callable[..., None]
 ) -> None:
@@ -53,3 +60,37 @@ def test_a_status_that_looks_like_html_is_shown_as_it_is(
     wait(shown)
     assert len(found) >= 2
     assert all(found)
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_no_text_of_a_control_ends_the_interface(style: str, start: Any) -> None:
+    """Qt's own IconLabel crashes at each image, in buttons, menu items and delegates."""
+    program = start("run", CONTROLS, QT_QUICK_CONTROLS_STYLE=style)
+    program.until("all texts were shown")
+    program.kill(15)
+    assert program.end() == 143
+    assert "loaded before" not in program.text
+
+
+def test_controls_show_markup_as_it_is(bench: Any) -> None:
+    root: Any = bench.load(
+        """Item {
+            Button { id: button; text: HOSTILE }
+            ItemDelegate { id: item; text: HOSTILE; icon.name: "x"; spacing: 3 }
+            Button { id: less; text: "a < b" }
+            Button { id: word; text: "a b" }
+            function texts() {
+                return JSON.stringify([button, item].map(c => [c.text, c.contentItem.text]))
+            }
+            function widths() {
+                return JSON.stringify([button, item, word, less].map(c => c.implicitWidth))
+            }
+        }""".replace("HOSTILE", json.dumps(HOSTILE)),
+        "import QtQuick 2.15\nimport QtQuick.Controls 2.15",
+    )
+    assert json.loads(root.texts()) == [[HOSTILE, HOSTILE]] * 2
+    button, item, word, less = json.loads(root.widths())
+    # As wide as its letters; as markup it would be two words.
+    assert button > 250
+    assert item > 250
+    assert less >= word

@@ -3,16 +3,19 @@
 
 from __future__ import annotations
 
+import ctypes
+import logging
 import os
+import warnings
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error, QmlError
 from rosglass.qml.runtime import Runtime, runtime_of
-from rosglass.qt import QT6, QtQml
+from rosglass.qt import QT6, QtCore, QtQml, address
 
 if TYPE_CHECKING:
     from rosglass.qml.session import Session
@@ -29,6 +32,9 @@ __all__ = [
     "register",
 ]
 
+_log = logging.getLogger("rosglass.qml")
+_LIBRARY = "libQt5Qml.so.5"
+_LIBRARIES = {".so", ".dylib", ".dll"}
 _PACKAGE = "package://"
 _REMOTE = ("http://", "https://", "ftp://")
 #: Where the windows of rosglass itself are, whose program registers the types that they use.
@@ -126,6 +132,83 @@ def is_own_window(file: Path) -> bool:
     return file.parent == _OWN
 
 
+#: Module of Qt's that has the labels of controls, and the version of ours: the last that all of
+#: Qt's styles import, and above that which our file imports.
+_IMPL, _IMPL_VERSION = "QtQuick.Controls.impl", (6, 11) if QT6 else (2, 4)
+#: Qt's plugin with this module, and the module to load it by.
+_IMPL_PLUGIN, _IMPL_LOADER = (
+    ("QtQuick/Controls/impl/*qtquickcontrols2implplugin.*", _IMPL)
+    if QT6
+    else ("QtQuick/Controls.2/*qtquickcontrols2plugin.*", "QtQuick.Controls")
+)
+#: QQmlPrivate::qmlregister(), mangled by the Itanium C++ ABI, and its argument for a QML file.
+_REGISTER, _COMPOSITE = "_ZN11QQmlPrivate11qmlregisterENS_16RegistrationTypeEPv", 4
+
+
+class _CompositeType(ctypes.Structure):
+    """QQmlPrivate::RegisterCompositeType of Qt 5."""
+
+    _fields_: ClassVar = [
+        ("url", ctypes.c_void_p),
+        ("uri", ctypes.c_char_p),
+        ("major", ctypes.c_int),
+        ("minor", ctypes.c_int),
+        ("name", ctypes.c_char_p),
+    ]
+
+
+@cache
+def _show_plain_labels() -> None:
+    """Let buttons, menu items and delegates show plain text; only the first call has an effect.
+
+    Qt's IconLabel makes its text without a context, and crashes at the first image in it: one text
+    of a robot would end the interface. Of two types of one name, Qt takes the one that was
+    registered last, so ours follows Qt's own.
+    """
+    folder = Path(_qml_folder())
+    plugin = next((p for p in folder.glob(_IMPL_PLUGIN) if p.suffix in _LIBRARIES), None)
+    if plugin is None:
+        return  # without controls
+    handler = QtCore.qInstallMessageHandler(lambda *_: None)  # "it cannot be protected"
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)
+            engine: Any = QtQml.QQmlEngine()
+            engine.importPlugin(str(plugin), _IMPL_LOADER, [])
+        done = _register_label(Path(IMPORT_PATHS[1], "Rosglass/Controls/IconLabel.qml"))
+    except (OSError, AttributeError):
+        done = False
+    finally:
+        QtCore.qInstallMessageHandler(handler)
+    if not done:
+        _log.warning(
+            "controls were loaded before rosglass.qml.install(): a text with <img ...> in a Button "
+            "or MenuItem ends the program; call install() before other QML is loaded"
+        )
+
+
+def _qml_folder() -> str:
+    """Return the folder of Qt's QML modules."""
+    info: Any = QtCore.QLibraryInfo
+    if QT6:
+        return str(info.path(info.LibraryPath.QmlImportsPath))
+    return str(info.location(info.Qml2ImportsPath))
+
+
+def _register_label(file: Path) -> bool:
+    """Register a QML file as the IconLabel of Qt's module; return whether Qt accepts it."""
+    url = QtCore.QUrl.fromLocalFile(str(file))
+    if QT6:
+        register: Any = QtQml.qmlRegisterType
+        return int(register(url, _IMPL, *_IMPL_VERSION, "IconLabel")) >= 0
+    # PySide2 registers Python's classes only.
+    call = ctypes.CDLL(_LIBRARY)[_REGISTER]
+    call.restype, call.argtypes = ctypes.c_int, [ctypes.c_int, ctypes.c_void_p]
+    pointer = ctypes.c_void_p.from_address(address(url)).value
+    made = _CompositeType(pointer, _IMPL.encode(), *_IMPL_VERSION, b"IconLabel")
+    return int(call(_COMPOSITE, ctypes.byref(made))) >= 0
+
+
 @cache
 def register() -> None:
     """Register the types with Qt; only the first call has an effect."""
@@ -159,6 +242,7 @@ def install(
     # Qt waits 5 ms before drawing, to collect further changes: a third of the time that a picture
     # takes from the robot to the screen.
     os.environ.setdefault("QT_QPA_UPDATE_IDLE_TIME", "0")
+    _show_plain_labels()
     if not own_window:
         register()
     for path in IMPORT_PATHS:

@@ -1,0 +1,31 @@
+// Takes the place of Qt's IconLabel, the content of buttons, menu items and delegates: shows plain text.
+import QtQuick 2.15
+// Qt's own type; ours is of version 2.4.
+import QtQuick.Controls.impl 2.3 as Impl
+
+Item {
+    id: root
+
+    property string text
+    property alias icon: label.icon
+    property alias display: label.display
+    property alias spacing: label.spacing
+    property alias mirrored: label.mirrored
+    property alias alignment: label.alignment
+    property alias font: label.font
+    property alias color: label.color
+    property alias topPadding: label.topPadding
+    property alias leftPadding: label.leftPadding
+    property alias rightPadding: label.rightPadding
+    property alias bottomPadding: label.bottomPadding
+
+    implicitWidth: label.implicitWidth
+    implicitHeight: label.implicitHeight
+
+    Impl.IconLabel {
+        id: label
+        anchors.fill: parent
+        // A word joiner, which is not drawn: Qt takes the text for no markup then.
+        text: root.text.replace(/<|&(?=lt;)/g, "$&\u2060")
+    }
+}
