@@ -151,7 +151,7 @@ def is_alive(item: QtCore.QObject | None) -> bool:
     return item is not None and bool(_shiboken.isValid(item))
 
 
-def address(item: object) -> int:
+def address(item: Any) -> int:
     """Return the address of the C++ object."""
     return int(_shiboken.getCppPointer(item)[0])
 
