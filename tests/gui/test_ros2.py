@@ -323,6 +323,7 @@ def test_empty_messages(bench: Any, caplog: Any) -> None:
 @pytest.mark.parametrize(
     ("call", "expected"),
     [
+        ("CommandQoS", ["reliable", "volatile", 1]),
         ("SensorDataQoS", ["best_effort", "volatile", 5]),
         ("SystemDefaultsQoS", ["reliable", "volatile", 10]),
         ("ServicesQoS", ["reliable", "volatile", 10]),

@@ -77,6 +77,8 @@ class Publisher(TopicEndpoint):
         #: The subscriptions in the graph at the last update; None requests another one.
         self._known: list[EndpointInfo] | None = None
         self._left: deque[EndpointInfo] = deque(maxlen=_MAX_LEFT)
+        #: What is wrong with subscriptions in the graph; None before the first update.
+        self._graph_problem: str | None = None
         self._big = False
         self._liveliness_listeners: Listeners[LivelinessLost] = Listeners(where=topic)
         #: Guards the watchdogs, and ensures that only one thread closes the writer.
@@ -277,9 +279,10 @@ class Publisher(TopicEndpoint):
 
     @property
     def dropped(self) -> int:
-        """The number of messages on the topic that were dropped because a subscriber is too slow.
+        """The number of messages that were dropped on this machine.
 
-        Always 0 on wires that do not count them: DDS, Zenoh.
+        In ROS 1, those on the topic that a subscriber was too slow for; over Zenoh, those that
+        could not be sent within the profile's ``send_timeout``. Always 0 over DDS.
         """
         return self._writer.lost()
 
@@ -313,6 +316,8 @@ class Publisher(TopicEndpoint):
             self._set_problem(self._writer.problem)
         elif moved:
             self._follow_graph()
+        elif self._graph_problem is not None:
+            self._update_problem()
         if self._timed:
             self._start_watchdogs()
 
@@ -323,10 +328,14 @@ class Publisher(TopicEndpoint):
         self._known = subscriptions
         matching, conflicting = self._matching(subscriptions), self._qos_conflicts(subscriptions)
         self._writer.match(matching)
-        self._set_problem("; ".join(self._problems(subscriptions, conflicting)))
+        self._graph_problem = "; ".join(self._problems(subscriptions, conflicting))
+        self._update_problem()
         left = [self._left.popleft() for _ in range(len(self._left))]
         self._matched_listeners.update(matching, Matched, left)
         self._incompatible_listeners.update(conflicting, conflict_events(conflicting))
+
+    def _update_problem(self) -> None:
+        self._set_problem("; ".join(filter(None, (self._graph_problem, self._writer.problem))))
 
     def _subscriptions(self) -> list[EndpointInfo]:
         found: list[EndpointInfo] = self._core.graph.endpoints(_SUBSCRIPTION, self.topic)

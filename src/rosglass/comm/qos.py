@@ -21,6 +21,8 @@ __all__ = ["BEST_AVAILABLE", "Durability", "History", "Liveliness", "QoS", "Reli
 _Policy = TypeVar("_Policy", bound=Enum)
 #: Limit of rmw's profile (a signed 32-bit integer in every middleware).
 _MAX_DEPTH = 2**31 - 1
+#: Seconds of :meth:`QoS.command`: longer than most round trips, shorter than robots' watchdogs.
+_COMMAND_TIMEOUT_S = 0.3
 #: A deadline or lease duration as strict as all peers allow (rmw's ``..._BEST_AVAILABLE``).
 BEST_AVAILABLE = Duration(2**63 - 2)
 
@@ -80,6 +82,9 @@ class QoS:
         lifespan: Age at which a sample expires; None for no limit.
         liveliness: How a publisher's liveliness is asserted.
         lease_duration: Time without assertion after which liveliness is lost; None for no limit.
+        send_timeout: For publishers: time that a message may wait on this machine until earlier
+            ones have left; then it is dropped and counted. By this machine's steady clock; peers
+            are not informed of it. None for no limit.
 
     The constant :data:`BEST_AVAILABLE` may stand for a deadline or a lease duration.
 
@@ -95,6 +100,7 @@ class QoS:
     lifespan: Duration | None = None
     liveliness: Liveliness = Liveliness.AUTOMATIC
     lease_duration: Duration | None = None
+    send_timeout: Duration | None = None
 
     def __post_init__(self) -> None:
         depth = self.depth
@@ -119,7 +125,7 @@ class QoS:
             if not isinstance(value, kind):
                 choices = " or ".join(f"{kind.__name__}.{member.name}" for member in kind)
                 raise ArgumentError(name, value, choices, "QoS")
-        for name in ("deadline", "lifespan", "lease_duration"):
+        for name in ("deadline", "lifespan", "lease_duration", "send_timeout"):
             value = getattr(self, name)
             if value is None:
                 continue
@@ -129,9 +135,27 @@ class QoS:
                     "or None for no limit"
                 )
                 raise ArgumentError(name, value, expected, "QoS")
-            if name == "lifespan" and value == BEST_AVAILABLE:
+            if name in ("lifespan", "send_timeout") and value == BEST_AVAILABLE:
                 expected = "a Duration, or None for no limit, as it is the publisher's alone"
                 raise ArgumentError(name, value, expected, "QoS")
+        if self.send_timeout is None:
+            return
+        # Latched messages, and those of which none may be lost, are meant to be received late.
+        if self.durability not in (Durability.VOLATILE, Durability.SYSTEM_DEFAULT):
+            expected = "None, or volatile durability: latched messages are received late"
+            raise ArgumentError("send_timeout", self.send_timeout, expected, "QoS")
+        if self.history is History.KEEP_ALL:
+            expected = "None, or keep-last history: keep all drops nothing"
+            raise ArgumentError("send_timeout", self.send_timeout, expected, "QoS")
+
+    @classmethod
+    def command(cls) -> QoS:
+        """Reliable, volatile, only the newest, sent within 0.3 s or dropped here: ``/cmd_vel``.
+
+        It has no lifespan: by DDS's specification, readers compare that with the stamp of the
+        sending machine, and would drop the commands of one whose clock is wrong.
+        """
+        return cls(depth=1, send_timeout=Duration.from_seconds(_COMMAND_TIMEOUT_S))
 
     @classmethod
     def sensor_data(cls) -> QoS:
@@ -321,6 +345,7 @@ class QoS:
 
 _PRESETS: dict[str, Callable[[], QoS]] = {
     "default": QoS,
+    "command": QoS.command,
     "sensor_data": QoS.sensor_data,
     "latched": QoS.latched,
     "services": QoS.services,

@@ -134,6 +134,7 @@
         keep_last: function (depth) { this.history = "keep_last"; this.size = depth; return this },
         deadline: function (milliseconds) { this.deadlineMs = milliseconds; return this },
         lifespan: function (milliseconds) { this.lifespanMs = milliseconds; return this },
+        send_timeout: function (milliseconds) { this.sendTimeoutMs = milliseconds; return this },
         liveliness_automatic: function () { this.liveliness = "automatic"; return this },
         liveliness_manual_by_topic: function () { this.liveliness = "manual_by_topic"; return this },
         liveliness_lease_duration: function (milliseconds) { this.leaseMs = milliseconds; return this },
@@ -145,10 +146,12 @@
         depth: function () { return this.size }
     })
 
-    function makeQos(reliability, durability, history, size, liveliness, deadline, lifespan, lease) {
+    function makeQos(reliability, durability, history, size, liveliness, deadline, lifespan, lease,
+                     sendTimeout) {
         return Object.assign(Object.create(qos), {
             reliability: reliability, durability: durability, history: history, size: size,
-            liveliness: liveliness, deadlineMs: deadline, lifespanMs: lifespan, leaseMs: lease
+            liveliness: liveliness, deadlineMs: deadline, lifespanMs: lifespan, leaseMs: lease,
+            sendTimeoutMs: sendTimeout
         })
     }
 

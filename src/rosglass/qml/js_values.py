@@ -223,7 +223,7 @@ _BEST = "best_available"
 
 def qos_parts(qos: QoS) -> tuple[Any, ...]:
     """Return the arguments of ``makeQos`` in helpers.js; durations in ms, 0 for no limit."""
-    limits = (qos.deadline, qos.lifespan, qos.lease_duration)
+    limits = (qos.deadline, qos.lifespan, qos.lease_duration, qos.send_timeout)
     head = (qos.reliability.value, qos.durability.value, qos.history.value, qos.depth)
     return (*head, qos.liveliness.value, *map(_milliseconds, limits))
 
@@ -260,6 +260,7 @@ def qos_from_js(value: QJSValue | None, default: QoS) -> QoS:
                 "automatic" if liveliness.isUndefined() else liveliness.toString()
             ),
             lease_duration=_limit(value, "lease"),
+            send_timeout=_limit(value, "sendTimeout"),
         )
     except ArgumentError as error:
         raise ConversionError(f"qos.{error.path}", shown(value), error.expected) from None

@@ -219,11 +219,18 @@ class Publisher(Element):
         engine = self._runtime.engine if self._runtime is not None else None
         if self._reference is None and engine is not None:
             self._reference = engine.newQObject(self)
-        self._held.append((message, time.monotonic() + _HOLD_TIMEOUT_S))
+        limit = self._qos.send_timeout
+        longest = _HOLD_TIMEOUT_S if limit is None else min(_HOLD_TIMEOUT_S, limit.seconds)
+        self._held.append((message, time.monotonic() + longest))
 
     def _send_held(self) -> None:
         """Send held messages once subscribers can receive them; drop those that are too old."""
         sender, held = self._endpoint, self._held
+        if self._qos.send_timeout is not None:
+            while held and time.monotonic() > held[0][1]:
+                held.popleft()
+                limit = self._qos.send_timeout.seconds
+                self._on_sent_late(Error(f"no subscriber was connected within {limit:g} s"))
         if sender is not None and self._is_settled(sender):
             while held:
                 message, _ = held.popleft()
@@ -313,7 +320,8 @@ class RosPublisher(Publisher):
         type_name: Message type, as in QML.
         topic: Topic name, as in QML.
         queue_size: Maximum number of messages queued for a slow subscriber; 0 for no limit.
-        latch: Whether new subscribers immediately get the last message.
+        qos: Profile offered, with that size; transient local if new subscribers immediately get the
+            last message.
     """
 
     DIALECT = Dialect.ROS1
@@ -322,11 +330,8 @@ class RosPublisher(Publisher):
     disconnected = Signal()
 
     def __init__(
-        self, runtime: Runtime, type_name: str, topic: str, queue_size: int, latch: bool
+        self, runtime: Runtime, type_name: str, topic: str, queue_size: int, qos: QoS
     ) -> None:
-        qos = QoS(depth=queue_size) if queue_size else QoS(history=History.KEEP_ALL)
-        if latch:
-            qos = QoS(depth=1, durability=Durability.TRANSIENT_LOCAL)
         super().__init__(runtime, topic, full_type(type_name), qos)
         self._written, self._size = type_name, queue_size
 

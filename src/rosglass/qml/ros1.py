@@ -7,10 +7,11 @@ import logging
 import os
 import shlex
 import threading
+from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from rosglass.comm.names import anonymous_name
-from rosglass.comm.qos import History
+from rosglass.comm.qos import Durability, History, QoS
 from rosglass.comm.time import Time as Moment
 from rosglass.errors import Error, InvalidNameError, UnsupportedError
 from rosglass.interfaces.provider import workspace, workspace_variables
@@ -302,28 +303,36 @@ class Ros(ValueFunctions):
 
     # Topics.
 
+    @Slot(result=QJSValue)
+    def CommandQoS(self) -> QJSValue:
+        """Return what commands give as queue size: the newest message, sent in 0.3 s or dropped."""
+        return self._runtime.qos(QoS.command())
+
     @Slot(QJSValue, QJSValue, QJSValue, result=QtCore.QObject)
     @Slot(QJSValue, QJSValue, QJSValue, QJSValue, result=QtCore.QObject)
     @Slot(QJSValue, QJSValue, QJSValue, QJSValue, QJSValue, result=QtCore.QObject)
-    def advertise(self, *given: QJSValue) -> QtCore.QObject | None:
+    def advertise(self, *arguments: QJSValue) -> QtCore.QObject | None:
         """Return a publisher, which exists while JavaScript refers to it.
 
-        Arguments are optional namespace, message type, topic, queue size (0 for no limit), and
-        optionally whether new subscribers get the last message.
+        Arguments are optional namespace, message type, topic, queue size (0 for no limit) or
+        ``Ros.CommandQoS()``, and optionally whether new subscribers get the last message.
         """
         try:
-            texts, rest = _split(given, "Ros.advertise([ns,] type, topic, queueSize, latch)")
+            texts, rest = _split(arguments, "Ros.advertise([ns,] type, topic, queueSize, latch)")
             namespace, type_name, topic = texts
-            qos = queue_from_js(rest[0], ROS1_QOS)
-            size = 0 if qos.history is History.KEEP_ALL else qos.depth
+            given = queue_from_js(rest[0], ROS1_QOS)
+            size = 0 if given.history is History.KEEP_ALL else given.depth
+            qos = QoS(given.depth, history=given.history, send_timeout=given.send_timeout)
+            if len(rest) > 1 and rest[1].toBool():
+                latched = Durability.TRANSIENT_LOCAL
+                qos = replace(qos, depth=1, history=History.KEEP_LAST, durability=latched)
             check_type(type_name, topic)
             topic = within_namespace(namespace, topic)
             self._check_topic(topic)
         except Error as error:
             self._runtime.throw(f"Ros.advertise: {error}")
             return None
-        latch = len(rest) > 1 and rest[1].toBool()
-        return self._runtime.keep(RosPublisher(self._runtime, type_name, topic, size, latch))
+        return self._runtime.keep(RosPublisher(self._runtime, type_name, topic, size, qos))
 
     @Slot(QJSValue, QJSValue, result=QtCore.QObject)
     @Slot(QJSValue, QJSValue, QJSValue, result=QtCore.QObject)

@@ -182,6 +182,11 @@ class Ros2(ValueFunctions):
         return self._runtime.qos(DEFAULT_QOS)
 
     @Slot(result=QJSValue)
+    def CommandQoS(self) -> QJSValue:
+        """Return a profile: reliable, only the newest message, dropped if not sent in 0.3 s."""
+        return self._runtime.qos(QoS.command())
+
+    @Slot(result=QJSValue)
     def SensorDataQoS(self) -> QJSValue:
         """Return a profile: best effort, the newest 5."""
         return self._runtime.qos(QoS.sensor_data())

@@ -166,6 +166,41 @@ def test_what_a_stalled_link_hands_on_too_late_is_dropped_if_it_says_so(start_ro
     assert ages["/mortal"][-1] < 0.3, "those that follow are fresh"
 
 
+def test_commands_that_a_stalled_link_would_deliver_late_are_dropped_here(start_router, connect):
+    router = start_router()
+    robot, cockpit = (
+        connect(name, "?mode=client", url=start_router.url) for name in ("robot", "cockpit")
+    )
+    publisher = cockpit.create_publisher("/cmd_vel", TWIST, rosglass.QoS.command())
+    received = []
+    robot.create_subscription(
+        "/cmd_vel", TWIST, lambda m: received.append(m.linear.x), rosglass.QoS(1000)
+    )
+    eventually(publisher.subscription_count)
+    count = 0
+
+    def drive(seconds):
+        nonlocal count
+        for _ in at_rate(0.02, round(seconds / 0.02)):
+            count += 1
+            publisher.publish(linear={"x": float(count)})
+
+    drive(0.5)
+    eventually(lambda: len(received) + publisher.dropped == count)
+    before = count - publisher.dropped
+    os.kill(router.pid, signal.SIGSTOP)
+    drive(2.0)
+    eventually(lambda: "does not confirm" in publisher.problem)
+    during = count
+    os.kill(router.pid, signal.SIGCONT)
+    drive(0.5)
+    eventually(lambda: len(received) + publisher.dropped == count)
+    old = [x for x in received if before < x <= during]
+    assert len(old) < 40, "of 100; about 6 on a machine that is not busy"
+    assert received[-1] == count, "those that follow are delivered"
+    assert received == sorted(received)
+
+
 def test_a_slow_consumer_costs_no_memory(router, start, connect):
     node = connect("cockpit")
     camera = start("-c", CAMERA.format(url=router.url, image=IMAGE))

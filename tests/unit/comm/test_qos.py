@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from rosglass import ArgumentError, Duration, QoS
-from rosglass.comm import BEST_AVAILABLE, Durability, Liveliness, Reliability
+from rosglass.comm import BEST_AVAILABLE, Durability, History, Liveliness, Reliability
 
 SECOND = Duration.from_seconds(1)
 BEST_EFFORT = QoS(reliability=Reliability.BEST_EFFORT)
@@ -98,11 +98,36 @@ def test_a_limit_must_fit_into_64_bits_and_a_lifespan_is_the_publishers_alone():
         QoS(lifespan=BEST_AVAILABLE)
 
 
+def test_a_command_expires_at_the_sender_and_peers_are_not_asked_to_judge_its_age():
+    command = QoS.command()
+    assert (command.depth, command.reliability) == (1, Reliability.RELIABLE)
+    assert command.durability is Durability.VOLATILE
+    assert command.lifespan is command.deadline is None, "a reader's clock may be another"
+    assert command.send_timeout == Duration.from_seconds(0.3)
+    assert QoS().conflicts(command) == {}, "robots' default subscriptions match"
+    assert command.for_publisher([LATCHED]) is command
+
+
+@pytest.mark.parametrize(
+    ("policies", "told"),
+    [
+        ({"durability": Durability.TRANSIENT_LOCAL}, "latched messages are received late"),
+        ({"durability": Durability.BEST_AVAILABLE}, "latched messages are received late"),
+        ({"history": History.KEEP_ALL}, "keep all drops nothing"),
+        ({"send_timeout": BEST_AVAILABLE}, "as it is the publisher's alone"),
+        ({"send_timeout": 0.3}, "a Duration above zero"),
+    ],
+)
+def test_a_send_timeout_that_contradicts_the_profile_is_refused(policies, told):
+    with pytest.raises(ArgumentError, match=f"QoS: send_timeout: expected .*{told}"):
+        QoS(**{"send_timeout": SECOND, **policies})
+
+
 def test_presets_by_name():
     assert QoS.preset("sensor_data") == QoS.sensor_data()
     assert QoS.preset("default") == QoS()
     for name in ("sensor", None):
-        with pytest.raises(ArgumentError, match="one of default, sensor_data, latched"):
+        with pytest.raises(ArgumentError, match="one of default, command, sensor_data, latched"):
             QoS.preset(name)
 
 

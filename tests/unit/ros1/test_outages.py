@@ -8,10 +8,10 @@ import sys
 from types import SimpleNamespace
 
 import pytest
-from waiting import at_rate
+from waiting import at_rate, eventually
 
 from rosglass.wires.tcpros import connection
-from rosglass.wires.tcpros.connection import Connection, UnackedBytes, survive_outages
+from rosglass.wires.tcpros.connection import Connection, Frame, UnackedBytes, survive_outages
 from rosglass.wires.tcpros.io_loop import IoLoop
 
 
@@ -81,6 +81,42 @@ def test_a_silent_subscriber_gets_only_the_newest_afterwards(monkeypatch):
         received = [each for (each,) in struct.iter_unpack("<I", data)]
         assert received[-1] == number
         assert len(received) < number - 10
+    finally:
+        loop.close()
+        peer.close()
+        ours.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not tell what is confirmed")
+def test_commands_to_a_silent_subscriber_expire_here(monkeypatch):
+    silent = [False]
+    real = UnackedBytes.unacked
+    monkeypatch.setattr(UnackedBytes, "unacked", lambda u: u.written if silent[0] else real(u))
+    loop = IoLoop("test outages")
+    ours, peer = socket.socketpair()
+    link = Connection(loop, _Tcp(ours), print, print, print, peer="robot")
+    loop.call(link.accept)
+    peer.settimeout(10)
+
+    def send(number):
+        link.send_frame(Frame([struct.pack("<I", number)], timeout=0.3), keep=1)
+
+    try:
+        eventually(lambda: link._connected)
+        silent[0] = True
+        for number in at_rate(0.02, 50):
+            send(number)
+        eventually(lambda: link.waiting() == 0)
+        lost = link.lost
+        assert lost > 25
+        silent[0] = False
+        send(1000)
+        data = b""
+        while not data.endswith(struct.pack("<I", 1000)):
+            data += peer.recv(4096)
+        received = [each for (each,) in struct.iter_unpack("<I", data)]
+        assert len(received) + lost == number + 2, "each was delivered, or counted"
+        assert received[:-1] == list(range(len(received) - 1)), "the first ones, of 0.1 s"
     finally:
         loop.close()
         peer.close()

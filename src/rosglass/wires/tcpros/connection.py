@@ -99,6 +99,11 @@ _TCP_RTO_MAX_MS = 44
 #: SIOCOUTQ (Linux, ``man 7 tcp``): bytes in the send queue that the peer has not acknowledged.
 _SIOCOUTQ = 0x5411
 _int = struct.Struct("i")
+#: ``tcpi_rtt`` of Linux's ``struct tcp_info``, in microseconds.
+_TCP_INFO = struct.Struct("=68xI")
+#: Shortest time without acknowledgement after which a connection counts as stalled for commands,
+#: and the pause between polls while one waits; in seconds.
+_COMMAND_STALL_S, _COMMAND_POLL_S = 0.1, 0.01
 #: Seconds without acknowledgement after which a connection counts as stalled, and between polls.
 _STALL_TIMEOUT_S, _STALL_POLL_S = 0.5, 0.05
 
@@ -135,18 +140,23 @@ class UnackedBytes:
         self._acked_at = self._polled_at = 0.0
         self._stalled = False
 
-    def stalled(self) -> bool:
-        """Return whether sent bytes have not been acknowledged for half a second."""
+    def stalled(self, command: bool = False) -> bool:
+        """Return whether sent bytes have not been acknowledged for half a second.
+
+        For a command, the limit is twice the round-trip time, but at least 0.1 s: what was given to
+        the system cannot be recalled.
+        """
         now = time.monotonic()
-        if now - self._polled_at < _STALL_POLL_S:
+        if not command and now - self._polled_at < _STALL_POLL_S:
             return self._stalled
         self._polled_at = now
         unacked = self.unacked()
         acked = self.written - unacked
         if not unacked or acked != self._acked:
             self._acked, self._acked_at = acked, now
-        self._stalled = now - self._acked_at > _STALL_TIMEOUT_S
-        return self._stalled
+        silence = now - self._acked_at
+        self._stalled = silence > _STALL_TIMEOUT_S
+        return self._stalled or (command and silence > max(_COMMAND_STALL_S, 2 * self._rtt()))
 
     def unacked(self) -> int:
         """Return how many bytes the peer has not acknowledged; 0 where that is unknown."""
@@ -157,6 +167,14 @@ class UnackedBytes:
         except OSError:
             return 0
         return int(waiting)
+
+    def _rtt(self) -> float:
+        """Return the round-trip time as the system measures it, in seconds; 0 if unknown."""
+        try:
+            info = self._sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO.size)
+            return float(_TCP_INFO.unpack(info)[0]) / 1e6
+        except (OSError, AttributeError, struct.error):
+            return 0.0
 
 
 #: Parts of a frame in one system call.
@@ -171,22 +189,26 @@ class Frame:
 
     Args:
         parts: The bytes, with their length.
+        kept: See the attribute.
+        timeout: Seconds after which it expires; 0 for never.
 
     Attributes:
         parts: As given, as views of bytes.
         size: Bytes in all.
         kept: Whether it is never dropped for newer ones: the last message of a latched publisher.
+        expiry: When it is dropped unless it was sent, by :func:`time.monotonic`; 0 for never.
     """
 
-    __slots__ = ("_copied", "_start", "kept", "parts", "size")
+    __slots__ = ("_copied", "_start", "expiry", "kept", "parts", "size")
 
-    def __init__(self, parts: Sequence[Buffer], kept: bool = False) -> None:
+    def __init__(self, parts: Sequence[Buffer], kept: bool = False, timeout: float = 0.0) -> None:
         views = [memoryview(part).cast("B") for part in parts]
         if len(views) > _MAX_PARTS:
             views = [memoryview(b"".join(views))]
         self.parts = views
         self.size = sum(map(len, views))
         self.kept = kept
+        self.expiry = time.monotonic() + timeout if timeout else 0.0
         self._copied: memoryview | None = None
         self._start = 0
 
@@ -203,7 +225,7 @@ class Outgoing:
     """The send queue of one connection; guarded by its owner's lock.
 
     Attributes:
-        lost: Frames that were dropped for newer ones.
+        lost: Frames that were dropped for newer ones, or expired.
         held: Bytes in the queue.
     """
 
@@ -247,6 +269,20 @@ class Outgoing:
                 self.lost += 1
                 return True
         return False
+
+    def expire(self) -> None:
+        """Drop frames that have waited for longer than their timeout."""
+        now = time.monotonic()
+        first = int(self._begun)
+        while len(self._frames) > first and 0 < self._frames[first][0].expiry < now:
+            self.held -= len(self._frames[first][1])
+            del self._frames[first]
+            self.lost += 1
+
+    @property
+    def is_command(self) -> bool:
+        """Whether the next frame expires."""
+        return bool(self._frames) and self._frames[0][0].expiry > 0
 
     def send(self, write: Callable[[Sequence[memoryview]], int]) -> None:
         """Send frames until `write`, which returns the number of sent bytes, sends less."""
@@ -601,7 +637,7 @@ class Connection:
 
     @property
     def lost(self) -> int:
-        """How many frames were dropped for newer ones."""
+        """How many frames were dropped for newer ones, or expired."""
         return self._outgoing.lost
 
     @property
@@ -664,7 +700,7 @@ class Connection:
             sent = 0
             first = not self._outgoing
             self._holds = self._holds or keep > 0 or keep_bytes > 0
-            if first and self._connected and not (self._holds and self._unacked.stalled()):
+            if first and self._connected and not self._must_wait(frame.expiry > 0):
                 sent = self._write(frame.parts)
                 if sent == frame.size:
                     return
@@ -688,10 +724,12 @@ class Connection:
     def _send_waiting(self) -> None:
         emptied = False
         with self._lock:
-            if self._closed or not self._outgoing:
+            outgoing = self._outgoing
+            outgoing.expire()
+            if self._closed or not outgoing:
                 emptied = not self._closed
-            elif self._holds and self._unacked.stalled():
-                self._hold()
+            elif self._must_wait(outgoing.is_command):
+                self._hold(_COMMAND_POLL_S if outgoing.is_command else _STALLED_POLL_S)
             else:
                 self._outgoing.send(self._write)
                 emptied = not self._outgoing
@@ -706,7 +744,11 @@ class Connection:
         with self._lock:
             return not self._closed and self._connected and self._unacked.stalled()
 
-    def _hold(self) -> None:
+    def _must_wait(self, command: bool) -> bool:
+        """Return whether a frame must not be handed to the system now."""
+        return self._holds and self._unacked.stalled(command)
+
+    def _hold(self, pause: float) -> None:
         """Send nothing for a moment: only the newest frames are of use after an outage."""
         if self._held:
             return
@@ -716,7 +758,7 @@ class Connection:
             self._held = False
             self._watch()
 
-        self._loop.after(_STALLED_POLL_S, release)
+        self._loop.after(pause, release)
         self._loop.call(self._watch)
 
     # -- receiving -------------------------------------------------------------------------------

@@ -138,9 +138,9 @@ class Publication(Member):
             return
         if size < 4096:
             # One part is sent faster than several.
-            frame = Frame((b"".join((_uint32.pack(size), *parts)),), latched)
+            frame = Frame((b"".join((_uint32.pack(size), *parts)),), latched, writer.timeout)
         else:
-            frame = Frame((_uint32.pack(size), *parts), latched)
+            frame = Frame((_uint32.pack(size), *parts), latched, writer.timeout)
         if latched:
             frame.parts = [frame.rest(0)]
         keep, keep_bytes = writer.keep, writer.keep_bytes
@@ -287,7 +287,9 @@ class Publication(Member):
                     text = ""
                 else:
                     reported, at = lost, now
-                    text = f"{link.peer} is too slow: {lost} messages were dropped for newer ones"
+                    text = f"{link.peer} is too slow: {lost} messages were dropped"
+                    if not any(writer.timeout for writer in self.writers):
+                        text += " for newer ones"
             slow[link] = (reported, at, text)
         self._slow = slow
         return [text for _, _, text in slow.values() if text]
@@ -335,6 +337,7 @@ class PublicationWriter(Writer):
         latched: Whether new subscribers receive the last message.
         keep: Most messages in the send queue of a subscriber; 0 for any number.
         keep_bytes: Most bytes in it; 0 for any number.
+        timeout: Seconds after which a message in it is dropped; 0 for never.
         before: The connections before the end of each that ended since the last call of
             :meth:`changes`.
     """
@@ -350,6 +353,7 @@ class PublicationWriter(Writer):
         self.latched = qos.durability is Durability.TRANSIENT_LOCAL
         keep_all = qos.history is History.KEEP_ALL
         self.keep, self.keep_bytes = (0, INBOX_LIMIT) if keep_all else (qos.depth, 0)
+        self.timeout = 0.0 if qos.send_timeout is None else qos.send_timeout.seconds
         self.before: deque[list[Connection]] = deque(maxlen=_MAX_ENDED)
         if _has_header(type):
             self.number = self._number

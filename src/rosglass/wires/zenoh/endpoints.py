@@ -18,6 +18,7 @@ import zenoh.ext
 from rosglass.comm import ConnectionState, Durability, Handle, History, Reliability
 from rosglass.errors import ConnectionLostError, NodeClosedError
 from rosglass.wires.base import Writer
+from rosglass.wires.zenoh.command_window import CommandWindow
 from rosglass.wires.zenoh.keys import ATTACHMENT_FULL, HUMBLE_HASH, gid_of, topic_key, without_hash
 
 try:
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm import EndpointInfo, Status
     from rosglass.comm.graph import Graph
+    from rosglass.comm.timers import Timers
     from rosglass.wires.zenoh.options import ZenohOptions
 
 __all__ = [
@@ -93,10 +95,12 @@ class Owner(Protocol):
     Attributes:
         options: Options of the session.
         version: Increases with each change of links or service servers.
+        timers: Run delayed jobs.
     """
 
     options: ZenohOptions
     version: int
+    timers: Timers
 
     @property
     def graph(self) -> Graph:
@@ -113,6 +117,12 @@ class Owner(Protocol):
 
     def status(self) -> Status:
         """Return the state of the connection."""
+
+    def is_linked(self) -> bool:
+        """Return whether there is a link to a router or peer."""
+
+    def query_router(self, timeout: float) -> Any:
+        """Send a query without result; return its channel, None if there is no session."""
 
 
 class Declaration(Handle):
@@ -248,8 +258,14 @@ class ZenohWriter(Declaration, Writer):
         self._history: deque[tuple[bytes | bytearray, bytes, int]] = deque(maxlen=self._qos.depth)
         #: A buffer to join parts in: fresh memory takes longer than copying.
         self._buffers: list[bytearray] = []
+        self._window: CommandWindow | None = None
+        if self._qos.send_timeout is not None:
+            timeout = self._qos.send_timeout.seconds
+            self._window = CommandWindow(
+                owner.timers, timeout, owner.query_router, self._put, owner.is_linked
+            )
         # Samples kept for late subscriptions would fill the shared memory.
-        self._shared = None if self._latched else shared
+        self._shared = None if self._latched or self._window is not None else shared
 
     def declare(self, session: zenoh.Session) -> list[Any]:
         """Declare a publisher for each known key."""
@@ -266,7 +282,7 @@ class ZenohWriter(Declaration, Writer):
     def write_parts(self, parts: Sequence[bytes | bytearray | memoryview]) -> None:
         """Send a payload given in parts, with one copy less than by joining them."""
         now = time.time_ns()
-        kept = self._latched or bool(self._readers.find(self._place))
+        kept = self._latched or self._window is not None or bool(self._readers.find(self._place))
         shared = None if kept or self._shared is None else self._shared.place(parts)
         if shared is not None:
             self._send(b"", shared, now)
@@ -304,8 +320,10 @@ class ZenohWriter(Declaration, Writer):
             note = ATTACHMENT_FULL.pack(number, now, 16, self.gid)
             if self._latched:
                 self._history.append((data, note, time.monotonic_ns()))
-            for publisher in self._publishers:
-                publisher.put(payload, attachment=note)
+            if self._window is None:
+                self._put(payload, note)
+            else:
+                self._window.send(bytes(payload), note)
             for reader in self._readers.find(self._place):
                 reader.on_local_sample(bytes(data), now, self.gid, number, self._type_hash)
         except zenoh.ZError as error:
@@ -314,6 +332,19 @@ class ZenohWriter(Declaration, Writer):
             writing.remove(thread)
             if self._release_later and not writing:
                 self._release()
+
+    def lost(self) -> int:
+        """Return how many commands were dropped because they could not be sent in time."""
+        return 0 if self._window is None else self._window.lost
+
+    @property
+    def problem(self) -> str:  # type: ignore[override]
+        """That commands could not be sent in time, in words; empty if all were."""
+        return "" if self._window is None else self._window.problem
+
+    def _put(self, payload: Any, note: bytes) -> None:
+        for publisher in self._publishers:
+            publisher.put(payload, attachment=note)
 
     def match(self, subscriptions: Sequence[EndpointInfo]) -> None:
         """Also publish on the key without type hash if a subscription, as in Humble, uses it."""
@@ -339,6 +370,8 @@ class ZenohWriter(Declaration, Writer):
         while set(self._writing) - {own} and time.monotonic() < deadline:
             time.sleep(_POLL_INTERVAL_S)
         self._release_later = True
+        if self._window is not None:
+            self._window.close()
         if not self._writing:
             super()._release()
 
@@ -363,6 +396,11 @@ class ZenohWriter(Declaration, Writer):
         # Each priority has its own queue: a stop command must not be dropped because best-effort
         # camera images of the same program fill theirs while the network is stuck.
         priority = zenoh.Priority.INTERACTIVE_LOW if reliable else zenoh.Priority.DATA
+        if self._window is not None:
+            priority = zenoh.Priority.REAL_TIME
+            return session.declare_publisher(
+                key, congestion_control=congestion, priority=priority, express=True
+            )
         if self._qos.durability is Durability.VOLATILE:
             return session.declare_publisher(key, congestion_control=congestion, priority=priority)
         return zenoh.ext.declare_advanced_publisher(

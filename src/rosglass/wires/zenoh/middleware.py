@@ -22,6 +22,7 @@ from rosglass.comm import (
     NodeName,
     Status,
 )
+from rosglass.comm.timers import Timers
 from rosglass.errors import ConnectionLostError, Error, NodeClosedError
 from rosglass.wires.base import (
     Middleware,
@@ -123,6 +124,7 @@ class ZenohMiddleware(Middleware):
             self._shared = SharedMemory()
         self._readers: LocalRegistry[ZenohReader] = LocalRegistry()
         self._servers: LocalRegistry[ZenohReplier] = LocalRegistry()
+        self.timers = Timers(f"{self._address} commands")
         self._drain = Drain(f"{self._address} unread")
         self._changed: Callable[[], None] = lambda: None
         self._graph: Graph | None = None
@@ -235,6 +237,7 @@ class ZenohMiddleware(Middleware):
         self._increase_version()
         for pump in self._pumps:
             pump.undeclare()
+        self.timers.close()
         if session is not None:
             close_session(session, pause)
         self._drain.close()
@@ -256,6 +259,18 @@ class ZenohMiddleware(Middleware):
     def wake(self) -> None:
         """Have declarations polled soon."""
         self._changed()
+
+    def is_linked(self) -> bool:
+        """Return whether there is a link to a router or peer."""
+        return bool(self._links)
+
+    def query_router(self, timeout: float) -> Any:
+        """Send a query without result; return its channel, None if there is no session."""
+        session = self._session
+        if session is None:
+            return None
+        channel = zenoh.handlers.FifoChannel(4)
+        return session.liveliness().get(self._no_token, channel, timeout=timeout)
 
     def _token(self, endpoint: EndpointInfo) -> str:
         with self._lock:
