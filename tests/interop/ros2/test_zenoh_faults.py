@@ -6,6 +6,7 @@ import gc
 import logging
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -439,3 +440,35 @@ def test_ctrl_c_at_any_moment(delay, router):
     process.send_signal(signal.SIGINT)
     out, errors = process.communicate(timeout=60)
     assert (process.returncode, out, errors) == (0, "interrupted\n", "")
+
+
+#: Ends while its node waits for a router that accepts the connection and never answers. Python's
+#: own end is made to last longer than that.
+LEAVING = """
+import sys, threading, time
+import rosglass
+from rosglass.wires.zenoh import middleware
+
+opening, open_session = threading.Event(), middleware.open_session
+
+def open_slowly(config):
+    opening.set()
+    return open_session(config)
+
+class Last:
+    def __del__(self, sleep=time.sleep):
+        sleep(4)
+
+middleware.open_session = open_slowly
+sys.last_of_all = Last()
+node = rosglass.connect("{url}?mode=client", "leaving", own_services=False)
+assert opening.wait(20)
+"""
+
+
+def test_a_program_that_ends_while_it_connects_is_not_aborted():
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        url = f"zenoh://127.0.0.1:{silent.getsockname()[1]}"
+        command = [sys.executable, "-c", LEAVING.format(url=url)]
+        process = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert (process.returncode, process.stderr) == (0, "")

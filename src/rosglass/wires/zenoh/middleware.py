@@ -48,6 +48,7 @@ from rosglass.wires.zenoh.reader import Drain, ZenohReader
 from rosglass.wires.zenoh.refusal import find_refusal
 from rosglass.wires.zenoh.services import ZenohReplier, ZenohRequester
 from rosglass.wires.zenoh.session import (
+    OPEN_TIMEOUT_S,
     Heartbeat,
     check_process,
     close_session,
@@ -109,6 +110,8 @@ class ZenohMiddleware(Middleware):
         self._settled = 0.0
         self._was_connected = self._closed = False
         self._retries_open = self._linked = False
+        #: Held while a session is being opened, which takes seconds without an answer.
+        self._opening = threading.Lock()
         self._no_token = f"@ros2_lv/{options.domain}/{self._id}/pulse"
         self._heartbeat = Heartbeat(self._no_token)
         #: A query that ends after the tokens that the router had when it was linked.
@@ -235,6 +238,9 @@ class ZenohMiddleware(Middleware):
             self._declared.clear()
             self._links.clear()
         self._increase_version()
+        # A thread that is inside Zenoh while the interpreter shuts down would abort the program.
+        if self._opening.acquire(timeout=OPEN_TIMEOUT_S):
+            self._opening.release()
         for pump in self._pumps:
             pump.undeclare()
         self.timers.close()
@@ -298,7 +304,10 @@ class ZenohMiddleware(Middleware):
 
     def _open(self) -> None:
         try:
-            session = open_session(self._config)
+            with self._opening:
+                if self._closed:
+                    return
+                session = open_session(self._config)
         except zenoh.ZError as error:
             if "Unable to connect" in str(error):
                 self._retries_open = True  # a client without router; poll() tries again

@@ -31,6 +31,7 @@ from rosglass.errors import ArgumentError, UnsupportedError
 from rosglass.wires.zenoh.options import ZenohOptions, locator
 
 __all__ = [
+    "OPEN_TIMEOUT_S",
     "Heartbeat",
     "check_process",
     "close_session",
@@ -52,6 +53,8 @@ _RETRY = {"period_init_ms": 250, "period_max_ms": 500, "period_increase_factor":
 #: Timeout for opening a link in milliseconds: closing a session waits for a running attempt, and
 #: three round trips over a satellite have to fit.
 _OPEN_TIMEOUT_MS = 3000
+#: Seconds within which an attempt to open a session ends; Zenoh's default for an address is 10.
+OPEN_TIMEOUT_S = 12.0
 #: Queue of a link on this machine in fragments of 64 kB. With Zenoh's default of 2, sender and link
 #: wait for each other: a 6 MB image takes a fifth longer, and is dropped on a busy machine. On
 #: other links, a longer queue would add latency.
