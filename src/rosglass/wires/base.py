@@ -117,6 +117,9 @@ class Writer(Handle):
 class Reader(Handle):
     """Receives the samples of one subscription."""
 
+    #: What is wrong with what arrives, in words, and already logged; empty if all is well.
+    problem: str = ""
+
     def set_eager(self, eager: bool) -> None:
         """Set whether samples are delivered one by one, which is the default.
 

@@ -75,6 +75,8 @@ _MIN_UNUSED_NUMBERS = 8
 _HEARTBEAT_INTERVAL_S = 0.9
 #: Seconds that a router has to send all tokens: for 10,000, Zenoh needs 4 to 13.
 _HISTORY_TIMEOUT_S = 20.0
+#: Number of publishers and clients whose topics and services are remembered.
+_MAX_NAMES = 20_000
 #: Number of invalid tokens to log.
 _MAX_LOGGED = 100
 #: Seconds without a router until the reason is looked for, between two times, and for its answer.
@@ -131,6 +133,9 @@ class ZenohMiddleware(Middleware):
         self._drain = Drain(f"{self._address} unread")
         self._changed: Callable[[], None] = lambda: None
         self._graph: Graph | None = None
+        #: Topic or service of each announced publisher and client by its GID, the oldest first.
+        #: Also of those that left: what they have sent may still arrive.
+        self._names: dict[bytes, str] = {}
         self._logged_tokens: set[str] = set()
 
     def open(self, graph: Graph, changed: Callable[[], None]) -> None:
@@ -261,6 +266,10 @@ class ZenohMiddleware(Middleware):
         Every program in the graph, and the router, stores each token's key for ever.
         """
         self._used_numbers.append(Token.parse(declaration.token).entity_id)
+
+    def name_of(self, gid: bytes) -> str | None:
+        """Return the topic or service that a publisher or client was announced for, if any."""
+        return self._names.get(gid)
 
     def wake(self) -> None:
         """Have declarations polled soon."""
@@ -430,6 +439,11 @@ class ZenohMiddleware(Middleware):
         if endpoint is None:
             self._graph.put_node(key, token.node)
             return
+        if endpoint.kind in (EndpointKind.PUBLISHER, EndpointKind.SERVICE_CLIENT):
+            with self._lock:
+                self._names[endpoint.gid] = endpoint.name
+                if len(self._names) > _MAX_NAMES:
+                    del self._names[next(iter(self._names))]
         self._graph.put_endpoint(key, endpoint)
         if endpoint.kind is EndpointKind.SERVICE_SERVER:
             self._increase_version()
