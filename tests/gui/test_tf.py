@@ -288,6 +288,16 @@ def test_waiting_for_a_transform(live: Bench, wait: Any) -> None:
     timer.join()
 
 
+@pytest.mark.parametrize("module", ["Ros2 1.0", "Ros 1.0"])
+def test_before_init_there_is_nothing_to_look_up(bench: Bench, module: str) -> None:
+    bench.module = module
+    script = """const l = TfTransformListener
+        return [l.canTransform("map", "base"), l.canTransform("map", 0, "base", 0, "odom", 50),
+                l.lookUpTransform("map", "base").exception,
+                l.lookUpTransform("map", "base").valid]"""
+    assert bench.run(script) == ["Uninitialized", "Uninitialized", "Uninitialized", False]
+
+
 def test_the_tree(live: Bench, robot: Robot, wait: Any) -> None:
     live.run("TfTransformListener.initialize()")
     wait(lambda: live.run('return TfTransformListener.canTransform("map", "laser")') is True)
@@ -309,8 +319,11 @@ def test_the_tree(live: Bench, robot: Robot, wait: Any) -> None:
                 l.getChain("map", "laser"), l.getFrame("moon") === undefined]
     """)
     assert shown == [
-        ["base", "laser", "map"], "/robot", "", -1, -1, ["laser", "base", "map"], True
+        ["base", "laser", "map"], "/robot", "", -1, shown[4], ["laser", "base", "map"], True
     ]  # fmt: skip
+    # Of static ones, too: the time since their stamp, which is zero.
+    assert abs(shown[4] - time.time()) < 60
+    assert live.run('return TfTransformListener.getTransformAge("moon")') == -1
     age = live.run('return TfTransformListener.getTransformAge("base")')
     assert 0 <= age < 20
 
