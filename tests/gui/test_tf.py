@@ -115,6 +115,37 @@ def test_a_chain_with_a_link_that_stands_still_is_stale(live: Bench, wait: Any) 
         thread.join()
 
 
+def test_a_transform_that_was_held_back_is_stale_as_it_arrives(live: Bench, wait: Any) -> None:
+    broadcaster = TransformBroadcaster(live.robot)
+    root: Any = live.load("""
+        QtObject {
+            property var seen: []
+            property TfTransform tf: TfTransform {
+                sourceFrame: "base"; targetFrame: "map"; timeout: 500
+            }
+            function shown() { return [tf.translation.x, tf.stale].join() }
+        }""")
+
+    def send(x: float, stamp: float) -> None:
+        frames = {"frame_id": "map", "child_frame_id": "base"}
+        broadcaster.send_transform(
+            Transform((x, 0.0, 0.0), stamp=Time(round(stamp * 1e9)), **frames)
+        )
+
+    def is_live(x: float) -> bool:
+        send(x, time.time())
+        return bool(root.shown() == f"{x:g},false")
+
+    wait(lambda: is_live(1.0))
+    wait(lambda: is_live(2.0))
+    sent = time.time()
+    wait(lambda: time.time() > sent + 2)
+    send(3.0, sent + 0.2)
+    wait(lambda: root.shown().startswith("3,"))
+    assert root.shown() == "3,true"
+    wait(lambda: is_live(4.0))
+
+
 def test_what_a_dead_robot_left_behind_is_stale(live: Bench, robot: Robot, wait: Any) -> None:
     first: Any = live.load(FOLLOWING)
     wait(lambda: first.shown().startswith("true,false"))

@@ -319,7 +319,7 @@ class Subscription(TopicElement):
     def _lateness(self, sample: Sample) -> float:
         """Return the excess delay of a message over others, in seconds."""
         endpoint = self._endpoint
-        if endpoint is None or sample.sent_ns is None:
+        if endpoint is None:
             return 0.0
         return endpoint.lateness(sample).seconds
 

@@ -137,6 +137,13 @@ class Reader(Handle):
         """
         return 0
 
+    def lateness(self, publisher: bytes) -> int:
+        """Return how late a publisher's last sample was by its arrival, in nanoseconds.
+
+        For samples without a stamp; 0 if that is unknown.
+        """
+        return 0
+
     def alive(self) -> int | None:
         """Return how many publishers asserted their liveliness in time; None if unknown."""
         return None
