@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import socket
 import subprocess
@@ -231,3 +232,23 @@ def test_ctrl_c_while_the_interface_is_being_made(
     program.kill(signal.SIGINT)
     assert program.end() == 130
     assert ended_soon(program, started)
+
+
+def test_the_process_ends_with_the_interface(file: Path, tmp_path: Path) -> None:
+    # The interpreter's own end takes seconds with Qt, OpenGL and Zenoh; all is closed before.
+    (tmp_path / "sitecustomize.py").write_text(
+        "import atexit\natexit.register(lambda: print('the interpreter ends'))\n"
+    )
+    file.write_text(
+        "import QtQuick 2.15\nimport QtQuick.Window 2.15\nimport Ros2 1.0\n"
+        "Window { visible: true; Component.onCompleted: Ros2.init('ui')\n"
+        "Timer { interval: 1; running: true; onTriggered: { console.log('done'); Qt.exit(7) } } }"
+    )
+    command = [sys.executable, "-m", "rosglass", "run", str(file), "--url", "local://end"]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "QT_QPA_PLATFORM": "offscreen"}
+    ended = subprocess.run(
+        command, check=False, env=environment, capture_output=True, text=True, timeout=60
+    )
+    assert ended.returncode == 7, ended.stderr
+    assert "done" in ended.stderr
+    assert "the interpreter ends" not in ended.stdout

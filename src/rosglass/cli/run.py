@@ -128,7 +128,7 @@ def show(
         screenshot: Where to save a picture of the window, after which the program ends.
         after: Seconds until the screenshot.
         verbose: Show what is logged for developers, too.
-        end_process: End the process soon after the interface, whatever still runs in it.
+        end_process: End the process with the interface, whatever still runs in it.
         longest_script: As for :class:`rosglass.qml.Session`.
         recorder: What records the window, as long as it is shown.
         options: As for :class:`rosglass.qml.Application`.
@@ -148,9 +148,14 @@ def show(
     # Nothing created until the first frame becomes garbage.
     gc.disable()
     try:
-        return _show(
+        code = _show(
             file, screenshot, after, verbose, end_process, longest_script, recorder, options
         )
+        if end_process:
+            from rosglass.qml.process import end_process as end_now  # noqa: PLC0415 - with Qt
+
+            end_now(code)
+        return code
     except SystemExit as end:
         # A signal before anything was shown: objects would be deleted in any order.
         if end_process and isinstance(end.code, int):

@@ -20,7 +20,7 @@ import threading
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from rosglass.errors import UnsupportedError
 from rosglass.qt import QT6, QtCore, optional
@@ -34,6 +34,7 @@ __all__ = [
     "NETWORK_HINT",
     "QuitOnSignal",
     "close_network",
+    "end_process",
     "end_process_within",
     "is_network_closed",
     "quiet_qt",
@@ -179,6 +180,20 @@ def end_process_within(seconds: float, code: int) -> None:
             os._exit(code)
 
     threading.Thread(target=end, name="end", daemon=True).start()
+
+
+def end_process(code: int) -> NoReturn:
+    """End the process with an exit code, after everything is closed.
+
+    The interpreter's own end takes seconds: it destroys the objects of Qt, OpenGL and Zenoh one by
+    one, and waits for their threads.
+    """
+    logging.shutdown()
+    for stream in (sys.stdout, sys.stderr):
+        # Its reader may be gone, or there may be none.
+        with suppress(OSError, ValueError, AttributeError):
+            stream.flush()
+    os._exit(code)
 
 
 class QuitOnSignal:
