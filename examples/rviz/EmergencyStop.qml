@@ -1,5 +1,6 @@
 // The emergency stop. It shows what the robot confirms, not the click; a request is repeated until
-// it is confirmed. A press stops at once; only a long press releases.
+// it is confirmed. A press stops at once; only a long press releases. A release names the number that
+// the robot's counter had then: the robot refuses it if it comes late, or after another stop.
 // With the keyboard focus (Tab, shown by a white frame), Space stops, and Enter held releases.
 import QtQuick 2.15
 import Ros 1.0
@@ -8,8 +9,11 @@ Rectangle {
     id: stop
     objectName: "emergency stop"
     property var publisher: Ros.advertise("std_msgs/Bool", "/emergency_stop", 1)
+    property var releasePublisher: Ros.advertise("std_msgs/UInt32", "/emergency_stop/release", Ros.CommandQoS())
     // The operator's request: true, false, or null for none.
     property var wanted: null
+    // The number that a release names.
+    property var named
     readonly property bool known: state_.message !== undefined && !state_.stale
     readonly property bool stopped: known && state_.message.data
     readonly property bool pending: wanted !== null && (!known || stopped !== wanted)
@@ -44,7 +48,10 @@ Rectangle {
         if (stopped)
             cancelHold()
         wanted = stopped
-        publisher.publish({data: wanted})
+        if (stopped)
+            publisher.publish({data: true})
+        else if (named !== undefined)
+            releasePublisher.publish({data: named})
     }
 
     radius: 8
@@ -52,12 +59,13 @@ Rectangle {
     border { color: !known || pending ? "#ffe24a" : stopped ? "#ff8a94" : "#ff6b78"; width: 3 }
 
     Subscriber { id: state_; topic: "/emergency_stop/state"; messageType: "std_msgs/Bool"; timeout: 1000 }
+    Subscriber { id: counter; topic: "/emergency_stop/counter"; messageType: "std_msgs/UInt32"; timeout: 1000 }
     Timer {
         interval: 100; repeat: true
         running: stop.pending
         onTriggered: stop.want(stop.wanted)
     }
-    // A stop never times out; a release must not undo another operator's stop much later.
+    // A stop never times out; a release does, here and (sooner) at the robot.
     Timer {
         interval: 3000
         running: stop.wanted === false
@@ -102,7 +110,11 @@ Rectangle {
         property real progress: 0
         target: hold; property: "progress"
         from: 0; to: 1; duration: 700
-        onFinished: { progress = 0; stop.want(false) }
+        onFinished: {
+            progress = 0
+            stop.named = counter.stale || !counter.message ? undefined : counter.message.data
+            stop.want(false)
+        }
     }
     MouseArea {
         anchors.fill: parent

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import logging
 import math
+import random
 import threading
 import time
+from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
     from rosglass.demo.simulation import RobotState
     from rosglass.messages import Message
 
-__all__ = ["Robot", "RobotOptions", "Services"]
+__all__ = ["ReleaseCounter", "Robot", "RobotOptions", "Services"]
 
 _log = logging.getLogger("rosglass.demo.robot")
 _MOVE_PERIOD_S, _REPORT_PERIOD_S, _TURN_PERIOD_S = 0.01, 1 / 30, 0.1
@@ -42,6 +44,8 @@ _LOG_PERIOD_S = 2.0
 _SPEED_PARAMETER = "max_speed"
 #: Limits of that parameter in metres per second.
 _MIN_SPEED, _MAX_SPEED = 0.1, 1.2
+#: Seconds after which a release of the emergency stop is too late.
+_RELEASE_TIMEOUT_S = 2.0
 #: Rate of a turn in radians per second, and its tolerance in radians.
 _TURN_RATE, _TURN_TOLERANCE = 0.8, 0.03
 
@@ -106,6 +110,7 @@ class Robot:
         self._threads: list[threading.Thread] = []
         self._rejected, self._logged_at = 0, -_LOG_PERIOD_S
         self._frame_period, self._render_time = 0.0, 0.0
+        self._releases = ReleaseCounter()
         self._send = _publishers(node, self.options)
         self._subscriptions = [
             node.create_subscription(topic, kind, self._counting_refusals(topic, handler), qos)
@@ -113,6 +118,7 @@ class Robot:
                 # Only the newest command counts: an old one must not be driven after it.
                 ("/cmd_vel", "geometry_msgs/msg/Twist", self._on_velocity, 1),
                 ("/emergency_stop", "std_msgs/msg/Bool", self._on_stop, 10),
+                ("/emergency_stop/release", "std_msgs/msg/UInt32", self._on_release, 1),
                 ("/flashlight", "std_msgs/msg/Bool", self._on_flashlight, 10),
                 (
                     "/flipper_controller/commands",
@@ -250,11 +256,27 @@ class Robot:
             self._simulation.command_velocity(speed, turn)
 
     def _on_stop(self, message: Message) -> None:
+        if not message.data:
+            raise CommandRejectedError(
+                "only true is accepted here; to release the stop, send the last number of "
+                "/emergency_stop/counter to /emergency_stop/release"
+            )
         with self._lock:
-            changed = self.state.emergency_stop != message.data
-            self._simulation.set_emergency_stop(message.data)
+            # Also while it is latched: releases of the stops before must not undo this one.
+            self._releases.invalidate()
+            changed = not self.state.emergency_stop
+            self._simulation.set_emergency_stop(True)
         if changed:
-            _log.info("emergency stop %s", "latched" if message.data else "released")
+            _log.info("emergency stop latched")
+        self._confirm()
+
+    def _on_release(self, message: Message) -> None:
+        with self._lock:
+            if not self.state.emergency_stop:
+                return  # cockpits repeat it until they receive the state
+            self._releases.check(message.data)
+            self._simulation.set_emergency_stop(False)
+        _log.info("emergency stop released")
         self._confirm()
 
     def _on_flashlight(self, message: Message) -> None:
@@ -269,7 +291,11 @@ class Robot:
         self._command_flippers([float(angle) for angle in message.data])
 
     def _confirm(self) -> None:
-        self._send["/emergency_stop/state"].publish(data=self.state.emergency_stop)
+        with self._lock:
+            stopped, number = self.state.emergency_stop, self._releases.count()
+        # First: who receives the state knows a number that is valid for it.
+        self._send["/emergency_stop/counter"].publish(data=number)
+        self._send["/emergency_stop/state"].publish(data=stopped)
 
     def _move(self) -> None:
         last = time.monotonic()
@@ -352,6 +378,52 @@ class Robot:
                 [cv2.IMWRITE_JPEG_QUALITY, self.options.jpeg_quality],
             )
             compressed.publish(header=header, format="rgb8; jpeg compressed bgr8", data=data)
+
+
+class ReleaseCounter:
+    """The numbers that a release of the emergency stop has to name.
+
+    A release may lie in a network for a long time, while another operator presses stop. So the
+    robot publishes a new number several times a second, and a release names the last one that the
+    operator's machine had received when it was requested. It is refused if stop was pressed after
+    that number was published, or if that is too long ago by the robot's own clock. No clocks of two
+    machines are compared.
+    """
+
+    def __init__(self) -> None:
+        # A release of the time before a restart must not name a new number by accident.
+        self._number = random.SystemRandom().getrandbits(32)
+        #: The numbers that are valid, each with the time when it was counted, monotonic.
+        self._valid: deque[tuple[int, float]] = deque()
+
+    def count(self) -> int:
+        """Return the next number, to be published now."""
+        now = time.monotonic()
+        self._number = (self._number + 1) % 2**32
+        self._valid.append((self._number, now))
+        self._expire(now)
+        return self._number
+
+    def invalidate(self) -> None:
+        """Refuse all numbers counted until now: stop was pressed."""
+        self._valid.clear()
+
+    def check(self, number: int) -> None:
+        """Check the number that a release names.
+
+        Raises:
+            CommandRejectedError: It is too old, or no number of this robot.
+        """
+        self._expire(time.monotonic())
+        if all(number != valid for valid, _ in self._valid):
+            raise CommandRejectedError(
+                f"a release has to name a number of /emergency_stop/counter that was published "
+                f"after the last stop and in the last {_RELEASE_TIMEOUT_S:.0f} s; {number} was not"
+            )
+
+    def _expire(self, now: float) -> None:
+        while self._valid and now - self._valid[0][1] > _RELEASE_TIMEOUT_S:
+            self._valid.popleft()
 
 
 class Services:
@@ -468,6 +540,7 @@ def _publishers(node: Node, options: RobotOptions) -> dict[str, Publisher]:
         ("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 10),
         ("/map", "nav_msgs/msg/OccupancyGrid", latched),
         ("/emergency_stop/state", "std_msgs/msg/Bool", latched),
+        ("/emergency_stop/counter", "std_msgs/msg/UInt32", 1),
         ("/flashlight/state", "std_msgs/msg/Bool", latched),
         ("/camera/camera_info", "sensor_msgs/msg/CameraInfo", sensor),
     ]

@@ -109,7 +109,7 @@ def test_the_emergency_stop_ends_the_mission_and_holds(
         node.command("/cmd_vel", linear={"x": 0.5})
         lives_on(robot, 0.2)
     assert (robot.state.x, robot.state.y) == place
-    node.command("/emergency_stop", data=False)
+    node.command("/emergency_stop/release", data=node.last("/emergency_stop/counter").data)
     eventually(lambda: node.last("/mission/state").data == "waiting for mode autonomous")
 
 

@@ -14,8 +14,8 @@ pytest.importorskip("cv2", reason="the simulated camera needs the extra `camera`
 from waiting import eventually
 
 from rosglass.comm import Durability, QoS
-from rosglass.demo.robot import Robot, RobotOptions
-from rosglass.demo.simulation import FLIPPERS
+from rosglass.demo.robot import ReleaseCounter, Robot, RobotOptions
+from rosglass.demo.simulation import FLIPPERS, CommandRejectedError
 from rosglass.errors import Error
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def alive(stub_node: type[StubNode]) -> Iterator[tuple[StubNode, Robot]]:
 @pytest.fixture
 def node(alive: tuple[StubNode, Robot]) -> Iterator[StubNode]:
     yield alive[0]
-    alive[0].command("/emergency_stop", data=False)
+    alive[0].command("/emergency_stop/release", data=alive[0].last("/emergency_stop/counter").data)
 
 
 @pytest.fixture
@@ -127,6 +127,42 @@ def test_a_stop_is_confirmed_at_once_and_holds(node: StubNode, robot: Robot, liv
         lives_on(robot, 0.03)
     assert robot.state.speed == 0.0
     assert node.last("/diagnostics").status[0].message == "emergency stop latched"
+
+
+def release(node: StubNode, number: int | None = None) -> None:
+    if number is None:
+        number = node.last("/emergency_stop/counter").data
+    node.command("/emergency_stop/release", data=number)
+
+
+def test_a_release_names_a_number_published_after_the_stop(node: StubNode, robot: Robot) -> None:
+    eventually(lambda: node.publishers["/emergency_stop/counter"].sent)
+    node.command("/emergency_stop", data=True)
+    old = node.last("/emergency_stop/counter").data
+    node.command("/emergency_stop", data=True)  # another operator presses it while it is latched
+    release(node, old)
+    assert robot.state.emergency_stop, "what releases the first stop does not undo the second"
+    node.command("/emergency_stop", data=False)
+    assert robot.state.emergency_stop, "nobody can know what an old false was meant for"
+    release(node)
+    assert not robot.state.emergency_stop
+    assert node.last("/emergency_stop/state").data is False
+    release(node)  # repeated until the cockpit receives the state
+    assert not robot.state.emergency_stop
+
+
+def test_a_release_that_is_too_old_is_refused() -> None:
+    releases = ReleaseCounter()
+    first, second = releases.count(), releases.count()
+    releases.check(first)
+    number, counted = releases._valid[0]
+    releases._valid[0] = number, counted - 2.1  # two seconds later
+    with pytest.raises(CommandRejectedError, match="in the last 2 s"):
+        releases.check(first)
+    releases.check(second)
+    releases.invalidate()
+    with pytest.raises(CommandRejectedError, match="after the last stop"):
+        releases.check(second)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,9 @@
 // The emergency stop. It shows what the robot confirms, not what was clicked: a stop that is not
 // confirmed is sent again and again, and said to be unconfirmed after half a second. A stop pressed
 // here stays wanted until it is released here, even when the robot forgets it (a restart).
+//
+// A release names the number that the robot's counter had when it was requested: if it comes late, or
+// after another operator's stop, the robot refuses it, however often it is repeated.
 import QtQuick
 import Ros2 1.0
 
@@ -12,7 +15,11 @@ Item {
     property var wanted: null
     readonly property bool known: state_.fresh
     readonly property bool stopped: known && state_.message.data
-    readonly property bool pending: wanted !== null && (!known || stopped !== wanted)
+    // Pressed, and not confirmed yet: the state received last is older than that.
+    property bool expected: false
+    // The number that a release names; null until it is known.
+    property var named: null
+    readonly property bool pending: wanted !== null && (!known || stopped !== wanted || expected)
     property bool overdue: false
     // Released here, and stopped again at once: another operator holds it.
     property bool contested: false
@@ -22,7 +29,11 @@ Item {
     readonly property bool blocks: wanted === true || stopped
 
     property var publisher: null
-    Component.onCompleted: publisher = Ros2.createPublisher(topic, "std_msgs/msg/Bool", 10)
+    property var releasePublisher: null
+    Component.onCompleted: {
+        publisher = Ros2.createPublisher(topic, "std_msgs/msg/Bool", 10)
+        releasePublisher = Ros2.createPublisher(topic + "/release", "std_msgs/msg/UInt32", Ros2.CommandQoS())
+    }
 
     // By Tab; the keys that stop and release count wherever the focus is.
     activeFocusOnTab: true
@@ -32,12 +43,14 @@ Item {
 
     function press() {
         cancelHold()
+        expected = !stopped
         wanted = true
         begin()
     }
 
     function release() {
         wanted = false
+        named = expected || !counter.fresh ? null : counter.message.data
         sinceRelease.restart()
         begin()
     }
@@ -61,12 +74,17 @@ Item {
     }
 
     function send() {
+        if (wanted === false && named === null) {
+            problem = "the robot's counter is unknown"
+            return
+        }
+        const to = wanted ? publisher : releasePublisher
         try {
-            if (publisher.publish({ data: wanted })) {
+            if (to.publish({ data: wanted || named })) {
                 sent += 1
                 problem = ""
             } else {
-                problem = publisher.problem || "no connection"
+                problem = to.problem || "no connection"
             }
         } catch (error) {
             problem = String(error.message || error)
@@ -84,14 +102,29 @@ Item {
         }
     }
 
-    onStoppedChanged: contested = stopped && wanted !== true && sinceRelease.running
+    onStoppedChanged: {
+        contested = stopped && wanted !== true && sinceRelease.running
+        if (stopped)
+            expected = false
+    }
     // Not at once: it may change what this is computed from.
     onPendingChanged: Qt.callLater(settle)
 
     property Feed state_: Feed {
-        topic: "/emergency_stop/state"
+        topic: stop.topic + "/state"
         messageType: "std_msgs/msg/Bool"
         urgent: true
+    }
+    property Feed counter: Feed {
+        topic: stop.topic + "/counter"
+        messageType: "std_msgs/msg/UInt32"
+        urgent: true
+        onArrived: function (message) {
+            if (stop.wanted === false && stop.named === null && !stop.expected) {
+                stop.named = message.data
+                stop.send()
+            }
+        }
     }
     Timer {
         interval: 100
@@ -109,7 +142,7 @@ Item {
         // A held stop is repeated ten times a second.
         interval: 1000
     }
-    // A stop never times out. A release does: it must not undo another operator's stop much later.
+    // A stop never times out. A release does, here and (sooner) at the robot.
     Timer {
         interval: 3000
         running: stop.wanted === false
