@@ -7,20 +7,22 @@ Item {
     ImageTransportSubscription { id: camera; topic: "/camera/image_raw" }
     VideoOutput { anchors.fill: parent; source: camera }
     Rectangle {
-        anchors.horizontalCenter: parent.horizontalCenter
-        anchors.bottom: parent.bottom
-        width: 120; height: 120; radius: 60
-        color: "#aaaaaa"
+        anchors { horizontalCenter: parent.horizontalCenter; bottom: parent.bottom }
+        width: 120; height: 120; radius: 60; color: "#aaaaaa"
         MouseArea {
-            id: stick
-            anchors.fill: parent
-            property var pub: Ros2.createPublisher("/cmd_vel", "geometry_msgs/msg/Twist", 1)
+            id: stick; anchors.fill: parent
+            property var pub: Ros2.createPublisher("/cmd_vel", "geometry_msgs/msg/Twist", Ros2.CommandQoS())
+            property int stops: 0
             function axis(at, size) { return Math.max(-1, Math.min(1, 1 - 2 * at / size)) }
-            onPressedChanged: if (!pressed) pub.publish({})
+            onPressedChanged: stops = 400  // for a second, or for 20 s while there is no picture
             Timer {
-                interval: 50; repeat: true; triggeredOnStart: true; running: stick.pressed
-                onTriggered: stick.pub.publish({linear: {x: stick.axis(stick.mouseY, stick.height)},
-                                                angular: {z: stick.axis(stick.mouseX, stick.width)}})
+                interval: 50; repeat: true; triggeredOnStart: true; running: stick.pressed || stick.stops > 0
+                onTriggered: {
+                    stick.stops -= camera.stale ? 1 : 20
+                    stick.pub.publish(!stick.pressed || camera.stale ? {} :
+                        {linear: {x: stick.axis(stick.mouseY, stick.height)},
+                         angular: {z: stick.axis(stick.mouseX, stick.width)}})
+                }
             }
         }
     }

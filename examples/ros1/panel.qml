@@ -6,7 +6,7 @@ import Ros 1.0
 Row {
     padding: 20; spacing: 20
     property string title: "Ros 1.0"
-    property var velocity: Ros.advertise("geometry_msgs/Twist", "/cmd_vel", 1)
+    property var velocity: Ros.advertise("geometry_msgs/Twist", "/cmd_vel", Ros.CommandQoS())
     Component.onCompleted: Ros.init("panel")
 
     ImageItem {
@@ -28,7 +28,13 @@ Row {
             interval: 100; repeat: true; running: true
             onTriggered: clock.text = "now " + Time.now().toSec().toFixed(2) + " s"
         }
-        Button { text: "Stop"; onClicked: velocity.publish({}) }
+        Button { text: "Stop"; onClicked: stopping.left = 20 }
+        Timer {
+            id: stopping
+            property int left: 0  // one may be lost
+            interval: 50; repeat: true; triggeredOnStart: true; running: left > 0
+            onTriggered: { left -= 1; velocity.publish({}) }
+        }
         Button {
             text: "Flashlight"
             onClicked: Service.callAsync("/flashlight/set", "std_srvs/SetBool", {data: true},

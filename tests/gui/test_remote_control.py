@@ -53,9 +53,13 @@ class Robot:
                 data=data,
             )
 
-    def close(self) -> None:
+    def freeze(self) -> None:
+        """Send no more pictures."""
         self._ended.set()
         self._thread.join()
+
+    def close(self) -> None:
+        self.freeze()
         self.node.close()
 
 
@@ -104,9 +108,30 @@ def test_dragging_drives_and_letting_go_stops(robot: Robot, view: Any, wait: Any
     assert -1.0 <= robot.commands[-1][0] < 0
     test.mouseRelease(view, left, pos=point(20, 290))
     wait(lambda: robot.commands[-1] == (0.0, 0.0))
+    begin = len(robot.commands)
+    wait(lambda: len(robot.commands) > begin + 15)
+    wait.nothing_happens(0.5)
     count = len(robot.commands)
     wait.nothing_happens(0.2)
-    assert len(robot.commands) == count
+    assert len(robot.commands) == count, "others may drive"
+    assert set(robot.commands[begin:]) == {(0.0, 0.0)}
+
+
+def test_who_holds_the_stick_without_a_live_picture_stops_the_robot(
+    robot: Robot, view: Any, wait: Any
+) -> None:
+    from rosglass.qt import QtCore, optional
+
+    test, point, left = optional("QtTest").QTest, QtCore.QPoint, QtCore.Qt.MouseButton.LeftButton
+    wait(view.isExposed)
+    test.mousePress(view, left, pos=point(200, 195))
+    wait(lambda: robot.commands and robot.commands[-1][0] > 0)
+    robot.freeze()
+    wait(lambda: robot.commands[-1] == (0.0, 0.0))
+    test.mouseRelease(view, left, pos=point(200, 195))
+    begin = len(robot.commands)
+    wait(lambda: len(robot.commands) > begin + 30, "it does not know whether they arrive")
+    assert set(robot.commands[begin:]) == {(0.0, 0.0)}
 
 
 def test_the_button_switches_the_lamp(robot: Robot, view: Any, wait: Any) -> None:

@@ -427,8 +427,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         if role not in {_DISPLAY, _EDIT}:
             return None
         if index.column() == _NAME:
-            # Editors show a field for what has an edit role.
-            return item.name if role == _DISPLAY else None
+            return item.name
         if not item.is_leaf:
             # Qt's own delegates warn about undefined.
             return "" if role == _DISPLAY else None
@@ -459,8 +458,7 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         except ConversionError as error:
             self._complain(f"{item.path} was not changed: {error}")
             return False
-        # Not the edit role: it would replace what is being typed.
-        self.dataChanged.emit(index, index, [_DISPLAY])
+        self.dataChanged.emit(index, index)
         self._edited()
         return True
 

@@ -119,10 +119,6 @@ class _Watches(NamedTuple):
     watches: list[Handle]
 
 
-#: The reason of the reference plugins while there is no node.
-_UNINITIALIZED = "Uninitialized"
-
-
 class _Queries(Element):
     """Looks up transforms in a buffer filled by the session's node."""
 
@@ -146,16 +142,13 @@ class _Queries(Element):
     def canTransform(self, *given: QJSValue) -> QJSValue:
         """Return true if a transform can be looked up, otherwise the reason as text.
 
-        Before there is a node, that is ``Uninitialized``. Arguments are those of
-        :meth:`lookUpTransform`.
+        Arguments are those of :meth:`lookUpTransform`.
         """
         runtime = self._find_runtime()
         result = self._look_up("canTransform", given)
         if runtime is None or isinstance(result, str):
             return QJSValue()
-        if not isinstance(result, _Missing):
-            return runtime.value(True)
-        return runtime.value(_UNINITIALIZED if result.exception == _UNINITIALIZED else result.why)
+        return runtime.value(result.why if isinstance(result, _Missing) else True)
 
     @Slot(QJSValue, QJSValue, result=QJSValue)
     @Slot(QJSValue, QJSValue, QJSValue, result=QJSValue)
@@ -193,7 +186,7 @@ class _Queries(Element):
             return ""
         buffer = self.buffer
         if buffer is None:
-            return _Missing(query.frames, _UNINITIALIZED, "there is no node yet")
+            return _Missing(query.frames, "Uninitialized", "there is no node yet")
         try:
             if not query.timeout:
                 return query.look_up(buffer)
@@ -240,13 +233,9 @@ class _Queries(Element):
 
     @Slot(str, result=float)
     def getTransformAge(self, frame: str) -> float:
-        """Return the time since the stamp of a frame's newest transform, static ones included.
-
-        Returns:
-            Seconds; -1 for unknown frames and for roots.
-        """
+        """Return the age of a frame's newest transform by its stamp, in seconds; -1 if unknown."""
         info, node = self._frame(frame), self.node
-        if info is None or node is None:
+        if info is None or node is None or info.static:
             return -1.0
         age = info.age(node.now())
         return -1.0 if age is None else age.seconds

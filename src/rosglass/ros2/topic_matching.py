@@ -91,10 +91,7 @@ class GraphMatching(TopicMatching):
             elif idle:
                 self._duplicates.guarded = False
             problems = problems + self._describe_qos_conflicts(publishers)
-        found = [Problem(text) for text in problems]
-        if self.reader is not None and self.reader.problem:
-            found.append(Problem(self.reader.problem, logged=False))
-        return found
+        return [Problem(text) for text in problems]
 
     def find_matching(self, publishers: Sequence[EndpointInfo]) -> list[EndpointInfo]:
         """Return the publishers of a known type with a compatible profile."""

@@ -93,6 +93,7 @@ Item {
     Drive {
         id: drive
         objectName: "drive"
+        reachable: link.alive
         obstacle: stop.blocks ? "emergency stop"
             : !camera.live ? "no live picture"
             : !link.alive ? "no robot"

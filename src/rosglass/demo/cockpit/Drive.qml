@@ -1,8 +1,9 @@
 // What the operator wants the robot to do, as a stream of geometry_msgs/msg/Twist.
 //
 // Sends 20 times a second while a stick or key is held; several zeros when it is let go, however
-// that happens; nothing otherwise, so that others may drive. Once blocked (emergency stop, no
-// picture, window not in front) it stays off until everything was let go.
+// that happens, and for as long as the robot is lost; nothing otherwise, so that others may drive.
+// Once blocked (emergency stop, no picture, window not in front) it stays off until everything was
+// let go.
 import QtQuick
 import Ros2 1.0
 
@@ -21,10 +22,14 @@ QtObject {
     property bool armed: false
     readonly property bool active: held && armed
     property string problem
+    // Whether the robot is there: before it is, zeros may not arrive.
+    property bool reachable: true
 
     property var publisher: null
-    Component.onCompleted: publisher = Ros2.createPublisher(topic, "geometry_msgs/msg/Twist", 1)
+    Component.onCompleted: publisher = Ros2.createPublisher(topic, "geometry_msgs/msg/Twist", Ros2.CommandQoS())
+    // Zeros to send while the robot is there, and in all.
     property int zeros: 0
+    property int attempts: 0
 
     // Take or change what is wanted; the stick and the keys call this.
     function steer(forward, left) {
@@ -51,6 +56,7 @@ QtObject {
 
     function halt() {
         zeros = 8
+        attempts = 1200
         send()
         timer.start()
     }
@@ -78,8 +84,13 @@ QtObject {
         interval: 50
         repeat: true
         onTriggered: {
-            if (!drive.active && --drive.zeros <= 0)
-                stop()
+            if (!drive.active) {
+                drive.attempts -= 1
+                if (drive.reachable)
+                    drive.zeros -= 1
+                if (drive.zeros <= 0 || drive.attempts <= 0)
+                    stop()
+            }
             drive.send()
         }
     }

@@ -18,7 +18,7 @@ Panel {
     property real wantedRear: NaN
     property var publisher: null
     Component.onCompleted: publisher = Ros2.createPublisher("/flipper_controller/commands",
-                                                            "std_msgs/msg/Float64MultiArray", 1)
+                                                            "std_msgs/msg/Float64MultiArray", Ros2.CommandQoS())
 
     // A restarted robot does not have the last command.
     onFreshChanged: if (!fresh) wantedFront = wantedRear = NaN
