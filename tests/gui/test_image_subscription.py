@@ -372,3 +372,26 @@ def test_a_picture_that_comes_while_its_stream_is_made(
     camera.publish(picture(RED))
     wait(lambda: colour(root) == RED)
     assert answers == [False]
+
+
+def test_a_picture_whose_stamp_is_old_is_not_shown(running: Any, camera: Any, wait: Any) -> None:
+    root, all_shown = load(running), load(running)
+    sub = root.property("sub")
+    all_shown.property("sub").setProperty("timeout", 0)
+    wait(lambda: sub.property("subscribed") and camera.subscription_count())
+
+    def send(color: Any, age: float) -> None:
+        stamp = Time(time.time_ns() - round(age * 1e9))
+        camera.publish({**picture(color), "header": {"stamp": stamp, "frame_id": "cam"}})
+
+    def is_shown(color: Any, age: float) -> bool:
+        send(color, age)
+        return bool(colour(root) == color)
+
+    for _ in range(3):
+        wait(lambda: is_shown(RED, 0.0))
+    send(BLUE, 12.4)
+    wait(lambda: colour(all_shown) == BLUE)
+    assert colour(root) != BLUE
+    wait(lambda: is_shown(RED, 0.0))
+    assert not sub.property("stale")

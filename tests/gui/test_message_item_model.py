@@ -79,6 +79,32 @@ def test_the_tree_index_is_the_row(bench: Any) -> None:
     assert run(bench, script) == "position"
 
 
+def test_only_values_have_an_edit_role(bench: Any) -> None:
+    """As editors of qml6_ros2_plugin tell names from fields by it, such as RQml's."""
+    script = """message = {"#messageType": "geometry_msgs/msg/PointStamped", point: {x: 1.5}}
+        const cells = [at([1, 0], 0), at([1, 0], 1)]
+        const edit = Qt.EditRole
+        return [cells.map(cell => data(cell)), cells.map(cell => data(cell, edit) === undefined),
+                data(cells[1], edit)]"""
+    names, missing, value = run(bench, script)
+    assert names == ["x", 1.5]
+    assert missing == [True, False]
+    assert value == 1.5
+
+
+def test_an_edit_leaves_the_field_alone_that_is_typed_in(bench: Any) -> None:
+    script = """const name = "geometry_msgs/msg/PointStamped"
+        if (message === undefined) message = {"#messageType": name}
+        else setData(at([1, 0], 1), 2.5)
+        return message.point.x"""
+    root = bench.load(MODEL.replace("SCRIPT", script))
+    assert root.go() == "0"
+    changed: list[list[int]] = []
+    root.dataChanged.connect(lambda *given: changed.append(list(given[2])))
+    assert root.go() == "2.5"
+    assert changed == [[0]]  # not the edit role
+
+
 def test_leaves_can_be_edited(bench: Any) -> None:
     script = """message = Ros2.createEmptyMessage('geometry_msgs/msg/PointStamped')
         const before = messages

@@ -182,6 +182,22 @@ def test_a_volatile_subscription_says_that_messages_are_kept(live: Any, wait: An
     wait(lambda: root.property("problem") == "")
 
 
+def test_publishers_are_counted_that_match(running: Any, wait: Any) -> None:
+    """As rclcpp's get_publisher_count()."""
+    best_effort = QoS(depth=1, reliability=Reliability.BEST_EFFORT)
+    running.robot.create_publisher("/b", "std_msgs/msg/Bool", best_effort)
+    running.robot.create_publisher("/b", "std_msgs/msg/Bool")
+    root: Any = running.load("""QtObject {
+        property Subscription reliable: Subscription { topic: "/b"; qos: Ros2.QoS().reliable() }
+        property Subscription any: Subscription { topic: "/b" }
+        property Subscription off: Subscription { topic: "/b"; enabled: false }
+        function counts() {
+            return JSON.stringify([reliable, any, off].map(s => s.getPublisherCount()))
+        }
+    }""")
+    wait(lambda: root.counts() == "[1,2,0]")
+
+
 @EVERY_WIRE
 def test_a_picture_that_was_latched_before_is_shown(live: Any, wait: Any) -> None:
     picture = {"width": 1, "height": 1, "encoding": "rgb8", "step": 3, "data": [1, 2, 3]}

@@ -46,12 +46,19 @@ def test_init(ros1: Bench, call: str, name: str) -> None:
         {call}
         return [Ros.getName(), Ros.getNamespace(), Ros.ok(), told]
     """
-    assert ros1.run(script) == [name, "/", True, [True]]
+    assert ros1.run(script) == [f"/{name}", "/", True, [True]]
+
+
+def test_the_name_is_that_of_the_ros_graph(ros1: Bench) -> None:
+    """As ``ros::this_node::getName()``; in ``Ros2 1.0`` it is the base name, as in rclcpp."""
+    assert ros1.run("return Ros.getName()") == ""
+    ros1.session.init("arm", "/left")
+    assert ros1.run("return [Ros.getName(), Ros.getNamespace()]") == ["/left/arm", "/left"]
 
 
 def test_anonymous_names(ros1: Bench) -> None:
     name = ros1.run('Ros.init("arm", RosInitOptions.AnonymousName); return Ros.getName()')
-    assert name.startswith("arm_")
+    assert name.startswith("/arm_")
     assert len(name) > 10
 
 

@@ -58,6 +58,19 @@ def test_an_engine_that_was_not_prepared_says_what_to_do(
     assert "Ros2 cannot be used yet" in caplog.text
 
 
+def test_elements_that_are_gone_at_once_say_nothing(bench: Any, wait: Any, caplog: Any) -> None:
+    bench.load(
+        """import QtQuick 2.15
+        import Ros2 1.0
+        Item {
+            Repeater { id: some; model: 3; Item { Subscription { topic: "/x" } } }
+            Component.onCompleted: { some.model = 2; some.model = 1 }
+        }"""
+    )
+    wait.settled(bench.session)
+    assert "cannot be used yet" not in caplog.text
+
+
 def test_before_init(bench: Any) -> None:
     script = """return [Ros2.isInitialized(), Ros2.ok(), Ros2.getName(), Ros2.getNamespace(),
         Ros2.connectionState, Ros2.queryTopics(), Ros2.hostname.length > 0]"""

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from rosglass.comm import ConnectionState, QoS, Sample
+from rosglass.comm import ConnectionState, QoS, Sample, Time
 from rosglass.comm.qos import Durability, Reliability
 from rosglass.messages import OpaqueType
 from rosglass.qml.log import LocationFormatter
@@ -641,3 +641,29 @@ def test_two_robots_of_one_name_are_a_problem(live: Any, wait: Any, caplog: Any)
     assert "2 nodes are called /robot" in caplog.text
     twin.close()
     wait(lambda: root.problems() == "||||||")
+
+
+def test_a_message_that_its_stamp_shows_to_be_old_is_stale_as_it_arrives(
+    running: Any, wait: Any
+) -> None:
+    """Over a bridge, or in ROS 1: it was sent late, or the wire has no stamps."""
+    imu = running.robot.create_publisher("/imu", "sensor_msgs/msg/Imu", QoS(depth=10))
+    root = running.load("""QtObject {
+        property var seen: []
+        property QtObject sub: Subscription {
+            topic: "/imu"; throttleRate: 0
+            onMessageChanged: if (message) seen.push(message.orientation.w + " " + stale)
+        }
+        function shown() { return seen.join() }
+    }""")
+    wait(imu.subscription_count)
+
+    def send(number: float, age: float) -> None:
+        header = {"stamp": Time(time.time_ns() - round(age * 1e9))}
+        imu.publish(header=header, orientation={"w": number})
+        wait(lambda: f"{number:g} " in root.shown())
+
+    # The robot's clock is an hour behind.
+    for number, age in enumerate((3600, 3600, 3612.4, 3601.6, 3600)):
+        send(number, age)
+    assert root.shown() == "0 false,1 false,2 true,3 false,4 false"

@@ -115,6 +115,37 @@ def test_a_chain_with_a_link_that_stands_still_is_stale(live: Bench, wait: Any) 
         thread.join()
 
 
+def test_a_transform_that_was_held_back_is_stale_as_it_arrives(live: Bench, wait: Any) -> None:
+    broadcaster = TransformBroadcaster(live.robot)
+    root: Any = live.load("""
+        QtObject {
+            property var seen: []
+            property TfTransform tf: TfTransform {
+                sourceFrame: "base"; targetFrame: "map"; timeout: 500
+            }
+            function shown() { return [tf.translation.x, tf.stale].join() }
+        }""")
+
+    def send(x: float, stamp: float) -> None:
+        frames = {"frame_id": "map", "child_frame_id": "base"}
+        broadcaster.send_transform(
+            Transform((x, 0.0, 0.0), stamp=Time(round(stamp * 1e9)), **frames)
+        )
+
+    def is_live(x: float) -> bool:
+        send(x, time.time())
+        return bool(root.shown() == f"{x:g},false")
+
+    wait(lambda: is_live(1.0))
+    wait(lambda: is_live(2.0))
+    sent = time.time()
+    wait(lambda: time.time() > sent + 2)
+    send(3.0, sent + 0.2)
+    wait(lambda: root.shown().startswith("3,"))
+    assert root.shown() == "3,true"
+    wait(lambda: is_live(4.0))
+
+
 def test_what_a_dead_robot_left_behind_is_stale(live: Bench, robot: Robot, wait: Any) -> None:
     first: Any = live.load(FOLLOWING)
     wait(lambda: first.shown().startswith("true,false"))
@@ -288,6 +319,16 @@ def test_waiting_for_a_transform(live: Bench, wait: Any) -> None:
     timer.join()
 
 
+@pytest.mark.parametrize("module", ["Ros2 1.0", "Ros 1.0"])
+def test_before_init_there_is_nothing_to_look_up(bench: Bench, module: str) -> None:
+    bench.module = module
+    script = """const l = TfTransformListener
+        return [l.canTransform("map", "base"), l.canTransform("map", 0, "base", 0, "odom", 50),
+                l.lookUpTransform("map", "base").exception,
+                l.lookUpTransform("map", "base").valid]"""
+    assert bench.run(script) == ["Uninitialized", "Uninitialized", "Uninitialized", False]
+
+
 def test_the_tree(live: Bench, robot: Robot, wait: Any) -> None:
     live.run("TfTransformListener.initialize()")
     wait(lambda: live.run('return TfTransformListener.canTransform("map", "laser")') is True)
@@ -309,8 +350,11 @@ def test_the_tree(live: Bench, robot: Robot, wait: Any) -> None:
                 l.getChain("map", "laser"), l.getFrame("moon") === undefined]
     """)
     assert shown == [
-        ["base", "laser", "map"], "/robot", "", -1, -1, ["laser", "base", "map"], True
+        ["base", "laser", "map"], "/robot", "", -1, shown[4], ["laser", "base", "map"], True
     ]  # fmt: skip
+    # Of static ones, too: the time since their stamp, which is zero.
+    assert abs(shown[4] - time.time()) < 60
+    assert live.run('return TfTransformListener.getTransformAge("moon")') == -1
     age = live.run('return TfTransformListener.getTransformAge("base")')
     assert 0 <= age < 20
 

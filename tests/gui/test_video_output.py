@@ -117,6 +117,25 @@ def test_a_turned_output_looks_the_same_with_every_renderer(
     np.testing.assert_allclose(painted["rgb8"], by_opengl["rgb8"], atol=1)
 
 
+def test_the_rotation_of_the_camera_is_that_of_every_qt(tmp_path: Path, screen: str) -> None:
+    """Qt 5 turns by `orientation` against the clock, Qt 6 with it: docs/elements/VideoOutput.md."""
+    from rosglass.qt import QT6
+
+    clockwise = [QUARTERS[index] for index in (2, 0, 3, 1)]
+    seen = {}
+    for name, old, new in (
+        ("rotation", 'topic: "/cam"', 'topic: "/cam"; rotation: 90'),
+        ("orientation", "source: sub", f"source: sub; orientation: {90 if QT6 else -90}"),
+    ):
+        file = interface(tmp_path, "source")
+        text = file.read_text()
+        assert old in text
+        file.write_text(text.replace(old, new, 1))
+        seen[name] = show(file, screen, ["rgb8"])["rgb8"]
+    for name, found in seen.items():
+        np.testing.assert_allclose(found, clockwise, atol=1, err_msg=name)
+
+
 def test_a_stream_shown_in_both_ways_at_once(tmp_path: Path, screen: str) -> None:
     seen = show(interface(tmp_path, "both"), screen, ["rgb8", "yuv422", "mono8"])
     # Each half shows the whole picture: left column of each is its middle.

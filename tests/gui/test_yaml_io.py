@@ -93,6 +93,62 @@ def test_messages_models_and_objects_are_written(bench: Any, tmp_path: Path) -> 
     assert shown["bag"] == {"x": 1, "y": [2]}
 
 
+@pytest.mark.parametrize(
+    ("value", "text", "back"),
+    [
+        ("new Map([['a', 1], ['b', [2, {c: 3}]], [4, true]])", "a: 1\nb:\n- 2\n- c: 3\n'4': true\n",
+         {"a": 1, "b": [2, {"c": 3}], "4": True}),
+        ("{m: new Map(), s: new Set([1, new Map([['x', 'y']])])}", "m: {}\ns:\n- 1\n- x: y\n",
+         {"m": {}, "s": [1, {"x": "y"}]}),
+        ("[new String('a'), new Number(2), new Boolean(false)]", "- a\n- 2\n- false\n",
+         ["a", 2, False]),
+        ("{constructor: {name: 'RegExp'}, n: 1}", "constructor:\n  name: RegExp\nn: 1\n",
+         {"constructor": {"name": "RegExp"}, "n": 1}),
+        ("Object.create(null)", "{}\n", {}),
+    ],
+)  # fmt: skip
+def test_maps_and_sets_are_written(
+    bench: Any, tmp_path: Path, value: str, text: str, back: Any
+) -> None:
+    file = tmp_path / "a.yaml"
+    assert write(bench, file, value) is True
+    assert file.read_text() == text
+    assert read(bench, file) == back
+
+
+@pytest.mark.parametrize(
+    ("value", "reason"),
+    [
+        ("/x/", "a RegExp"),
+        ("{a: new WeakMap()}", "a: expected a value, got a WeakMap"),
+        ("[Promise.resolve(1)]", "a Promise"),
+        ("new Map([[{}, 1]])", "expected texts as keys of a Map"),
+        ("new Map([[1, 1], ['1', 2]])", "expected keys that differ as texts"),
+        ("(() => { const m = new Map(); m.set('m', m); return m })()", "not referring to"),
+    ],
+)
+def test_what_has_no_content_is_refused(
+    bench: Any, tmp_path: Path, caplog: Any, value: str, reason: str
+) -> None:
+    assert write(bench, tmp_path / "a.yaml", value) is False
+    assert reason in caplog.records[-1].getMessage()
+
+
+def test_integers_beyond_those_of_javascript_stay_integers_in_the_file(
+    bench: Any, tmp_path: Path
+) -> None:
+    file = tmp_path / "a.yaml"
+    text = (
+        "stamp: 1700000000123456789\nhash: 18446744073709551615\nlow: -9223372036854775808\n"
+        "text: '18446744073709551616'\nserial: 00012345678901234567\nshort: '12'\n"
+    )
+    file.write_text(text)
+    path = json.dumps(str(file))
+    script = f"const v = Ros2.io.readYaml({path}); return [Ros2.io.writeYaml({path}, v), v.stamp]"
+    assert bench.run(script) == [True, "1700000000123456789"]
+    assert file.read_text() == text
+
+
 @pytest.mark.parametrize("kind", ["UInt64", "Int64"])
 @pytest.mark.parametrize("count", [3, 40])
 def test_arrays_of_wide_integers_come_back(

@@ -538,3 +538,36 @@ def test_panels_over_a_view_are_moved_and_resized(
     assert drag((60, 130), (20, 100), (5, 130)) == QRectF(0, 125, 210, 155), "not out of the view"
     bench.view.scene.add("Grid")
     bench.wait(lambda: pixel(bench, 205, 260) == (0, 255, 255))
+
+
+@pytest.mark.parametrize("size", [(400, 300), (1200, 250), (300, 900)])
+def test_many_panels_are_in_the_window_and_can_be_closed(
+    bench: SceneBench, load: Callable[..., Any], size: tuple[int, int], caplog: Any
+) -> None:
+    from PySide6.QtCore import QObject, QPoint, QRectF, Qt
+    from PySide6.QtTest import QTest
+
+    bench.window.resize(*size)
+    load(IMAGE + 'id: main; ImagePanels { objectName: "area"; anchors.fill: parent; view: main }')
+    for number in range(5):
+        bench.view.scene.add("Camera" if number % 2 else "Image", f"more{number}")
+    area: Any = bench.view.findChild(QObject, "area")
+
+    def panels() -> list[Any]:
+        return [one for one in area.childItems() if one.property("has")]
+
+    bench.wait(lambda: len(panels()) == 6 and bench.window.width() == size[0])
+    places = [QRectF(one.x(), one.y(), one.width(), one.height()) for one in panels()]
+    for at, place in enumerate(places):
+        assert QRectF(0, 0, *size).contains(place), f"{place} is outside of the window"
+        assert place.width() > 40
+        assert not any(place.intersects(other) for other in places[:at])
+    shown, display = panels()[4], panels()[4].property("display")
+    button = shown.findChild(QObject, "closePanel")
+    middle = button.mapToScene(QPoint(button.width() // 2, button.height() // 2)).toPoint()
+    bench.picture()
+    QTest.mouseMove(bench.window, middle)
+    QTest.mouseClick(bench.window, Qt.MouseButton.LeftButton, pos=middle)
+    assert not display.enabled
+    assert not shown.isVisible()
+    assert "cannot be used yet" not in caplog.text

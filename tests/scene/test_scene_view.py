@@ -587,6 +587,23 @@ def test_python_keeps_the_items_around_a_view_that_is_destroyed(bench: SceneBenc
     bench.picture()
 
 
+def test_a_view_that_leaves_its_window_has_nothing_on_its_device(bench: SceneBench) -> None:
+    from PySide6.QtCore import QObject
+    from PySide6.QtQuick import QQuickItem
+
+    view = bench.load('SceneView { objectName: "inner"; anchors.fill: parent; AxesDisplay {} }')
+    bench.picture()
+    inner = view.findChild(QObject, "inner")
+    kept = renderers_of(inner)
+    assert [device_of(one) is not None for one in kept] == [True]
+    # The window may be gone, with its device, before the item is destroyed.
+    QQuickItem.setParentItem(inner, None)
+    assert [device_of(one) for one in kept] == [None]
+    QQuickItem.setParentItem(inner, view)
+    bench.picture()
+    assert device_of(renderers_of(inner)[-1]) is not None
+
+
 def test_frames_fade_one_by_one_and_all_when_transforms_stop(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.scene.drawing import Mesh

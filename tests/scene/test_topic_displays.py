@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -587,3 +588,30 @@ def test_messages_wait_for_the_gui_thread_as_one_job() -> None:
         assert broken.drain() == ([], "this message could not be shown: ValueError(99)")
         assert empty.drain() == ([], "")
     assert broken.received == empty.received == 200
+
+
+def test_a_message_that_was_held_back_fades_as_it_arrives(bench: SceneBench) -> None:
+    from rosglass import Time
+
+    view = bench.load('LaserScanDisplay { topic: "/scan" }')
+    (display,) = view.scene.displays
+    scan = bench.robot.create_publisher("/scan", "sensor_msgs/msg/LaserScan")
+
+    def send(age: float) -> None:
+        stamp = Time(time.time_ns() - round(age * 1e9))
+        scan.publish({**SCAN, "header": {"frame_id": "map", "stamp": stamp}})
+
+    def is_live() -> bool:
+        send(0.0)
+        return bool(display.received and display.root.alpha == 1.0)
+
+    bench.wait(is_live)
+    bench.wait(is_live)
+
+    def is_faded() -> bool:
+        send(30.0)
+        return bool(display.root.alpha < 1.0)
+
+    bench.wait(is_faded)
+    assert "the newest message was 30 s late" in display.statusText
+    bench.wait(is_live)

@@ -136,10 +136,14 @@ class Graph:
 
     Args:
         changed: Called after each change, in the thread that made it; must not block.
+
+    Attributes:
+        version: Another number after each change.
     """
 
     def __init__(self, changed: Callable[[], None]) -> None:
-        self._changed = changed
+        self._report_change = changed
+        self.version = 0
         #: Guards all members below, which belong together.
         self._lock = threading.Lock()
         self._nodes: dict[Hashable, NodeName] = {}
@@ -278,6 +282,11 @@ class Graph:
             self._by_name.clear()
             self._by_node.clear()
         self._changed()
+
+    def _changed(self) -> None:
+        with self._lock:
+            self.version += 1
+        self._report_change()
 
     def _names(self, kinds: tuple[EndpointKind, ...], all_names: bool) -> dict[str, list[str]]:
         with self._lock:

@@ -17,7 +17,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rosglass.comm.executor import IMMEDIATE, RetryingExecutor, reraise_exit
 from rosglass.comm.log_limits import FailureLog
 from rosglass.comm.qos import History
-from rosglass.comm.statistics import LatencyEstimator, Statistics, fading_rate
+from rosglass.comm.statistics import (
+    LatencyEstimator,
+    StampMonitor,
+    Statistics,
+    fading_rate,
+    header_stamp,
+)
 from rosglass.comm.time import Duration, Time
 from rosglass.errors import ArgumentError
 
@@ -280,10 +286,18 @@ class Inbox:
                 now, self._last_time, self._received, self._received_bytes, self._dropped, lost
             )
 
-    def lateness(self, sample: Sample) -> Duration:
-        """Return how much longer a sample took than the fastest one of its publisher."""
+    def lateness(self, sample: Sample, by_header: bool) -> Duration | None:
+        """Return how much longer a sample took than the fastest one of its publisher.
+
+        Args:
+            sample: The sample.
+            by_header: Whether the stamp of its header counts.
+
+        Returns:
+            None if it has no stamp that counts.
+        """
         with self._lock:
-            return self._meter.lateness(sample)
+            return self._meter.lateness(sample, by_header)
 
     def close(self) -> bool:
         """Discard and refuse all samples and wake all waiters; return False if already closed."""
@@ -479,7 +493,7 @@ class _Meter:
         self._marks: deque[tuple[float, int, int]] = deque(maxlen=_MAX_MARKS)
         #: Latency and lateness of samples in nanoseconds.
         self._latencies: deque[tuple[int, int]] = deque(maxlen=_MAX_MARKS)
-        self._estimator = LatencyEstimator()
+        self._estimator, self._stamps = LatencyEstimator(), StampMonitor()
 
     def mark(self, now: float, last: float, count: int, size: int, sample: Sample) -> None:
         """Add a mark.
@@ -500,14 +514,21 @@ class _Meter:
         if sent is not None:
             lateness = self._estimator.add(sample.publisher, sample.received_ns, sent)
             self._latencies.append((sample.received_ns - sent, lateness))
+        stamp = header_stamp(sample.type, sample.wire, sample.data)
+        if stamp:
+            self._stamps.add(sample.publisher, sample.received_ns, stamp)
 
-    def lateness(self, sample: Sample) -> Duration:
+    def lateness(self, sample: Sample, by_header: bool) -> Duration | None:
         """Return how much longer `sample` took than the fastest one of its publisher."""
-        if sample.sent_ns is None:
-            return Duration()
-        return Duration(
-            self._estimator.lateness(sample.publisher, sample.received_ns, sample.sent_ns)
-        )
+        publisher, received, found = sample.publisher, sample.received_ns, list[int]()
+        if sample.sent_ns is not None:
+            found.append(self._estimator.lateness(publisher, received, sample.sent_ns))
+        if by_header:
+            stamp = header_stamp(sample.type, sample.wire, sample.data)
+            late = self._stamps.lateness(publisher, received, stamp)
+            if late is not None:
+                found.append(round(late * 1e9))
+        return Duration(max(found)) if found else None
 
     def read(
         self, now: float, last: float, received: int, size: int, dropped: int, lost: int

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,8 +13,18 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rosglass.comm.time import Duration
+    from rosglass.messages import MessageType
 
-__all__ = ["LatencyEstimator", "Pace", "Statistics", "fading_rate", "note_time", "rate_of"]
+__all__ = [
+    "LatencyEstimator",
+    "Pace",
+    "StampMonitor",
+    "Statistics",
+    "fading_rate",
+    "header_stamp",
+    "note_time",
+    "rate_of",
+]
 
 #: A rate starts to fall when the next event is this many periods late, ...
 _LATE_PERIODS = 1.5
@@ -23,6 +34,8 @@ _FADE_PERIODS, _FADE_S = 2.0, 2.0
 _MAX_PUBLISHERS = 256
 #: Largest drift between two clocks; NTP slews a clock by at most 500 ppm.
 _MAX_DRIFT = 500e-6
+#: How long the fastest message is remembered, at least, where stamps are those of headers.
+_STAMP_MEMORY_NS = 30 * 10**9
 #: Steps of this machine's clock below this are ignored.
 _MIN_STEP_NS = 50_000_000
 
@@ -126,6 +139,12 @@ class _Publisher(NamedTuple):
     newest: int
     #: Whether the last stamp was older than that: a late sample, or a clock that was set back.
     behind: bool
+    #: The shortest time of the period before, and when the present one began; without memory, both
+    #: have no meaning.
+    before: int
+    began: int
+    #: Whether the last stamp was that of the sample before.
+    repeats: bool
 
 
 class LatencyEstimator:
@@ -139,9 +158,14 @@ class LatencyEstimator:
     A late first sample of a publisher cannot be detected. Clocks may be set: a step of this
     machine's clock is measured, a step back of the publisher's shows in its stamps, and one forward
     makes its samples look faster than any before.
+
+    Args:
+        memory: Nanoseconds after which the fastest sample is forgotten, up to twice as late; 0 for
+            never.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, memory: int = 0) -> None:
+        self._memory = memory
         self._publishers: dict[bytes, _Publisher] = {}
         self._offset = _offset()
 
@@ -153,21 +177,39 @@ class LatencyEstimator:
         if known is None and len(self._publishers) >= _MAX_PUBLISHERS:
             self._publishers.clear()
         if known is None or (known.behind and sent < known.newest):
-            fastest = took
-            known = None
-        else:
-            drift = round(max(0, received - known.updated) * _MAX_DRIFT)
-            fastest = min(took, known.fastest + drift)
-        behind = known is not None and sent < known.newest
-        newest = sent if known is None else max(sent, known.newest)
-        self._publishers[publisher] = _Publisher(fastest, received, newest, behind)
-        return took - fastest
+            self._publishers[publisher] = _Publisher(
+                took, received, sent, False, took, received, False
+            )
+            return 0
+        drift = round(max(0, received - known.updated) * _MAX_DRIFT)
+        fastest, before, began = known.fastest + drift, known.before + drift, known.began
+        if self._memory and received - began > self._memory:
+            before, fastest, began = fastest, took, received
+        fastest = min(took, fastest)
+        self._publishers[publisher] = _Publisher(
+            fastest,
+            received,
+            max(sent, known.newest),
+            sent < known.newest,
+            before,
+            began,
+            sent == known.newest,
+        )
+        return took - (min(fastest, before) if self._memory else fastest)
 
     def lateness(self, publisher: bytes, received: int, sent: int) -> int:
         """Return the lateness of a sample, 0 for unknown publishers; times in nanoseconds."""
         self._follow_clock()
         known = self._publishers.get(publisher)
-        return 0 if known is None else max(0, received - sent - known.fastest)
+        if known is None:
+            return 0
+        fastest = min(known.fastest, known.before) if self._memory else known.fastest
+        return max(0, received - sent - fastest)
+
+    def repeats(self, publisher: bytes, sent: int) -> bool:
+        """Return whether a stamp is that of several samples in a row, and so not their time."""
+        known = self._publishers.get(publisher)
+        return known is not None and known.repeats and sent == known.newest
 
     def _follow_clock(self) -> None:
         offset = _offset()
@@ -177,8 +219,61 @@ class LatencyEstimator:
         self._offset = offset
         for publisher, known in self._publishers.items():
             self._publishers[publisher] = known._replace(
-                fastest=known.fastest + step, updated=known.updated + step
+                fastest=known.fastest + step,
+                updated=known.updated + step,
+                before=known.before + step,
+                began=known.began + step,
             )
+
+
+class StampMonitor:
+    """Measures by their own stamps how much later than usual data arrives.
+
+    Unlike the time stamp of a wire, a stamp in a message is what its node chose: stamps of zero,
+    and stamps that do not change, say nothing; and the shortest delay is that of the last 30 to 60
+    seconds only, for data that is paused, or by whose stamps the time runs differently.
+    """
+
+    def __init__(self) -> None:
+        self._estimator = LatencyEstimator(_STAMP_MEMORY_NS)
+
+    def add(self, source: bytes, received: int, stamp: int) -> float:
+        """Add data and return its lateness in seconds.
+
+        Args:
+            source: Where the data is from; each source has its own clock.
+            received: System time of arrival in nanoseconds.
+            stamp: The data's own time in nanoseconds; 0 for none.
+        """
+        if not stamp:
+            return 0.0
+        late = self._estimator.add(source, received, stamp)
+        return 0.0 if self._estimator.repeats(source, stamp) else max(0, late) / 1e9
+
+    def lateness(self, source: bytes, received: int, stamp: int) -> float | None:
+        """Return the lateness of data in seconds; None if its stamp says nothing."""
+        if not stamp or self._estimator.repeats(source, stamp):
+            return None
+        return self._estimator.lateness(source, received, stamp) / 1e9
+
+
+_ros1_stamp, _ros2_stamps = struct.Struct("<4xII"), (struct.Struct(">4xiI"), struct.Struct("<4xiI"))
+
+
+def header_stamp(type: MessageType, wire: str, data: bytes | memoryview) -> int:
+    """Return the stamp of a message that begins with a header, in nanoseconds; 0 without one.
+
+    Args:
+        type: The message's type.
+        wire: ``ros1`` or ``cdr``.
+        data: The message's bytes.
+    """
+    if not getattr(type, "has_header", False) or len(data) < _ros1_stamp.size:
+        return 0
+    # In ROS 1, the sequence number is before the stamp; in ROS 2, the encapsulation header.
+    stamp = _ros1_stamp if wire == "ros1" else _ros2_stamps[data[1] & 1]
+    seconds, nanoseconds = stamp.unpack_from(data)
+    return max(0, int(seconds) * 10**9 + int(nanoseconds))
 
 
 def _offset() -> int:

@@ -31,6 +31,7 @@ from rosglass.comm.listeners import Listeners
 from rosglass.comm.names import similar
 from rosglass.comm.promise import check_timeout
 from rosglass.comm.rclpy_names import hint_at_members
+from rosglass.comm.time import Duration
 from rosglass.comm.timers import Watchdog
 from rosglass.errors import ArgumentError, Error, NodeClosedError, TypeNotFoundError
 from rosglass.interfaces.names import join_name
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
     from rosglass.comm.graph import EndpointInfo, NodeName, Status
     from rosglass.comm.qos import QoS
     from rosglass.comm.statistics import Statistics
-    from rosglass.comm.time import Duration
     from rosglass.messages import Message, MessageType
     from rosglass.wires.base import Reader
 
@@ -296,14 +296,20 @@ class Subscription(TopicEndpoint):
     def lateness(self, sample: Sample) -> Duration:
         """Return how much longer a sample took than the fastest one of its publisher.
 
-        Zero if that is unknown. See :attr:`Statistics.lateness`.
+        By the time at which it was sent, and by the stamp of its header, unless time is simulated;
+        in ROS 1, for messages without a header, by when the publisher's messages arrive. Zero if
+        that is unknown. See :attr:`Statistics.lateness`.
 
         Raises:
             ArgumentError: The argument is not a sample.
         """
         if not isinstance(sample, Sample):
             raise ArgumentError("sample", sample, "a rosglass.comm.Sample", self.topic)
-        return self._inbox.lateness(sample)
+        feed = self._feed
+        if feed is None:
+            return self._inbox.lateness(sample, by_header=True) or Duration()
+        late = self._inbox.lateness(sample, by_header=not feed.is_simulated)
+        return Duration(feed.lateness(sample.publisher)) if late is None else late
 
     # -- events ----------------------------------------------------------------------------------
 
@@ -606,6 +612,16 @@ class SubscriptionFeed(NodeMember):
         reader = self._lazy_reader
         if reader is not None:
             reader.flush()
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the node's time is that of a simulation, which stamps of messages follow."""
+        return self._core.clock.is_simulated
+
+    def lateness(self, publisher: bytes) -> int:
+        """Return the lateness of a publisher's last sample by its arrival, in nanoseconds."""
+        reader = self._matching.reader
+        return 0 if reader is None else reader.lateness(publisher)
 
     def lost(self) -> int:
         """Return how many samples were sent and did not arrive."""

@@ -116,7 +116,7 @@ _MAX_TIFF_FIELDS = 1000
 
 def _tiff_header(view: memoryview) -> PictureHeader:
     """Read the fields of the first image that decide how much memory it takes."""
-    order = "<" if view[:1] == b"I" else ">"
+    order = "<" if bytes(view[:1]) == b"I" else ">"
     values = {_WIDTH: 0, _HEIGHT: 0, _BITS: 1, _SAMPLES: 1, _TILE_WIDTH: 0, _TILE_HEIGHT: 0}
     try:
         (start,) = struct.unpack_from(f"{order}I", view, 4)

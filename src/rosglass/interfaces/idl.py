@@ -257,9 +257,13 @@ class _Parser:
     def __init__(self, lexer: Lexer) -> None:
         self._lexer = lexer
         self._scope: tuple[str, ...] = ()
+        #: The struct whose fields are read.
+        self._struct_name = ""
         self._structs: dict[tuple[str, ...], _Struct] = {}
         self._typedefs: dict[tuple[str, ...], FieldType] = {}
         self._constants: dict[tuple[str, ...], Constant] = {}
+        #: Those of messages without their modules, X_Constants: the values by these.
+        self._homes: dict[tuple[str, ...], dict[str, _Literal]] = {}
 
     def read(self, text: str, source: Source, messages: dict[str, Definition]) -> None:
         """Parse the file; adds its structs by full name, each with all of `messages` as nested."""
@@ -334,8 +338,10 @@ class _Parser:
             raise self._lexer.error(f"struct {name.text} is defined twice", name)
         fields: dict[str, Field] = {}
         self._lexer.take("{")
+        self._struct_name = name.text
         while not self._lexer.accept("}"):
             self._members(fields)
+        self._struct_name = ""
         self._structs[scope] = _Struct(list(fields.values()), notes.comment)
 
     def _members(self, fields: dict[str, Field]) -> None:
@@ -407,6 +413,8 @@ class _Parser:
         self._constants[scope] = Constant(
             name.text, kind.name, checked, str(checked), notes.comment
         )
+        if self._scope[-1:] and self._scope[-1].endswith("_Constants"):
+            self._homes.setdefault((*scope[:-2], name.text), {})[scope[-2]] = checked
 
     def _default(self, kind: FieldType, default: tuple[_Literal, Token]) -> Value:
         value, at = default
@@ -527,6 +535,11 @@ class _Parser:
             found = self._constants.get((*self._scope[:depth], *path))
             if found is not None:
                 return found.value
+        # As in rosidl, those of a message need no qualification.
+        homes = self._homes.get((*self._scope, *path), {})
+        own = f"{self._struct_name}_Constants"
+        if own in homes or len(homes) == 1:
+            return homes.get(own, next(iter(homes.values())))
         raise self._lexer.error(f"unknown constant {'::'.join(path)!r}", token)
 
     def _annotations(self) -> _Annotations:

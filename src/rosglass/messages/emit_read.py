@@ -634,7 +634,8 @@ def path_function(
         codec: Codec of the bytes.
         paths: The paths.
         single: Whether it returns the value of the only path, instead of a tuple.
-        other: Called with buffers whose CDR header has another byte order than this codec.
+        other: Called with buffers of another type, or whose CDR header has another byte order, than
+            this codec.
         failed: Called with the buffer and the error after any error.
 
     Raises:
@@ -643,6 +644,10 @@ def path_function(
     targets = [(f"r{i}", resolve_path(codec.schema, path), path) for i, path in enumerate(paths)]
     source = Source()
     with source.block("try:"):
+        if not all(_is_value(route) for _, route, _ in targets):
+            # What is returned keeps the buffer, and is made for its type.
+            kind = source.bind(memoryview if codec.wire.view else bytes, "kind")
+            source.line(f"if type(b) is not {kind}: return {source.bind(other, 'other')}(b)")
         if not _constant_offsets(codec, source, targets, other):
             if codec.wire.aligned:
                 different = source.bind(other, "other")
@@ -657,6 +662,14 @@ def path_function(
     title = f"path {', '.join(paths)} {codec.schema.name} {codec.wire.title}"
     made: Callable[[bytes], Any] = source.compile("path(b)", title)
     return made
+
+
+def _is_value(route: Route) -> bool:
+    """Return whether a path leads to one number or text."""
+    member = route[-1][0]
+    return member.struct is None and all(
+        not step.is_array or isinstance(index, int) for step, index in route
+    )
 
 
 def _constant_offsets(

@@ -10,7 +10,7 @@ import threading
 import weakref
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from rosglass import interfaces
@@ -52,6 +52,7 @@ __all__ = [
 ]
 
 
+_HEADER = "std_msgs/msg/Header"
 _WIRES = {
     (name, big, wide, view): Wire(name, big, wide, view)
     for name in ("cdr", "ros1")
@@ -180,6 +181,12 @@ class MessageType:
     def type_hash(self) -> str:
         """The hash by which peers compare versions of the type: RIHS01, or md5 in ROS 1."""
         return self.md5 if self.ros == 1 else self.rihs01
+
+    @cached_property
+    def has_header(self) -> bool:
+        """Whether messages begin with a ``std_msgs/Header`` named ``header``."""
+        first = self.definition.fields[:1]
+        return [(field.name, str(field.type)) for field in first] == [("header", _HEADER)]
 
     @property
     def fields(self) -> tuple[Field, ...]:
@@ -623,6 +630,7 @@ class OpaqueType(MessageType):
             )
         self.name, self.ros, self.wire = join_name(name), ros, "cdr" if ros == 2 else "ros1"
         self.reason, self.text = reason, text
+        self.has_header = False
         self._hash = type_hash
 
     @property

@@ -58,6 +58,10 @@ def single_shot(parent: QtCore.QObject, on_timeout: Callable[[], None]) -> QtCor
     return timer
 
 
+#: Milliseconds until an object without an engine is one that will not be destroyed.
+_UNPREPARED_MS = 1000
+
+
 class Element(QtCore.QObject):
     """A QML object that uses the session's node, usually through one endpoint.
 
@@ -96,6 +100,8 @@ class Element(QtCore.QObject):
         self._origin = runtime.caller() if runtime is not None else None
         self._session: Session | None = None
         self._scheduled = False
+        #: Whether it has found no engine once.
+        self._is_unprepared = False
         self._problem = self._announced_problem = ""
         self._limit = RateLimit()
         self._retry: QtCore.QTimer | None = None
@@ -218,7 +224,13 @@ class Element(QtCore.QObject):
     def _find_session(self) -> bool:
         runtime = self._find_runtime()
         if runtime is None:
-            self._set_problem(f"{type(self).__name__} cannot be used yet: {UNPREPARED}")
+            if self._is_unprepared:
+                self._set_problem(f"{type(self).__name__} cannot be used yet: {UNPREPARED}")
+            else:
+                # It may have no engine any more: a Repeater destroys what it has just made if its
+                # model changes. It is gone before the next attempt then.
+                self._is_unprepared = True
+                QtCore.QTimer.singleShot(_UNPREPARED_MS, self, self._schedule)
             return False
         session = self._session = runtime.session
         self._steady = session.steady

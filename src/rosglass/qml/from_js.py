@@ -428,6 +428,10 @@ def _as_number(value: Any, code: str) -> Any:
     return value
 
 
+#: Constructors of JavaScript's objects whose content is not in their properties.
+_COLLECTIONS = frozenset({"Map", "Set"})
+_BOXES = frozenset({"Boolean", "Number", "String"})
+_WITHOUT_CONTENT = frozenset({"DataView", "Promise", "RegExp", "WeakMap", "WeakSet"})
 _DEEPEST = 100
 #: Maximum number of values read one by one: with shared parts, the count can grow exponentially.
 _MOST = 1 << 18
@@ -439,7 +443,7 @@ def plain_from_js(value: QJSValue) -> Any:
     """Return a value as None, bool, int, float, str, list, dict, bytes, QDateTime, Time, Duration.
 
     QML objects become the properties that their own class declares, item models a list of their
-    rows, as dicts by role.
+    rows, as dicts by role, a Map a dict, and a Set a list.
 
     Raises:
         ConversionError: The value is a function, refers to itself, is nested too deeply, has more
@@ -532,11 +536,41 @@ class _Reader:
         ]
 
     def _object(self, value: QJSValue, path: str, depth: int) -> Any:
+        # The content of these is not in their properties.
+        own = value.hasOwnProperty("constructor")
+        constructor = "" if own else value.property("constructor").property("name").toString()
+        if constructor in _COLLECTIONS and value.property("entries").isCallable():
+            return self._collection(value, constructor, path, depth)
+        if constructor in _BOXES:
+            return self.read(value.property("valueOf").callWithInstance(value), path, depth + 1)
+        if constructor in _WITHOUT_CONTENT:
+            raise ConversionError(path, Shown(f"a {constructor}"), "a value")
         names = properties_of(value)
         if not names and value.toString() != "[object Object]":
             return self._python(value.toVariant(), path, depth)
         found = (name for name in names if name != "#messageType")
         return {name: self._inner(value, name, path, depth) for name in found}
+
+    def _collection(self, value: QJSValue, constructor: str, path: str, depth: int) -> Any:
+        """Return a Map as a dict, whose keys become texts as those of objects, a Set as a list."""
+        iterator = value.property("entries").callWithInstance(value)
+        found: dict[str, Any] = {}
+        items: list[Any] = []
+        while True:
+            step = iterator.property("next").callWithInstance(iterator)
+            if step.isError() or not step.isObject() or step.property("done").toBool():
+                break
+            key, inner = (step.property("value").property(at) for at in (0, 1))
+            if constructor == "Set":
+                items.append(self.read(inner, f"{path}[{len(items)}]", depth + 1))
+                continue
+            name = key.toString()
+            here = f"{path}.{name}" if path else name
+            if key.isObject() or name in found:
+                wanted = "keys that differ as texts" if name in found else "texts as keys of a Map"
+                raise ConversionError(here, shown(key), wanted)
+            found[name] = self.read(inner, here, depth + 1)
+        return items if constructor == "Set" else found
 
     def _rows(self, model: Any, path: str, depth: int) -> list[Any]:
         roles = roles_of(model)

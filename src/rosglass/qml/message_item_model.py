@@ -427,7 +427,8 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         if role not in {_DISPLAY, _EDIT}:
             return None
         if index.column() == _NAME:
-            return item.name
+            # Editors show a field for what has an edit role.
+            return item.name if role == _DISPLAY else None
         if not item.is_leaf:
             # Qt's own delegates warn about undefined.
             return "" if role == _DISPLAY else None
@@ -458,7 +459,8 @@ class MessageItemModel(QtCore.QAbstractItemModel):
         except ConversionError as error:
             self._complain(f"{item.path} was not changed: {error}")
             return False
-        self.dataChanged.emit(index, index)
+        # Not the edit role: it would replace what is being typed.
+        self.dataChanged.emit(index, index, [_DISPLAY])
         self._edited()
         return True
 

@@ -291,6 +291,12 @@ class Ros(ValueFunctions):
             self._log(logging.WARNING, "Ros.init: NoRosout has no effect: every node has its log")
         self._session.init(name, arguments=args)
 
+    @Slot(result=str)
+    def getName(self) -> str:
+        """Return the node's full name, e.g. ``/panel``; empty before init."""
+        name, namespace = self._session.name, self._session.namespace
+        return f"{namespace.rstrip('/')}/{name}" if name else ""
+
     @Slot()
     def spinOnce(self) -> None:
         """Do nothing: callbacks need no spinning."""

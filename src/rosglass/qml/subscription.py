@@ -196,8 +196,8 @@ class Subscription(TopicElement):
 
     @Slot(result=int)
     def getPublisherCount(self) -> int:
-        """Return the number of publishers of the topic; 0 while not connected."""
-        return self._count_publishers()
+        """Return the number of publishers that match; 0 while there is no subscription."""
+        return 0 if self._endpoint is None else self._endpoint.publisher_count()
 
     # Subscribing.
 
@@ -319,7 +319,7 @@ class Subscription(TopicElement):
     def _lateness(self, sample: Sample) -> float:
         """Return the excess delay of a message over others, in seconds."""
         endpoint = self._endpoint
-        if endpoint is None or sample.sent_ns is None:
+        if endpoint is None:
             return 0.0
         return endpoint.lateness(sample).seconds
 
@@ -440,8 +440,8 @@ class Subscriber(Subscription):
 
     @Slot(result=int)
     def getNumPublishers(self) -> int:
-        """Return the number of publishers of the topic; 0 while not connected."""
-        return self._count_publishers()
+        """Return the number of connected publishers; 0 while there is no subscription."""
+        return self.getPublisherCount()
 
 
 #: Maximum milliseconds of a Qt timer, 24 days.

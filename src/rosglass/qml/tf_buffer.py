@@ -119,6 +119,10 @@ class _Watches(NamedTuple):
     watches: list[Handle]
 
 
+#: The reason of the reference plugins while there is no node.
+_UNINITIALIZED = "Uninitialized"
+
+
 class _Queries(Element):
     """Looks up transforms in a buffer filled by the session's node."""
 
@@ -142,13 +146,16 @@ class _Queries(Element):
     def canTransform(self, *given: QJSValue) -> QJSValue:
         """Return true if a transform can be looked up, otherwise the reason as text.
 
-        Arguments are those of :meth:`lookUpTransform`.
+        Before there is a node, that is ``Uninitialized``. Arguments are those of
+        :meth:`lookUpTransform`.
         """
         runtime = self._find_runtime()
         result = self._look_up("canTransform", given)
         if runtime is None or isinstance(result, str):
             return QJSValue()
-        return runtime.value(result.why if isinstance(result, _Missing) else True)
+        if not isinstance(result, _Missing):
+            return runtime.value(True)
+        return runtime.value(_UNINITIALIZED if result.exception == _UNINITIALIZED else result.why)
 
     @Slot(QJSValue, QJSValue, result=QJSValue)
     @Slot(QJSValue, QJSValue, QJSValue, result=QJSValue)
@@ -186,7 +193,7 @@ class _Queries(Element):
             return ""
         buffer = self.buffer
         if buffer is None:
-            return _Missing(query.frames, "Uninitialized", "there is no node yet")
+            return _Missing(query.frames, _UNINITIALIZED, "there is no node yet")
         try:
             if not query.timeout:
                 return query.look_up(buffer)
@@ -233,9 +240,13 @@ class _Queries(Element):
 
     @Slot(str, result=float)
     def getTransformAge(self, frame: str) -> float:
-        """Return the age of a frame's newest transform by its stamp, in seconds; -1 if unknown."""
+        """Return the time since the stamp of a frame's newest transform, static ones included.
+
+        Returns:
+            Seconds; -1 for unknown frames and for roots.
+        """
         info, node = self._frame(frame), self.node
-        if info is None or node is None or info.static:
+        if info is None or node is None:
             return -1.0
         age = info.age(node.now())
         return -1.0 if age is None else age.seconds

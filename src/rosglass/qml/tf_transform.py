@@ -8,7 +8,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import rosglass
-from rosglass.comm.statistics import Pace
+from rosglass.comm.statistics import Pace, StampMonitor
 from rosglass.comm.time import Time
 from rosglass.errors import Error, TransformException
 from rosglass.qml.callbacks import weak_callback
@@ -90,8 +90,9 @@ class TfTransform(Element):
         self._exception, self._why = "Uninitialized", "nothing was looked up yet"
         self._shown: QJSValue | None = None
         self._updated, self._pace = 0.0, Pace()
-        #: When the transform last changed; None before.
+        #: When the transform last changed; None before. And the seconds by which it was late.
         self._arrived: float | None = None
+        self._late, self._stamps = 0.0, StampMonitor()
         #: When the connection was lost; later transforms are live, e.g. without a ROS 1 master.
         self._lost: float | None = None
         self._timer = single_shot(self, self._refresh)
@@ -223,7 +224,15 @@ class TfTransform(Element):
         # In a chain, the newest common time only changes with the link that is furthest behind.
         if moved and (self._transform is None or found.stamp != self._transform.stamp):
             self._arrived = self._steady()
+            self._late = self._lateness(found.stamp.nanoseconds)
         self._show(found, "", "")
+
+    def _lateness(self, stamp: int) -> float:
+        """Return how much longer than usual a transform took that has just arrived, in seconds."""
+        node, frames = self.node, f"{self.targetFrame} {self.sourceFrame}"
+        if node is None or node.clock.is_simulated:
+            return 0.0
+        return self._stamps.add(frames.encode(), time.time_ns(), stamp)
 
     def _show(self, found: Transform | None, exception: str, why: str) -> None:
         before, valid = self._transform, self._valid
@@ -252,7 +261,7 @@ class TfTransform(Element):
         age = self._steady() - arrived if moving and arrived is not None else -1.0
         connected = self._session is not None and self._session.state == "connected"
         lost = not connected and (arrived is None or self._lost is None or arrived <= self._lost)
-        late = arrived is None or age > self.timeout / 1000 + self._interval
+        late = arrived is None or age + self._late > self.timeout / 1000 + self._interval
         old = moving and self.timeout > 0 and late
         stale = self._transform is None or self._config is None or lost or old
         report(self, age=age, stale=stale)

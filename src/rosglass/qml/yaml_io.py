@@ -15,6 +15,7 @@ from rosglass.comm.time import Duration, Time
 from rosglass.errors import Error, UnsupportedError
 from rosglass.qml.dialect import Dialect
 from rosglass.qml.from_js import plain_from_js
+from rosglass.qml.js_values import wide
 from rosglass.qml.log import log_from_qml
 from rosglass.qml.to_js import exact
 from rosglass.qml.waiting import FILE_TIMEOUT_S, within
@@ -304,6 +305,11 @@ def _writable(value: Any, dialect: Dialect) -> Any:
         return {key: _writable(inner, dialect) for key, inner in value.items()}
     if isinstance(value, list):
         return [_writable(inner, dialect) for inner in value]
+    if isinstance(value, str):
+        # JavaScript has integers from 2^53 on as texts: they stay integers in the file.
+        number = wide(value)
+        is_wide = type(number) is int and exact(number) == value and -(2**63) <= number < 2**64
+        return number if is_wide else value
     if isinstance(value, QtCore.QDateTime):
         return _Moment(value.toUTC().toString(QtCore.Qt.DateFormat.ISODateWithMs))
     if isinstance(value, (Time, Duration)):

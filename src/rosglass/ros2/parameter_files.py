@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import logging
 import math
 import re
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ParameterFile", "dump", "parse", "parse_value", "read", "write"]
 
+_log = logging.getLogger("rosglass.ros2")
 _KEY = "ros__parameters"
 #: Maximum depth of nested mappings in a file; only an attack on the stack has more.
 _MAX_DEPTH = 64
@@ -48,6 +50,8 @@ _STR_TAG, _BINARY_TAG = "tag:yaml.org,2002:str", "tag:yaml.org,2002:binary"
 @dataclass(frozen=True)
 class ParameterFile:
     """The contents of a parameter file.
+
+    A list with mappings in it is left out, with a warning in the log.
 
     Attributes:
         label: The file's path or another source, for messages.
@@ -140,6 +144,10 @@ def dump(nodes: Mapping[str, Mapping[str, ParameterValue]]) -> str:
 def write(path: str | os.PathLike[str], nodes: Mapping[str, Mapping[str, ParameterValue]]) -> None:
     """Write a parameter file atomically; raises ParameterError if that is not possible."""
     write_text(path, dump(nodes))
+
+
+class _MapInListError(ParameterError):
+    """A list has a mapping in it, up to which it was read."""
 
 
 class _Reader:
@@ -241,13 +249,29 @@ class _Reader:
             if isinstance(begin, self._yaml.MappingStartEvent):
                 yield from self._parameters(full, begin, depth + 1)
             elif isinstance(begin, self._yaml.SequenceStartEvent):
-                yield full, self._sequence()
+                try:
+                    yield full, self._sequence()
+                except _MapInListError as error:
+                    # Nodes read other names and values out of it, and the rest of the file.
+                    _log.warning("%s; the parameter %r is left out", error, full)
+                    self._skip(2)
             else:
                 yield full, self._scalar(begin)
+
+    def _skip(self, depth: int) -> None:
+        """Skip to the end of so many lists and mappings."""
+        starts = (self._yaml.MappingStartEvent, self._yaml.SequenceStartEvent)
+        ends = (self._yaml.MappingEndEvent, self._yaml.SequenceEndEvent)
+        while depth:
+            event = self._next()
+            depth += isinstance(event, starts) - isinstance(event, ends)
 
     def _sequence(self) -> ParameterValue:
         items: list[Any] = []
         while not isinstance(event := self._next(), self._yaml.SequenceEndEvent):
+            if isinstance(event, self._yaml.MappingStartEvent):
+                problem = self._error(event, "a mapping in a list is no parameter's value")
+                raise _MapInListError(str(problem))
             if not isinstance(event, self._yaml.ScalarEvent):
                 raise self._error(event, "a list in a list is no parameter's value")
             item = self._scalar(event)

@@ -91,7 +91,10 @@ class GraphMatching(TopicMatching):
             elif idle:
                 self._duplicates.guarded = False
             problems = problems + self._describe_qos_conflicts(publishers)
-        return [Problem(text) for text in problems]
+        found = [Problem(text) for text in problems]
+        if self.reader is not None and self.reader.problem:
+            found.append(Problem(self.reader.problem, logged=False))
+        return found
 
     def find_matching(self, publishers: Sequence[EndpointInfo]) -> list[EndpointInfo]:
         """Return the publishers of a known type with a compatible profile."""

@@ -14,6 +14,7 @@ import threading
 import time
 from collections import deque
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from rosglass.comm import EndpointKind, Handle, Promise
@@ -283,7 +284,8 @@ class TypeFetcher(NodeMember):
     """Fetches type definitions for a node from other nodes.
 
     All decisions are made in rounds on the node's own dispatcher. Events of the graph, timers and
-    responses only schedule the next round.
+    responses only schedule the next round: for all requests after a change of the graph, otherwise
+    for those that are concerned.
 
     Args:
         core: The node.
@@ -299,8 +301,13 @@ class TypeFetcher(NodeMember):
         self._answers: deque[tuple[TypeRequest, bytes | str, Future[Any]]] = deque()
         #: Clients of ``get_type_description``, and monotonic times of their last use, by service.
         self._clients: dict[str, tuple[ServiceClient, float]] = {}
+        #: Requests for the next round, from any thread, and those that wait for a pending query.
+        self._due: deque[TypeRequest] = deque()
+        self._waiting: dict[TypeRequest, None] = {}
+        #: The endpoints of every type, as of a version of the graph.
+        self._users: tuple[int, _Users] = -1, {}
         self._cache = TypeCache(cache_folder())
-        self._scheduled = self._closed = False
+        self._scheduled = self._closed = self._all_due = False
         self._started = time.monotonic()
         self._pending = self._fetched = 0
         self._warned: set[tuple[str, str]] = set()
@@ -355,9 +362,11 @@ class TypeFetcher(NodeMember):
         self._add_request(((name, hash, "" if hash else node), None, None, promise))
         return promise
 
-    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - time passes, too
+    def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - it may move for others
         """Follow the graph: a node to query may have appeared."""
-        if self._requests or self._clients:
+        if self._clients or (
+            self._requests and (idle or self._users[0] != self._core.graph.version)
+        ):
             self._schedule()
 
     def close(self) -> None:
@@ -389,7 +398,10 @@ class TypeFetcher(NodeMember):
         self._schedule()
 
     def _request(self, key: tuple[str, str, str]) -> TypeRequest:
-        return self._requests.setdefault(key, TypeRequest(*key))
+        request = self._requests.get(key)
+        if request is None:
+            request = self._requests[key] = TypeRequest(*key, self._schedule)
+        return request
 
     def _load(self, name: str, type_hash: str) -> AnyType:
         return load(name, ros=2, library=self._core.types.library, hash=type_hash)
@@ -414,38 +426,62 @@ class TypeFetcher(NodeMember):
 
     # -- rounds ------------------------------------------------------------------------------------
 
-    def _schedule(self) -> None:
+    def _schedule(self, request: TypeRequest | None = None) -> None:
+        """Request a round for a request, or for all."""
+        if request is None:
+            self._all_due = True
+        else:
+            self._due.append(request)
         if not self._scheduled and not self._closed:
             self._scheduled = True
             self._core.own_dispatcher.post(self._round)
 
     def _round(self) -> None:
         self._scheduled = False  # first: requests from here on schedule another round
+        version = self._core.graph.version
+        if version != self._users[0]:
+            self._users = version, self._core.graph.users()
+            self._all_due = True
+        due: dict[TypeRequest, None] = {}
         while self._new and not self._closed:
             key, endpoints, listener, promise = self._new.popleft()
-            self._request(key).add(endpoints, listener, promise)
-        requests = list(self._requests.values())
+            request = self._request(key)
+            request.add(endpoints, listener, promise)
+            due[request] = None
+        if self._all_due:
+            self._all_due = False
+            due |= dict.fromkeys(self._requests.values())
         while self._answers:
             self._on_answer(*self._answers.popleft())
-        users = self._core.graph.users()
+        while self._due:
+            due[self._due.popleft()] = None
+        for request in due:
+            self._continue(request)
+        while self._waiting and self._pending < _MAX_PENDING and not self._closed:
+            request = next(iter(self._waiting))
+            del self._waiting[request]
+            self._continue(request)
         now = time.monotonic()
-        for request in requests:
-            request.promises = [promise for promise in request.promises if not promise.done()]
-            if not request.promises and now - request.used > _INTEREST_S:
-                self._drop(request)
-            elif self._requests.get(request.key) is request:
-                try:
-                    self._advance(request, users, now)
-                except NodeClosedError:
-                    break
-                except Exception:
-                    _log.exception("fetching %s failed", request.name)
         for service, (client, used) in list(self._clients.items()):
             if not client.pending and now - used > _LINGER_S:
                 del self._clients[service]
                 client.close()
         if self._closed:
             self._fail_all()
+
+    def _continue(self, request: TypeRequest) -> None:
+        """Advance a request, or drop it if it is of no use any more."""
+        now = time.monotonic()
+        request.promises = [promise for promise in request.promises if not promise.done()]
+        if not request.promises and now - request.used > _INTEREST_S:
+            self._drop(request)
+        elif self._requests.get(request.key) is request and not self._closed:
+            try:
+                self._advance(request, self._users[1], now)
+            except NodeClosedError:
+                self._closed = True
+            except Exception:
+                _log.exception("fetching %s failed", request.name)
 
     def _advance(self, request: TypeRequest, users: _Users, now: float) -> None:
         """Take the next possible steps to get a definition."""
@@ -476,7 +512,10 @@ class TypeFetcher(NodeMember):
         target.endpoints = target.endpoints or request.endpoints
         target.promises += request.promises
         request.promises = []
-        target.listeners += [each for each in request.listeners if each not in target.listeners]
+        # The request continues with its target, as do those that wait for it.
+        target.listeners += [
+            each for each in (*request.listeners, request.wake) if each not in target.listeners
+        ]
         self._advance(target, users, now)
         changed, request.problem = request.problem != target.problem, target.problem
         if not request.listeners or self._requests.get(target.key) is not target:
@@ -518,7 +557,7 @@ class TypeFetcher(NodeMember):
         problems: list[str] = []
         for suffix in ACTION_PARTS:
             part = self._request((name + suffix, "", request.node))
-            part.add(users.get(name + suffix, request.endpoints), self._schedule, None)
+            part.add(users.get(name + suffix, request.endpoints), request.wake, None)
             announced = self._find_hash(part, part.name, users, now)
             found = announced and self._core.types.library.version(part.name, announced)
             if found:
@@ -567,6 +606,8 @@ class TypeFetcher(NodeMember):
             if key not in request.queries and (failed is None or now >= failed.next_try):
                 if self._pending < _MAX_PENDING:
                     self._query(request, key, server, name)
+                else:
+                    self._waiting[request] = None
                 return
         if request.queries:
             return
@@ -605,11 +646,11 @@ class TypeFetcher(NodeMember):
             return
         request.queries[key] = query
         self._pending += 1
-        self._core.timers.after(_HEDGE_S, self._schedule)
+        self._core.timers.after(_HEDGE_S, request.wake)
 
         def on_response(done: Future[Any]) -> None:
             self._answers.append((request, key, done))
-            self._schedule()
+            self._schedule(request)
 
         call.add_done_callback(on_response)
 
@@ -649,14 +690,14 @@ class TypeFetcher(NodeMember):
         pause = min(_RETRY_S * 2.0 ** (attempts - 1), _MAX_RETRY_S) if retry else math.inf
         next_try = time.monotonic() + pause
         request.failed[key] = QueryResult(query.server.node.full, reason, attempts, next_try)
-        self._schedule()
+        self._schedule(request)
 
     def _look_up(self, request: TypeRequest, name: str, users: _Users) -> bool:
         """Look up a message in the middleware; return whether that succeeded or is pending."""
         lookup = request.lookup
         if lookup is None or time.monotonic() - lookup.started > _MAX_RETRY_S:
             endpoints = (*request.endpoints, *users.get(name, ()))
-            lookup = request.lookup = Lookup(self._core.middleware, name, endpoints, self._schedule)
+            lookup = request.lookup = Lookup(self._core.middleware, name, endpoints, request.wake)
         found = lookup.found
         if lookup.done and found is not None:
             if found.name == name and request.hash in ("", *announced_hashes(found)):
@@ -710,7 +751,7 @@ class TypeFetcher(NodeMember):
         limit = _INTRODUCTION_S if self._core.middleware.unnamed() else _GRACE_S
         left = max(request.since, self._started) + limit - now
         if left > 0:
-            self._core.timers.after(min(left, _GRACE_S) + 0.01, self._schedule)
+            self._core.timers.after(min(left, _GRACE_S) + 0.01, request.wake)
         else:
             error = TypeNotFoundError(f"no definition of {request.name}: {reason}")
             self._settle(request, error, reason)
@@ -752,9 +793,11 @@ class TypeRequest:
         name: The type's name.
         type_hash: The announced hash; empty for the one in the graph.
         node: Full name of the node whose version is meant; empty for any.
+        schedule: Has the fetcher continue with a request.
 
     Attributes:
         key: Identifies the request.
+        wake: Has the fetcher continue with this request.
         endpoints: The endpoints that use it.
         listeners: Called when it is found, or cannot be.
         promises: Fulfilled when it is found.
@@ -769,9 +812,12 @@ class TypeRequest:
         lookup: The last lookup in the middleware.
     """
 
-    def __init__(self, name: str, type_hash: str, node: str) -> None:
+    def __init__(
+        self, name: str, type_hash: str, node: str, schedule: Callable[[TypeRequest], None]
+    ) -> None:
         self.name, self.hash, self.node = name, type_hash, node
         self.key = name, type_hash, node
+        self.wake: Callable[[], None] = partial(schedule, self)
         self.endpoints: Sequence[EndpointInfo] = ()
         self.listeners: list[Callable[[], None]] = []
         self.promises: list[Promise[AnyType]] = []

@@ -8,6 +8,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.names import similar
+from rosglass.comm.statistics import StampMonitor
 from rosglass.errors import Error, LookupException, TransformException
 from rosglass.qml.element import DEFAULT_TIMEOUT_MS
 from rosglass.qml.tf_buffer import TfLink
@@ -75,6 +76,11 @@ class Frames(QtCore.QObject):
     def steady(self) -> float:
         """Return the current time for measuring ages, in seconds; see :meth:`Session.steady`."""
         return self._session.steady()
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the robot's time is that of a simulation or a recording."""
+        return self._node is not None and self._node.clock.is_simulated
 
     def locate(self, frame: str, time: Time | None = None) -> Transform:
         """Return the transform from a frame to the fixed frame.
@@ -185,8 +191,10 @@ class Tracker(QtCore.QObject):
         self._owner, self._point, self._frame = owner, point, frame
         self._scale, self._runtime = scale, runtime
         self._position, self._problem, self._stale = _NAN, "", False
-        #: Stamp of the latest transform in nanoseconds, and its arrival time in seconds.
+        #: Stamp of the latest transform in nanoseconds, and its arrival time in seconds, earlier by
+        #: what it was late.
         self._latest: tuple[int, float] | None = None
+        self._stamps = StampMonitor()
 
     @property
     def follows_frame(self) -> bool:
@@ -220,7 +228,10 @@ class Tracker(QtCore.QObject):
             return False
         now = self._owner.steady()
         if self._latest is None or self._latest[0] != stamp:
-            self._latest = stamp, now
+            late = 0.0
+            if not self._owner.is_simulated():
+                late = self._stamps.add(self._frame.encode(), time.time_ns(), stamp)
+            self._latest = stamp, now - late
         return now - self._latest[1] > _STALE_AFTER_S
 
     def move(self, point: Sequence[float] | dict[str, float]) -> None:
@@ -351,6 +362,10 @@ class Trackers:
     def steady(self) -> float:
         """Return the current time for measuring ages, in seconds; see :meth:`Session.steady`."""
         return self._frames().steady()
+
+    def is_simulated(self) -> bool:
+        """Return whether the robot's time is that of a simulation or a recording."""
+        return self._frames().is_simulated
 
     def _before_frame(self) -> None:
         self._trackers = [tracker for tracker in self._trackers if is_alive(tracker)]

@@ -529,9 +529,11 @@ class MessageQueue:
         self.received = self.dropped = 0
         #: Identity of the publisher of the last message; empty if the wire has none.
         self.publisher = b""
+        #: Seconds by which the last message was delayed on its way.
+        self.late = 0.0
 
-    def receive(self, sample: Sample) -> None:
-        """Decode and queue a sample, in the node's thread."""
+    def receive(self, sample: Sample, late: float = 0.0) -> None:
+        """Decode and queue a sample that was delayed by `late` seconds, in the node's thread."""
 
         def decode() -> Message:
             name = sample.type.name
@@ -541,7 +543,7 @@ class MessageQueue:
                 return sample.type.decode_all(sample.data, wire=sample.wire)
             return sample.message()
 
-        self.publisher = sample.publisher
+        self.publisher, self.late = sample.publisher, late
         self.put(decode, sample.type.name, len(sample.data))
 
     def put(self, decode: Callable[[], Message], what: str, size: int = 0) -> None:
@@ -778,7 +780,7 @@ class TopicDisplay(OneTopicDisplay):
         self._newest: _Item | None = None
         #: How many messages were dropped while they waited, and are missed.
         self._dropped = 0
-        self._arrived = self._arrived_at = 0.0
+        self._arrived = self._arrived_at = self._message_late = 0.0
         #: Seconds between the last messages.
         self._intervals = deque((0.0, 0.0), maxlen=2)
         super().__init__(parent, runtime)
@@ -929,6 +931,8 @@ class TopicDisplay(OneTopicDisplay):
                 reason = "its publisher is gone"
             elif seconds > _CONTINUOUS_S and seconds > self._outdated_after_s():
                 reason = f"no message for {seconds:.0f} s that could be shown"
+            elif self._message_late + seconds > max(_CONTINUOUS_S, self._outdated_after_s()):
+                reason = f"the newest message was {self._message_late:.0f} s late"
             elif self._is_late():
                 reason = "the transform of the newest message is not known"
         self._is_gone = bool(reason)
@@ -994,7 +998,7 @@ class TopicDisplay(OneTopicDisplay):
             return
         now = self._steady()
         self._intervals.append(now - self._arrived_at)
-        self._arrived, self._arrived_at = time.time(), now
+        self._arrived, self._arrived_at, self._message_late = time.time(), now, queue.late
         self._newest = items[-1]
         self._outdated = False
         self._waiting.extend(items)
@@ -1135,13 +1139,21 @@ class Subscriptions:
         self._open: list[Any] = []
         try:
             for topic, qos in profiles.items():
-                subscription = node.create_subscription(
-                    topic, None, qos=qos, raw_callback=queue.receive
-                )
-                self._open.append(subscription)
+                self._open.append(self._subscribe(node, topic, qos, queue))
         except Error:
             self.close()
             raise
+
+    @staticmethod
+    def _subscribe(node: Node, topic: str, qos: QoS, queue: MessageQueue) -> Any:
+        made: list[Any] = []
+
+        def on_sample(sample: Sample) -> None:
+            # The first may arrive before the subscription is returned.
+            queue.receive(sample, made[0].lateness(sample).seconds if made else 0.0)
+
+        made.append(node.create_subscription(topic, None, qos=qos, raw_callback=on_sample))
+        return made[0]
 
     @property
     def problem(self) -> str:

@@ -834,14 +834,23 @@ class SceneView(QQuickRhiItem):
         while self._frames:
             QtCore.QObject.disconnect(self._frames.pop())
         self._forget_first_frame()
+        self._free_devices()
         self._drawing = None
         if window is None:
             return
+        self._frames.append(window.sceneGraphInvalidated.connect(self._free_devices))
         self._frames.append(window.afterAnimating.connect(self._on_frame))
         self._frames.append(window.frameSwapped.connect(self._on_frame_swapped))
         self._first_frame = window.afterFrameEnd.connect(self._take_mouse)
         api = window.rendererInterface().graphicsApi()
         self._set_problem(NO_GPU if api == QSGRendererInterface.GraphicsApi.Software else "")
+
+    @Slot()
+    def _free_devices(self) -> None:
+        """Free what is on the device before the window, which has it, is gone."""
+        if self._drawing is not None:
+            for renderer in self._renderers:
+                renderer.close()
 
     # -- mouse, touch, keys ----------------------------------------------------------------------
 

@@ -381,7 +381,11 @@ class TransformBuffer(Handle):
         return not refused
 
     def set_many(
-        self, items: Iterable[tuple[str, int, Entry]], authority: object = "", static: bool = False
+        self,
+        items: Iterable[tuple[str, int, Entry]],
+        authority: object = "",
+        static: bool = False,
+        late: float = 0.0,
     ) -> list[tuple[str, str]]:
         """Store several transforms; for listeners.
 
@@ -389,6 +393,7 @@ class TransformBuffer(Handle):
             items: For each the child frame, the stamp in nanoseconds, and the transform.
             authority: Publisher of the transforms; converted to a string when needed.
             static: Whether they are static.
+            late: Seconds by which they were delayed on their way, for :meth:`silence`.
 
         Returns:
             The refused ones: a key of :attr:`ignored`, and the reason. Each reason is logged once
@@ -398,7 +403,7 @@ class TransformBuffer(Handle):
         changed = set()
         store = self._store
         with self._lock:
-            tree, now = store.version, monotonic()
+            tree, now = store.version, monotonic() - late
             for child, stamp, entry in items:
                 kind, name = store.put(child, stamp, entry, static, authority)
                 if kind:
@@ -675,8 +680,8 @@ class TransformBuffer(Handle):
     def silence(self, target: str, source: str) -> float:
         """Return for how long one frame may have been somewhere else in another one, in seconds.
 
-        That is since the last transform of whichever link between them was received longest ago; 0
-        if all are static, or if nothing connects the frames.
+        That is since the last transform of whichever link between them was received longest ago, or
+        should have been if it was delayed; 0 if all are static, or if nothing connects the frames.
         """
         store, now = self._store, monotonic()
         with self._lock:

@@ -63,7 +63,8 @@ class FrameInfo:
         latest: Time of the newest transform; of a static one, its stamp. None without a parent.
         oldest: Time of the oldest transform in the buffer.
         count: Number of transforms in the buffer.
-        silence: Seconds since the last transform was received, by this machine's clock.
+        silence: Seconds since the last transform was received, by this machine's clock, or should
+            have been if it was delayed.
     """
 
     name: str
@@ -412,7 +413,8 @@ class FrameStore:
         names: All frames, including parents, in order of appearance, each with the publisher that
             named it first.
         authorities: Publisher of the last transform of each frame.
-        arrivals: Time of the last transform of each frame, by :func:`time.monotonic`.
+        arrivals: Time of the last transform of each frame, by :func:`time.monotonic`; earlier by
+            what it was late.
         version: Changes when frames appear, disappear, or change their parent.
         disagreements: Frames that changed between static and dynamic, with their publishers before
             and now; for the buffer to log.

@@ -11,12 +11,13 @@ from rosglass.comm.executor import IMMEDIATE
 from rosglass.comm.handle import Handle
 from rosglass.comm.names import hidden
 from rosglass.comm.qos import QoS
+from rosglass.comm.statistics import StampMonitor
 from rosglass.errors import Error, InvalidArgumentException, InvalidNameError, NodeClosedError
 from rosglass.tf.buffer import TransformBuffer
 from rosglass.tf.transform import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from rosglass.comm.clock import Jump
     from rosglass.comm.inbox import Sample
@@ -106,6 +107,7 @@ class TransformListener(Handle):
         self._own = buffer is None
         self.buffer = TransformBuffer() if buffer is None else buffer
         self._origins: dict[tuple[str, bytes], _Origin] = {}
+        self._stamps = StampMonitor()
         self._jumps = node.clock.on_jump(self._on_jump, executor=IMMEDIATE)
         made: list[Subscription] = []
         try:
@@ -135,12 +137,21 @@ class TransformListener(Handle):
 
     def _subscribe(self, topic: str, static: bool) -> Subscription:
         def on_sample(sample: Sample) -> None:
-            self.buffer.set_many(transforms_in(sample), self._origin(topic, sample), static)
+            items = transforms_in(sample)
+            late = 0.0 if static else self._lateness(sample, items)
+            self.buffer.set_many(items, self._origin(topic, sample), static, late)
 
         # On the receiving thread, so that a callback can wait for a transform.
         return self.node.create_subscription(
             topic, TYPE, qos=qos_of(static, DEPTH), raw_callback=on_sample, executor=IMMEDIATE
         )
+
+    def _lateness(self, sample: Sample, items: Sequence[tuple[str, int, Entry]]) -> float:
+        """Return the seconds by which dynamic transforms were delayed on their way."""
+        if self.node.clock.is_simulated:
+            return 0.0
+        newest = max((stamp for _, stamp, _ in items), default=0)
+        return self._stamps.add(sample.publisher, sample.received_ns, newest)
 
     def _origin(self, topic: str, sample: Sample) -> _Origin:
         key = (topic, sample.publisher)

@@ -117,6 +117,9 @@ class Writer(Handle):
 class Reader(Handle):
     """Receives the samples of one subscription."""
 
+    #: What is wrong with what arrives, in words, and already logged; empty if all is well.
+    problem: str = ""
+
     def set_eager(self, eager: bool) -> None:
         """Set whether samples are delivered one by one, which is the default.
 
@@ -131,6 +134,13 @@ class Reader(Handle):
         """Return how many samples the middleware reports as lost, of those without sequence number.
 
         Gaps in sequence numbers are counted by the subscription.
+        """
+        return 0
+
+    def lateness(self, publisher: bytes) -> int:
+        """Return how late a publisher's last sample was by its arrival, in nanoseconds.
+
+        For samples without a stamp; 0 if that is unknown.
         """
         return 0
 

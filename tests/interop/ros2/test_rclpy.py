@@ -198,6 +198,30 @@ def test_rclpy_receives_every_picture(peer, node, width, height, rate, count, de
         assert sum(1 for _ in itertools.islice(arrived, count)) == count
 
 
+def test_rclpy_answers_while_images_displace_each_other(start_rclpy_peer, node):
+    """Fast DDS spun for ever after a GAP for an image that it had received in part."""
+    peer = start_rclpy_peer("displaced")
+    do(peer, "subscribe", topic="/displaced", type=IMAGE, quiet=True, depth=1)
+    image = rosglass.load(IMAGE).create(
+        height=1080, width=1920, encoding="rgb8", step=5760, data=bytes(1080 * 5760)
+    )
+    with node.create_publisher("/displaced", IMAGE, QoS(1)) as publisher:
+        eventually(publisher.subscription_count)
+        count = 0
+
+        def publish() -> None:
+            nonlocal count
+            count += 1
+            publisher.publish(image)
+
+        with node.create_timer(0.01, publish):
+            eventually(lambda: count > 200, timeout=60)
+        assert peer.event("received /displaced")
+        assert publisher.dropped > 0
+        assert do(peer, "graph")["nodes"]
+    peer.end()
+
+
 # -- services --------------------------------------------------------------------------------------
 
 

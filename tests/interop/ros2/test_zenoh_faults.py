@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import gc
+import itertools
 import logging
 import os
+import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -19,6 +22,7 @@ from waiting import at_rate, eventually
 import rosglass
 from rosglass.comm import ConnectionState
 from rosglass.errors import ConnectionLostError, ServiceError
+from rosglass.wires.zenoh.keys import Attachment, topic_key
 
 HERE = Path(__file__).parent
 ADD, TWIST = "example_interfaces/srv/AddTwoInts", "geometry_msgs/msg/Twist"
@@ -439,3 +443,100 @@ def test_ctrl_c_at_any_moment(delay, router):
     process.send_signal(signal.SIGINT)
     out, errors = process.communicate(timeout=60)
     assert (process.returncode, out, errors) == (0, "interrupted\n", "")
+
+
+@pytest.fixture
+def other_session(router):
+    """A Zenoh session that is no node, as Zenoh's own confusion cannot be had when it is wanted."""
+    zenoh = pytest.importorskip("zenoh")
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", f'["{router.listen}"]')
+    with zenoh.open(config) as session:
+        yield session
+
+
+def test_messages_on_the_wrong_topic_are_dropped_and_counted(connect, other_session, caplog):
+    robot, cockpit = connect("robot"), connect("cockpit")
+    publisher = robot.create_publisher("/flashlight/state", STRING)
+    got = []
+    subscription = cockpit.create_subscription("/emergency_stop/state", STRING, got.append)
+    (other,) = eventually(lambda: cockpit.publishers("/flashlight/state"))
+    string = rosglass.load(STRING)
+    key = topic_key(0, "/emergency_stop/state", STRING, string.rihs01)
+    numbers = itertools.count(1)
+
+    def put(text, gid):
+        number = next(numbers)
+        note = Attachment(number, time.time_ns(), gid).encode()
+        other_session.put(key, string.encode(data=text), attachment=note)
+        return number
+
+    def dropped(more_than):
+        put("wrong", other.gid)
+        found = re.match(r"(\d+) messages of other topics, such as /fla", subscription.problem)
+        return found and int(found[1]) > more_than
+
+    eventually(lambda: dropped(3))
+    publisher.close()
+    eventually(lambda: not cockpit.publishers("/flashlight/state"))
+    number = put("wrong", other.gid)
+    eventually(lambda: dropped(number), what="of a publisher that has left")
+    # Publishers of dora-rs and others have identities that no token tells.
+    eventually(lambda: put("right", bytes(range(16))) and got)
+    assert {message.data for message in got} == {"right"}
+    logged = [each for each in caplog.records if "dropping a message of /fla" in each.message]
+    assert len(logged) == 1
+
+
+def test_requests_to_the_wrong_service_are_refused(connect, other_session):
+    robot, cockpit = connect("robot"), connect("cockpit")
+    asked = []
+    kind = rosglass.load("std_srvs/srv/Trigger")
+    robot.create_service_server("/emergency_stop/reset", kind, asked.append)
+    client = cockpit.create_service_client("/flashlight/toggle", kind)
+    (endpoint,) = eventually(lambda: robot.service_clients("/flashlight/toggle"))
+    key = topic_key(0, "/emergency_stop/reset", kind.name, kind.rihs01)
+
+    def refused():
+        note = Attachment(1, time.time_ns(), endpoint.gid).encode()
+        data = kind.request.encode({})
+        replies = list(other_session.get(key, payload=data, attachment=note))
+        return [reply.err.payload.to_string() for reply in replies if reply.err is not None]
+
+    (reason,) = eventually(refused)
+    assert "to /emergency_stop/reset, not to /flashlight/toggle" in reason
+    assert asked == []
+    client.close()
+
+
+#: Ends while its node waits for a router that accepts the connection and never answers. Python's
+#: own end is made to last longer than that.
+LEAVING = """
+import sys, threading, time
+import rosglass
+from rosglass.wires.zenoh import middleware
+
+opening, open_session = threading.Event(), middleware.open_session
+
+def open_slowly(config):
+    opening.set()
+    return open_session(config)
+
+class Last:
+    def __del__(self, sleep=time.sleep):
+        sleep(4)
+
+middleware.open_session = open_slowly
+sys.last_of_all = Last()
+node = rosglass.connect("{url}?mode=client", "leaving", own_services=False)
+assert opening.wait(20)
+"""
+
+
+def test_a_program_that_ends_while_it_connects_is_not_aborted():
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        url = f"zenoh://127.0.0.1:{silent.getsockname()[1]}"
+        command = [sys.executable, "-c", LEAVING.format(url=url)]
+        process = subprocess.run(command, check=False, capture_output=True, text=True, timeout=120)
+    assert (process.returncode, process.stderr) == (0, "")

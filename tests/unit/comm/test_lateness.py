@@ -3,10 +3,10 @@ from __future__ import annotations
 import pytest
 from receiving import deliver
 
-from rosglass import Duration, QoS
-from rosglass.comm import IMMEDIATE, Sample, Subscription
+from rosglass import Duration, QoS, load
+from rosglass.comm import IMMEDIATE, Sample, Subscription, inbox
 from rosglass.comm import statistics as module
-from rosglass.comm.statistics import LatencyEstimator
+from rosglass.comm.statistics import LatencyEstimator, StampMonitor
 
 P = b"p" * 16
 MS = 1_000_000
@@ -108,3 +108,101 @@ def test_subscriptions_tell_latency_and_lateness(offset):
     assert sub.lateness(live._replace(sent_ns=None)) == Duration()
     assert (live.received.nanoseconds, live.sent.nanoseconds) == (1_000 * MS, 998 * MS)
     assert live._replace(sent_ns=None).sent is None
+
+
+IMU1, IMU2 = load("sensor_msgs/Imu", ros=1), load("sensor_msgs/msg/Imu")
+
+
+def stamped(received, stamp, wire="ros1", **more):
+    """Return a sample that begins with a header; times in ms."""
+    seconds, rest = divmod(round(stamp * MS), S)
+    if wire == "ros1":
+        data = IMU1.encode(header={"stamp": {"secs": seconds, "nsecs": rest}})
+    else:
+        order = more.pop("byteorder", "little")
+        header = {"stamp": {"sec": seconds, "nanosec": rest}}
+        data = IMU2.encode(header=header, byteorder=order)
+    kind = IMU1 if wire == "ros1" else IMU2
+    return Sample(data, wire, kind, received * MS, publisher=P)._replace(**more)
+
+
+@pytest.fixture
+def topic(monkeypatch, offset):
+    """A subscription that measures each sample; returns the lateness of those given, in ms."""
+    sub = Subscription("/imu", None, QoS(), IMMEDIATE)
+    monkeypatch.setattr(inbox, "_MARK_PERIOD_S", 0.0)
+
+    def lateness(*samples):
+        found = []
+        for sample in samples:
+            deliver(sub, sample)
+            found.append(sub.lateness(sample).seconds * 1000)
+        return found
+
+    return lateness
+
+
+@pytest.mark.parametrize(
+    "form", [{}, {"wire": "cdr"}, {"wire": "cdr", "byteorder": "big"}], ids=["1", "2", "2 big"]
+)
+@pytest.mark.parametrize("skew", [0, 90_000, -90_000])
+def test_the_stamps_of_headers_tell_what_was_held_back(topic, form, skew):
+    live = [stamped(100_000 + n * 100 + skew, 100_000 + n * 100, **form) for n in range(10)]
+    kept = [stamped(111_000 + skew, 101_000 + n * 100, **form) for n in range(100)]
+    after = [stamped(111_000 + n * 100 + skew, 111_000 + n * 100, **form) for n in range(5)]
+    found = topic(*live, *kept, *after)
+    assert found[:10] == pytest.approx([0] * 10, abs=1)
+    assert found[10] == pytest.approx(10_000, abs=10)
+    assert found[109] == pytest.approx(100, abs=10)
+    assert found[110:] == pytest.approx([0] * 5, abs=10)
+
+
+def test_the_later_of_two_stamps_counts(topic):
+    # A bridge on this machine sends at once what a bad link has brought it late.
+    samples = [
+        stamped(n * 100 + 500, 100_000 + n * 100, "cdr", sent_ns=n * 100 * MS) for n in range(5)
+    ]
+    bridged = stamped(1_000 + 500, 97_000, "cdr", sent_ns=1_000 * MS)
+    slow = stamped(9_000 + 500, 108_900, "cdr", sent_ns=1_100 * MS)
+    found = topic(*samples, bridged, slow)
+    assert found[5] == pytest.approx(4_000, abs=10)
+    assert found[6] == pytest.approx(7_900, abs=10)
+
+
+def test_stamps_of_zero_and_stamps_that_stand_still_say_nothing(topic):
+    assert topic(*[stamped(n * 1000, 0) for n in range(5)]) == [0] * 5
+    # A map that is sent again every second, as it was made.
+    assert topic(*[stamped(10_000 + n * 1000, 7_000) for n in range(5)])[1:] == [0] * 4
+    short = stamped(20_000, 20_000)._replace(data=b"short")
+    assert topic(short, short._replace(type=None)) == [0, 0]
+
+
+def test_a_robots_clock_that_is_set_and_a_bag_that_loops_are_followed(topic):
+    live = [stamped(100_000 + n * 100, 100_000 + n * 100) for n in range(10)]
+    back = [stamped(101_000 + n * 100, 71_000 + n * 100) for n in range(10)]
+    ahead = [stamped(102_000 + n * 100, 602_000 + n * 100) for n in range(10)]
+    found = topic(*live, *back, *ahead)
+    assert found[10] == pytest.approx(30_000, abs=10), "it may as well be late itself"
+    assert found[11:] == pytest.approx([0] * 19, abs=1)
+
+
+def test_a_recording_that_was_paused_is_live_again_after_a_minute(topic):
+    live = [stamped(100_000 + n * 1000, 100_000 + n * 1000) for n in range(10)]
+    after = [stamped(120_000 + n * 1000, 110_000 + n * 1000) for n in range(120)]
+    found = topic(*live, *after)[10:]
+    assert found[20] == pytest.approx(10_000, abs=20)
+    assert found[62:] == pytest.approx([0] * 58, abs=20)
+
+
+def test_the_fastest_message_is_remembered_through_a_long_outage(topic):
+    live = [stamped(100_000 + n * 1000, 100_000 + n * 1000) for n in range(10)]
+    kept = [stamped(400_000, 110_000 + n * 1000) for n in range(280)]
+    assert topic(*live, *kept)[10] == pytest.approx(290_000, rel=0.01)
+
+
+def test_transforms_and_other_data_with_stamps(offset):
+    seen = StampMonitor()
+    assert [seen.add(b"map base", n * S, n * S) for n in range(1, 5)] == [0.0] * 4
+    assert seen.add(b"map base", 20 * S, 5 * S) == pytest.approx(15, rel=0.01)
+    assert seen.add(b"odom base", 20 * S, 5 * S) == 0
+    assert seen.add(b"map base", 21 * S, 0) == 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rosglass.wires.tcpros.topic_subscription import SilenceMonitor
+from rosglass.wires.tcpros.arrivals import SilenceMonitor
 
 
 def look(silence: SilenceMonitor, counts: list[int], start: float = 0.0) -> list[str]:

@@ -213,6 +213,28 @@ def test_services_and_actions(library: Library) -> None:
     assert library.definition("a/action/Go_FeedbackMessage").name == "a/action/Go_FeedbackMessage"
 
 
+def test_constants_of_a_message_need_no_qualification() -> None:
+    """As ``wstring<UNSIGNED_LONG_CONSTANT>`` in rosidl's own MyMessage.idl."""
+    text = """module a { module msg {
+        module B_Constants { const unsigned long N = 42; const short M = 3; };
+        module C_Constants { const unsigned long N = 7; };
+        typedef sequence<long, M> few;
+        struct B { wstring<N> text; string<N> names[M]; few numbers; sequence<double, N> more; };
+        struct C { wstring<N> text; };
+    }; };"""
+    types = {field.name: str(field.type) for field in message(text, "a/msg/B").fields}
+    assert types == {
+        "text": "wstring<=42",
+        "names": "string<=42[3]",
+        "numbers": "int32[<=3]",
+        "more": "float64[<=42]",
+    }
+    assert str(message(text, "a/msg/C").fields[0].type) == "wstring<=7"
+    other = text.replace("struct C {", "struct D {")
+    with pytest.raises(DefinitionError, match="unknown constant 'N'"):
+        message(other, "a/msg/D")
+
+
 def test_constants_as_sizes_and_names_in_scopes() -> None:
     text = """
     module a { module msg {

@@ -54,6 +54,12 @@ PATHS = (
     "parts[-1].samples[2]",
     "even[*].n",
     "even[2]",
+    "parts",
+    "parts[3]",
+    "parts[1:3]",
+    "parts[-1].samples",
+    "even",
+    "bits",
     "values",
     "values[1:]",
     "words[2]",
@@ -90,6 +96,19 @@ def test_a_view_reads_as_its_bytes_do(wire: str, order: str) -> None:
         assert plain(expected[path]) == plain(KIND.decode(view(data), wire=wire)[path])
     get = KIND.path(*PATHS[:2], wire=wire)
     assert get(view(data)) == get(data) == (VALUE["name"], 9)
+
+
+@pytest.mark.parametrize("path", ["parts", "parts[3]", "even[2]", "values", "even[*].x", "bits"])
+@pytest.mark.parametrize(("wire", "order"), FORMATS)
+def test_what_a_path_returns_does_not_follow_a_buffer_that_changes(
+    wire: str, order: str, path: str
+) -> None:
+    data = KIND.encode(VALUE, wire=wire, byteorder=order)
+    for make in (lambda memory: memory, memoryview):
+        memory = bytearray(data)
+        found = KIND.path(path, wire=wire)(make(memory))
+        memory[4:] = bytes(len(memory) - 4)
+        assert plain(found) == plain(KIND.path(path, wire=wire)(data))
 
 
 @pytest.mark.parametrize("width", [2, 4])

@@ -7,27 +7,27 @@ import threading
 from tcpros import publisher_links
 
 from rosglass.comm import Durability, QoS
-from rosglass.wires.tcpros import topic_subscription
+from rosglass.wires.tcpros import arrivals
 
 LATCHED = QoS(depth=1, durability=Durability.TRANSIENT_LOCAL)
 
 
 def count_looks(monkeypatch):
     """Return a list to which each look whether somebody has fallen silent is added."""
-    looks, follow = [], topic_subscription.SilenceMonitor.update
+    looks, follow = [], arrivals.SilenceMonitor.update
 
     def count(self, *given):
         follow(self, *given)
         looks.append(given)
 
-    monkeypatch.setattr(topic_subscription.SilenceMonitor, "update", count)
+    monkeypatch.setattr(arrivals.SilenceMonitor, "update", count)
     return looks
 
 
 def test_a_publisher_that_falls_silent_is_a_problem_until_its_next_message(
     connect, eventually, monkeypatch
 ):
-    monkeypatch.setattr(topic_subscription, "_REGULAR_SAMPLES", 2)  # takes ten seconds else
+    monkeypatch.setattr(arrivals, "_REGULAR_SAMPLES", 2)  # takes ten seconds else
     looks = count_looks(monkeypatch)
     robot, cockpit = connect("robot"), connect("cockpit")
     publisher = robot.create_publisher("/odom", "std_msgs/Int32")
@@ -62,7 +62,7 @@ def test_a_publisher_that_falls_silent_is_a_problem_until_its_next_message(
 
 
 def test_a_latched_message_is_not_missed(connect, eventually, monkeypatch):
-    monkeypatch.setattr(topic_subscription, "_REGULAR_SAMPLES", 0)
+    monkeypatch.setattr(arrivals, "_REGULAR_SAMPLES", 0)
     robot, cockpit = connect("robot"), connect("cockpit")
     robot.create_publisher("/map", "std_msgs/Int32", LATCHED).publish({"data": 1})
     subscription = cockpit.create_subscription("/map", "std_msgs/Int32")

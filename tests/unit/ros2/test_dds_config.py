@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import struct
 import threading
 import xml.etree.ElementTree as ET
 
@@ -20,10 +21,37 @@ def ours(url="dds://", **env):
     return ET.fromstring(config(url, **env)).find("Domain")
 
 
-def test_big_messages_get_big_datagrams_and_room():
-    domain = ours()
+@pytest.mark.parametrize("url", ["dds://?range=localhost", "dds://?interface=lo"])
+def test_big_messages_get_big_datagrams_on_this_machine(url):
+    domain = ours(url)
     assert domain.findtext("General/MaxMessageSize") == "31000B"
-    assert domain.findtext("General/FragmentSize") == "30700B"
+    assert domain.findtext("General/FragmentSize") == "30872B"
+
+
+def test_on_a_network_a_datagram_is_one_packet(monkeypatch):
+    """The kernel's memory for IP fragments fills up where packets are lost."""
+    mtus = {"lo": 65536, "eth0": 1500, "wg0": 1420, "eth1": 9000}
+    names = list(enumerate(mtus, 1))
+
+    def ioctl(_, request, argument):
+        name = argument[:16].rstrip(b"\0").decode()
+        flags = 0x49 if name == "lo" else 0x1 if name != "eth1" else 0x0  # it is down
+        address = bytes((10, 0, 0, next(n for n, each in names if each == name)))
+        found = {0x8913: struct.pack("H", flags), 0x8921: struct.pack("i", mtus[name])}
+        return argument[:16] + found.get(request, b"\0" * 4 + address).ljust(16, b"\0")
+
+    monkeypatch.setattr(dds_domain.socket, "if_nameindex", lambda: names)
+    monkeypatch.setattr(dds_domain.fcntl, "ioctl", ioctl)
+    size = dds_domain._datagram_size.__wrapped__
+    assert size(()) == 1392
+    assert size(("eth0",)) == size(("10.0.0.2",)) == 1472
+    assert size(("lo",)) == 31000
+    domain = ours("dds://?range=localhost")
+    assert domain.findtext("General/MaxMessageSize") == "31000B"
+
+
+def test_the_socket_has_room():
+    domain = ours()
     assert domain.find("Internal/SocketReceiveBufferSize").attrib == {
         "min": "default",
         "max": "10MB",

@@ -23,7 +23,7 @@ from rosglass.errors import (
 from rosglass.interfaces import Library, TypeCache, announced_hashes, rihs01
 from rosglass.messages import OpaqueType
 from rosglass.ros2 import Ros2Node
-from rosglass.ros2.type_descriptions import describe
+from rosglass.ros2.type_descriptions import TypeFetcher, describe
 
 from .steered import SteeredMiddleware
 
@@ -600,3 +600,27 @@ def test_whoever_asks_at_any_time_gets_an_answer(join: Callable[..., Ros2Node]) 
     finally:
         sys.setswitchinterval(usual)
     assert {promise.result(30).rihs01 for promise in promises} == {hash_of(STATE)}
+
+
+def test_each_answer_costs_the_same_however_many_types_are_fetched(
+    join: Callable[..., Ros2Node], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library = Library()
+    names = [f"many_msgs/msg/M{number}" for number in range(500)]
+    for name in names:
+        library.add_text(name, "int8 a")
+    join("talker", library)
+    user = join("cockpit", serves=False)
+    for name in names:
+        use(user, name, hash_of(name, library), "talker")
+    steps: list[Any] = []
+    advance = TypeFetcher._advance
+
+    def count(self: TypeFetcher, *arguments: Any) -> None:
+        steps.append(None)
+        advance(self, *arguments)
+
+    monkeypatch.setattr(TypeFetcher, "_advance", count)
+    promises = [user.fetch_type_async(name, timeout=60) for name in names]
+    assert [promise.result(60).name for promise in promises] == names
+    assert len(steps) < 8 * len(names)

@@ -95,20 +95,19 @@ def test_a_router_that_sends_tokens_is_not_silent_though_its_answer_queues():
 @pytest.mark.parametrize(
     ("peer", "locator", "limited"),
     [
-        ("127.0.0.1", "tcp/127.0.0.1:7", False),
-        ("::1", "tcp/[::1]:7", False),
+        ("127.0.0.1", "tcp/127.0.0.1:7", True),
+        ("::1", "tcp/[::1]:7", True),
         ("192.0.2.1", "tcp/192.0.2.1:7", True),
         ("::ffff:192.0.2.1", "tcp/[::ffff:192.0.2.1]:7", True),
         ("fe80::1%eth0", "tcp/[fe80::1]:7", True),
+        ("192.0.2.1", "tls/192.0.2.1:7", True),
         ("192.0.2.1", "udp/192.0.2.1:7", False),
         ("192.0.2.1", "tcp/192.0.2.2:7", False),
         ("192.0.2.1", "tcp/192.0.2.1:8", False),
         ("192.0.2.1", "tcp/robot:7", False),
     ],
 )
-def test_connections_that_leave_the_machine_end_when_nothing_is_acknowledged(
-    peer, locator, limited, monkeypatch
-):
+def test_connections_end_when_nothing_is_acknowledged(peer, locator, limited, monkeypatch):
     with (
         socket.create_server(("127.0.0.1", 0)) as server,
         socket.create_connection(server.getsockname()) as connection,

@@ -708,11 +708,8 @@ class _Visibility(Parts):
         self._camera = camera
 
     def _others(self) -> list[str]:
-        scene = self._camera.scene
-        displays = (
-            [] if scene is None else [one for one in scene.displays if one is not self._camera]
-        )
-        return [_path_of(one).removeprefix("/") for one in displays]
+        others = (one for one in self._displays() if one is not self._camera)
+        return [_path_of(one).removeprefix("/") for one in others]
 
     def is_enabled(self, name: str) -> bool:
         """Return whether a display is shown, by its path without the first slash."""

@@ -7,7 +7,7 @@ Rectangle {
 
     // The display.
     property QtObject display: null
-    // Whether it has handles for the user to move and resize it.
+    // Whether it has handles for the user to move and resize it, and to disable the display, which hides it.
     property bool movable: false
 
     // The user moves or resizes it, by so much.
@@ -51,7 +51,7 @@ Rectangle {
         color: panel.bad ? "#c0804000" : "#80000000"
         Text {
             id: title
-            anchors { left: parent.left; right: parent.right; top: parent.top; margins: 3 }
+            anchors { left: parent.left; right: parent.right; top: parent.top; margins: 3; rightMargin: panel.movable ? 20 : 3 }
             text: !panel.has ? "" : panel.display.name + (panel.bad ? "\n" + panel.display.statusText : "")
             textFormat: Text.PlainText
             wrapMode: Text.Wrap
@@ -71,6 +71,19 @@ Rectangle {
                 panel.dragged(now.x - at.x, now.y - at.y)
                 at = now
             }
+        }
+    }
+    Text {
+        anchors { right: parent.right; top: parent.top; rightMargin: 6; topMargin: 1 }
+        visible: panel.movable
+        text: "\u00d7"
+        textFormat: Text.PlainText
+        font.pixelSize: 16
+        color: "white"
+        MouseArea {
+            objectName: "closePanel"
+            anchors { fill: parent; margins: -4 }
+            onClicked: panel.display.enabled = false
         }
     }
     Rectangle {

@@ -59,6 +59,7 @@ __all__ = [
     "Discovered",
     "Event",
     "Qos",
+    "RepeatedBytes",
     "Waitset",
     "alive_writers",
     "assert_liveliness",
@@ -114,6 +115,10 @@ _PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
     "dds_get_matched_subscription_data": (pointer, [_entity, c_uint64]),
     "dds_builtintopic_free_endpoint": (None, [pointer]),
     "dds_assert_liveliness": (c_int32, [_entity]),
+    "dds_create_statistics": (pointer, [_entity]),
+    "dds_refresh_statistics": (c_int32, [pointer]),
+    "dds_lookup_statistic": (pointer, [pointer, c_char_p]),
+    "dds_delete_statistics": (None, [pointer]),
     "dds_create_waitset": (_entity, [_entity]),
     "dds_create_guardcondition": (_entity, [_entity]),
     "dds_set_guardcondition": (c_int32, [_entity, c_bool]),
@@ -375,6 +380,39 @@ def acknowledged(writer: int) -> bool:
 def assert_liveliness(entity: int, place: str) -> None:
     """Assert the liveliness of a participant or writer."""
     check_alive(library().dds_assert_liveliness(entity), "dds_assert_liveliness", place)
+
+
+class RepeatedBytes:
+    """How many bytes a writer has repeated because readers asked for them.
+
+    Args:
+        writer: The writer.
+    """
+
+    def __init__(self, writer: int) -> None:
+        lib = library()
+        self._statistics: int | None = lib.dds_create_statistics(writer)
+        self._found = self._statistics and lib.dds_lookup_statistic(
+            self._statistics, b"rexmit_bytes"
+        )
+
+    def get(self) -> int:
+        """Return the number so far; 0 if the writer was deleted."""
+        if not self._found or library().dds_refresh_statistics(self._statistics) < 0:
+            return 0
+        return int(_Statistic.from_address(self._found).value)
+
+    def close(self) -> None:
+        """Release the memory."""
+        if self._statistics:
+            library().dds_delete_statistics(self._statistics)
+        self._statistics = self._found = None
+
+
+class _Statistic(ctypes.Structure):
+    """``dds_stat_keyvalue`` (``dds/ddsc/dds_statistics.h``)."""
+
+    _fields_ = (("name", c_char_p), ("kind", c_int32), ("value", c_uint64))
 
 
 class _Descriptor(ctypes.Structure):

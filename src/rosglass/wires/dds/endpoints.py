@@ -8,7 +8,7 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from rosglass.comm import History, Reliability
+from rosglass.comm import Durability, History, Reliability
 from rosglass.comm.names import mangle_type
 from rosglass.errors import NodeClosedError, TimeoutError  # noqa: A004 - the field's own word
 from rosglass.wires.base import Reader, Writer
@@ -22,6 +22,7 @@ from rosglass.wires.dds.cyclone import (
     subscription_matched,
 )
 from rosglass.wires.dds.cyclone_samples import Batch, Taken, discard, sample, send
+from rosglass.wires.dds.flow_control import FlowControl
 from rosglass.wires.dds.graph import format_user_data, hash_of
 
 if TYPE_CHECKING:
@@ -93,6 +94,8 @@ class SampleWriter:
         #: Held by a write: the topic must not be deleted before the write ends.
         self._lock = threading.Lock()
         self._closed = False
+        #: Of a topic's writer that readers may fall behind of.
+        self._flow: FlowControl | None = None
         with participant.in_use():
             self._topic = make_topic(participant.entity, topic, dds_type)
             try:
@@ -120,6 +123,8 @@ class SampleWriter:
             if self._closed:
                 raise NodeClosedError(f"{self._place}: the publisher is closed")
             serdata = sample(self._type, parts, self._place)
+            if self._flow is not None and self._flow.hold(serdata, sum(map(len, parts))):
+                return
             try:
                 if not send(self.entity, serdata, self._place):
                     self._retry(serdata)
@@ -144,10 +149,25 @@ class SampleWriter:
         if self._closed:
             return
         self._closed = True
-        if cyclone.acknowledged(self.entity):
+        if self._is_done():
             self._delete()
         else:
-            self._participant.lingering.add(self.entity, self._delete)
+            self._participant.lingering.add(self.entity, self._is_done, self._delete)
+
+    def _is_done(self) -> bool:
+        """Return whether the readers have acknowledged everything."""
+        if self._flow is not None:
+            with self._lock:
+                self._flow.advance()
+                if not self._flow.idle:
+                    return False
+        return cyclone.acknowledged(self.entity)
+
+    def _poll_flow(self) -> bool:
+        assert self._flow is not None
+        with self._lock, suppress(NodeClosedError):  # it was deleted
+            return self._flow.advance()
+        return False
 
     def _stop(self) -> None:
         """Wait for writes in other threads: the writer will be deleted with the participant."""
@@ -161,6 +181,8 @@ class SampleWriter:
         cyclone.delete(self.entity)
         # A write in another thread may be using the topic's type.
         with self._lock:
+            if self._flow is not None:
+                self._flow.close()
             cyclone.delete(self._topic)
 
 
@@ -326,6 +348,21 @@ class DdsWriter(SampleWriter, Writer):
         self.gid = self.guid
         participant.add_endpoint(endpoint.node, self.gid, writer=True)
         participant.add_writer(cyclone.handle(self.entity), self.gid, endpoint.type_hash)
+        qos = endpoint.qos
+        if qos.reliability is Reliability.RELIABLE and qos.history is not History.KEEP_ALL:
+            self._flow = FlowControl(
+                self.entity,
+                max(qos.depth, 1),
+                qos.durability is Durability.TRANSIENT_LOCAL,
+                participant.fragment_size,
+                participant.pump,
+                self._place,
+                self._poll_flow,
+            )
+
+    def lost(self) -> int:
+        """Return how many large samples were displaced while others were not acknowledged."""
+        return 0 if self._flow is None else self._flow.displaced
 
     def write(self, data: bytes | bytearray) -> None:
         """Send a payload; a reliable KEEP_ALL writer waits for slow readers."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from rosglass.errors import NodeClosedError
 from rosglass.wires.dds import cyclone
 from rosglass.wires.dds.cyclone import Event, Qos, Waitset, set_events
-from rosglass.wires.dds.domain import Domain
+from rosglass.wires.dds.domain import Domain, fragment_size
 from rosglass.wires.dds.graph import PARTICIPANT_USER_DATA, NodeEntities
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ class Participant:
     Attributes:
         entity: Cyclone's number for it.
         guid: Its 16 bytes of identity.
+        fragment_size: Size in bytes of the largest sample that is sent in one piece.
         born: Monotonic time when it joined the domain.
         pump: Handles the events of its entities.
         lingering: The closed writers whose samples are not acknowledged yet.
@@ -76,6 +77,7 @@ class Participant:
         self._leaving: dict[int, Callable[[], None]] = {}
         self._closed = False
         self._domain = Domain(options)
+        self.fragment_size = fragment_size(options)
         try:
             qos = Qos()
             qos.set_user_data(PARTICIPANT_USER_DATA)
@@ -284,13 +286,13 @@ class LingeringWriters:
 
     def __init__(self, pump: Pump) -> None:
         self._pump = pump
-        #: Deadlines and deleters, by writer; any thread may add some.
-        self._waiting: dict[int, tuple[float, Callable[[], None]]] = {}
+        #: Deadlines, conditions and deleters, by writer; any thread may add some.
+        self._waiting: dict[int, tuple[float, Callable[[], bool], Callable[[], None]]] = {}
 
-    def add(self, writer: int, delete: Callable[[], None]) -> None:
+    def add(self, writer: int, is_done: Callable[[], bool], delete: Callable[[], None]) -> None:
         """Call `delete` once a writer's samples are acknowledged, or after a second."""
         set_events(writer, Event.NONE)  # no thread handles them any more
-        self._waiting[writer] = time.monotonic() + _ACKNOWLEDGE_TIMEOUT_S, delete
+        self._waiting[writer] = time.monotonic() + _ACKNOWLEDGE_TIMEOUT_S, is_done, delete
         self._pump.poll(_LINGERING, self._poll)
 
     def close(self) -> None:
@@ -301,8 +303,8 @@ class LingeringWriters:
 
     def _poll(self) -> None:
         now = time.monotonic()
-        for writer, (deadline, delete) in self._waiting.copy().items():
-            if now >= deadline or cyclone.acknowledged(writer):
+        for writer, (deadline, is_done, delete) in self._waiting.copy().items():
+            if now >= deadline or is_done():
                 delete()
                 self._waiting.pop(writer, None)
         if not self._waiting:

@@ -45,7 +45,6 @@ _FLUSH_TIMEOUT_S = 1.0
 _MAX_ENDED = 100
 #: How long a connected subscriber may be missing in the master's graph.
 _LISTED_AFTER_S = 5.0
-_HEADER = "std_msgs/msg/Header"
 _uint32 = struct.Struct("<I")
 
 
@@ -355,7 +354,7 @@ class PublicationWriter(Writer):
         self.keep, self.keep_bytes = (0, INBOX_LIMIT) if keep_all else (qos.depth, 0)
         self.timeout = 0.0 if qos.send_timeout is None else qos.send_timeout.seconds
         self.before: deque[list[Connection]] = deque(maxlen=_MAX_ENDED)
-        if _has_header(type):
+        if type.has_header:
             self.number = self._number
 
     def write(self, data: bytes | bytearray) -> None:
@@ -403,11 +402,3 @@ class PublicationWriter(Writer):
 def definition_text(types: Any, message_type: MessageType) -> str:
     """Return a type's full definition; that of an opaque type as it was received."""
     return message_type.text if isinstance(message_type, OpaqueType) else types.text(message_type)
-
-
-def _has_header(type: MessageType) -> bool:
-    """Return whether messages begin with a header, whose sequence number publishers set."""
-    if isinstance(type, OpaqueType):
-        return False
-    fields = type.definition.fields
-    return bool(fields) and (fields[0].name, str(fields[0].type)) == ("header", _HEADER)

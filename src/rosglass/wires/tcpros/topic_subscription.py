@@ -30,6 +30,7 @@ from rosglass.interfaces import join_name, ros1_name
 from rosglass.interfaces.counterparts import RENAMED
 from rosglass.messages import OpaqueType
 from rosglass.wires.base import Reader
+from rosglass.wires.tcpros.arrivals import BacklogMonitor, SilenceMonitor
 from rosglass.wires.tcpros.connection import ANY, Connection
 from rosglass.wires.tcpros.graph import split
 from rosglass.wires.tcpros.master import call_node, reason_of
@@ -38,7 +39,6 @@ from rosglass.wires.tcpros.registrations import Member
 
 __all__ = [
     "PublisherLink",
-    "SilenceMonitor",
     "TopicSubscription",
     "TypeNegotiation",
     "UnreachableLog",
@@ -464,6 +464,12 @@ class TypeNegotiation(TopicMatching, Reader):
             self._closed = True
             self._on_close(self)
 
+    def lateness(self, publisher: bytes) -> int:
+        """Return how late a publisher's last message was, by when its messages arrive."""
+        known = self._accepted.copy().items()
+        late = (link.late for link, (_, name) in known if name == publisher)
+        return round(max(late, default=0.0) * 1e9)
+
     # -- as the matching of the subscription's feed ----------------------------------------------
 
     def open(
@@ -592,7 +598,7 @@ class PublisherLink:
         self._connection: Connection | None = None
         self._addresses: list[tuple[str, int]] = []
         self._latches = False
-        self._silence, self._count = SilenceMonitor(), 0
+        self._silence, self._backlog, self._count = SilenceMonitor(), BacklogMonitor(), 0
         self._delay = _RETRY_S
         self._measured_at, self._measured, self._rate = time.monotonic(), 0, 0.0
         self._begin()
@@ -612,11 +618,18 @@ class PublisherLink:
         """Why its silence is suspicious; empty when it is not."""
         return self._silence.problem
 
+    @property
+    def late(self) -> float:
+        """Seconds by which its last message was late, if it sends regularly; 0 if it does not."""
+        return self._backlog.late
+
     def check_silence(self) -> None:
         """Check whether it has stopped sending; on the node's own thread."""
         # Latched messages are sent once; and this node knows what it sends itself.
         if self.connected and not self._latches and not self.is_local:
-            self._silence.update(self.name, self._count, time.monotonic())
+            now = time.monotonic()
+            self._silence.update(self.name, self._count, now)
+            self._backlog.set_period(self._silence.period, now)
 
     @property
     def info(self) -> str:
@@ -704,7 +717,7 @@ class PublisherLink:
         self.header, self.problem, self._delay, self._addresses = header, "", _RETRY_S, []
         self.name = header.get("callerid", "") or self.uri
         self._latches = header.get("latching") == "1"
-        self._silence, self._count = SilenceMonitor(), 0
+        self._silence, self._backlog, self._count = SilenceMonitor(), BacklogMonitor(), 0
         self._measured_at, self._measured, self._rate = time.monotonic(), 0, 0.0
         self.subscription.unreachable.on_publisher_connected(self)
         self.subscription.on_publisher_connected(self)
@@ -712,6 +725,7 @@ class PublisherLink:
     def _on_frames(self, frames: list[Received], _: int) -> None:
         received = time.time_ns()
         self._count += len(frames)
+        self._backlog.add(len(frames), time.monotonic())
         if self._silence.problem:
             self.subscription.notify_feeds()  # it is none any more
         if self._latches:
@@ -934,76 +948,3 @@ def _request_header(
     except FutureTimeoutError:
         core.loop.call(lambda: finish({}, ""))
         return {}, f"{address[0]}:{address[1]}: no answer in time"
-
-
-#: Shortest time between two samples of the count.
-_SAMPLE_S = 0.9
-#: Consecutive samples with about the same rate that make a publisher regular.
-_REGULAR_SAMPLES = 10
-#: Silence is suspicious after so many of the usual intervals, and after so many seconds.
-_MISSED_INTERVALS, _MIN_SILENCE_S = 5, 1.0
-
-
-class SilenceMonitor:
-    """Detects that a publisher with a regular rate has stopped sending; free for each message.
-
-    Publishers with less than one message per second or with a changing rate are never reported.
-
-    Attributes:
-        problem: Why the silence is suspicious, in words; empty when it is not.
-    """
-
-    def __init__(self) -> None:
-        self.problem = ""
-        self._sampled_at = self._received_at = 0.0
-        self._count = self._regular = 0
-        self._rate = 0.0
-        #: The messages of the last sample, and its seconds: evaluated only when more are received,
-        #: as the last messages before a silence fill only a part of that time.
-        self._newest = (0, 0.0)
-
-    def update(self, name: str, count: int, now: float) -> None:
-        """Sample the count of received messages.
-
-        Args:
-            name: The publisher, for the problem.
-            count: Received messages in all.
-            now: The time, by :func:`time.monotonic`.
-        """
-        passed = now - self._sampled_at
-        if count > self._count and self.problem:
-            self.problem, self._regular, self._newest = "", 0, (0, 0.0)
-        elif passed < _SAMPLE_S:
-            return
-        elif count > self._count:
-            self._evaluate(*self._newest)
-            self._newest = (count - self._count, passed)
-        elif self._regular < _REGULAR_SAMPLES:
-            self._regular, self._newest = 0, (0, 0.0)
-        elif not self.problem and self._is_overdue(now):
-            # No age: the text would change, and be reported again, every second.
-            since = time.strftime(
-                "%H:%M:%S", time.localtime(time.time() - (now - self._received_at))
-            )
-            self.problem = (
-                f"nothing was received from {name} since {since} (it sent {self._rate:.0f} per "
-                "second before); is it frozen, or cut off?"
-            )
-        if count > self._count:
-            self._received_at = now
-        self._sampled_at, self._count = now, count
-
-    def _is_overdue(self, now: float) -> bool:
-        limit = max(_MIN_SILENCE_S, _MISSED_INTERVALS / self._rate)
-        return now - self._received_at >= limit
-
-    def _evaluate(self, count: int, passed: float) -> None:
-        """Update the rate by the messages of one sample."""
-        if not count:
-            return
-        usual = self._rate * passed
-        if self._regular and not usual / 2 - 1 <= count <= 2 * usual + 1:
-            self._regular = 0
-        rate = count / passed
-        self._rate = rate if not self._regular else 0.7 * self._rate + 0.3 * rate
-        self._regular += 1

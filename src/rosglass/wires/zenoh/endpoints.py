@@ -112,6 +112,12 @@ class Owner(Protocol):
     def recycle(self, declaration: Declaration) -> None:
         """Reuse the number of a declaration whose token is gone."""
 
+    def name_of(self, gid: bytes) -> str | None:
+        """Return the topic or service that a publisher or client was announced for.
+
+        None for those whose identity is not derived from their token, as of dora-rs.
+        """
+
     def wake(self) -> None:
         """Have declarations polled soon; from any thread."""
 

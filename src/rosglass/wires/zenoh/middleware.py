@@ -48,6 +48,7 @@ from rosglass.wires.zenoh.reader import Drain, ZenohReader
 from rosglass.wires.zenoh.refusal import find_refusal
 from rosglass.wires.zenoh.services import ZenohReplier, ZenohRequester
 from rosglass.wires.zenoh.session import (
+    OPEN_TIMEOUT_S,
     Heartbeat,
     check_process,
     close_session,
@@ -74,6 +75,8 @@ _MIN_UNUSED_NUMBERS = 8
 _HEARTBEAT_INTERVAL_S = 0.9
 #: Seconds that a router has to send all tokens: for 10,000, Zenoh needs 4 to 13.
 _HISTORY_TIMEOUT_S = 20.0
+#: Number of publishers and clients whose topics and services are remembered.
+_MAX_NAMES = 20_000
 #: Number of invalid tokens to log.
 _MAX_LOGGED = 100
 #: Seconds without a router until the reason is looked for, between two times, and for its answer.
@@ -109,6 +112,8 @@ class ZenohMiddleware(Middleware):
         self._settled = 0.0
         self._was_connected = self._closed = False
         self._retries_open = self._linked = False
+        #: Held while a session is being opened, which takes seconds without an answer.
+        self._opening = threading.Lock()
         self._no_token = f"@ros2_lv/{options.domain}/{self._id}/pulse"
         self._heartbeat = Heartbeat(self._no_token)
         #: A query that ends after the tokens that the router had when it was linked.
@@ -128,6 +133,9 @@ class ZenohMiddleware(Middleware):
         self._drain = Drain(f"{self._address} unread")
         self._changed: Callable[[], None] = lambda: None
         self._graph: Graph | None = None
+        #: Topic or service of each announced publisher and client by its GID, the oldest first.
+        #: Also of those that left: what they have sent may still arrive.
+        self._names: dict[bytes, str] = {}
         self._logged_tokens: set[str] = set()
 
     def open(self, graph: Graph, changed: Callable[[], None]) -> None:
@@ -235,6 +243,9 @@ class ZenohMiddleware(Middleware):
             self._declared.clear()
             self._links.clear()
         self._increase_version()
+        # A thread that is inside Zenoh while the interpreter shuts down would abort the program.
+        if self._opening.acquire(timeout=OPEN_TIMEOUT_S):
+            self._opening.release()
         for pump in self._pumps:
             pump.undeclare()
         self.timers.close()
@@ -255,6 +266,10 @@ class ZenohMiddleware(Middleware):
         Every program in the graph, and the router, stores each token's key for ever.
         """
         self._used_numbers.append(Token.parse(declaration.token).entity_id)
+
+    def name_of(self, gid: bytes) -> str | None:
+        """Return the topic or service that a publisher or client was announced for, if any."""
+        return self._names.get(gid)
 
     def wake(self) -> None:
         """Have declarations polled soon."""
@@ -298,7 +313,10 @@ class ZenohMiddleware(Middleware):
 
     def _open(self) -> None:
         try:
-            session = open_session(self._config)
+            with self._opening:
+                if self._closed:
+                    return
+                session = open_session(self._config)
         except zenoh.ZError as error:
             if "Unable to connect" in str(error):
                 self._retries_open = True  # a client without router; poll() tries again
@@ -421,6 +439,11 @@ class ZenohMiddleware(Middleware):
         if endpoint is None:
             self._graph.put_node(key, token.node)
             return
+        if endpoint.kind in (EndpointKind.PUBLISHER, EndpointKind.SERVICE_CLIENT):
+            with self._lock:
+                self._names[endpoint.gid] = endpoint.name
+                if len(self._names) > _MAX_NAMES:
+                    del self._names[next(iter(self._names))]
         self._graph.put_endpoint(key, endpoint)
         if endpoint.kind is EndpointKind.SERVICE_SERVER:
             self._increase_version()

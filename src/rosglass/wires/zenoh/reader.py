@@ -8,6 +8,7 @@ than everything else. If no consumer waits, they are taken from a channel ten ti
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections import deque
@@ -54,6 +55,8 @@ _MAX_THREAD_SIZE = 65_536
 _CLOSE_TIMEOUT_S, _LATCHED_CLOSE_TIMEOUT_S = 1.0, 0.02
 #: The node's own publishers deliver their samples directly.
 _REMOTE = zenoh.Locality.REMOTE
+#: Seconds for which messages of other topics are a problem of the subscription.
+_MISROUTED_S = 10.0
 #: Number of publishers to cache, for a second.
 _MAX_PUBLISHERS = 256
 _NOTE_SIZE, _read_note = ATTACHMENT.size, ATTACHMENT.unpack
@@ -272,6 +275,8 @@ class ZenohReader(Declaration, Reader):
         self._known: dict[bytes, tuple[str, int]] = {}
         self._latency = LatencyEstimator()
         self._warned = self._anonymous = False
+        #: Messages of other topics, one of these topics, and the time of the last of them.
+        self._misrouted, self._other_topic, self._misrouted_at = 0, "", -math.inf
         self._count = self._largest = self._marked = 0
         self._marked_at, self._rate = time.monotonic(), 0.0
 
@@ -289,6 +294,17 @@ class ZenohReader(Declaration, Reader):
             self._source = source
         source.begin()
         return []
+
+    @property
+    def problem(self) -> str:  # type: ignore[override]
+        """How many messages of other topics have arrived, while they do."""
+        if time.monotonic() - self._misrouted_at > _MISROUTED_S:
+            return ""
+        return (
+            f"{self._misrouted} messages of other topics, such as {self._other_topic}, arrived on "
+            "this one and were dropped: Zenoh confuses topics while a link that was interrupted is "
+            "restored"
+        )
 
     def set_eager(self, eager: bool) -> None:
         """Set whether a consumer waits for the samples."""
@@ -447,9 +463,13 @@ class ZenohReader(Declaration, Reader):
 
         Returns:
             The publisher's type hash, and its lifespan in nanoseconds, 0 for none. None if there
-            is no sample.
+            is no sample, or if its publisher is that of another topic.
         """
         if len(data) < 4 and sample.kind == zenoh.SampleKind.DELETE:
+            return None
+        announced = self._owner.name_of(gid)
+        if announced is not None and announced != self._place[0]:
+            self._on_misrouted(announced)
             return None
         self._largest = max(self._largest, len(data))
         type_hash = str(sample.key_expr).rpartition("/")[2]
@@ -461,6 +481,22 @@ class ZenohReader(Declaration, Reader):
         elif len(self._known) < _MAX_PUBLISHERS:
             self._known[gid] = known
         return known
+
+    def _on_misrouted(self, topic: str) -> None:
+        """Count a sample that Zenoh delivered on the wrong topic.
+
+        Its type may be that of this topic, so that nothing else would tell. A publisher that is not
+        announced is accepted: its token may be late, or its identity not be that of its token.
+        """
+        self._misrouted += 1
+        self._misrouted_at, self._other_topic = time.monotonic(), topic
+        if self._misrouted == 1:
+            _log.warning(
+                "%s: dropping a message of %s, as Zenoh confuses topics while a link that was "
+                "interrupted is restored; see the subscription's problem for their number",
+                self._place[0],
+                topic,
+            )
 
     def _log_failure(self) -> None:
         _log.exception("%s: handling a sample failed", self._key)

@@ -81,7 +81,7 @@ class Router(Handle):
             self._session = open_session(config)
         except zenoh.ZError as error:
             raise ConnectionLostError(self._explain(error)) from error
-        self._pump = None if self.is_local else self._watch(self._session)
+        self._pump = self._watch(self._session)
         # No Zenoh thread may call into an interpreter that is shutting down.
         atexit.register(self.close)
 
@@ -91,8 +91,7 @@ class Router(Handle):
         if session is None:
             return
         atexit.unregister(self.close)
-        if self._pump is not None:
-            self._pump.undeclare()
+        self._pump.undeclare()
         close_session(session)
 
     def _watch(self, session: zenoh.Session) -> Pump:

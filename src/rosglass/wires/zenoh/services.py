@@ -269,6 +269,11 @@ class ZenohRequester(Declaration, Requester):
         """Handle a reply to a query."""
         sample = reply.ok
         if sample is not None:
+            attached = sample.attachment
+            note = NO_ATTACHMENT if attached is None else Attachment.decode(attached.to_bytes())
+            if note.gid == self._gid and note.sequence != number:
+                _log.warning("%s: dropping the reply to another call", self._service.name)
+                return
             self.on_response(number, sample.payload.to_bytes())
             return
         call, error = self._calls.get(number), reply.err
@@ -543,6 +548,12 @@ class ZenohReplier(Declaration, Replier):
                 self._warned = True
                 _log.warning("%s: refusing a request without payload", self._service.name)
             request.refuse("the request has no payload")
+            return
+        meant = self._owner.name_of(note.gid)
+        if meant is not None and meant != self._service.name:
+            # As with topics: see ZenohReader.
+            _log.warning("%s: refusing a request for %s", self._service.name, meant)
+            request.refuse(f"Zenoh delivered the request to {self._service.name}, not to {meant}")
             return
         self._waiting.add(request)
         self._on_request(RequestId(note.gid, note.sequence, request), payload.to_bytes())

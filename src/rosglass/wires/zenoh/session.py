@@ -6,7 +6,9 @@ a client.
 
 Zenoh drops a dead link after its lease: 10 s, and 60 s with the routers of ROS 2. Until then, an
 operator would see the last picture as if it were live. If the connection survives, it delivers old
-commands when the network returns.
+commands when the network returns. While Zenoh closes a link on which data waits, it accepts a new
+one to the same peer and numbers its keys as on the old one: messages arrive on other topics
+(docs/upstream/zenoh_misrouting.md). So the system closes connections that acknowledge nothing.
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ from rosglass.errors import ArgumentError, UnsupportedError
 from rosglass.wires.zenoh.options import ZenohOptions, locator
 
 __all__ = [
+    "OPEN_TIMEOUT_S",
     "Heartbeat",
     "check_process",
     "close_session",
@@ -52,6 +55,8 @@ _RETRY = {"period_init_ms": 250, "period_max_ms": 500, "period_increase_factor":
 #: Timeout for opening a link in milliseconds: closing a session waits for a running attempt, and
 #: three round trips over a satellite have to fit.
 _OPEN_TIMEOUT_MS = 3000
+#: Seconds within which an attempt to open a session ends; Zenoh's default for an address is 10.
+OPEN_TIMEOUT_S = 12.0
 #: Queue of a link on this machine in fragments of 64 kB. With Zenoh's default of 2, sender and link
 #: wait for each other: a 6 MB image takes a fifth longer, and is dropped on a busy machine. On
 #: other links, a longer queue would add latency.
@@ -290,7 +295,7 @@ _QUERY_TIMEOUT_S = 10.0
 #: Milliseconds after which the system closes a connection with unacknowledged data.
 _USER_TIMEOUT_MS = 4000
 _SOCKETS = Path("/proc/self/fd")
-_LOCATOR = re.compile(r"tcp/(?:\[([^\]]+)\]|([^:\[\]]+)):(\d+)")
+_LOCATOR = re.compile(r"(?:tcp|tls)/(?:\[([^\]]+)\]|([^:\[\]]+)):(\d+)")
 
 
 class Heartbeat:
@@ -341,7 +346,7 @@ class Heartbeat:
 def limit_silence(session: zenoh.Session) -> None:
     """Have the system close a session's connections whose data is not acknowledged.
 
-    Zenoh has no setting for this. Only on Linux, and only for connections to other machines.
+    Zenoh has no setting for this. Only on Linux, and only for TCP and TLS.
     """
     links = getattr(session.info, "links", None)
     if links is None or not sys.platform.startswith("linux"):
@@ -373,7 +378,7 @@ _INTERNET = (socket.AF_INET, socket.AF_INET6)
 
 
 def _parse_locator(locator: str) -> tuple[str, int] | None:
-    """Return address and port of a TCP locator; None for this machine."""
+    """Return address and port of a TCP or TLS locator; None for a name."""
     match = _LOCATOR.match(locator)
     if match is None:
         return None
@@ -382,10 +387,9 @@ def _parse_locator(locator: str) -> tuple[str, int] | None:
 
 
 def _normalize(host: str) -> str | None:
-    """Return an address in its shortest form; None for loopback addresses and names."""
+    """Return an address in its shortest form; None for a name."""
     try:
         address = ipaddress.ip_address(host.partition("%")[0])
     except ValueError:
         return None
-    address = getattr(address, "ipv4_mapped", None) or address
-    return None if address.is_loopback else str(address)
+    return str(getattr(address, "ipv4_mapped", None) or address)
