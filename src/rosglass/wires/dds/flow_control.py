@@ -8,7 +8,8 @@ they send a heartbeat with the new first sample instead.
 
 A large sample is therefore not sent before the readers have acknowledged earlier ones, and is
 displaced here, where no reader has seen any of it. A reader that acknowledges nothing, as it was
-killed or stopped, holds up the others for half a second only.
+killed or stopped, holds up the others for half a second only; from then on, frequent heartbeats
+name the first sample that is left.
 """
 
 from __future__ import annotations
@@ -110,7 +111,7 @@ class FlowControl:
 
     def advance(self) -> bool:
         """Send what may be sent; return whether to call this again soon."""
-        needed = not self._waiting or self._is_needed()
+        needed = not (self._waiting or self._stalled) or self._is_needed()
         while self._waiting and (not needed or self._may_send(self._waiting[0][1])):
             serdata, size = self._waiting.popleft()
             try:
@@ -118,6 +119,12 @@ class FlowControl:
             finally:
                 discard(serdata)
             self._note_sent(size)
+        if self._stalled and needed and not self._is_acknowledged():
+            # This sends a heartbeat with the first sample that is left: a stopped reader that goes
+            # on must get it before it asks for an older one.
+            cyclone.assert_liveliness(self._writer, self._place)
+            return True
+        self._stalled = False
         if self._waiting:
             return True
         self._pump.forget(-self._writer)
@@ -153,7 +160,9 @@ class FlowControl:
             self._repeated, self._quiet_since = repeated, now
         if now - self._sent < _STALL_S:
             return self._stalled and now - max(self._sent, self._quiet_since) >= _QUIET_S
-        self._stalled = True
+        if not self._stalled:
+            self._stalled = True
+            self._pump.poll(-self._writer, self._poll)
         return True
 
     def _is_acknowledged(self) -> bool:
