@@ -359,6 +359,21 @@ def test_tool_icons(over: Over) -> None:
     assert here.run(sizes) == [[1, 48, 48], [1, 20, 20], [1, 48, 48]]
 
 
+def test_a_tool_icon_is_there_at_the_first_load(over: Over) -> None:
+    over.use_tools(TOOLS)
+    # Nothing has used the object `rviz` before.
+    here = over.qml('Image { source: "image://rviz_tool_icons/rviz/Select" }')
+    over.wait(lambda: here.root.property("sourceSize").width() == 48)
+
+
+def test_removing_a_tool_that_was_added_keeps_the_others(over: Over) -> None:
+    over.use_tools([*TOOLS, "rviz/Measure"])
+    run = over.qml("Item {}").run
+    run("const m = rviz.toolManager; m.removeTool(m.addTool('rviz/Measure'))")
+    over.frames(2)
+    assert [tool.class_id for tool in over.access.tools.all] == [*TOOLS, "rviz/Measure"]
+
+
 # -- the view --------------------------------------------------------------------------------------
 
 

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
+from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.log import Caller, log_from_qml, plain_path
 from rosglass.qml.runtime import runtime_of
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, QtQml, Signal, Slot
@@ -185,15 +186,18 @@ class ToolIcons(QtQuick.QQuickImageProvider):  # type: ignore[misc]
 
     Scales the largest icon to the requested size, by default 48 pixels; a width or height alone
     keeps the proportions.
+
+    Args:
+        find: Returns a tool by its class id; None for one that does not exist.
     """
 
-    def __init__(self, tools: Tools) -> None:
+    def __init__(self, find: Callable[[str], Tool | None]) -> None:
         super().__init__(QtQuick.QQuickImageProvider.Pixmap)
-        self._tools = tools
+        self._find = find
 
     def requestPixmap(self, name: str, size: Any, requested: Any) -> Any:
         """Return a tool's icon; a transparent one if there is no such tool, or no icon."""
-        tool = self._tools.find(name)
+        tool = self._find(name)
         picture = Qt5Gui.QPixmap() if tool is None else tool.picture()
         width, height = (requested.width(), requested.height())
         if picture.isNull():
@@ -429,8 +433,10 @@ class RvizObject(RegisteredProperties):
         self.overlay = overlay
         self._visible = overlay.visible
         self._disconnects: list[Callable[[], Any]] = []
-        #: Keeps the Python half of the image provider alive, which the engine owns.
-        self._icons: ToolIcons | None = None
+        #: Keeps the Python half of the image provider alive, which the engine owns. Files may use
+        #: it without the object, and before.
+        self._icons = ToolIcons(weak_callback(self._find_tool))
+        engine.addImageProvider(_ICONS, self._icons)
         QtQml.QQmlEngine.setObjectOwnership(self, QtQml.QQmlEngine.ObjectOwnership.CppOwnership)
         # QML may use the object as long as the engine exists.
         held = [self, spell_checked(runtime, self)]
@@ -470,11 +476,15 @@ class RvizObject(RegisteredProperties):
             raise Error("there is no RViz: the overlay's session belongs to no Application")
         return self._access
 
+    def _find_tool(self, class_id: str) -> Tool | None:
+        try:
+            return self.access.tools.find(class_id)
+        except Error:  # there is no view
+            return None
+
     @cached_property
     def tool_manager(self) -> QmlToolManager:
         """The QML object `toolManager`."""
-        self._icons = ToolIcons(self.access.tools)
-        self._engine.addImageProvider(_ICONS, self._icons)
         return QmlToolManager(self.access.tools, self.runtime, self._engine)
 
     @cached_property
