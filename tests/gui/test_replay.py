@@ -330,3 +330,26 @@ def test_from_the_command_line(start: Any, drive: Path, tmp_path: Path) -> None:
     program.until("heard 15", 30)
     program.until("heard 30", 30)
     assert program.end() == 0
+
+
+def test_a_topic_that_cannot_be_decoded_says_why(live: Bench, tmp_path: Path, wait: Any) -> None:
+    path = tmp_path / "gear.mcap"
+    writer = mcap_writer.Writer(str(path))
+    writer.start("ros2")
+    schema = writer.register_schema("a_msgs/msg/Nope", "", b"")
+    number = writer.register_channel("/gear", "cdr", schema)
+    for i in range(20):
+        writer.add_message(number, START + i * SECOND // 10, b"\0\1\0\0abcd", START)
+    writer.finish()
+    live.module = "Ros2 1.0"
+    root = live.load(
+        """QtObject {
+            property Replay replay: Replay { file: "PATH" }
+            property Subscription sub: Subscription { topic: "/gear" }
+            function problem() { return sub.problem }
+            function shown() { return sub.message === undefined }
+        }""".replace("PATH", str(path))
+    )
+    wait(lambda: "the recording has no definition of it" in root.problem())
+    assert "Library.add_path('a_msgs')" in root.problem()
+    assert root.shown() is True

@@ -51,7 +51,8 @@ _WIRES = {"cdr": "cdr", "ros1": "ros1"}
 #: The headers of a record (opcode, length) and of a message (channel, sequence, two times).
 _record_header = struct.Struct("<BQ")
 _message_header = struct.Struct("<HIQQ")
-_LANGUAGES = {"ros2msg": "msg", "ros1msg": "msg", "ros2idl": "idl"}
+#: rosbag2 writes "unknown" and no text for a type whose definition it did not find.
+_LANGUAGES = {"ros2msg": "msg", "ros1msg": "msg", "ros2idl": "idl", "unknown": "msg"}
 
 
 class McapBag(ScannedBag):

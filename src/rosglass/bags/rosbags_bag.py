@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
-from contextlib import closing, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +15,7 @@ from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.rosbag1.reader import decompressors
 from rosbags.rosbag2 import Reader as Ros2Reader
 from rosbags.rosbag2 import reader as rosbag2_reader
-from rosbags.rosbag2 import storage_mcap
+from rosbags.rosbag2 import storage_mcap, storage_sqlite3
 
 from rosglass.bags.bag import Bag, BagMessage, Channel, LeftOut, decompress, parse_profile
 from rosglass.comm import QoS
@@ -51,7 +51,8 @@ class RosbagsBag(Bag):
             # AnyReader refuses a whole bag for one missing or wrong definition.
             reader = Ros1Reader if path.suffix == ".bag" else Ros2Reader
             self._reader: Any = reader(path)
-            self._reader.open()
+            with _any_encoding():
+                self._reader.open()
         except BagError:
             raise
         except Exception as error:  # damaged data may raise anything in the libraries
@@ -176,6 +177,37 @@ for _kind in ("lz4", "zstd"):
     storage_mcap.DECOMPRESSORS[_kind] = partial(decompress, _kind)
 # The same for files that are compressed as a whole, which it decompresses first.
 rosbag2_reader.shutil = SimpleNamespace(copyfileobj=_unpack)  # type: ignore[assignment,attr-defined]
+
+
+# It refuses a whole bag for a definition in another language than these.
+_mcap_definition = storage_mcap.get_msgdef
+_LANGUAGES = ("ros2msg", "ros2idl", "omgidl", "")
+storage_mcap.get_msgdef = lambda schema: _mcap_definition(
+    schema if schema is not None and schema.encoding in _LANGUAGES else None
+)
+_DEFINITIONS = """
+CREATE TEMP VIEW message_definitions AS SELECT id, topic_type, type_description_hash,
+iif(encoding = 'ros2idl', encoding, 'ros2msg') AS encoding,
+iif(encoding IN ('ros2msg', 'ros2idl'), encoded_message_definition, '')
+AS encoded_message_definition FROM main.message_definitions
+"""
+
+
+@contextmanager
+def _any_encoding() -> Iterator[None]:
+    """Let SQLite files have definitions in other languages, as rosbag2's "unknown"; as above."""
+
+    def hook(connection: Any) -> None:
+        connection.execute(_DEFINITIONS)
+
+    # Earlier versions of the package do not use apsw, and refuse such files.
+    apsw: Any = getattr(storage_sqlite3, "apsw", None)
+    hooks: list[Any] = getattr(apsw, "connection_hooks", [])
+    hooks.append(hook)
+    try:
+        yield
+    finally:
+        hooks.remove(hook)
 
 
 def _chunk(offset: int, decompressor: Any, data: bytes) -> bytes:

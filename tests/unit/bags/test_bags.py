@@ -115,11 +115,12 @@ def test_foreign_topics_are_left_out_and_named(tmp_path):
         assert "/json (json described by jsonschema)" in bag.problem
 
 
-def test_a_type_without_definition_is_opaque(tmp_path):
+@pytest.mark.parametrize("encoding", ["", "unknown"])
+def test_a_type_without_definition_is_opaque(tmp_path, encoding):
     path = tmp_path / "a.mcap"
     writer = mcap_writer.Writer(str(path))
     writer.start("ros2")
-    schema = writer.register_schema("unheard_of_msgs/msg/Thing", "", b"")
+    schema = writer.register_schema("unheard_of_msgs/msg/Thing", encoding, b"")
     number = writer.register_channel("/s", "cdr", schema)
     writer.add_message(number, 1, b"\0\1\0\0\1", 1)
     writer.finish()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import sqlite3
+from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -215,6 +218,36 @@ def test_a_ros2_bag_with_an_idl_type(tmp_path, storage, broken):
         assert chatter.decode(second.data).data == "hello"
         if not broken:
             assert winch.decode(first.data) == kind.create(VALUES)
+
+
+@pytest.mark.parametrize("storage", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
+@pytest.mark.parametrize("encoding", ["unknown", "ros3idl"])
+def test_a_ros2_bag_with_a_definition_in_another_language(tmp_path, storage, encoding):
+    """As rosbag2 writes it for a type whose definition it does not find."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    string, number = load("std_msgs/msg/String"), load("std_msgs/msg/Int8")
+    with Writer2(tmp_path / "bag", version=9, storage_plugin=storage) as writer:
+        for time, kind, fields in ((1, string, {"data": "hello"}), (2, number, {"data": 7})):
+            connection = writer.add_connection(f"/{time}", kind.name, typestore=store)
+            writer.write(connection, time, kind.encode(fields))
+    (file,) = (path for path in (tmp_path / "bag").iterdir() if path.suffix != ".yaml")
+    if storage is StoragePlugin.SQLITE3:
+        with closing(sqlite3.connect(file)) as database:
+            database.execute(
+                "UPDATE message_definitions SET encoding = ?, encoded_message_definition = '?' "
+                "WHERE topic_type = 'std_msgs/msg/Int8'", [encoding],
+            )  # fmt: skip
+            database.commit()
+    else:
+        data = file.read_bytes()
+        for at in [found.end() + 4 for found in re.finditer(rb"std_msgs/msg/Int8", data)]:
+            if data[at : at + 7] == b"ros2msg":
+                data = data[:at] + encoding.encode() + data[at + 7 :]
+        file.write_bytes(data)
+    with open_bag(tmp_path / "bag") as bag:
+        types = {channel.topic: channel.type() for channel in bag.channels}
+        found = [types[m.channel.topic].decode(m.data).data for m in bag.messages()]
+    assert found == ["hello", 7]  # this machine knows both
 
 
 def test_idl_texts_say_what_the_definition_says(library):
