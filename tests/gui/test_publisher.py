@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import logging
 import threading
+import time
 from typing import Any
 
 import pytest
@@ -128,6 +129,32 @@ def test_nothing_is_held_for_longer_than_the_robot_may_take(
     assert root.property("sent") is True
     wait(lambda: 3.0 in [message.linear.x for message in received])
     assert 1.0 not in [message.linear.x for message in received]
+
+
+def test_a_command_is_not_held_for_longer_than_its_timeout(
+    running: Any, received: list, wait: Any, caplog: Any, monkeypatch: Any
+) -> None:
+    go = threading.Event()
+    create = running.session.node.create_publisher
+    monkeypatch.setattr(
+        running.session.node,
+        "create_publisher",
+        lambda *given: go.wait(30) and create(*given),
+    )
+    root: Any = running.load("""QtObject {
+        property var qos: Ros2.CommandQoS()
+        property var pub: Ros2.createPublisher("cmd_vel", "geometry_msgs/msg/Twist", qos)
+        function send(x) { return pub.publish({linear: {x: x}}) }
+        function timeout() { return pub.qos.sendTimeoutMs }
+    }""")
+    assert root.timeout() == 300
+    begin = time.monotonic()
+    assert root.send(1.0) is True
+    wait(lambda: "nothing was published on cmd_vel: it could not be advertised" in caplog.text)
+    assert time.monotonic() - begin < 1.9, "others are held for 2 s"
+    go.set()
+    wait(lambda: root.send(2.0) and received)
+    assert {message.linear.x for message in received} == {2.0}
 
 
 def test_a_publisher_that_is_let_go_sends_what_it_holds(

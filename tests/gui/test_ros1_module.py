@@ -103,6 +103,20 @@ def test_publishing(up: Bench, wait: Any) -> None:
     wait(lambda: root.property("n") == 1)
 
 
+def test_commands(up: Bench, wait: Any) -> None:
+    received: list[Any] = []
+    up.robot.create_subscription("/speed", "geometry_msgs/msg/Twist", received.append)
+    root: Any = up.load("""
+        QtObject {
+            property var pub: Ros.advertise("geometry_msgs/Twist", "/speed", Ros.CommandQoS())
+            function send() { return pub.publish({linear: {x: 0.5}}) }
+            function shown() { return [pub.queueSize, pub.isLatched, pub.qos.sendTimeoutMs].join() }
+        }
+    """)
+    wait(lambda: root.send() and received)
+    assert root.shown() == "1,false,300"
+
+
 def test_latched_publishers(up: Bench, wait: Any) -> None:
     root: Any = up.load("""
         QtObject {
@@ -124,6 +138,7 @@ def test_latched_publishers(up: Bench, wait: Any) -> None:
         'Ros.advertise("std_msgs/String", "/mode")',
         'Ros.advertise("std_msgs/String", "/mode", -1)',
         'Ros.advertise("std_msgs/String", "/mode", "ten")',
+        'Ros.advertise("std_msgs/String", "/mode", Ros.CommandQoS(), true)',
         'Ros.advertise("", "/mode", 10)',
         'Ros.advertise("std_msgs/String", "no good", 10)',
         'Ros.advertise("/mode", "std_msgs/String", 10)',

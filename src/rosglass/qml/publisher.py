@@ -226,26 +226,25 @@ class Publisher(Element):
     def _send_held(self) -> None:
         """Send held messages once subscribers can receive them; drop those that are too old."""
         sender, held = self._endpoint, self._held
-        if self._qos.send_timeout is not None:
+        connected, ready = self._is_connected(), sender is not None and self._is_settled(sender)
+        if self._qos.send_timeout is not None or not (ready or (sender is not None and connected)):
             while held and time.monotonic() > held[0][1]:
                 held.popleft()
-                limit = self._qos.send_timeout.seconds
-                self._on_sent_late(Error(f"no subscriber was connected within {limit:g} s"))
-        if sender is not None and self._is_settled(sender):
+                late = "it could not be advertised in time"
+                if sender is not None and connected:
+                    late = "no subscriber was connected in time"
+                else:
+                    self._unreachable = sender is not None or not connected
+                    if sender is not None and self._session is not None:
+                        late = f"not connected in time: {self._session.detail}"
+                self._on_sent_late(Error(self._problem or late))
+        if sender is not None and ready:
             while held:
                 message, _ = held.popleft()
                 try:
                     self._send(sender, message)
                 except Error as error:
                     self._on_sent_late(error)
-        elif sender is None or not self._is_connected():
-            while held and time.monotonic() > held[0][1]:
-                held.popleft()
-                self._unreachable = sender is not None or not self._is_connected()
-                late = "it could not be advertised in time"
-                if sender is not None and self._session is not None:
-                    late = f"not connected in time: {self._session.detail}"
-                self._on_sent_late(Error(self._problem or late))
         if not held:
             self._reference = None
 

@@ -42,6 +42,13 @@ def test_who_drives_through_an_outage_stops_the_robot_after_it(outage: Any) -> N
     assert ConnectionState.LOST.name in seen["states"]
 
 
+def test_commands_of_an_outage_are_dropped_and_a_repeated_stop_arrives(outage: Any) -> None:
+    seen = outage("command", 6)
+    check(seen)
+    assert seen["old"] < 10, "2 where nothing else runs: those of the first 0.1 s"
+    assert seen["dropped"] > seen["sent"] - 10
+
+
 def test_the_first_word_after_a_silent_outage_stops_the_robot(outage: Any) -> None:
     seen = outage("idle", 5)
     check(seen)

@@ -1,7 +1,8 @@
 """A robot with roscore and rospy, and an operator on another machine.
 
-``two_machines_ros1.py teleop|idle SECONDS HOME``, to be run as root of a network namespace, which
-is the operator's. The cable is unplugged for so long, while the operator drives, or says nothing.
+``two_machines_ros1.py teleop|command|idle SECONDS HOME``, to be run as root of a network namespace,
+which is the operator's. The cable is unplugged for so long, while the operator drives, by a profile
+for commands or another, or says nothing.
 Then the robot is told to stop. Prints what it got, and what the operator saw.
 """
 
@@ -72,7 +73,8 @@ with Cable() as cable:
     node.on_status_change(lambda status: states.append(status.state.name), IMMEDIATE)
     words = node.create_subscription("/word")
     client = node.create_service_client("/stop")
-    publisher = node.create_publisher("/cmd_vel", "geometry_msgs/Twist", qos=1)
+    qos = rosglass.QoS.command() if what == "command" else rosglass.QoS(1)
+    publisher = node.create_publisher("/cmd_vel", "geometry_msgs/Twist", qos)
 
     def drive(until: float, speed: float) -> int:
         """Publish 20 times a second; return how often."""
@@ -89,7 +91,7 @@ with Cable() as cable:
     states.clear()
     cable.unplug()
     cut = time.monotonic()
-    sent = drive(cut + seconds, 2.0) if what == "teleop" else 0
+    sent = drive(cut + seconds, 2.0) if what != "idle" else 0
     time.sleep(max(0.0, cut + seconds - time.monotonic()))
     count = publisher.subscription_count()
     back = time.time()
@@ -98,7 +100,14 @@ with Cable() as cable:
     cable.plug()
     if what == "idle":
         publisher.publish(linear={"x": 0.0})
-    eventually(lambda: any(x == 0.0 for _, x in commands(back)))
+
+    def is_stopped() -> bool:
+        """Return whether the robot got the stop; a command is repeated until then."""
+        if what == "command":
+            publisher.publish(linear={"x": 0.0})
+        return any(x == 0.0 for _, x in commands(back))
+
+    eventually(is_stopped)
     late = commands(back)
     eventually(lambda: node.status().state.name == "CONNECTED" and client.ready)
     while words.take() is not None:
@@ -109,6 +118,7 @@ with Cable() as cable:
             {
                 "sent": sent,
                 "old": sum(x == 2.0 for _, x in late),
+                "dropped": publisher.dropped,
                 "stopped": next(at for at, x in late if x == 0.0) - back,
                 "last": late[-1][1],
                 "subscribers": count,
