@@ -23,7 +23,7 @@ Row {
             }
             Text {
                 anchors.centerIn: parent
-                color: "white"; font.pixelSize: 32
+                color: battery.stale ? "red" : "white"; font.pixelSize: 32
                 textFormat: Text.PlainText
                 text: battery.message ? (battery.message.percentage * 100).toFixed(1) + " %" : "?"
             }

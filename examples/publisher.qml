@@ -17,5 +17,9 @@ Column {
         checked: state.message ? state.message.data : false
         onClicked: pub.publish({data: checked})
     }
-    Label { textFormat: Text.PlainText; text: "state of the robot: " + (state.message ? state.message.data : "not received yet") }
+    Label {
+        textFormat: Text.PlainText
+        text: "state of the robot: " + (state.message ? state.message.data : "not received yet")
+        color: state.stale ? "red" : "black"
+    }
 }

@@ -26,7 +26,7 @@ Column {
     }
 
     Label { textFormat: Text.PlainText; text: map.topic + " offers " + mapOffer; font.bold: true }
-    Label { textFormat: Text.PlainText; text: map.message ? map.message.info.width + " x " + map.message.info.height + " cells" : "no map yet" }
+    Label { textFormat: Text.PlainText; text: map.message ? map.message.info.width + " x " + map.message.info.height + " cells" : "no map yet"; color: map.stale ? "red" : "black" }
     Label { textFormat: Text.PlainText; text: scan.topic + " offers " + scanOffer; font.bold: true }
     Label { textFormat: Text.PlainText; text: scan.problem || (scan.message ? scan.frequency.toFixed(0) + " Hz" : "nothing yet") }
 }

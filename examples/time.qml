@@ -19,5 +19,6 @@ Column {
         text: odom.message ? "the odometry's stamp: "
                              + odom.message.header.stamp.toJSDate().toLocaleTimeString()
                            : "no odometry yet"
+        color: odom.stale ? "red" : "black"
     }
 }

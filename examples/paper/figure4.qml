@@ -11,7 +11,12 @@ Rectangle {
     property bool overlay: false
     property string title: "Pose prediction"
     property var step: null
-    property string problem: client.ready ? "" : "waiting for " + client.name
+    // The iterations that were asked for last, and whose values are shown.
+    property int asked: 0
+    property int shown: 0
+    property string failure: ""
+    readonly property string problem: client.ready ? failure : "waiting for " + client.name
+    readonly property bool current: step !== null && shown === asked && problem === ""
     // The type is not on this machine: it is fetched from the node with the service.
     property var client: Ros2.createServiceClient("/pose_prediction/get_iteration",
                                                   "pose_prediction_msgs/srv/GetIteration")
@@ -19,9 +24,13 @@ Rectangle {
     Component.onCompleted: Ros2.init("pose_prediction_view")
 
     function show(iteration) {
+        asked = iteration
         client.call({iteration: iteration}).then(
-            function (found) { step = found; problem = "" },
-            function (error) { problem = error.message })
+            function (found) {
+                if (iteration !== asked) return
+                step = found; shown = iteration; failure = ""
+            },
+            function (error) { if (iteration === asked) failure = error.message })
     }
     Connections { target: client; function onServiceReadyChanged() { if (client.ready) show(slider.value) } }
 
@@ -60,18 +69,23 @@ Rectangle {
         id: horizons
         anchors { horizontalCenter: parent.horizontalCenter; top: parent.top; topMargin: 16 }
         spacing: 24
+        opacity: root.current ? 1 : 0.35
         Horizon { name: "input"; q: root.step ? root.step.input : null }
         Horizon { name: "output"; q: root.step ? root.step.output : null }
     }
     Column {
         anchors { left: parent.left; right: parent.right; bottom: parent.bottom; margins: 16 }
         spacing: 8
-        ProgressBar { width: parent.width; value: root.step ? root.step.stability : 0 }
+        ProgressBar { width: parent.width; value: root.step ? root.step.stability : 0; opacity: root.current ? 1 : 0.35 }
         Label {
             color: root.problem ? "#ff6060" : "white"
             textFormat: Text.PlainText
-            text: root.problem ? root.problem
-                : "stability " + (root.step ? root.step.stability.toFixed(2) : "-")
+            width: parent.width
+            wrapMode: Text.Wrap
+            text: (root.problem ? root.problem
+                   : root.shown !== root.asked || !root.step ? "asking for iteration " + root.asked
+                   : "stability " + root.step.stability.toFixed(2))
+                + (root.step && !root.current ? "; above: iteration " + root.shown : "")
         }
         Row {
             spacing: 12

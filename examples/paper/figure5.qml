@@ -17,6 +17,11 @@ Rectangle {
     readonly property string state_: state.message ? state.message.data : "unknown"
     Component.onCompleted: Ros2.init("humanoid_demonstrator")
 
+    function standUp(up) {
+        stand.call({data: up}).then(found => note.text = found.success ? "" : found.message,
+                                    error => note.text = error.message)
+    }
+
     Subscription { id: state; topic: "/humanoid/state"; qos: Ros2.QoS().reliable().transient_local() }
     Subscription { id: spoken; topic: "/humanoid/spoken"; qos: Ros2.QoS().reliable().transient_local() }
     Subscription { id: joints; topic: "/humanoid/joints"; timeout: 1000 }
@@ -35,12 +40,12 @@ Rectangle {
     }
     component Gauge: Column {
         property string name
-        property real value: 0
+        property var value
         property real full: 1
         property string unit
         width: parent ? parent.width : 0
-        Label { textFormat: Text.PlainText; text: name + ": " + value.toFixed(1) + " " + unit }
-        ProgressBar { width: parent.width; value: parent.value / parent.full }
+        Label { textFormat: Text.PlainText; text: name + ": " + (value === undefined ? "unknown" : value.toFixed(1) + " " + unit) }
+        ProgressBar { width: parent.width; value: (parent.value || 0) / parent.full }
     }
 
     GridLayout {
@@ -55,14 +60,10 @@ Rectangle {
                 Label { textFormat: Text.PlainText; text: root.state_; font.pixelSize: 28 }
                 Row {
                     spacing: 8
-                    Button { text: "Stand up"; enabled: stand.ready; onClicked: set(true) }
-                    Button { text: "Sit down"; enabled: stand.ready; onClicked: set(false) }
+                    Button { text: "Stand up"; enabled: stand.ready; onClicked: standUp(true) }
+                    Button { text: "Sit down"; enabled: stand.ready; onClicked: standUp(false) }
                 }
                 Label { textFormat: Text.PlainText; id: note; color: "#d03030" }
-            }
-            function set(up) {
-                stand.call({data: up}).then(function () { note.text = "" },
-                                            function (error) { note.text = error.message })
             }
         }
         Panel {
@@ -75,7 +76,7 @@ Rectangle {
                     Button {
                         text: modelData
                         contentItem: Label { textFormat: Text.PlainText; text: modelData }
-                        enabled: root.state_ === "standing"
+                        enabled: root.state_ === "standing" && !state.stale
                         highlighted: root.state_ === modelData
                         onClicked: gesture.publish({data: modelData})
                     }
@@ -84,6 +85,7 @@ Rectangle {
         }
         Panel {
             name: "Speech"
+            old: spoken.stale && !!spoken.message
             Column {
                 width: parent.width
                 spacing: 8
@@ -108,8 +110,8 @@ Rectangle {
             Column {
                 width: parent.width
                 spacing: 8
-                Gauge { name: "temperature"; unit: "°C"; full: 90; value: heat.message ? heat.message.temperature : 0 }
-                Gauge { name: "distance"; unit: "m"; full: 4; value: sonar.message ? sonar.message.range : 0 }
+                Gauge { name: "temperature"; unit: "°C"; full: 90; value: heat.message ? heat.message.temperature : undefined }
+                Gauge { name: "distance"; unit: "m"; full: 4; value: sonar.message ? sonar.message.range : undefined }
             }
         }
         Panel {

@@ -22,7 +22,7 @@ Row {
             text: at ? "x " + at.x.toFixed(2) + " m, y " + at.y.toFixed(2) + " m" : "nothing yet"
             color: odom.stale ? "red" : "black"
         }
-        Label { textFormat: Text.PlainText; text: odom.message ? "stamp " + odom.message.header.stamp.toSec().toFixed(2) + " s" : "" }
+        Label { textFormat: Text.PlainText; text: odom.message ? "stamp " + odom.message.header.stamp.toSec().toFixed(2) + " s" : ""; color: odom.stale ? "red" : "black" }
         Label { textFormat: Text.PlainText; id: clock }
         Timer {
             interval: 100; repeat: true; running: true
@@ -38,7 +38,7 @@ Row {
         Button {
             text: "Flashlight"
             onClicked: Service.callAsync("/flashlight/set", "std_srvs/SetBool", {data: true},
-                                         function (response) { Ros.info(response.message) })
+                                         function (response) { Ros.info(response ? response.message : "no answer") })
         }
     }
 }
