@@ -66,8 +66,9 @@ _PADDING = 3
 #: Limits of bytes and values for which decoding at once is faster than in two steps.
 _SMALL, _FEW_LEAVES = 1024, 16
 _MOST_PATHS = 1000
-#: Lines of a definition that are left out to get the md5 sum that its publisher announced.
-_MAX_BROKEN_LINES = 10
+#: Lines of a definition that are left out to get the md5 sum that its publisher announced, and the
+#: longest text that is tried: each line costs a parser's run.
+_MAX_BROKEN_LINES, _MAX_BROKEN_TEXT = 10, 1 << 17
 
 
 class Constants(dict[str, Any]):
@@ -854,6 +855,8 @@ def mend(name: str, text: str, md5: str, library: Library | None = None) -> Mess
 
 
 def _without_broken_lines(name: str, text: str) -> Definition | None:
+    if len(text) > _MAX_BROKEN_TEXT:
+        return None
     lines = text.splitlines()
     for _ in range(_MAX_BROKEN_LINES):
         try:
