@@ -6,6 +6,7 @@ Recordings join definitions as https://mcap.dev/spec/registry describes for ``ro
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -207,13 +208,19 @@ def idl_text(definition: Definition) -> str:
         lines += _verbatim(field.comment)
         if field.unit:
             lines.append(f"@unit (value={_value(field.unit)})")
-        if field.default is not None:
+        # IDL has no infinity and NaN; decoding needs no defaults.
+        if field.default is not None and _is_finite(field.default):
             lines.append(f"@default (value={_idl_value(field.default)})")
         size = f"[{field.type.size}]" if field.type.array is ArrayKind.FIXED else ""
         lines.append(f"{_idl_type(field.type)} {field.name}{size};")
     if not definition.fields:
         lines.append(f"uint8 {PLACEHOLDER};")
     return "\n".join((*lines, "};", "};", "};"))
+
+
+def _is_finite(value: Value) -> bool:
+    values = value if isinstance(value, tuple) else (value,)
+    return all(math.isfinite(one) for one in values if isinstance(one, float))
 
 
 def _verbatim(comment: str) -> Iterator[str]:

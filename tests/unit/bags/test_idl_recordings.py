@@ -279,6 +279,14 @@ def test_messages_of_actions_and_services_are_readable_again(name):
     assert (language, MessageType.from_text(name, text).rihs01) == ("msg", found.rihs01)
 
 
+def test_idl_has_no_infinity():
+    text = 'float64 far inf\nfloat64[] all [1.0, -inf, nan]\nstring word "inf"\n'
+    definition = MessageType.from_text("lab_msgs/msg/Far", text).definition
+    again = parse_idl(idl_text(definition), definition.name)
+    assert [(f.name, f.type) for f in again.fields] == [(f.name, f.type) for f in definition.fields]
+    assert [f.default for f in again.fields] == [None, None, "inf"]
+
+
 def test_a_schema_of_many_files_is_read_within_limits():
     struct = "module lab_msgs { module msg { struct T# { long x; }; }; };"
     one = f"{LINE}\nIDL: lab_msgs/msg/T#\n{struct}\n"
