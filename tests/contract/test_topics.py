@@ -737,3 +737,28 @@ def test_nothing_comes_after_closing(link, eventually):
     publisher.close()
     with pytest.raises(rosglass.NodeClosedError, match="closed"):
         publisher.publish(data="later")
+
+
+def test_commands_are_delivered_and_match_every_subscription(robot, console, topic, eventually):
+    publisher = console.create_publisher(topic, "geometry_msgs/msg/Twist", QoS.command())
+    received = {}
+    for depth in (1, 10):
+        received[depth] = []
+        robot.create_subscription(
+            topic,
+            "geometry_msgs/msg/Twist",
+            lambda m, seen=received[depth]: seen.append(m.linear.x),
+            depth,
+        )
+    robot.create_subscription(topic, "geometry_msgs/msg/Twist", qos=QoS.command())
+    eventually(lambda: publisher.subscription_count() >= 1)
+    eventually(lambda: publisher.publish(linear={"x": 1.0}) or all(received.values()))
+    for _ in at_rate(0.02, 20):
+        publisher.publish(linear={"x": 2.0})
+
+    def stop():
+        """Publish a stop; on a busy machine, one may be dropped."""
+        publisher.publish(linear={"x": 0.0})
+        return all(seen[-1] == 0.0 for seen in received.values())
+
+    eventually(stop)

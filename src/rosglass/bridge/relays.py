@@ -500,7 +500,8 @@ class TopicRelay:
         usual = QoS.latched() if gid is not None else QoS()
         qos = usual if self._qos is None else self._qos
         if self._qos is not None and gid is not None:
-            qos = replace(qos, durability=Durability.TRANSIENT_LOCAL)
+            # What is latched is received late: it does not expire.
+            qos = replace(qos, durability=Durability.TRANSIENT_LOCAL, send_timeout=None)
         made = self._target.node.create_publisher(self.other, kind, qos)
         with self._lock:
             if gid is None and self._shared is None:

@@ -152,7 +152,8 @@ class Subscription(TopicElement):
         size, before_size, before = self._wanted_queue_size, self._get_queue_size(), self._profile
         if size is not None:
             history = History.KEEP_LAST if size else History.KEEP_ALL
-            qos = replace(qos, history=history, depth=size or qos.depth)
+            # The timeout is a publisher's, and contradicts keep all.
+            qos = replace(qos, history=history, depth=size or qos.depth, send_timeout=None)
         self._profile = qos
         if qos == before:
             return
