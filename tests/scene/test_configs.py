@@ -314,6 +314,30 @@ def test_what_rosglass_cannot_use_comes_back(bench: SceneBench, tmp_path: Path) 
     assert (kept["odd"]["Cell Size"], kept["odd"]["Plane"]) == (2, "AB")
 
 
+def test_displays_of_hector_rviz_plugins_say_what_replaces_them(
+    bench: SceneBench, tmp_path: Path
+) -> None:
+    instead = {
+        "GraphDisplay": "MarkerArray",
+        "MultiRobotModel": "add a RobotModel with a TF Prefix",
+        "MultiRobotState": "nothing replaces it",
+        "PointCloudFilter": "filter the cloud on the robot",
+        "PointCloudNormal": "publish the normals as markers",
+    }
+    displays = [{"Class": f"hector_rviz_plugins/{name}", "Name": name} for name in instead]
+    file = tmp_path / "hector.rviz"
+    config = {"Visualization Manager": {"Class": "", "Displays": displays}}
+    file.write_text(yaml.safe_dump(config))
+    view = bench.load()
+    view.load_config(file)
+    for display, text in zip(view.scene.displays, instead.values(), strict=True):
+        assert text in display.statusText, display.name
+    view.save_config()
+    assert [one.class_id for one in RvizConfig.load(file).walk()] == [
+        f"hector_rviz_plugins/{name}" for name in instead
+    ]
+
+
 def test_settings_have_the_names_that_rviz_writes(bench: SceneBench) -> None:
     (file,) = (file for file in FILES if file.stem == "ros1_all_displays")
     before = RvizConfig.load(file)

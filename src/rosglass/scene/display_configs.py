@@ -53,6 +53,18 @@ _HECTOR_SETTINGS = {
 }
 
 
+#: What shows the same as displays of hector_rviz_plugins, by their class.
+_INSTEAD = {
+    "hector_rviz_plugins/GraphDisplay": "nothing replaces it: publish the graph as a MarkerArray",
+    "hector_rviz_plugins/MultiRobotModel": "add a RobotModel with a TF Prefix for each robot",
+    "hector_rviz_plugins/MultiRobotState": "nothing replaces it: a RobotModel with a TF Prefix "
+    "shows a state whose transforms are published with that prefix",
+    "hector_rviz_plugins/PointCloudFilter": "nothing replaces it: filter the cloud on the robot, "
+    "and show the result with PointCloud2",
+    "hector_rviz_plugins/PointCloudNormal": "nothing replaces it: publish the normals as markers",
+}
+
+
 class UnknownDisplay(Display):
     """A display of a config that rosglass does not have; it shows nothing, and is written back."""
 
@@ -70,7 +82,8 @@ class UnknownDisplay(Display):
 
     def _restyle(self) -> None:
         text = f"rosglass has no display {self.class_id}; it is kept in the file as it is"
-        self.set_status("Class", "warn", text)
+        instead = _INSTEAD.get(self.class_id)
+        self.set_status("Class", "warn", f"{text}; {instead}" if instead else text)
 
 
 class GroupDisplay(Display):
