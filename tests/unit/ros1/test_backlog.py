@@ -43,7 +43,7 @@ def test_each_message_after_an_outage_makes_up_for_its_part(monitor: BacklogMoni
     assert found[0] == pytest.approx(9.9, abs=0.01)
     assert found[50] == pytest.approx(4.9, abs=0.1)
     assert found[99] == pytest.approx(0, abs=0.11)
-    assert not any(lateness(monitor, *((110.2 + PERIOD * n, 1) for n in range(5)))[3:])
+    assert not any(lateness(monitor, *((110.2 + PERIOD * n, 1) for n in range(15)))[10:])
     assert lateness(BacklogMonitor(), *burst) == [0] * 100, "of an irregular publisher"
 
 
@@ -66,9 +66,9 @@ def test_a_link_that_loses_packets_holds_back_again_and_again(monitor: BacklogMo
 
 def test_messages_that_the_publisher_dropped_are_not_waited_for(monitor: BacklogMonitor) -> None:
     # After the outage only the newest one, then as usual.
-    found = lateness(monitor, *((110.0 + PERIOD * n, 1) for n in range(10)))
-    assert found[0] == pytest.approx(9.9)
-    assert found[3:] == [0] * 7
+    found = lateness(monitor, *((110.0 + PERIOD * n, 1) for n in range(20)))
+    assert found[0] == found[5] == pytest.approx(9.9), "by chance, part of a backlog may look so"
+    assert found[11:] == [0] * 9
 
 
 def test_a_publisher_that_sends_less_often_is_not_late_for_long(monitor: BacklogMonitor) -> None:

@@ -90,8 +90,9 @@ class SilenceMonitor:
 
 #: Gaps of more than so many periods, and of more than so many seconds, may have held messages back.
 _GAP_PERIODS, _MIN_GAP_S = 3, 0.3
-#: Messages at the usual interval after which none is held back any more.
-_STEADY_MESSAGES = 3
+#: Messages at the usual interval, and seconds of them, after which none is held back any more: if
+#: packets get lost, a part of a backlog may arrive at that interval by chance.
+_STEADY_MESSAGES, _STEADY_S = 3, 1.0
 #: How long a period is remembered of a publisher that is not regular any more: a bad link makes
 #: that of it.
 _PERIOD_MEMORY_S = 15.0
@@ -114,7 +115,8 @@ class BacklogMonitor:
     def __init__(self) -> None:
         self.late = 0.0
         self._period = self._known_at = self._received_at = 0.0
-        self._steady = 0
+        #: Messages at the usual interval, and since when.
+        self._steady, self._steady_since = 0, 0.0
 
     def set_period(self, period: float, now: float) -> None:
         """Set the usual interval between two messages in seconds, 0 if there is none now."""
@@ -137,6 +139,8 @@ class BacklogMonitor:
         elif gap * 2 < count * period:
             self.late, self._steady = max(0.0, self.late + missing), 0
         else:
+            if not self._steady:
+                self._steady_since = before
             self._steady += count
-            if self._steady >= _STEADY_MESSAGES:
+            if self._steady >= _STEADY_MESSAGES and now - self._steady_since >= _STEADY_S:
                 self.late = 0.0
