@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from waiting import eventually
 
-from rosglass.comm import ConnectionState
+from rosglass.comm import ConnectionState, QoS
 from rosglass.demo.robot import Robot, RobotOptions
 
 if TYPE_CHECKING:
@@ -46,7 +46,11 @@ def test_it_drives_and_stops_without_the_master(
     console = connect("console")
     drive = console.create_publisher("/cmd_vel", "geometry_msgs/Twist")
     stop = console.create_publisher("/emergency_stop", "std_msgs/Bool")
-    eventually(lambda: drive.subscription_count() and stop.subscription_count())
+    release = console.create_publisher("/emergency_stop/release", "std_msgs/UInt32", QoS.command())
+    counter = console.create_subscription("/emergency_stop/counter", "std_msgs/UInt32")
+    topics = (drive, stop, release)
+    eventually(lambda: all(one.subscription_count() for one in topics))
+    eventually(counter.publisher_count)
     made.start()
     node.parameters.set({"max_speed": 0.4})
     eventually(lambda: made.services.max_speed == 0.4)
@@ -54,6 +58,17 @@ def test_it_drives_and_stops_without_the_master(
     eventually(lambda: node.status().state is not ConnectionState.CONNECTED)
     eventually(lambda: drive.publish(linear={"x": 1.0}) or made.state.speed > 0.3)
     assert made.state.speed < 0.5
+    stop.publish(data=True)
+    eventually(lambda: made.state.emergency_stop)
+
+    def is_released() -> bool:
+        """Release the stop by the newest number."""
+        while (sample := counter.take_latest()) is not None:
+            release.publish(data=sample.message().data)
+        return not made.state.emergency_stop
+
+    stop.publish(data=False)
+    eventually(is_released)
     stop.publish(data=True)
     eventually(lambda: made.state.emergency_stop)
     assert not made.wait(0.3)
