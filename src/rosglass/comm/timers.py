@@ -27,6 +27,8 @@ _log = logging.getLogger("rosglass.comm")
 _CLOSE_TIMEOUT_S = 2.0
 #: Longest single wait; the operating system has an upper limit.
 _LONGEST_WAIT_S = 3600.0
+#: After a run, a worker rests for so many times as long, and at most for so many seconds.
+_REST_FACTOR, _MAX_REST_S = 4.0, 0.05
 #: Cancelled jobs are removed from the heap once there are this many, and more than half.
 _SWEEP_COUNT = 64
 
@@ -119,7 +121,8 @@ class _Job(Handle):
 class Worker:
     """A thread that runs `job` soon after each :meth:`wake`, and regularly.
 
-    Wake-ups that arrive during a run are merged into one more run.
+    Wake-ups that arrive during a run, and shortly after it, are merged into one more run: a worker
+    that runs all the time would delay the threads that wake it.
 
     Args:
         name: The thread's name.
@@ -129,8 +132,7 @@ class Worker:
 
     def __init__(self, name: str, job: Callable[[bool], None], pause: float) -> None:
         self._job, self._pause = job, pause
-        self._wanted = threading.Event()
-        self._closed = False
+        self._wanted, self._closed = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._thread.start()
 
@@ -149,7 +151,7 @@ class Worker:
         After 2 s a run that does not return is abandoned with a warning, so that closing never
         hangs a program; its thread is a daemon.
         """
-        self._closed = True
+        self._closed.set()
         self._wanted.set()
         if self._thread is threading.current_thread():
             return
@@ -162,7 +164,7 @@ class Worker:
         while True:
             self._wanted.wait(max(0.0, due - time.monotonic()))
             self._wanted.clear()
-            if self._closed:
+            if self._closed.is_set():
                 return
             now = time.monotonic()
             regular = now >= due
@@ -172,6 +174,7 @@ class Worker:
                 self._job(regular)
             except Exception:
                 _log.exception("%s failed", self._thread.name)
+            self._closed.wait(min(_MAX_REST_S, _REST_FACTOR * (time.monotonic() - now)))
 
 
 class Watchdog(Handle):

@@ -1,8 +1,12 @@
 from __future__ import annotations
 
+import math
 import threading
+import time
+from types import SimpleNamespace
 
 import pytest
+from waiting import nothing_happens
 
 from rosglass.comm import IMMEDIATE, Dispatcher, Listeners, Worker
 
@@ -143,3 +147,46 @@ def test_a_worker_that_hangs_does_not_hang_closing(monkeypatch, caplog):
     worker.close()
     assert "test worker still runs" in caplog.text
     go_on.set()
+
+
+def test_a_busy_dispatcher_takes_several_jobs_at_a_time(dispatcher, monkeypatch):
+    done, pauses = [], []
+
+    def pause(seconds):
+        number = len(pauses)
+        pauses.append(seconds)
+        if number < 3:
+            for job in range(5):
+                dispatcher.post(lambda job=job: done.append((number, job)))
+        else:
+            dispatcher.post(ended.set)
+
+    ended = threading.Event()
+    monkeypatch.setattr("rosglass.comm.executor._BUSY_HZ", 0.0)
+    monkeypatch.setattr("rosglass.comm.executor._RATE_JOBS", 1)
+    monkeypatch.setattr(
+        "rosglass.comm.executor.time", SimpleNamespace(sleep=pause, monotonic=time.monotonic)
+    )
+    dispatcher.post(lambda: None)
+    assert ended.wait(30)
+    assert done == [(number, job) for number in range(3) for job in range(5)]
+
+
+def test_a_worker_rests_after_a_run_and_still_ends_at_once(monkeypatch):
+    monkeypatch.setattr("rosglass.comm.timers._REST_FACTOR", math.inf)
+    monkeypatch.setattr("rosglass.comm.timers._MAX_REST_S", 3600.0)
+    runs, ran = [], threading.Event()
+
+    def run(regular):
+        runs.append(regular)
+        ran.set()
+
+    worker = Worker("worker", run, 3600.0)
+    worker.wake()
+    assert ran.wait(30)
+    for _ in range(3):
+        worker.wake()
+        nothing_happens(0.05)
+    worker.close()
+    assert runs == [False]
+    assert not worker._thread.is_alive()
