@@ -96,6 +96,26 @@ def test_the_fastest_get_a_thread_of_their_own_and_keep_their_order(connect, str
     received.assert_each_once_in_order()
 
 
+def test_topics_that_are_fast_together_are_collected_and_keep_their_order(
+    connect, stream, monkeypatch
+):
+    monkeypatch.setattr("rosglass.wires.zenoh.reader._POLL_RATE_HZ", 50.0)
+    monkeypatch.setattr("rosglass.wires.zenoh.reader._POLL_TOTAL_HZ", 100.0)
+    node, all_received = connect("cockpit"), [Received(), Received()]
+    for received in all_received:
+        node.create_subscription("/count", TWIST, received, rosglass.QoS(100_000))
+    eventually(lambda: node.publishers("/count"))
+    stream(300)
+    eventually(lambda: has_thread("fast"), what="one thread for both")
+    for received in all_received:
+        count = len(received.numbers)
+        eventually(lambda: len(received.numbers) > count + 50)  # noqa: B023 - called at once
+    stream(10)
+    eventually(lambda: not has_thread("fast"), what="slow again")
+    for received in all_received:
+        received.assert_each_once_in_order()
+
+
 def test_closing_ends_every_way_of_receiving(connect, stream):
     node, received = connect("cockpit"), Received()
     qos = rosglass.QoS(100_000)

@@ -12,7 +12,7 @@ zenoh = pytest.importorskip("zenoh")
 from rosglass.comm import Durability, Duration, EndpointInfo, EndpointKind, NodeName, QoS  # noqa: E402
 from rosglass.wires.zenoh.endpoints import LocalRegistry, ZenohWriter  # noqa: E402
 from rosglass.wires.zenoh.options import ZenohOptions  # noqa: E402
-from rosglass.wires.zenoh.reader import _Collected  # noqa: E402
+from rosglass.wires.zenoh.reader import Drain, _Collected  # noqa: E402
 
 HOUR = 3_600_000_000_000
 JUMPS = (HOUR, -HOUR)
@@ -50,7 +50,7 @@ class Session:
 @pytest.mark.parametrize("jump", JUMPS)
 def test_samples_collected_around_a_jump_of_the_clock_are_new(monkeypatch, jump):
     session, received, clock = Session(), [], time.time_ns
-    collected = _Collected(session, "key", 10, lambda _, at: received.append(at), None)
+    collected = _Collected(session, "key", 10, lambda _, at: received.append(at), Drain("", 0.1))
     monkeypatch.setattr(time, "time_ns", lambda: clock() + jump)
     session.samples.append("sample")
     collected.flush()

@@ -43,6 +43,7 @@ class Session:
 class Drain:
     def __init__(self, closing):
         self.remove = lambda _: closing.set()
+        self.interval_ns = 100_000_000
 
 
 def test_a_reader_is_closed_while_the_drain_takes_its_samples():
@@ -94,7 +95,7 @@ def test_a_reader_closed_while_its_samples_change_their_way_ends_each_source_onc
     endpoint = EndpointInfo(
         EndpointKind.SUBSCRIPTION, "/topic", "std_msgs/msg/Empty", NodeName("/", "node")
     )
-    reader = ZenohReader(owner, "token", endpoint, print, None, LocalRegistry())
+    reader = ZenohReader(owner, "token", endpoint, print, None, None, LocalRegistry())
     reader.declare(Session(first))
     reader.poll()
     assert first.undeclared

@@ -96,11 +96,13 @@ class Owner(Protocol):
         options: Options of the session.
         version: Increases with each change of links or service servers.
         timers: Run delayed jobs.
+        rate: Samples per second that all readers have received in the last second.
     """
 
     options: ZenohOptions
     version: int
     timers: Timers
+    rate: float
 
     @property
     def graph(self) -> Graph:

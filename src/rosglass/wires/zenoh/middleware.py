@@ -44,7 +44,12 @@ from rosglass.wires.zenoh.endpoints import (
     ZenohWriter,
 )
 from rosglass.wires.zenoh.keys import Token, gid_of, graph_key
-from rosglass.wires.zenoh.reader import Drain, ZenohReader
+from rosglass.wires.zenoh.reader import (
+    COLLECT_INTERVAL_S,
+    POLL_INTERVAL_S,
+    Drain,
+    ZenohReader,
+)
 from rosglass.wires.zenoh.refusal import find_refusal
 from rosglass.wires.zenoh.services import ZenohReplier, ZenohRequester
 from rosglass.wires.zenoh.session import (
@@ -130,7 +135,9 @@ class ZenohMiddleware(Middleware):
         self._readers: LocalRegistry[ZenohReader] = LocalRegistry()
         self._servers: LocalRegistry[ZenohReplier] = LocalRegistry()
         self.timers = Timers(f"{self._address} commands")
-        self._drain = Drain(f"{self._address} unread")
+        self._drain = Drain(f"{self._address} unread", COLLECT_INTERVAL_S)
+        self._poller = Drain(f"{self._address} fast", POLL_INTERVAL_S)
+        self.rate = 0.0
         self._changed: Callable[[], None] = lambda: None
         self._graph: Graph | None = None
         #: Topic or service of each announced publisher and client by its GID, the oldest first.
@@ -209,7 +216,9 @@ class ZenohMiddleware(Middleware):
     def create_reader(self, endpoint: EndpointInfo, on_sample: OnSample) -> Reader:
         """Declare a subscriber to all definitions of the type, and its token."""
         token = self._token(endpoint)
-        return self._add(ZenohReader(self, token, endpoint, on_sample, self._drain, self._readers))
+        return self._add(
+            ZenohReader(self, token, endpoint, on_sample, self._drain, self._poller, self._readers)
+        )
 
     def create_requester(self, endpoint: EndpointInfo, on_reply: OnReply) -> Requester:
         """Declare a client's queriers and its token."""
@@ -229,6 +238,7 @@ class ZenohMiddleware(Middleware):
             self._open()
         self._watch_links()
         self._look_for_refusal()
+        self.rate = sum(reader.rate for reader in self._declared_of(ZenohReader))
         for declaration in self._declared_of(Declaration):  # type: ignore[type-abstract]
             declaration.poll()
 
@@ -252,6 +262,7 @@ class ZenohMiddleware(Middleware):
         if session is not None:
             close_session(session, pause)
         self._drain.close()
+        self._poller.close()
         self._changed()
 
     def forget(self, declaration: Declaration) -> None:

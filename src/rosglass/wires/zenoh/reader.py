@@ -1,8 +1,10 @@
-"""Receiving samples over Zenoh, in the cheapest of three ways.
+"""Receiving samples over Zenoh, in the cheapest of four ways.
 
 Usually each sample is handled on Zenoh's receiving thread, which is the fastest. At thousands per
 second, a Python thread takes them from a native channel, as entering Python from outside costs more
-than everything else. If no consumer waits, they are taken from a channel ten times a second.
+than everything else: one thread for a topic that is so fast, or one for all topics that are so fast
+together, which takes them every millisecond. If no consumer waits, they are taken from a channel
+ten times a second.
 """
 
 from __future__ import annotations
@@ -29,20 +31,21 @@ if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
     from rosglass.wires.zenoh.endpoints import LocalRegistry
 
-__all__ = ["Drain", "ZenohReader"]
+__all__ = ["COLLECT_INTERVAL_S", "POLL_INTERVAL_S", "Drain", "ZenohReader"]
 
 _log = logging.getLogger("rosglass.ros2")
-#: Seconds between two collections of the samples that no consumer waits for.
-_COLLECT_INTERVAL_S = 0.1
-_COLLECT_INTERVAL_NS = 100_000_000
+#: Seconds between two collections of the samples that no consumer waits for, and of those of many
+#: fast topics.
+COLLECT_INTERVAL_S, POLL_INTERVAL_S = 0.1, 0.001
 #: Shortest time in seconds over which the rate is measured.
 _MIN_RATE_WINDOW_S = 0.2
 #: The rate is checked at every 512th sample (a bit mask).
 _RATE_CHECK_MASK = 511
 #: Rate in Hz from which collecting is cheaper, if no consumer waits.
 _COLLECT_RATE_HZ = 30.0
-#: Rate in Hz from which a thread is cheaper.
-_THREAD_RATE_HZ = 2000.0
+#: Rate in Hz from which a thread is cheaper, and a thread for all readers of a node, if they have
+#: this rate together.
+_THREAD_RATE_HZ, _POLL_RATE_HZ, _POLL_TOTAL_HZ = 2000.0, 200.0, 4000.0
 #: Capacity of a channel in samples, and in bytes by the largest sample so far.
 _MAX_WAITING = 4096
 _MAX_BYTES = 32 * 1024 * 1024
@@ -70,10 +73,19 @@ class _OnSample(Protocol):
 
 
 class Drain:
-    """The thread that collects the samples of all readers without a waiting consumer."""
+    """A thread that collects the samples of several readers at regular intervals.
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    Args:
+        name: The thread's name.
+        interval_s: Seconds between two collections.
+
+    Attributes:
+        interval_ns: The same in nanoseconds.
+    """
+
+    def __init__(self, name: str, interval_s: float) -> None:
+        self._name, self._interval_s = name, interval_s
+        self.interval_ns = int(interval_s * 1e9)
         #: Guards the state below; notified when the thread has to end.
         self._lock = threading.Condition()
         self._collected: dict[_Collected, None] = {}
@@ -118,7 +130,7 @@ class Drain:
             for source in collected:
                 source.flush()
             with self._lock:
-                if self._lock.wait_for(lambda: not self._collected, _COLLECT_INTERVAL_S):
+                if self._lock.wait_for(lambda: not self._collected, self._interval_s):
                     self._thread = None
                     return
 
@@ -222,7 +234,7 @@ class _Collected:
         with self._lock, suppress(zenoh.ZError):  # undeclared, and empty
             now = time.monotonic_ns()
             # Samples that waited longer, because the program was stalled, must not look new.
-            received = time.time_ns() - max(0, now - self._flushed_at - _COLLECT_INTERVAL_NS)
+            received = time.time_ns() - max(0, now - self._flushed_at - self._drain.interval_ns)
             for _ in range(_MAX_WAITING):
                 sample = self._next()
                 if sample is None:
@@ -236,6 +248,7 @@ class _Mode(Enum):
 
     DIRECT = "on the receiving thread"
     PUMPED = "on a thread"
+    POLLED = "on a thread for all fast topics"
     COLLECTED = "in batches"
 
 
@@ -248,6 +261,7 @@ class ZenohReader(Declaration, Reader):
         endpoint: The subscription.
         on_sample: Handles the samples.
         drain: Collects the samples while no consumer waits.
+        poller: Collects the samples of many fast topics.
         readers: The readers of the node, to which its own publishers deliver directly.
     """
 
@@ -258,13 +272,15 @@ class ZenohReader(Declaration, Reader):
         endpoint: EndpointInfo,
         on_sample: OnSample,
         drain: Drain,
+        poller: Drain,
         readers: LocalRegistry[ZenohReader],
     ) -> None:
         super().__init__(owner, token)
         self._place, self._qos = (endpoint.name, endpoint.type), endpoint.qos
         # All definitions of the type.
         self._key = topic_key(owner.options.domain, *self._place, "*")
-        self._on_sample, self._drain, self._readers = on_sample, drain, readers
+        self._on_sample, self._readers = on_sample, readers
+        self._drain, self._poller = drain, poller
         # Transient-local ones receive everything over Zenoh, never in the sending thread.
         if self._qos.durability is not Durability.TRANSIENT_LOCAL:
             readers.add(self._place, self)
@@ -278,7 +294,7 @@ class ZenohReader(Declaration, Reader):
         #: Messages of other topics, one of these topics, and the time of the last of them.
         self._misrouted, self._other_topic, self._misrouted_at = 0, "", -math.inf
         self._count = self._largest = self._marked = 0
-        self._marked_at, self._rate = time.monotonic(), 0.0
+        self._marked_at, self.rate = time.monotonic(), 0.0
 
     def declare(self, session: zenoh.Session) -> list[Any]:
         """Declare the subscriber; a transient-local one queries the publishers' last samples."""
@@ -324,7 +340,7 @@ class ZenohReader(Declaration, Reader):
         if now - self._marked_at < _MIN_RATE_WINDOW_S:
             return
         self._known.clear()  # read the publishers' profiles again
-        self._rate = (count - self._marked) / (now - self._marked_at)
+        self.rate = (count - self._marked) / (now - self._marked_at)
         self._marked, self._marked_at = count, now
         self._switch()
 
@@ -368,10 +384,14 @@ class ZenohReader(Declaration, Reader):
         often = _COLLECT_RATE_HZ / 2 if self._mode is _Mode.COLLECTED else _COLLECT_RATE_HZ
         fast = _THREAD_RATE_HZ / 2 if self._mode is _Mode.PUMPED else _THREAD_RATE_HZ
         room = min(_MAX_WAITING, self._room())
-        if not self._eager and self._rate > often and self._rate * 4 * _COLLECT_INTERVAL_S < room:
+        if not self._eager and self.rate > often and self.rate * 4 * COLLECT_INTERVAL_S < room:
             return _Mode.COLLECTED
-        if self._rate > fast and self._largest <= _MAX_THREAD_SIZE:
-            return _Mode.PUMPED
+        if self._largest <= _MAX_THREAD_SIZE:
+            if self.rate > fast:
+                return _Mode.PUMPED
+            factor = 0.5 if self._mode is _Mode.POLLED else 1.0
+            if self.rate > factor * _POLL_RATE_HZ and self._owner.rate > factor * _POLL_TOTAL_HZ:
+                return _Mode.POLLED
         return _Mode.DIRECT
 
     def _room(self) -> int:
@@ -411,9 +431,10 @@ class ZenohReader(Declaration, Reader):
     def _create_source(self, session: zenoh.Session, mode: _Mode) -> _Source:
         if mode is _Mode.DIRECT:
             return _Direct(session, self._key, self._take, held=True)
-        if mode is _Mode.COLLECTED:
+        if mode in (_Mode.COLLECTED, _Mode.POLLED):
             room = min(_MAX_WAITING, self._room())
-            return _Collected(session, self._key, room, self._take, self._drain)
+            drain = self._drain if mode is _Mode.COLLECTED else self._poller
+            return _Collected(session, self._key, room, self._take, drain)
         channel = zenoh.handlers.FifoChannel(min(_MAX_THREAD_WAITING, self._room()))
         subscriber = session.declare_subscriber(self._key, channel, allowed_origin=_REMOTE)
         name = f"{self._key} samples"
