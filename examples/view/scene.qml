@@ -16,6 +16,7 @@ ApplicationWindow {
         id: view
         objectName: "view"
         anchors.fill: parent
+        focus: true // Keys select tools.
         fixedFrame: "map"
         GridDisplay {}
         RobotModelDisplay {}

@@ -96,7 +96,7 @@ class SceneBench:
         file.parent.mkdir()
         file.write_text(
             f"import QtQuick\nimport RosScene 1.0\n{imports}\n"
-            f'SceneView {{ fixedFrame: "map"\n{body}\n}}'
+            f'SceneView {{ fixedFrame: "map"; focus: true; focusOnClick: true\n{body}\n}}'
         )
         self.window.setSource(QUrl.fromLocalFile(str(file)))
         assert not self.window.errors(), [error.toString() for error in self.window.errors()]

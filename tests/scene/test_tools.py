@@ -262,6 +262,32 @@ def test_keys_select_tools(bench: SceneBench, hand: Hand) -> None:
 # -- the camera ----------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("policy", ["", "focusOnClick: true"])
+def test_a_click_leaves_the_keyboard_to_the_interface(
+    bench: SceneBench, hand: Hand, policy: str
+) -> None:
+    from PySide6.QtCore import QObject
+    from PySide6.QtTest import QTest
+
+    around = bench.load(
+        'property string keys: ""\n'
+        'Item { objectName: "drive"; focus: true; Keys.onPressed: event => keys += event.text }\n'
+        f'SceneView {{ objectName: "inner"; anchors.fill: parent; {policy} }}'
+    )
+    inner: Any = around.findChild(QObject, "inner")
+    around.findChild(QObject, "drive").forceActiveFocus()
+    bench.picture()
+    hand.drag((100, 100), (150, 120))
+    for key in (hand.keys.Key_G, hand.keys.Key_Space):
+        QTest.keyClick(bench.window, key)
+    if policy:
+        assert inner.hasActiveFocus()
+        assert inner.tool == "SetGoal"
+    else:
+        assert around.property("keys") == "g "
+        assert inner.tool == "Interact"
+
+
 def test_the_mouse_moves_the_camera(bench: SceneBench, hand: Hand) -> None:
     view = bench.load("GridDisplay {}")
     yaw, distance = view.controller.yaw, view.controller.distance

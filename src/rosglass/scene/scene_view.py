@@ -85,6 +85,7 @@ class SceneView(QQuickRhiItem):
     cameraChanged = Signal()
     sceneChanged = Signal()
     bareChanged = Signal()
+    focusOnClickChanged = Signal()
     #: A config is about to replace what is shown.
     configLoading = Signal()
     #: A config was shown: its file, if any.
@@ -96,7 +97,7 @@ class SceneView(QQuickRhiItem):
         super().__init__(parent)
         self._runtime = runtime
         self._background = QColor(*_BACKGROUND)
-        self._bare = False
+        self._bare = self._focus_on_click = False
         self._problem = ""
         #: Whether it showed the scene of another view, which is gone.
         self._scene_is_gone = False
@@ -291,6 +292,17 @@ class SceneView(QQuickRhiItem):
 
     #: Whether the view is to be shown alone, as overlays ask for; the program hides its panels.
     bare = Property(bool, lambda self: self._bare, _set_bare, notify=bareChanged)
+
+    def _set_focus_on_click(self, focus: bool) -> None:
+        if focus != self._focus_on_click:
+            self._focus_on_click = focus
+            self.focusOnClickChanged.emit()
+
+    #: Whether a click gives it the keyboard; otherwise, the keys of the interface around it stay as
+    #: they are: they may drive the robot, or stop it.
+    focusOnClick = Property(
+        bool, lambda self: self._focus_on_click, _set_focus_on_click, notify=focusOnClickChanged
+    )
 
     #: Why nothing, or not everything, is drawn, or the camera does not follow its target frame;
     #: empty without a problem.
@@ -876,7 +888,8 @@ class SceneView(QQuickRhiItem):
 
     def mousePressEvent(self, event: Any) -> None:
         """Give a press to the tool, or start to drag the camera."""
-        self.forceActiveFocus(QtCore.Qt.FocusReason.MouseFocusReason)
+        if self._focus_on_click:
+            self.forceActiveFocus(QtCore.Qt.FocusReason.MouseFocusReason)
         self._stop_turning()
         event.accept()
         self._tools.on_press(self._event(event))

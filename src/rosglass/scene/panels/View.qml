@@ -39,6 +39,7 @@ Window {
         width: window.place.width
         height: window.place.height
         focus: true
+        focusOnClick: true
         // Overlays may want it alone.
         onBareChanged: window.panels = !bare
 
