@@ -39,7 +39,7 @@ def test_published_configs_are_shown_and_come_back(
     bench.picture()
     assert view.problem == ""
     for note in notes:
-        assert note.startswith(("display '", "tool '", "view ", str(file))), note
+        assert note.startswith(("display '", "tool '", "view ", "panels '", str(file))), note
     saved = tmp_path / "saved.rviz"
     view.save_config(saved)
     after = RvizConfig.load(saved)
@@ -268,6 +268,18 @@ NEWER = {
     "PointCloud2": {"Min Intensity", "Max Intensity"},
     "TF": {"Filter (whitelist)", "Filter (blacklist)"},
 }
+
+
+def test_panels_of_other_packages_are_named(bench: SceneBench, tmp_path: Path) -> None:
+    file = tmp_path / "panels.rviz"
+    panels = ["rviz_common/Displays", "nav2_rviz_plugins/Selector", "rviz/Time", "lab/Teleop"]
+    rows = [{"Class": one, "Name": one, "topic": "/x"} for one in [*panels, "lab/Teleop"]]
+    file.write_text(yaml.safe_dump({"Panels": rows, "Visualization Manager": {"Displays": []}}))
+    view = bench.load()
+    (note,) = view.load_config(file)
+    assert note.startswith("panels 'nav2_rviz_plugins/Selector', 'lab/Teleop': rosglass has no")
+    view.save_config()
+    assert yaml.safe_load(file.read_text())["Panels"] == rows
 
 
 def test_what_rosglass_cannot_use_comes_back(bench: SceneBench, tmp_path: Path) -> None:

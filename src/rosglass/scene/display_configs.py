@@ -9,7 +9,7 @@ from __future__ import annotations
 from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
-from rosglass.errors import Error
+from rosglass.errors import Error, shown
 from rosglass.rviz.orbit import Orbit, Point
 from rosglass.rviz.view_controller_settings import CONTROLLER_CLASS
 from rosglass.scene.display import Display
@@ -34,6 +34,7 @@ __all__ = [
     "GroupDisplay",
     "UnknownDisplay",
     "add_controller",
+    "check_panels",
     "check_saved_views",
     "collect_displays",
     "create_saved_view",
@@ -42,6 +43,8 @@ __all__ = [
 ]
 
 
+#: Panels of other packages that are named.
+_MAX_PANELS = 10
 #: Classes of other packages that rosglass has as well.
 _SAME = {"hector_rviz_overlay_controls/QmlOverlay": "rosglass/QmlOverlay"}
 #: A view of another package: an Orbit with a display View Controller has the same.
@@ -184,6 +187,20 @@ def check_saved_views(config: RvizConfig) -> list[str]:
                 f"it is kept as it is{instead}"
             )
     return notes
+
+
+def check_panels(config: RvizConfig) -> list[str]:
+    """Return which panels of a config are of other packages than RViz, in one line at most.
+
+    They are kept as they are.
+    """
+    classes = (setting_text(one.get("Class")) for one in config.panels if isinstance(one, dict))
+    others = list(dict.fromkeys(one for one in classes if one and ros_of(one) is None))
+    if not others:
+        return []
+    names = ", ".join(shown(one) for one in others[:_MAX_PANELS])
+    more = f" and {len(others) - _MAX_PANELS} more" if len(others) > _MAX_PANELS else ""
+    return [f"panels {names}{more}: rosglass has no such panels; they are kept as they are"]
 
 
 def create_saved_view(saved: ViewConfig, notes: list[str]) -> ViewController | None:

@@ -20,6 +20,7 @@ from rosglass.scene.camera import interpolate
 from rosglass.scene.display import Display
 from rosglass.scene.display_configs import (
     add_controller,
+    check_panels,
     check_saved_views,
     collect_displays,
     create_saved_view,
@@ -592,7 +593,7 @@ class SceneView(QQuickRhiItem):
         if made is not None:
             self.show_view(made)
         self._keeps_view = saved is not None and made is None
-        notes += check_saved_views(config)
+        notes += check_saved_views(config) + check_panels(config)
         self.config = config
         self.savedViewsChanged.emit()
         self.configLoaded.emit(config.source)
