@@ -15,6 +15,7 @@ from waiting import eventually
 import rosglass
 from rosglass.comm import ParameterType, Range
 from rosglass.errors import ConnectionLostError, Error, ServiceError
+from rosglass.ros2.parameter_files import read
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -153,3 +154,19 @@ def test_doras_parameters(start: Any, dds_connect: Any, dds_domain: int, interfa
     dora.ask(set=["speed", 9.5])
     eventually(lambda: [event for event in events if event.changed == {"speed": 9.5}])
     assert {event.node for event in events} == {"/dora/dora_node"}
+
+
+def test_a_parameter_file_with_a_list_of_mappings_starts_nodes(
+    start_rclpy: Any, tmp_path: Path
+) -> None:
+    """rclpy reads names and values out of the list that are not in it; the rest is ours, too."""
+    file = tmp_path / "arm.yaml"
+    file.write_text(
+        "arm:\n  ros__parameters:\n    speed: 1.5\n"
+        "    sensors: [{name: a, ranges: [1, 2]}, {name: b, ranges: [3]}]\n    names: [u, v]\n"
+    )
+    theirs = json.loads(start_rclpy("rclpy_parameters", str(file)).stdout.readline())
+    ours = read(file).for_node("/arm")
+    assert ours == {"speed": 1.5, "names": ["u", "v"]}
+    assert {name: value for name, value in theirs.items() if "sensors" not in name} == ours
+    assert any(name.startswith("sensors") for name in theirs)
