@@ -118,11 +118,20 @@ NOTES = {
     ("Ros2", "Subscription", "enabled"): ("better", "false unsubscribes"),
     ("Ros2", "Subscription", "queueSize"): ("better", "its change signal is emitted"),
     ("Ros2", "Subscription", "messageType"): ("better", "several types are reported, not guessed"),
+    ("Ros2", "Ros2", "SystemDefaultsQoS"): (
+        "different",
+        "always reliable, volatile, keep last 10; in R2 the defaults of the middleware in use",
+    ),
     ("Ros2", "ServiceClient", "ready"): ("better", _LOST),
     ("Ros2", "ServiceClient", "sendRequestAsync"): (
         "better",
         f"the callback is optional; {_THROWS}",
     ),
+    ("Ros", "ActionClient", "sendGoal"): ("better", f"waits for a server; {_THROWS}"),
+    ("Ros2", "ActionClient", "sendGoalAsync"): ("better", f"waits for a server; {_THROWS}"),
+    ("Ros2", "Ros2", "createPublisher"): ("better", "invalid arguments throw"),
+    ("Ros2", "Ros2", "createSubscription"): ("better", "invalid arguments throw"),
+    ("Ros2", "Ros2", "getLogger"): ("better", "also before init"),
     ("Ros2", "ActionClient", "ready"): ("better", _LOST),
     ("Ros2", "ServiceServer", "processRequest"): (
         "better",
