@@ -446,10 +446,20 @@ class Ros2Requester(ServiceRequester):
     def _has_left(self, pending: PendingCall, here: frozenset[bytes | str]) -> bool:
         """Return whether the servers that a request was sent to have left."""
         route = pending.route
-        lost = route.requester.is_reply_lost(pending.number)
+        lost = route.requester.is_reply_lost(pending.number) or self._is_replaced(route)
         if self._waits_for_reconnect:
             return bool(lost and self.ready())  # it can be sent again
         return lost or (bool(route.servers) and not route.servers & here)
+
+    def _is_replaced(self, route: _Route) -> bool:
+        """Return whether each of a request's servers has a successor of the same node name.
+
+        A killed server stays in the graph of DDS for 10 to 20 s, although its successor answers.
+        """
+        servers = self._fitting(self._servers())
+        successors = {each.node for each in servers if endpoint_id(each) not in route.servers}
+        asked = [each.node for each in servers if endpoint_id(each) in route.servers]
+        return bool(asked) and all(node.name and node in successors for node in asked)
 
     def close(self) -> None:
         """Close the requester; safe to call twice."""

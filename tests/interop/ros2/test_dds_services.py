@@ -350,6 +350,22 @@ def test_a_server_killed_in_a_call_is_told_and_its_successor_called(
     server.end()
 
 
+def test_a_call_ends_when_another_server_has_replaced_its_killed_one(
+    start_services, node, types, impatient
+):
+    config = SHORT_LEASE.replace("1s", "120s")
+    server = start_services("rosglass", "replaced", ["add"], config=config)
+    client = ready(node.create_service_client("/replaced/add", types[ADD]))
+    call = client.call_async({"a": -1}, timeout=None)
+    assert server.event("got") == [-1, 0]
+    server.end()
+    successor = start_services("rosglass", "replaced", ["add"])
+    with pytest.raises(rosglass.ConnectionLostError, match="may have carried it out or not"):
+        call.result(60)
+    assert client.call({"a": 5, "b": 6}, timeout=30).sum == 11
+    successor.end()
+
+
 def test_rubbish_is_named_once_and_disturbs_nobody(node, types, caplog, start, dds_domain):
     plan = {"domain": dds_domain, "requests": "/strict", "replies": "/odd"}
     server = node.create_service_server("/strict", types[ADD], lambda r: {"sum": r.a + r.b})
