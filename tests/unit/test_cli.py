@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 import rosglass
-from rosglass.cli import main
+from rosglass.cli import doctor, main
 from rosglass.cli.arguments import COMMANDS
 from rosglass.cli.messages import split_type
 from rosglass.cli.network import interfaces, is_loopback, router_problem
@@ -350,3 +350,17 @@ def test_where_the_simulated_robot_is(
     for name, value in said.items():
         monkeypatch.setenv(name, value)
     assert build_parser("robot").parse_args(["robot"]).url == url
+
+
+@pytest.mark.parametrize(
+    ("size", "seconds", "level"),
+    [(4 * 2**20, 30, "note"), (4 * 2**20, 3, "ok"), (128 * 2**20, 30, "ok")],
+)
+def test_doctor_looks_at_the_memory_for_ip_fragments(tmp_path, size, seconds, level):
+    """Lost packets fill it, and large messages over DDS stay away until it is empty."""
+    (tmp_path / "ipfrag_high_thresh").write_text(f"{size}\n")
+    (tmp_path / "ipfrag_time").write_text(f"{seconds}\n")
+    (finding,) = doctor._fragments(tmp_path)
+    assert finding.level == level
+    assert ("sysctl" in finding.fix) == (level == "note")
+    assert not list(doctor._fragments(tmp_path / "none"))

@@ -80,6 +80,8 @@ _VARIABLES = (
 )
 #: Receive buffer in bytes that a camera picture needs.
 _BUFFER_BYTES = 4 * 2**20
+#: Memory for IP fragments, in bytes, and seconds that they may stay, as ROS 2's guide recommends.
+_FRAGMENTS_BYTES, _FRAGMENTS_S = 128 * 2**20, 3
 _NO_NETWORK = "connect a network, or for this machine alone: sudo ip link set lo up multicast on"
 #: The fix for names that break ROS's rules.
 _RENAME = "rename them where they are made: letters, digits, '_' and '/', no digit first"
@@ -194,6 +196,31 @@ def _kernel() -> Iterator[_Finding]:
         )
     else:
         yield _Finding("ok", "network", f"receive buffers up to {size / 2**20:.0f} MiB")
+    yield from _fragments()
+
+
+def _fragments(folder: Path = Path("/proc/sys/net/ipv4")) -> Iterator[_Finding]:
+    """Yield whether the kernel has room for the IP fragments of large datagrams.
+
+    ROS 2 nodes on Fast DDS and Cyclone DDS send datagrams of up to 64 kB. What is left of one that
+    lost a packet stays for a while, and if it fills the memory, none arrives.
+    """
+    try:
+        size = int((folder / "ipfrag_high_thresh").read_text())
+        seconds = int((folder / "ipfrag_time").read_text())
+    except (OSError, ValueError):
+        return
+    text = f"IP fragments may take {size / 2**20:.0f} MiB, and {seconds} s each"
+    if size >= _FRAGMENTS_BYTES or seconds <= _FRAGMENTS_S:
+        yield _Finding("ok", "network", text)
+    else:
+        yield _Finding(
+            "note",
+            "network",
+            f"{text}: after packets were lost, no large message arrives over DDS for that long",
+            f"sudo sysctl -w net.ipv4.ipfrag_time={_FRAGMENTS_S} "
+            f"net.ipv4.ipfrag_high_thresh={_FRAGMENTS_BYTES} (and into /etc/sysctl.d to keep it)",
+        )
 
 
 def _interfaces(ros2: bool) -> Iterator[_Finding]:
