@@ -49,6 +49,19 @@ def test_a_header_without_a_frame_is_an_error(bench: SceneBench) -> None:
     bench.wait(lambda: send(frame_id="map") and path.statusLevel == area.statusLevel == "ok")
 
 
+def test_a_volatile_display_says_that_earlier_messages_are_kept(bench: SceneBench) -> None:
+    """The usual mistake with maps in configs of RViz 2."""
+    from rosglass.comm import QoS
+
+    plan = bench.robot.create_publisher("/plan", "nav_msgs/Path", QoS.latched())
+    plan.publish({"header": {"frame_id": "map"}})
+    view = bench.load('PathDisplay { topic: "/plan"; durability: "Volatile" }')
+    (display,) = view.scene.displays
+    bench.wait(lambda: "request transient local durability" in display.statusText)
+    display.durability = "Transient Local"
+    bench.wait(lambda: display.statusLevel == "ok")
+
+
 def test_a_reference_frame_of_rviz_1_may_have_a_slash(bench: SceneBench) -> None:
     from rosglass import Time
     from rosglass.tf import StaticTransformBroadcaster, Transform

@@ -712,6 +712,8 @@ class OneTopicDisplay(Display):
                 text = f"{text}: it has no publisher{similar(topic, topics)}"
             elif problem := getattr(self._endpoint, "problem", ""):
                 text = f"{text}: {problem}"
+            elif self._count_publishers() and (hint := getattr(self._endpoint, "hint", "")):
+                text = f"{text}: {hint}"
         return "warn", text
 
     def _topic_in_logs(self) -> str:
@@ -1159,6 +1161,11 @@ class Subscriptions:
     def problem(self) -> str:
         """Why messages cannot be received, e.g. by their publishers' policies; empty otherwise."""
         return "; ".join(filter(None, (one.problem for one in list(self._open))))
+
+    @property
+    def hint(self) -> str:
+        """What may be missing, e.g. that earlier messages are kept which were not asked for."""
+        return "; ".join(filter(None, (one.hint for one in list(self._open))))
 
     def close(self) -> None:
         """Close them; safe to call twice."""
