@@ -553,6 +553,45 @@ def test_links_share_the_mesh_that_they_name(
     assert len(read) == 1
 
 
+def test_screenshots_wait_for_meshes_that_are_being_read(
+    bench: SceneBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.cli.run import Picture
+    from rosglass.qml.image_sinks import is_loading
+    from rosglass.scene.displays import robot_model
+
+    may_read, load = threading.Event(), robot_model.load_mesh_cached
+
+    def wait_at_the_third(path: Any, name: str, *rest: Any) -> Any:
+        if "third" in name:
+            assert may_read.wait(30)
+        return load(path, name, *rest)
+
+    monkeypatch.setattr(robot_model, "load_mesh_cached", wait_at_the_third)
+    monkeypatch.setattr(robot_model, "_PROGRESS_S", -1.0)
+    view = bench.load("RobotModelDisplay {}")
+    (robot,) = view.scene.displays
+    assert not is_loading(bench.window)
+    meshes = [triangles(tmp_path, f"{name}.stl", 2) for name in ("first", "second", "third")]
+    send_transforms(bench, "base", "arm0", "arm1", "arm2", "arm3")
+    publish(bench, arms([*meshes, meshes[0]]))
+    text = "URDF: loading 2 of 3 meshes"
+    bench.wait(lambda: text in robot.statusText, lambda: robot.statusText)
+    saved: list[int] = []
+    ended: list[int] = []
+
+    def save(_: Path) -> None:
+        saved.append(len(list(robot.root.drawables())))
+
+    Picture(tmp_path / "robot.png", 0.0).take(ended.append, save, lambda: is_loading(bench.window))
+    bench.wait.settled(bench.session)
+    assert not saved
+    may_read.set()
+    bench.wait(lambda: ended == [0])
+    assert saved == [4]
+    assert "URDF: URDF parsed OK" in robot.statusText
+
+
 def test_all_meshes_of_a_robot_are_bounded(
     bench: SceneBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

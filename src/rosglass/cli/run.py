@@ -30,6 +30,8 @@ __all__ = [
     "show_interface",
 ]
 
+#: Seconds that a screenshot waits for meshes that are being read, and between two looks.
+_LOADING_TIMEOUT_S, _LOADING_POLL_S = 30.0, 0.1
 #: Seconds after which garbage is collected, which takes some 20 ms: not before the first frame.
 _FIRST_COLLECTION_S = 1.0
 
@@ -201,7 +203,9 @@ def _show(
             # What the window shows is in the video: a kiosk has no mark of it.
             note(f"recording to {recorder.path}")
         if picture is not None:
-            picture.take(app.quit, lambda target: _save_connected(app, target))
+            picture.take(
+                app.quit, lambda target: _save_connected(app, target), lambda: app.is_loading
+            )
 
     _call_later(0.0, shown)
     _call_later(_FIRST_COLLECTION_S, gc.enable)
@@ -241,15 +245,27 @@ class Picture:
         self._target, self._after = target, after
         self._taken = False
 
-    def take(self, end: Callable[[int], None], save: Callable[[Path], None]) -> None:
+    def take(
+        self,
+        end: Callable[[int], None],
+        save: Callable[[Path], None],
+        is_loading: Callable[[], bool] = lambda: False,
+    ) -> None:
         """Take it after the given time.
 
         Args:
             end: Ends the program with an exit code.
             save: Writes the file; raises Error.
+            is_loading: Whether to wait for what is still being read, for 30 s at most.
         """
+        waits = iter(range(round(_LOADING_TIMEOUT_S / _LOADING_POLL_S)))
 
         def take() -> None:
+            if is_loading():
+                if next(waits, None) is not None:
+                    _call_later(_LOADING_POLL_S, take)
+                    return
+                note(f"{self._target} does not show all: files are still being read")
             self._taken = True
             try:
                 save(self._target)

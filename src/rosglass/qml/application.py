@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm import Handle
 from rosglass.comm.log import warn_on_terminal
 from rosglass.errors import Error
+from rosglass.qml.image_sinks import is_loading
 from rosglass.qml.log import LocationFormatter
 from rosglass.qml.modules import interface_file
 from rosglass.qml.process import (
@@ -172,6 +173,11 @@ class Application(Handle):
     def grab(self) -> QtGui.QImage:
         """Return an image of the window; a null image if there is no window."""
         return self._runner.grab()
+
+    @property
+    def is_loading(self) -> bool:
+        """Whether a 3D view in the window still reads files, such as the robot's meshes."""
+        return self.window is not None and is_loading(self.window)
 
     def quit(self, code: int = 0) -> None:
         """Make :meth:`run` return; thread-safe."""

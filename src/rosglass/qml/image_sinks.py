@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rosglass.qml.image_rendering import Picture
 
 
-__all__ = ["ImageItem", "Sink", "all_items", "grab", "is_painted", "window_of"]
+__all__ = ["ImageItem", "Sink", "all_items", "grab", "is_loading", "is_painted", "window_of"]
 
 
 def window_of(item: QtQuick.QQuickItem) -> QtQuick.QQuickWindow | None:
@@ -63,6 +63,11 @@ def grab(window: QtQuick.QQuickWindow) -> QtGui.QImage:
         before, drawn = drawn, sum(view.pictures_drawn() for view in views)
         if not views or drawn == before:  # such as a view that is hidden
             return image
+
+
+def is_loading(window: QtQuick.QQuickWindow) -> bool:
+    """Return whether a ``SceneView`` in a window still reads files, such as the robot's meshes."""
+    return any(getattr(item, "is_loading", False) is True for item in _items_of(window))
 
 
 def is_painted(window: QtQuick.QQuickWindow) -> bool:

@@ -487,6 +487,11 @@ class Scene(Element):
 
         self._loader.post(run)
 
+    @property
+    def is_loading(self) -> bool:
+        """Whether files are being read, such as meshes, or wait for it."""
+        return bool(self._takers)
+
     def _ask_later(self) -> None:
         """Ask servers of files again that have not answered, less and less often."""
         if is_alive(self) and not self._ask_timer.isActive():

@@ -679,6 +679,11 @@ class SceneView(QQuickRhiItem):
         """Whether the last picture showed all: new data is uploaded over several pictures."""
         return all(one.is_complete for one in self._renderers if Shiboken.isValid(one))
 
+    @property
+    def is_loading(self) -> bool:
+        """Whether meshes or other files of what it shows are being read."""
+        return is_alive(self._scene) and self._scene.is_loading
+
     def camera_moved(self) -> None:
         """Draw from where the camera is now."""
         self._still.start()

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.drawing import Group
-    from rosglass.scene.resource_retriever import ResourceRetriever
     from rosglass.scene.urdf import Joint
 
 __all__ = ["EffortDisplay"]
@@ -161,7 +160,7 @@ class _JointStates:
             return _Efforts({name: one[:2] for name, one in self._latest.items()}, {})
 
 
-def _joints_of(text: str, source: str, _: ResourceRetriever) -> tuple[str, dict[str, Joint]]:
+def _joints_of(text: str, source: str, *_: Any) -> tuple[str, dict[str, Joint]]:
     """Return the robot's name, and its joints that turn."""
     if not text.strip():
         raise Error(f"{source}: the robot description is empty")

@@ -35,7 +35,7 @@ from rosglass.scene.triangles import MAX_TRIANGLES, moved
 from rosglass.scene.urdf import Box, Capsule, Cylinder, MeshFile, Robot, Sphere, parse_urdf
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Mapping
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from rosglass.scene.resource_retriever import ResourceRetriever
     from rosglass.scene.scene import Scene
     from rosglass.scene.triangles import MeshPart
-    from rosglass.scene.urdf import Visual
+    from rosglass.scene.urdf import Link, Visual
 
 __all__ = [
     "DescriptionLoader",
@@ -59,6 +59,8 @@ __all__ = [
 
 _log = logging.getLogger("rosglass.scene")
 _T = TypeVar("_T")
+#: Seconds between two notes on the meshes that were read.
+_PROGRESS_S = 0.1
 #: Milliseconds until a parameter that is not there is looked up again.
 _RETRY_MS = 2000
 #: RViz's colour of what has no material.
@@ -134,16 +136,19 @@ class DescriptionLoader:
     """Reads descriptions in the scene's thread: one at a time, and of those that wait the newest.
 
     Args:
-        read: Called there with the text, its source, and what finds meshes.
+        read: Called there with the text, its source, what finds meshes, and a function to call with
+            the number of meshes that were read, and that of all.
         on_read: Called in the GUI thread with the text and what `read` returned, or its error.
+        on_progress: Called in the GUI thread with the text and these numbers.
     """
 
     def __init__(
         self,
-        read: Callable[[str, str, ResourceRetriever], Any],
+        read: Callable[[str, str, ResourceRetriever, Callable[[int, int], None]], Any],
         on_read: Callable[[str, Any], None],
+        on_progress: Callable[[str, int, int], None] = lambda *_: None,
     ) -> None:
-        self._read, self._on_read = read, on_read
+        self._read, self._on_read, self._on_progress = read, on_read, on_progress
         #: Where one is being read.
         self._busy: Scene | None = None
         self._next: tuple[str, str] | None = None
@@ -154,8 +159,16 @@ class DescriptionLoader:
             self._next = (text, source)
             return
         self._busy = scene
+        # Not the scene: its thread must not be the last to hold it.
+        executor = None if scene._session is None else scene._executor
+        on_progress = self._on_progress
+
+        def progress(done: int, total: int) -> None:
+            if executor is not None:
+                executor.post(lambda: on_progress(text, done, total))
+
         scene.load(
-            lambda resources: self._read(text, source, resources),
+            lambda resources: self._read(text, source, resources, progress),
             lambda result: self._on_loaded(scene, text, result),
         )
 
@@ -400,18 +413,33 @@ def material_of(part: MeshPart) -> tuple[float, float, float, float]:
     return (r, g, b, 1.0)
 
 
-def _load(text: str, source: str, resources: ResourceRetriever) -> _Loaded:
+def _load(
+    text: str, source: str, resources: ResourceRetriever, progress: Callable[[int, int], None]
+) -> _Loaded:
     """Read a description and its meshes; takes seconds for large ones."""
     if not text.strip():
         raise Error(f"{source}: the robot description is empty")
     robot = parse_urdf(text, source)
     problems: dict[str, str] = {}
     files = MeshFiles(resources)
+    total = len({uri for link in robot.links.values() for uri in _mesh_uris(link)})
+    read: set[str] = set()
+    said_at = -math.inf
     visuals, collisions = {}, {}
     for name, link in robot.links.items():
         visuals[name] = [m for v in link.visuals for m in link_drawables(v, problems, files)]
         collisions[name] = [m for v in link.collisions for m in link_drawables(v, problems, files)]
+        read.update(_mesh_uris(link))
+        if read and time.monotonic() - said_at > _PROGRESS_S:
+            said_at = time.monotonic()
+            progress(len(read), total)
     return _Loaded(robot, visuals, collisions, problems)
+
+
+def _mesh_uris(link: Link) -> Iterator[str]:
+    for one in (*link.visuals, *link.collisions):
+        if isinstance(one.geometry, MeshFile):
+            yield one.geometry.uri
 
 
 class _Link:
@@ -545,7 +573,9 @@ class RobotModelDisplay(Display):
         self._source = ""
         #: Why meshes and textures of the robot that is shown could not be loaded.
         self._missing: list[str] = []
-        self._loader = DescriptionLoader(_load, weak_callback(self._show))
+        self._loader = DescriptionLoader(
+            _load, weak_callback(self._show), weak_callback(self._show_progress)
+        )
         #: What the status says of the description that is shown.
         self._loaded_lines: dict[str, Status] = {}
         self._followed_at = -math.inf
@@ -616,6 +646,10 @@ class RobotModelDisplay(Display):
         self._text, self._source = text, source
         self.set_status("URDF", "warn", "loading the robot and its meshes")
         self._loader.load(self.scene, text, source)
+
+    def _show_progress(self, text: str, done: int, total: int) -> None:
+        if is_alive(self) and text == self._text:
+            self.set_status("URDF", "warn", f"loading {done} of {total} meshes")
 
     def _show(self, text: str, result: _Loaded | Error) -> None:
         if not is_alive(self) or text != self._text:
