@@ -45,6 +45,7 @@ _HELP = {
     "services": "name of the service, e.g. /reset",
     "actions": "name of the action, e.g. /dock",
     "nodes": "name of the node, e.g. /camera",
+    "lifecycle_nodes": "name of the lifecycle node, e.g. /camera",
 }
 _rate = number(0, 10_000, "a rate above 0 and up to 10000", above=True)
 _time_within_a_day = number(0, 86_400, "a number of seconds from 0 to 86400")
@@ -537,6 +538,32 @@ def _service(parser: argparse.ArgumentParser) -> None:
     _add_common(sub)
 
 
+def _lifecycle(parser: argparse.ArgumentParser) -> None:
+    parser.epilog = "Only ROS 2 has lifecycle nodes."
+    add = Subcommands(parser).add
+    sub = add("nodes", "list lifecycle nodes", "list_nodes")
+    sub.add_argument(
+        "-a", "--all", "--include-hidden-nodes", action="store_true", help="include hidden nodes"
+    )
+    sub.add_argument(
+        "-c", "--count", "--count-nodes", action="store_true", help="print their number"
+    )
+    _add_common(sub)
+    sub = add("get", "print the state of a lifecycle node, or of all", "get")
+    _add_name(sub, "node", "lifecycle_nodes", nargs="?", default="")
+    _add_common(sub)
+    sub = add("list", "list the transitions that are possible now", "list_transitions")
+    _add_name(sub, "node", "lifecycle_nodes")
+    sub.add_argument("-a", "--all", action="store_true", help="list the transitions of all states")
+    _add_common(sub)
+    sub = add("set", "make a transition, and wait for its end", "set_state")
+    _add_name(sub, "node", "lifecycle_nodes")
+    sub.add_argument(
+        "transition", help="its name or number, e.g. configure, activate, deactivate, shutdown"
+    )
+    _add_common(sub, timeout=30.0)
+
+
 def _action(parser: argparse.ArgumentParser) -> None:
     add = Subcommands(parser).add
     sub = add("list", "list actions", "list_actions")
@@ -921,6 +948,7 @@ COMMANDS = {
     "action": (_action, "inspect actions and send goals"),
     "param": (_param, "read and set the parameters of nodes"),
     "node": (_node, "inspect nodes"),
+    "lifecycle": (_lifecycle, "inspect lifecycle nodes, change their states"),
     "interface": (_interface, "show message, service and action types"),
     "record": (_record, "record topics to an MCAP file or a ROS 1 bag"),
     "play": (_play, "play a recording: MCAP, ROS 2 bag or ROS 1 bag"),

@@ -81,6 +81,9 @@ def _names(what: str, args: argparse.Namespace) -> list[str]:
     with rosglass.connect(url, own_services=False) as node:
 
         def look() -> list[str]:
+            if what == "lifecycle_nodes":
+                services = [name for name in node.services() if name.endswith("/get_state")]
+                return [name.removesuffix("/get_state") for name in services]
             return other_nodes(node) if what == "nodes" else list(getattr(node, what)())
 
         return wait(node, look, _DISCOVERY_TIMEOUT_S)
