@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rosglass.cli.connecting import await_graph, connect, names_ros1
 from rosglass.cli.messages import print_json, template
 from rosglass.cli.output import Style, note
-from rosglass.errors import TypeNotFoundError, UnsupportedError
-from rosglass.interfaces import ros1_name
-from rosglass.messages import default_library, load
+from rosglass.errors import Error, TypeNotFoundError, UnsupportedError
+from rosglass.interfaces import join_name, ros1_name
+from rosglass.messages import MessageType, default_library, load
 
 if TYPE_CHECKING:
     import argparse
 
-    from rosglass.messages import ActionType, MessageType, ServiceType
+    from rosglass.comm import Node
+    from rosglass.messages import ActionType, ServiceType
 
 __all__ = ["list_types", "show", "type_names"]
 
@@ -81,6 +83,41 @@ def show(args: argparse.Namespace) -> int:
     return 0
 
 
+def _nested(node: Node, args: argparse.Namespace) -> MessageType | None:
+    """Return a type that nodes use only inside of others; None for others, and if none is known.
+
+    Nodes send their types with all that these contain, but answer requests for them only. Types
+    that are known on this machine are left out: what they contain is known as well.
+    """
+    name, ros = join_name(args.type), 1 if args.ros1 else 2
+    graph = (node.topics(), node.services(), node.actions())
+    used = set[str]()
+    for found in graph:
+        for one in {one for types in found.values() for one in types}:
+            with suppress(Error):  # what peers announce may be anything
+                used.add(join_name(one))
+    if name in used:
+        return None
+    unknown = [one for one in used if not _is_known(one, ros)]
+    # Types of one package contain each other most often.
+    package = name.partition("/")[0]
+    unknown.sort(key=lambda one: (one.partition("/")[0] != package, one))
+    for promise in [node.fetch_type_async(one, timeout=args.timeout) for one in unknown]:
+        with suppress(Error):  # another one may contain it
+            outer = promise.result(args.timeout)
+            for part in getattr(outer, "parts", {"": outer}).values():
+                if name in part.definition.nested:
+                    return MessageType(part.definition.nested[name])
+    return None
+
+
+def _is_known(name: str, ros: int) -> bool:
+    with suppress(Error):
+        load(name, ros)
+        return True
+    return False
+
+
 def _fields(part: MessageType) -> list[dict[str, str]]:
     return [
         {"name": f.name, "type": str(f.type), "unit": f.unit, "comment": f.comment}
@@ -107,6 +144,6 @@ def _find(args: argparse.Namespace) -> MessageType | ServiceType | ActionType:
     try:
         with connect(args) as node:
             await_graph(node)  # the node with the type may not be discovered yet
-            return node.fetch_type(args.type, timeout=args.timeout)
+            return _nested(node, args) or node.fetch_type(args.type, timeout=args.timeout)
     except (TypeNotFoundError, UnsupportedError) as error:
         raise TypeNotFoundError(f"{args.type}: {error}. {hint}".rstrip(". ")) from error

@@ -247,6 +247,25 @@ def test_a_type_that_only_the_robot_has_is_fetched(router: Any, start_command_at
                 assert (process.returncode, answer in out) == (0, True), err
 
 
+def test_a_type_that_is_only_inside_of_others_is_shown(router: Any, start_command_at: Any) -> None:
+    library = Library()
+    library.add_text("moon_msgs/msg/Wheel", "float64 turns  # of the wheel\n")
+    library.add_text("moon_msgs/msg/Axle", "Wheel[2] wheels\n")
+    library.add_text("moon_msgs/srv/Drive", "Axle[] axles\n---\n")
+    with rosglass.connect(router.url, "rover", library=library) as node:
+        node.create_service_server("drive", "moon_msgs/srv/Drive", lambda request: {})
+        shown = {"Wheel": "float64 turns  # of the wheel", "Axle": "Wheel[2] wheels"}
+        for name, line in shown.items():
+            process = start_command_at(router.url, "interface", "show", f"moon_msgs/msg/{name}")
+            out, err = process.communicate(timeout=60)
+            assert (process.returncode, line in out) == (0, True), err
+        process = start_command_at(
+            router.url, "interface", "show", "moon_msgs/msg/Crater", "--timeout", "1"
+        )
+        _, err = process.communicate(timeout=60)
+        assert (process.returncode, "no node in the graph uses it" in err) == (1, True), err
+
+
 @BOTH
 def test_parameters(run: Any, robot: Node, tmp_path: Path) -> None:
     assert "  speed" in run("param", "list", "/lab/robot")[1]
