@@ -44,6 +44,11 @@ def test_a_cable_that_is_unplugged_for_ten_seconds(on_two_machines):
     assert seen["status"].startswith("CONNECTED")
 
 
+def test_a_peer_notices_that_its_links_are_dead(on_two_machines):
+    seen = on_two_machines(HERE / "peers" / "one_machine_zenoh.py", "10")
+    assert seen["lost"] < 8, "before Zenoh's lease of 10 s"
+
+
 @pytest.mark.parametrize("mode", ["peer", "client"])
 def test_services_and_latched_topics_after_a_router_was_restarted(mode, start_router, connect):
     router = start_router()
