@@ -1169,6 +1169,34 @@ def test_what_is_new_is_uploaded_over_several_pictures(
     assert view.is_complete
 
 
+def test_displays_upload_what_is_new_in_turns(
+    bench: SceneBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosglass.scene import renderer as module
+    from rosglass.scene.drawing import Group
+
+    view = bench.load()
+    bench.picture()
+    many, few = boxes_in_a_row(40), boxes_in_a_row(2)
+    robot, path = Group(Group(*many)), Group(*few)
+    (renderer,) = renderers_of(view)
+    shown: list[tuple[int, int]] = []
+    prepare = renderer._prepare
+
+    def watched(*args: Any) -> Any:
+        found = prepare(*args)
+        shown.append(tuple(len(set(one) & set(renderer._on_device)) for one in (many, few)))
+        return found
+
+    clock = itertools.count()
+    monkeypatch.setattr(renderer, "_prepare", watched)
+    # Each upload takes as long as the budget.
+    monkeypatch.setattr(module.time, "perf_counter", lambda: float(next(clock)))
+    view.scene.root.add(robot, path)
+    bench.wait(lambda: (40, 2) in shown)
+    assert shown[:4] == [(1, 0), (1, 1), (2, 1), (2, 2)], "the path waits for all of the robot"
+
+
 def test_a_grabbed_picture_shows_all(bench: SceneBench, monkeypatch: pytest.MonkeyPatch) -> None:
     from rosglass.scene import renderer as module
 

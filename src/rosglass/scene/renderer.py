@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import logging
 import time
+from collections import Counter
 from itertools import pairwise, product
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -44,7 +46,7 @@ if TYPE_CHECKING:
     from PySide6.QtQuick import QQuickRhiItem
 
     from rosglass.scene.camera import Camera
-    from rosglass.scene.drawing import Drawable, Shape
+    from rosglass.scene.drawing import Drawable, Item, Shape
 
     _Drawn: TypeAlias = "_OnDevice | _LabelsPart"
 
@@ -683,16 +685,17 @@ class SceneRenderer(QQuickRhiItemRenderer):
         origin = self._origin
         device.eye = eye - origin
         self._send_camera(device, frame, batch)
-        opaque: list[tuple[_Drawn, bool]] = []
+        opaque: list[tuple[int, _Drawn]] = []
         blended: list[tuple[int, float, int, _Drawn]] = []
-        texts: list[tuple[int, _LabelsOnDevice]] = []
+        texts: list[tuple[int, int, _LabelsOnDevice]] = []
         problem = ""
         for one in self._on_device.values():
             one.seen = False
         self.is_complete = True
         # As long as drawing takes: with many drawables, there would be too many pictures else.
         left_s = max(_UPLOAD_S, self._drawn_s)
-        for drawable, pose, alpha in frame.drawables:
+        for number in self._in_order_of_upload(frame):
+            drawable, pose, alpha = frame.drawables[number]
             on_device = self._on_device.get(drawable)
             is_new, began = on_device is None, time.perf_counter()
             if is_new and left_s <= 0:
@@ -714,25 +717,53 @@ class SceneRenderer(QQuickRhiItemRenderer):
             finally:
                 left_s -= time.perf_counter() - began if is_new else 0.0
             if drawable.opaque and alpha >= 0.9998:
-                opaque.append((on_device, False))
+                opaque.append((number, on_device))
             elif isinstance(on_device, _LabelsOnDevice):
-                texts.append((drawable.layer, on_device))
+                texts.append((number, drawable.layer, on_device))
             else:
                 box = drawable.bounds() if isinstance(drawable, Mesh) else None
                 middle = (
                     pose[:3, 3] if box is None else (pose @ np.append((box[0] + box[1]) / 2, 1))[:3]
                 )
                 far = float(np.sum((middle - eye) ** 2))
-                blended.append((drawable.layer, -far, len(blended), on_device))
+                blended.append((drawable.layer, -far, number, on_device))
         for drawable, one in list(self._on_device.items()):
             if not one.seen:
                 one.close()
                 del self._on_device[drawable]
         others = np.array([-far for _, far, _, _ in blended])
-        for layer, labels in texts:
+        # Texts come after what is as far away and of the same layer.
+        last = len(frame.drawables)
+        for _, layer, labels in sorted(texts, key=itemgetter(0)):
             for far, part in labels.parts(others):
-                blended.append((layer, -far, len(blended), part))
-        return [*opaque, *((one, True) for *_, one in sorted(blended))], problem
+                blended.append((layer, -far, last, part))
+                last += 1
+        opaque.sort(key=itemgetter(0))
+        blended.sort(key=itemgetter(0, 1, 2))
+        ready = [(one, False) for _, one in opaque] + [(one, True) for *_, one in blended]
+        return ready, problem
+
+    def _in_order_of_upload(self, frame: Frame) -> Sequence[int]:
+        """Return the numbers of a frame's drawables: new ones last, of the displays with few first.
+
+        A display that makes new ones for each message would not be shown while another one has
+        thousands.
+        """
+        known: list[int] = []
+        new: list[int] = []
+        for number, (drawable, _, _) in enumerate(frame.drawables):
+            (known if drawable in self._on_device else new).append(number)
+        if not new:
+            return known
+        turns: Counter[Item] = Counter()
+        ranked: list[tuple[int, int]] = []
+        for number in (*known, *new):
+            display: Item = frame.drawables[number][0]
+            while (above := display.parent) is not None and above.parent is not None:
+                display = above
+            turns[display] += 1
+            ranked.append((turns[display], number))
+        return [*known, *(number for _, number in sorted(ranked[len(known) :]))]
 
     def _view_of(self, camera: Camera) -> NDArray[np.float64]:
         """Return the matrix from the renderer's origin to the eye."""
