@@ -341,7 +341,7 @@ def test_empty_messages(bench: Any, caplog: Any) -> None:
         ("SystemDefaultsQoS", ["reliable", "volatile", 10]),
         ("ServicesQoS", ["reliable", "volatile", 10]),
         ("ClockQoS", ["best_effort", "volatile", 1]),
-        ("BestAvailableQoS", ["best_effort", "volatile", 10]),
+        ("BestAvailableQoS", ["best_available", "best_available", 10]),
         ("QoS", ["best_effort", "volatile", 1]),
     ],
 )

@@ -98,12 +98,17 @@ class SharedStream(QtCore.QObject):
     fetched one by one, at times scheduled by the session's load balancer.
     """
 
-    def __init__(self, session: Session, node: Node, topic: str, preferred: str) -> None:
+    def __init__(
+        self, session: Session, node: Node, topic: str, preferred: str, look: Look, viewer: Viewer
+    ) -> None:
         super().__init__(session)
         self._session = session
         self._key = (node, topic, preferred)
-        #: Replaced instead of modified, because the stream's thread reads it.
-        self._channels: tuple[Channel, ...] = ()
+        channel = Channel(look)
+        channel.viewers.append(viewer)
+        #: Replaced instead of modified, because the stream's thread reads it. With the first viewer
+        #: before the stream begins: a latched image arrives at once, and only once.
+        self._channels: tuple[Channel, ...] = (channel,)
         self._renderer = Renderer(session.steady)
         self._lock = threading.Lock()
         self._pending: _Pending | None = None
@@ -144,7 +149,9 @@ class SharedStream(QtCore.QObject):
         key = (node, topic, preferred)
         stream = session.streams.get(key)
         if stream is None:
-            stream = session.streams[key] = cls(session, node, topic, preferred)
+            first = session.streams[key] = cls(session, node, topic, preferred, look, viewer)
+            first._look_at_channels()
+            return first
         made: SharedStream = stream
         made._linger.stop()
         made.change_look(viewer, look)
