@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -380,7 +379,6 @@ def test_markers_wait_for_their_frame_and_locked_ones_follow_it(
 def test_locked_markers_fade_when_their_frame_is_not_updated(
     bench: SceneBench, show: Callable[..., Any], monkeypatch: Any
 ) -> None:
-    from rosglass import Time
     from rosglass.scene import display as displays
     from rosglass.tf import Transform, TransformBroadcaster
 
@@ -391,10 +389,9 @@ def test_locked_markers_fade_when_their_frame_is_not_updated(
         marker(3, 2),
     )
     broadcaster = TransformBroadcaster(bench.robot)
-    sent = itertools.count(1)
 
     def move() -> None:
-        stamp = Time.from_parts(1, next(sent))
+        stamp = bench.robot.now()
         broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), stamp, "map", "arm"))
 
     def opacities() -> dict[int, float]:
