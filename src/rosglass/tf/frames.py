@@ -27,7 +27,7 @@ from rosglass.errors import (
 from rosglass.tf.transform import conjugate, multiply, rotate, slerp
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from rosglass.comm.time import Duration
     from rosglass.tf.transform import Quaternion, Vector
@@ -432,9 +432,10 @@ class FrameStore:
         self.disagreements: list[tuple[str, object, object]] = []
         self.jumps: list[tuple[str, int, object]] = []
         self._behind: dict[str, _Behind] = {}
-        #: Number of names by publisher, and when its outdated ones were last searched.
+        #: Number of names by publisher, and when its outdated ones were last searched; those of
+        #: all by None.
         self._counts: Counter[object] = Counter()
-        self._forgot_at: dict[object, float] = {}
+        self._forgot_at: dict[object | None, float] = {}
         #: Number of accepted transforms.
         self._stored = 0
 
@@ -538,8 +539,7 @@ class FrameStore:
             return "no name"
         if child == parent:
             return "self"
-        new = [name for name in (child, parent) if name not in self.names]
-        wrong = _bad_numbers(entry) or (self._find_room(new, authority) if new else "")
+        wrong = _bad_numbers(entry) or self._find_room((child, parent), authority)
         if wrong:
             return wrong
         cache = self.caches.get(child)
@@ -556,27 +556,38 @@ class FrameStore:
             self.caches[child] = cache
         kind = cache.insert(stamp, entry)
         if not kind:
-            if new:
-                self.names.update(dict.fromkeys(new, authority))
-                self._counts[authority] += len(new)
+            new = self._new_among((child, parent))
+            self.names.update(dict.fromkeys(new, authority))
+            self._counts[authority] += len(new)
             self.version += before != (cache.parent, static)
         return kind
 
-    def _find_room(self, new: list[str], authority: object) -> str:
-        """Return why a publisher can add no names; outdated ones are removed for them."""
+    def _new_among(self, names: Sequence[str]) -> list[str]:
+        return [name for name in names if name not in self.names]
+
+    def _find_room(self, names: Sequence[str], authority: object) -> str:
+        """Return why a publisher cannot name these frames; outdated ones make room for new ones."""
+        new = self._new_among(names)
+        if not new:
+            return ""
         if max(map(len, new)) > _MAX_NAME_LENGTH:
             return "long name"
         if self._counts[authority] + len(new) > _MAX_NAMES:
             self._forget_outdated(authority)
         elif len(self.names) + len(new) > _MAX_ALL_NAMES:
-            self._forget_outdated(max(self._counts, key=self._counts.__getitem__))
-        has_room = self._counts[authority] + len(new) <= _MAX_NAMES
-        return "" if has_room and len(self.names) + len(new) <= _MAX_ALL_NAMES else "too many"
+            self._forget_outdated(None)
+        # One of the two that was known may have been removed.
+        count = len(self._new_among(names))
+        has_room = self._counts[authority] + count <= _MAX_NAMES
+        return "" if has_room and len(self.names) + count <= _MAX_ALL_NAMES else "too many"
 
-    def _forget_outdated(self, authority: object) -> None:
-        """Remove a publisher's frames that were not received for longer than transforms are kept.
+    def _forget_outdated(self, authority: object | None) -> None:
+        """Remove frames that were not received for longer than transforms are kept.
 
         Not those in which others are placed.
+
+        Args:
+            authority: Publisher that named them; None for all.
         """
         now = monotonic()
         if now < self._forgot_at.get(authority, -math.inf) + _FORGET_PERIOD_S:
@@ -585,19 +596,24 @@ class FrameStore:
         used: set[str] = set()
         for name, cache in self.caches.items():
             silence = now - self.arrivals.get(name, now)
-            if cache.static or silence * 1e9 <= self._keep or self.names[name] != authority:
+            old = not cache.static and silence * 1e9 > self._keep
+            if not old or authority not in (None, self.names[name]):
                 frame = name
                 while frame not in used:
                     used.add(frame)
                     above = self.caches.get(frame)
                     frame = frame if above is None else above.parent
-        gone = [one for one, owner in self.names.items() if owner == authority and one not in used]
+        gone = {
+            name: owner
+            for name, owner in self.names.items()
+            if authority in (None, owner) and name not in used
+        }
         for name in gone:
             del self.names[name]
             self._behind.pop(name, None)
             if name in self.caches:
                 self._remove(name)
-        self._counts[authority] -= len(gone)
+        self._counts -= Counter(gone.values())
 
     def _closes_loop(self, child: str, parent: str, stamp: int | None) -> str:
         """Return why a link is refused, as it closes a loop; outdated links are removed for it."""
