@@ -15,6 +15,7 @@ from ports import free_port
 from rosmaster import RosMaster
 from waiting import eventually
 
+import rosglass
 from rosglass.demo.processes import VirtualScreen
 
 if TYPE_CHECKING:
@@ -139,6 +140,40 @@ def test_edges_are_hard_if_asked_for(start: Callable[..., Program], tmp_path: Pa
 def test_qml_ends_it_with_an_exit_code(start: Callable[..., Program], tmp_path: Path) -> None:
     program = start("--overlay", interface(tmp_path, "Qt.exit(7)"))
     assert program.process.wait(PATIENCE) == 7, program.output
+
+
+LAST = """
+import QtQuick 2.15
+import Ros 1.0
+Item {
+    property var publisher
+    Component.onCompleted: {
+        Ros.init("overlay")
+        publisher = Ros.advertise("std_msgs/String", "/last", 10)
+    }
+    Component.onDestruction: publisher.publish({data: "destroyed"})
+    Timer {
+        interval: 100; running: true; repeat: true
+        onTriggered: if (publisher.getNumSubscribers()) { console.warn("it may end"); stop() }
+    }
+}
+"""
+
+
+def test_an_overlay_sends_its_last_message(
+    start: Callable[..., Program], master: str, tmp_path: Path
+) -> None:
+    file, received = tmp_path / "Last.qml", []
+    file.write_text(LAST)
+    uri = master.removeprefix("http://")
+    with rosglass.connect(f"ros1://{uri}?ip=127.0.0.1", "robot") as robot:
+        robot.create_subscription(
+            "/last", "std_msgs/msg/String", lambda message: received.append(message.data)
+        )
+        program = start("--overlay", file)
+        program.wait_for("it may end")
+        program.end()
+        eventually(lambda: received == ["destroyed"], lambda: program.output)
 
 
 def test_logs_nothing_without_a_problem(start: Callable[..., Program], tmp_path: Path) -> None:

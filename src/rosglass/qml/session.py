@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import importlib
 import logging
@@ -344,8 +345,9 @@ class Session(QtCore.QObject):
         app = QtCore.QCoreApplication.instance()
         self._collects = app is not None
         if app is not None:
-            app.aboutToQuit.connect(self.close)
             _garbage_collection.enter()
+        # Not when the application quits: interfaces may send until they are destroyed.
+        atexit.register(self.close)
 
     @classmethod
     def default(cls) -> Session:
@@ -499,6 +501,7 @@ class Session(QtCore.QObject):
         if self._closed:
             return
         self._closed = True
+        atexit.unregister(self.close)
         self.holding = 0
         until = time.monotonic() + _CLOSE_TIMEOUT_S
         streams = list(self.streams.values())
