@@ -12,6 +12,8 @@ import pytest
 
 from rosglass.comm import ConnectionState
 from rosglass.comm.qos import Durability, Reliability
+from rosglass.qml import install
+from rosglass.qt import QtQml, send_deferred_deletes
 
 TWIST = "geometry_msgs/msg/Twist"
 
@@ -371,3 +373,26 @@ def test_publishing_at_the_end_of_the_program_is_no_mistake(
     send(root, 0.5)
     assert root.property("sent") is False
     assert caplog.text == ""
+
+
+def test_what_waits_for_its_topic_is_sent_after_the_engine(
+    running: Any, wait: Any, tmp_path: Any
+) -> None:
+    received: list[str] = []
+    running.robot.create_subscription(
+        "/late", "std_msgs/msg/String", lambda message: received.append(message.data)
+    )
+    engine = QtQml.QQmlEngine()
+    install(engine, running.session)
+    from conftest import Bench
+
+    other = Bench(running.session, engine, running.world, tmp_path / "other")
+    script = (
+        "return Ros2.createPublisher('/late', 'std_msgs/msg/String', 5).publish({data: 'last'})"
+    )
+    assert other.run(script) is True
+    assert received == []
+    for item in (*other._roots, engine):
+        item.deleteLater()
+    send_deferred_deletes()
+    wait(lambda: received == ["last"])

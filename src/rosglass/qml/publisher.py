@@ -33,8 +33,11 @@ if TYPE_CHECKING:
     from rosglass.comm.publisher import Publisher as Sender
     from rosglass.messages import Message, MessageType
     from rosglass.qml.runtime import Runtime
+    from rosglass.qml.session import Session
 
 __all__ = ["Publisher", "RosPublisher"]
+
+_log = logging.getLogger("rosglass.qml")
 
 #: Maximum seconds that a message waits for its topic to be advertised and the node connected.
 _HOLD_TIMEOUT_S = 2.0
@@ -222,6 +225,10 @@ class Publisher(Element):
         limit = self._qos.send_timeout
         longest = _HOLD_TIMEOUT_S if limit is None else min(_HOLD_TIMEOUT_S, limit.seconds)
         self._held.append((message, time.monotonic() + longest))
+        if self._config is None:
+            # The interface may end before the next event.
+            self._run_update()
+        self._cleanup["held"] = self._report_held
 
     def _send_held(self) -> None:
         """Send held messages once subscribers can receive them; drop those that are too old."""
@@ -248,6 +255,12 @@ class Publisher(Element):
         if not held:
             self._reference = None
 
+    def _report_held(self) -> None:
+        """Log what an interface that has ended did not send."""
+        if self._held and self._config is None:
+            text = "the interface ended before there was a node"
+            _log.error("nothing was published on %s: %s", self._topic, text)
+
     def _on_sent_late(self, result: Error | None) -> None:
         """Log that a message could not be sent after waiting for the network."""
         if result is not None and is_alive(self):
@@ -267,6 +280,27 @@ class Publisher(Element):
 
     def _factory(self, node: Node) -> Callable[[], Sender]:
         return lambda: node.create_publisher(self._topic, self._type, self._qos)
+
+    def _dispose(self, session: Session, endpoint: Sender) -> None:
+        # What is held goes out first if the interface has ended.
+        held = [] if is_alive(self) else list(self._held)
+        if not held:
+            super()._dispose(session, endpoint)
+            return
+        self._held.clear()
+
+        def send() -> None:
+            try:
+                for message, deadline in held:
+                    if time.monotonic() > deadline:
+                        raise Error("it was not sent in time before the interface ended")
+                    endpoint.publish(message)
+            except Error as error:
+                _log.error("nothing was published on %s: %s", endpoint.topic, error)
+            finally:
+                endpoint.close()
+
+        session.background(send)
 
     def _on_created(self, endpoint: Sender) -> None:
         self._resolved = endpoint.topic
