@@ -12,7 +12,8 @@ from rosglass.extras import install_command
 from rosglass.qml import Session
 from rosglass.qml.runner import Runner, needs_widgets
 from rosglass.qml.waiting import wait_for
-from rosglass.qt import QtCore, is_alive
+from rosglass.qt import QtCore, Signal, is_alive
+from rosglass.tf import Transform, TransformBroadcaster
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -73,6 +74,82 @@ def test_reload_keeps_the_node_and_collects_the_old_interface(
         assert window.title() == title
     assert colour(runner) == "#00ff00"
     wait(lambda: len(world.publishers) == 1 and len(world.subscriptions) == 1)
+
+
+LISTENING = """import QtQuick 2.15
+import QtQuick.Window 2.15
+import Ros2 1.0
+Item {
+    id: root
+    property string version: "one"
+    property var publisher
+    property var subscription
+    Component.onCompleted: {
+        Ros2.init("ui")
+        publisher = Ros2.createPublisher("/effect", "std_msgs/msg/String", 10)
+        subscription = Ros2.createSubscription("/chat", "std_msgs/msg/String", 10)
+        // Names of the file are gone with it; what a function has captured is not.
+        const mine = version, send = publisher, effect = what => () => {
+            send.publish({data: mine + " " + what})
+        }
+        arm.moved.connect(effect("arm"))
+        subscription.newMessage.connect(effect("message"))
+        root.parentChanged.connect(() => {
+            root.Window.window.windowTitleChanged.connect(effect("title"))
+        })
+        TfTransformListener.transformChanged.connect(effect("transform"))
+    }
+}
+"""
+
+
+class Arm(QtCore.QObject):
+    """An object of the program, which outlives each interface."""
+
+    moved = Signal()
+
+
+def test_functions_of_a_file_end_when_it_is_reloaded(
+    app: Any, file: Path, world: LocalWorld, wait: Any
+) -> None:
+    session = Session(connect=world.connect)
+    robot, arm, received = world.connect(None, "robot"), Arm(), []
+    robot.create_subscription(
+        "/effect", "std_msgs/msg/String", lambda m: received.append(m.data), qos=10
+    )
+    chat = robot.create_publisher("/chat", "std_msgs/msg/String")
+    tf = TransformBroadcaster(robot)
+    file.write_text(LISTENING)
+    runner = Runner(file, session)
+    runner.prepare(lambda engine: engine.rootContext().setContextProperty("arm", arm))
+    wanted = {"arm", "message", "title", "transform"}
+    try:
+        for number, version in enumerate(("one", "two", "three")):
+            file.write_text(LISTENING.replace('"one"', f'"{version}"'))
+            assert runner.reload() if number else runner.load() is None
+            wait.settled(session)
+            received.clear()
+
+            def effects(version: str = version) -> bool:
+                arm.moved.emit()
+                chat.publish(data="x")
+                runner.window.setTitle(f"title {len(received)}")
+                at = Transform(frame_id="map", child_frame_id="base", stamp=robot.now())
+                tf.send_transform(at)
+                return {text.split()[1] for text in received if version in text} == wanted
+
+            wait(effects)
+            wait.settled(session)
+            assert {text.split()[0] for text in received} == {version}
+        # One that was never shown connects nothing that stays.
+        file.write_text(LISTENING.replace('"one"', '"four"') + "Item { }")
+        assert not runner.reload()
+        arm.moved.emit()
+        wait.settled(session)
+        assert {text.split()[0] for text in received} == {"three"}
+    finally:
+        runner.close()
+        session.close()
 
 
 def test_errors_are_shown_over_the_last_good_interface(

@@ -742,6 +742,53 @@ def test_a_file_is_reloaded(over: Over) -> None:
     over.wait(lambda: overlay.problem == "")
 
 
+def test_functions_of_a_file_end_when_it_is_reloaded(over: Over) -> None:
+    here = over.qml(
+        """Item {
+            property string version: "one"
+            property var shown: rviz.displays
+            Component.onCompleted: {
+                // Names of the file are gone with it; what a function has captured is not.
+                const mine = version, own = rviz
+                const note = what => () => {
+                    own.config = {calls: own.config.calls.concat([mine + " " + what])}
+                }
+                own.config = {calls: []}
+                own.toolManager.toolChanged.connect(note("tool"))
+                own.displaysChanged.connect(note("displays"))
+                own.registerFloatProperty("Speed", 0.5).valueChanged.connect(note("speed"))
+            }
+        }""",
+        watch=True,
+    )
+    overlay = here.overlay
+
+    def calls() -> list[str]:
+        return list(overlay.properties.get_config()["calls"])
+
+    def act(speed: float) -> list[str]:
+        overlay.properties.set_config({"calls": []})
+        next(tool for tool in over.access.tools.all[:2] if not tool.selected).select()
+        overlay.properties.properties["Speed"].set(speed)
+        over.access.displays.add("rviz/Axes").remove()
+        wanted = ("tool", "speed", "displays")
+        over.wait(lambda: {call.split()[1] for call in calls()} >= {*wanted})
+        over.frames(2)
+        return sorted({*calls()})
+
+    assert act(2) == ["one displays", "one speed", "one tool"]
+    good = overlay.file.read_text()
+    for number, version in enumerate(("two", "three")):
+        overlay.file.write_text(good.replace('"one"', f'"{version}"'))
+        over.wait(lambda version=version: overlay.root.property("version") == version)
+        over.frames(1)
+        assert act(3 + number) == [f"{version} displays", f"{version} speed", f"{version} tool"]
+    # One with errors connects nothing, and the last one goes on.
+    overlay.file.write_text(good.replace('"one"', '"four"') + "Item { }")
+    over.wait(lambda: overlay.problem != "")
+    assert act(9) == ["three displays", "three speed", "three tool"]
+
+
 def test_overlays_come_and_go(over: Over) -> None:
     """What they followed is not followed any longer."""
     for _ in range(3):

@@ -26,7 +26,7 @@ from rosglass.qml.session import Session
 from rosglass.qt import QtCore, QtGui, QtQml, QtQuick, optional, run_event_loop
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
 __all__ = ["Application"]
@@ -130,14 +130,30 @@ class Application(Handle):
                 raise
             # QML does not keep them alive.
             self._context = dict(context or {})
-            for word, value in self._context.items():
-                self.engine.rootContext().setContextProperty(word, value)
+            self.prepare(self._set_context)
             self._loaded = self._closed = False
 
     @property
     def engine(self) -> QtQml.QQmlEngine:
-        """The QML engine, e.g. for image providers."""
+        """The QML engine of the interface; a reload makes another one: see :meth:`prepare`."""
         return self._runner.engine
+
+    def prepare(self, job: Callable[[QtQml.QQmlEngine], None]) -> None:
+        """Call a function with the engine, and with that of each reload before it loads the file.
+
+        Args:
+            job: E.g. ``lambda engine: engine.addImageProvider("plots", Plots())``.
+
+        Raises:
+            Error: The job cannot be called.
+        """
+        if not callable(job):
+            raise Error(f"prepare: expected a function of the engine, got {job!r:.80}")
+        self._runner.prepare(job)
+
+    def _set_context(self, engine: QtQml.QQmlEngine) -> None:
+        for word, value in self._context.items():
+            engine.rootContext().setContextProperty(word, value)
 
     @property
     def window(self) -> QtQuick.QQuickWindow | None:

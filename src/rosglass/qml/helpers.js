@@ -58,8 +58,6 @@
         return names
     }
 
-    function forgetAbsent() { absent.clear() }
-
     const times = makeTimes(prototype, host, base)
     const arrays = makeArrays(prototype, host)
 
@@ -170,6 +168,6 @@
     return {
         build: build, buildWithNan: buildWithNan, shape: shape,
         makeTime: times.make, clock: times.clock, createTime: times.create, timeParts: times.parts,
-        makeQos: makeQos, makeOptions: makeOptions, forgetAbsent: forgetAbsent
+        makeQos: makeQos, makeOptions: makeOptions
     }
 })

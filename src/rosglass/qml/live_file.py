@@ -16,7 +16,6 @@ from rosglass.extras import install_command
 from rosglass.qml.log import forget_repeats, log_engine_warnings, plain_path
 from rosglass.qml.modules import import_folder, install, interface_file, is_own_window
 from rosglass.qml.renderer_choice import imported_modules
-from rosglass.qml.runtime import runtime_of
 from rosglass.qml.watchdog import Watchdog
 from rosglass.qt import QT6, QtCore, QtQml, Signal, address, is_alive
 
@@ -271,12 +270,12 @@ class ErrorView:
     """Shows errors, in one item per window.
 
     Args:
-        engine: The engine of the interface.
+        live: The file with the errors.
         look: The QML file of the item, with properties ``heading`` and ``text``.
     """
 
-    def __init__(self, engine: QtQml.QQmlEngine, look: Path) -> None:
-        self._engine, self._look = engine, look
+    def __init__(self, live: LiveFile, look: Path) -> None:
+        self._live, self._look = live, look
         self._component: QtQml.QQmlComponent | None = None
         #: The items, while there are errors.
         self.items: list[Any] = []
@@ -292,7 +291,7 @@ class ErrorView:
         """
         self.hide()
         url = QtCore.QUrl.fromLocalFile(str(self._look))
-        component = self._component = QtQml.QQmlComponent(self._engine, url)
+        component = self._component = QtQml.QQmlComponent(self._live.engine, url)
         for window in windows:
             item: Any = component.create()
             item.setProperty("heading", heading)
@@ -317,10 +316,14 @@ class Made(NamedTuple):
     root: QtCore.QObject
     #: Must live as long as the root: dropping it destroys the root.
     component: QtQml.QQmlComponent
+    engine: QtQml.QQmlEngine
 
 
 class LiveFile(QtCore.QObject):
-    """A QML file, its engine, and the interface created from it last.
+    """A QML file, the interface created from it last, and its engine.
+
+    Each interface has an engine of its own: when that is destroyed, no function runs any more that
+    the file has connected to signals of objects that live on, as ``rviz`` or those of the program.
 
     Callers pass the result of :meth:`create` to :meth:`replace`, so that the current interface
     stays if the file has errors.
@@ -354,19 +357,37 @@ class LiveFile(QtCore.QObject):
         #: The objects created last; None before the first.
         self.made: Made | None = None
         self._deferred = False
-        self._closed = False
-        self.engine = QtQml.QQmlEngine()
-        log_engine_warnings(self.engine)
-        # The engine searches the last path first: our own modules are added last.
-        for path in [*_environment_paths(), *map(str, reversed(self._folders))]:
-            self.engine.addImportPath(path)
+        self._closed = self._used = False
         self._is_own = is_own_window(self.path)
-        install(self.engine, session, own_window=self._is_own)
-        Watchdog.of(session).watch(self.engine, self.script_ended.emit)
+        self._preparations: list[Callable[[QtQml.QQmlEngine], None]] = []
+        #: The engine of the interface shown, or before the first, the one that it will have.
+        self.engine = self._new_engine()
         session.call_ended.connect(self._go_on)
         self._watcher: Watcher | None = None
         # Before reading any file, so that no change is missed.
         self.watch = watch
+
+    def prepare(self, job: Callable[[QtQml.QQmlEngine], None]) -> None:
+        """Call a function with the engine, and with each later one before it loads the file."""
+        self._preparations.append(job)
+        job(self.engine)
+
+    def _new_engine(self) -> QtQml.QQmlEngine:
+        engine = QtQml.QQmlEngine()
+        log_engine_warnings(engine)
+        # The engine searches the last path first: our own modules are added last.
+        for path in [*_environment_paths(), *map(str, reversed(self._folders))]:
+            engine.addImportPath(path)
+        install(engine, self._session, own_window=self._is_own)
+        Watchdog.of(self._session).watch(engine, self.script_ended.emit)
+        for job in self._preparations:
+            job(engine)
+        return engine
+
+    def _drop_engine(self, engine: QtQml.QQmlEngine) -> None:
+        if is_alive(engine):
+            Watchdog.of(self._session).forget(engine)
+            engine.deleteLater()
 
     @property
     def watch(self) -> bool:
@@ -400,20 +421,22 @@ class LiveFile(QtCore.QObject):
         """
         if not os.path.isfile(self.path):  # noqa: PTH113 - pathlib's may raise
             raise QmlError(f"{self.path}: there is no such file")
-        self.engine.clearComponentCache()
         forget_repeats()
-        runtime = runtime_of(self.engine)
-        if runtime is not None:
-            runtime.forget_warnings()
-        paths = self.engine.importPathList()
+        engine = self._new_engine() if self._used else self.engine
+        self._used = True
+        paths = engine.importPathList()
         if QT6 and not self._is_own:
             for module in sorted(imported_modules(self.path, paths) & _REGISTERED_BY.keys()):
                 import_module(_REGISTERED_BY[module]).register()
-        component = QtQml.QQmlComponent(self.engine, QtCore.QUrl.fromLocalFile(str(self.path)))
-        root = create(component, self.engine)
+        component = QtQml.QQmlComponent(engine, QtCore.QUrl.fromLocalFile(str(self.path)))
+        root = create(component, engine)
         if root is None:
-            raise QmlError(error_list(component.errors(), self.path))
-        return Made(root, component)
+            errors = error_list(component.errors(), self.path)
+            if engine is not self.engine:
+                component.deleteLater()
+                self._drop_engine(engine)
+            raise QmlError(errors)
+        return Made(root, component, engine)
 
     def replace(self, made: Made, show: Callable[[], None]) -> None:
         """Replace the previous interface by a new one and destroy the previous one.
@@ -423,6 +446,9 @@ class LiveFile(QtCore.QObject):
             show: Shows it; called before the previous interface is destroyed.
         """
         before, self.made = self.made, made
+        unused, self.engine = self.engine, made.engine
+        if before is None and unused is not made.engine:
+            self._drop_engine(unused)
         self._session.holding += 1
         try:
             show()
@@ -433,15 +459,22 @@ class LiveFile(QtCore.QObject):
 
     def drop(self, made: Made) -> None:
         """Destroy an interface; its clean-up must not shut down its successor's node."""
-        root, component = made
+        root, component, engine = made
         if not is_alive(root):
-            self._dropped(component)
+            self._dropped(component, engine)
             return
         self._session.holding += 1
 
-        def dropped() -> None:
+        def gone() -> None:
             self._session.holding -= 1
-            self._dropped(component)
+
+        def dropped() -> None:
+            if engine is self.engine or not is_alive(engine):
+                gone()
+            else:
+                # Until then, singletons of the file may shut the node down.
+                engine.destroyed.connect(lambda *_: gone())
+            self._dropped(component, engine)
 
         # After access to a signal of an object from QML, PySide2 would keep its half of it forever.
         end = QtCore.QObject(root)
@@ -460,13 +493,13 @@ class LiveFile(QtCore.QObject):
         self.watch = False
         self._closed = True
         self._session.call_ended.disconnect(self._go_on)
-        Watchdog.of(self._session).forget(self.engine)
         made, self.made = self.made, None
         if made is not None and hold:
             self.drop(made)
-        for item in (*(made or ()), self.engine):
+        for item in made[:2] if made is not None else ():
             if is_alive(item):
                 item.deleteLater()
+        self._drop_engine(self.engine)
 
     def _go_on(self) -> None:
         # The call that has ended must still return into QML.
@@ -478,12 +511,11 @@ class LiveFile(QtCore.QObject):
         if not self._closed:
             self.due.emit()
 
-    def _dropped(self, component: QtQml.QQmlComponent) -> None:
+    def _dropped(self, component: QtQml.QQmlComponent, engine: QtQml.QQmlEngine) -> None:
         if is_alive(component):
             component.deleteLater()
-        if is_alive(self.engine) and not self._closed:
-            # Publishers of the old interface live until they are collected.
-            self.engine.collectGarbage()
+        if engine is not self.engine:
+            self._drop_engine(engine)
 
 
 def _environment_paths() -> list[str]:

@@ -21,11 +21,11 @@ from rosglass.qml.live_file import (
 )
 from rosglass.qml.renderer_choice import choice, need_in_file, need_in_items
 from rosglass.qml.runtime import runtime_of
-from rosglass.qt import QtCore, QtGui, QtQuick, Slot, is_alive, send_deferred_deletes
+from rosglass.qt import QtCore, QtGui, QtQml, QtQuick, Slot, is_alive, send_deferred_deletes
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from rosglass.qml.session import Session
 
@@ -159,10 +159,8 @@ class Runner(QtCore.QObject):
         super().__init__()
         self._live = LiveFile(file, session, watch=watch, import_paths=import_paths)
         self.file, self.session = self._live.path, session
-        self.engine = self._live.engine
         self._fullscreen = fullscreen or kiosk
-        self.engine.quit.connect(self._quit)
-        self.engine.exit.connect(self.exit)
+        self.prepare(self._follow)
         session.killed.connect(self._on_killed)
         session.forgotten.connect(self._on_forgotten)
         session.initialized.connect(self._on_initialized)
@@ -174,8 +172,8 @@ class Runner(QtCore.QObject):
         self.exit_code: int | None = None
         #: Whether we created `window`, for an interface that is not a window itself.
         self._own = False
-        self._errors = ErrorView(self.engine, _ERRORS)
-        self._notice = ErrorView(self.engine, PANEL)
+        self._errors = ErrorView(self._live, _ERRORS)
+        self._notice = ErrorView(self._live, PANEL)
         #: Whether the interface did not call init(), so that the line to add is shown.
         self._without_node = False
         self._live.script_ended.connect(self._tell_script_ended)
@@ -183,6 +181,19 @@ class Runner(QtCore.QObject):
         app: Any = QtCore.QCoreApplication.instance()
         if kiosk and app is not None:
             self._kiosk = Kiosk(app)
+
+    @property
+    def engine(self) -> QtQml.QQmlEngine:
+        """The engine of the interface; a reload makes another one."""
+        return self._live.engine
+
+    def prepare(self, job: Callable[[QtQml.QQmlEngine], None]) -> None:
+        """Call a function with the engine, and with each later one before it loads the file."""
+        self._live.prepare(job)
+
+    def _follow(self, engine: QtQml.QQmlEngine) -> None:
+        engine.quit.connect(self._quit)
+        engine.exit.connect(self.exit)
 
     def load(self) -> None:
         """Show the file; if it has errors and is watched, show it as soon as they are fixed.

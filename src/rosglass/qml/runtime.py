@@ -181,7 +181,6 @@ _HELPERS = (
     "clock",
     "makeQos",
     "makeOptions",
-    "forgetAbsent",
 )
 _PROMISE = """(function () {
     let made = {}
@@ -283,12 +282,6 @@ class Runtime(QtCore.QObject):
             if line.lstrip("-").isdigit() and not path.startswith(_OWN_SCRIPTS):
                 return Caller(path, max(int(line), 0), function)
         return Caller(_NO_FILE, 0, "")
-
-    def forget_warnings(self) -> None:
-        """Allow warnings about missing fields to be repeated, as the files may have changed."""
-        self._host.named.clear()
-        if "_helper" in self.__dict__:
-            self._call("forgetAbsent", [])
 
     def keep(self, item: QtCore.QObject) -> QtCore.QObject:
         """Transfer the ownership of an object to JavaScript's garbage collector."""

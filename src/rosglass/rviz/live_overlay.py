@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from rosglass.qml.live_file import Made
     from rosglass.qml.session import Session
+    from rosglass.qt import QtQml
     from rosglass.rviz.access import Access
 
 __all__ = ["LiveOverlay"]
@@ -62,19 +63,27 @@ class LiveOverlay(Overlay):
         super().__init__(name or self.file.stem, **options)
         self.session = session
         self._live = LiveFile(file, session, watch=watch, import_paths=import_paths)
-        self.engine = self._live.engine
-        self.engine.addImportPath(str(_IMPORTS))
-        self.engine.quit.connect(self._quit)
-        self.engine.exit.connect(self._exit)
         #: The object ``rviz`` in QML.
         self.properties = RvizObject(self, self.engine, access)
-        self.engine.rootContext().setContextProperty("rviz", self.properties)
+        self._live.prepare(self._prepare)
         self._root: Any = None
         self._error = ""
-        self._errors = ErrorView(self.engine, PANEL)
+        self._errors = ErrorView(self._live, PANEL)
         self._closed = self._loading = False
         self._live.due.connect(self.reload)
         self._live.script_ended.connect(self._on_script_ended)
+
+    @property
+    def engine(self) -> QtQml.QQmlEngine:
+        """The engine of the interface; a reload makes another one."""
+        return self._live.engine
+
+    def _prepare(self, engine: QtQml.QQmlEngine) -> None:
+        engine.addImportPath(str(_IMPORTS))
+        engine.quit.connect(self._quit)
+        engine.exit.connect(self._exit)
+        self.properties.serve(engine)
+        engine.rootContext().setContextProperty("rviz", self.properties)
 
     # Of each 3D view.
 
@@ -156,6 +165,7 @@ class LiveOverlay(Overlay):
             made = self._live.create()
             self._check(made)
         except QmlError as error:
+            self.properties.serve(self.engine)
             self._show_error(str(error))
             raise
         finally:

@@ -53,6 +53,8 @@ __all__ = ["ACCESS", "RvizObject"]
 ACCESS = "3D view"
 #: Name of the image provider of icons, after ``image://``.
 _ICONS = "rviz_tool_icons"
+#: What an object `rviz` has for one engine.
+_PARTS = ("runtime", "_engine", "_icons", "tool_manager", "display_wrappers", "camera")
 #: Default and maximum size of an icon in pixels.
 _ICON_SIZE, _MAX_ICON_SIZE = 48, 1024
 #: Minimum movement of the camera in metres that `moved` reports.
@@ -421,26 +423,21 @@ class RvizObject(RegisteredProperties):
     configLoaded = Signal(str, arguments=["file"])
 
     runtime: Runtime
+    _engine: QtQml.QQmlEngine
 
     def __init__(
         self, overlay: Overlay, engine: QtQml.QQmlEngine, access: Access | None = None
     ) -> None:
         super().__init__()
-        runtime = runtime_of(engine)
-        assert runtime is not None
-        self.runtime = runtime
-        self._engine = engine
+        #: What belongs to engines other than the present one, while a file is reloaded.
+        self._others: dict[int, dict[str, Any]] = {}
+        self._follows_status = False
+        self.serve(engine)
+        runtime = self.runtime
         self.overlay = overlay
         self._visible = overlay.visible
         self._disconnects: list[Callable[[], Any]] = []
-        #: Keeps the Python half of the image provider alive, which the engine owns. Files may use
-        #: it without the object, and before.
-        self._icons = ToolIcons(weak_callback(self._find_tool))
-        engine.addImageProvider(_ICONS, self._icons)
         QtQml.QQmlEngine.setObjectOwnership(self, QtQml.QQmlEngine.ObjectOwnership.CppOwnership)
-        # QML may use the object as long as the engine exists.
-        held = [self, spell_checked(runtime, self)]
-        engine.destroyed.connect(lambda *_: held.clear())
         self._follow(overlay.arranged, self._on_arranged)
         self._access = access = access or runtime.session.shared.get(ACCESS)
         if access is not None:
@@ -449,6 +446,36 @@ class RvizObject(RegisteredProperties):
             self._follow(access.config_loaded, self.configLoaded)
             self._follow(access.fixed_frame_changed, self.fixedFrameChanged)
             self._follow(access.frame_rate_changed, self.frameRateChanged)
+
+    def serve(self, engine: QtQml.QQmlEngine) -> None:
+        """Work with an engine, which may be the one before; the previous one is kept until it ends.
+
+        The objects that QML gets from this one belong to the engine, so that functions that a file
+        has connected to their signals end with it.
+        """
+        state, others = self.__dict__, self._others
+        if "_engine" in state:
+            key = id(self._engine)
+            others[key] = {name: state.pop(name) for name in _PARTS if name in state}
+        known = others.pop(id(engine), None)
+        if known is not None:
+            state.update(known)
+            return
+        runtime = runtime_of(engine)
+        assert runtime is not None
+        self.runtime, self._engine = runtime, engine
+        #: Keeps the Python half of the image provider alive, which the engine owns. Files may use
+        #: it without the object, and before.
+        self._icons = ToolIcons(weak_callback(self._find_tool))
+        engine.addImageProvider(_ICONS, self._icons)
+        # QML may use the object as long as the engine exists.
+        held, key = [self, spell_checked(runtime, self)], id(engine)
+
+        def ended(*_: object) -> None:
+            held.clear()
+            others.pop(key, None)
+
+        engine.destroyed.connect(ended)
 
     def _follow(self, signal: Any, slot: Any) -> None:
         signal.connect(slot)
@@ -495,7 +522,9 @@ class RvizObject(RegisteredProperties):
         wrappers.changed.connect(self.displaysChanged)
         wrappers.added.connect(self.displayAdded)
         wrappers.removed.connect(self.displayRemoved)
-        displays.status_changed.connect(self.statusChanged)
+        if not self._follows_status:
+            self._follows_status = True
+            displays.status_changed.connect(self.statusChanged)
         return wrappers
 
     @cached_property
