@@ -230,7 +230,7 @@ class Element(QtCore.QObject):
                 # It may have no engine any more: a Repeater destroys what it has just made if its
                 # model changes. It is gone before the next attempt then.
                 self._is_unprepared = True
-                QtCore.QTimer.singleShot(_UNPREPARED_MS, self, self._schedule)
+                QtCore.QTimer.singleShot(_UNPREPARED_MS, self._schedule)
             return False
         session = self._session = runtime.session
         self._steady = session.steady
