@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -617,16 +616,14 @@ def test_controls_face_the_viewer_or_stay_fixed_or_turn_with_the_marker(
 def test_markers_fade_when_their_frame_is_not_updated(
     bench: SceneBench, show: Callable[..., Any], monkeypatch: Any
 ) -> None:
-    from rosglass import Time
     from rosglass.scene import display as displays
     from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 0.5)
     broadcaster = TransformBroadcaster(bench.robot)
-    sent = itertools.count(1)
 
     def move() -> None:
-        stamp = Time.from_parts(1, next(sent))
+        stamp = bench.robot.now()
         broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), stamp, "map", "gripper"))
 
     display = show(

@@ -465,7 +465,6 @@ def test_a_robot_whose_transforms_stop_fades(bench: SceneBench, monkeypatch: Any
 def test_a_robot_fades_when_one_of_its_joints_is_not_updated(
     bench: SceneBench, monkeypatch: Any
 ) -> None:
-    from rosglass import Time
     from rosglass.scene import display
     from rosglass.tf import Transform, TransformBroadcaster
 
@@ -474,10 +473,9 @@ def test_a_robot_fades_when_one_of_its_joints_is_not_updated(
     (robot,) = view.scene.displays
     publish(bench, URDF)
     broadcaster = TransformBroadcaster(bench.robot)
-    sent = itertools.count(1)
 
     def move(*links: tuple[str, str]) -> None:
-        stamp = Time.from_parts(5, next(sent))
+        stamp = bench.robot.now()
         for parent, child in links:
             broadcaster.send_transform(Transform((0, 0, 0), (0, 0, 0, 1), stamp, parent, child))
 
