@@ -123,13 +123,15 @@ class SampleWriter:
             if self._closed:
                 raise NodeClosedError(f"{self._place}: the publisher is closed")
             serdata = sample(self._type, parts, self._place)
-            if self._flow is not None and self._flow.hold(serdata, sum(map(len, parts))):
-                return
+            held = False
             try:
-                if not send(self.entity, serdata, self._place):
+                if self._flow is not None:
+                    held = self._flow.hold(serdata, sum(map(len, parts)))
+                if not held and not send(self.entity, serdata, self._place):
                     self._retry(serdata)
             finally:
-                discard(serdata)
+                if not held:
+                    discard(serdata)
 
     def _retry(self, serdata: int) -> None:
         """Repeat a write until its timeout; signals such as Ctrl-C are handled in between."""
@@ -171,9 +173,11 @@ class SampleWriter:
 
     def _stop(self) -> None:
         """Wait for writes in other threads: the writer will be deleted with the participant."""
-        self._closed = True
+        lingers, self._closed = self._closed, True
         # With a timeout: a signal may have interrupted this thread while it holds the lock.
         if self._lock.acquire(timeout=_STOP_TIMEOUT_S):
+            if self._flow is not None and not lingers:
+                self._flow.close()
             self._lock.release()
 
     def _delete(self) -> None:

@@ -132,6 +132,7 @@ class FlowControl:
 
     def close(self) -> None:
         """Drop what still waits."""
+        self._stalled = False
         while self._waiting:
             discard(self._waiting.popleft()[0])
         self._pump.forget(-self._writer)
