@@ -206,7 +206,7 @@ def test_a_key_held_down_neither_stutters_nor_drives_again_after_a_stop(
     assert robot.commands
     assert all(c[1] > 0 for c in robot.commands), robot.commands
     cockpit.key("press", "Key_Space")
-    robot.until(lambda: robot.stopped is True)
+    cockpit.until("stop", "stopped")
     cockpit.call("stop", "release")
     robot.until(lambda: robot.stopped is False)
     cockpit.until("drive", "obstacle", "")

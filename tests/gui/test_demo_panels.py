@@ -185,3 +185,40 @@ def test_the_cockpit_grows_with_screens_that_report_no_resolution(
     wait(lambda: window.property("zoom") == zoom)
     cockpit = window.findChild(QtCore.QObject, "cockpit")
     wait(lambda: (cockpit.width(), cockpit.height()) == (width / zoom, height / zoom))
+
+
+def test_a_release_in_an_outage_does_not_undo_a_stop_of_that_time(
+    running: Any, wait: Callable[..., None]
+) -> None:
+    root = running.load(
+        """Item {
+            EmergencyStop { id: button }
+            property bool fresh: button.counter.fresh && button.known
+            property string wanted: String(button.wanted)
+            property string problem: button.problem
+            function release() { button.release() }
+        }""",
+        f'import QtQuick 2.15\nimport "{COCKPIT.as_uri()}"',
+    )
+    robot, released = running.robot, list[int]()
+    state = robot.create_publisher("/emergency_stop/state", "std_msgs/msg/Bool")
+    counter = robot.create_publisher("/emergency_stop/counter", "std_msgs/msg/UInt32")
+    robot.create_subscription(
+        "/emergency_stop/release", "std_msgs/msg/UInt32", lambda m: released.append(m.data)
+    )
+
+    def say(number: int) -> bool:
+        counter.publish(data=number)
+        state.publish(data=True)
+        return bool(root.property("fresh"))
+
+    wait(lambda: say(1))
+    wait(lambda: not root.property("fresh"))
+    root.release()
+    wait(lambda: say(2))  # after another operator's stop
+    wait(lambda: say(3) and root.property("wanted") == "null")
+    assert released == []
+    assert "unknown" in root.property("problem")
+    root.release()
+    wait(lambda: released)
+    assert set(released) == {3}

@@ -15,11 +15,10 @@ Item {
     property var wanted: null
     readonly property bool known: state_.fresh
     readonly property bool stopped: known && state_.message.data
-    // Pressed, and not confirmed yet: the state received last is older than that.
-    property bool expected: false
-    // The number that a release names; null until it is known.
+    // The number that a release names; null if there was none. It is not looked up later: that
+    // number may be of the time after another operator's stop.
     property var named: null
-    readonly property bool pending: wanted !== null && (!known || stopped !== wanted || expected)
+    readonly property bool pending: wanted !== null && (!known || stopped !== wanted)
     property bool overdue: false
     // Released here, and stopped again at once: another operator holds it.
     property bool contested: false
@@ -43,14 +42,13 @@ Item {
 
     function press() {
         cancelHold()
-        expected = !stopped
         wanted = true
         begin()
     }
 
     function release() {
         wanted = false
-        named = expected || !counter.fresh ? null : counter.message.data
+        named = counter.fresh ? counter.message.data : null
         sinceRelease.restart()
         begin()
     }
@@ -75,7 +73,7 @@ Item {
 
     function send() {
         if (wanted === false && named === null) {
-            problem = "the robot's counter is unknown"
+            problem = "the robot's counter was unknown"
             return
         }
         const to = wanted ? publisher : releasePublisher
@@ -102,11 +100,7 @@ Item {
         }
     }
 
-    onStoppedChanged: {
-        contested = stopped && wanted !== true && sinceRelease.running
-        if (stopped)
-            expected = false
-    }
+    onStoppedChanged: contested = stopped && wanted !== true && sinceRelease.running
     // Not at once: it may change what this is computed from.
     onPendingChanged: Qt.callLater(settle)
 
@@ -119,12 +113,6 @@ Item {
         topic: stop.topic + "/counter"
         messageType: "std_msgs/msg/UInt32"
         urgent: true
-        onArrived: function (message) {
-            if (stop.wanted === false && stop.named === null && !stop.expected) {
-                stop.named = message.data
-                stop.send()
-            }
-        }
     }
     Timer {
         interval: 100
