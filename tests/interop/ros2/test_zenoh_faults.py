@@ -210,6 +210,31 @@ def test_commands_that_a_stalled_link_would_deliver_late_are_dropped_here(start_
     assert received == sorted(received)
 
 
+def test_each_command_that_waits_behind_images_is_delivered_or_counted(start_router, connect):
+    router = start_router()
+    robot, cockpit = (
+        connect(name, "?mode=client", url=start_router.url) for name in ("robot", "cockpit")
+    )
+    publisher = cockpit.create_publisher("/cmd_vel", TWIST, rosglass.QoS.command())
+    camera = cockpit.create_publisher("/camera", IMAGE, rosglass.QoS.sensor_data())
+    received, seen = [], []
+    robot.create_subscription(
+        "/cmd_vel", TWIST, lambda m: received.append(m.linear.x), rosglass.QoS(1000)
+    )
+    robot.create_subscription("/camera", IMAGE, seen.append, rosglass.QoS.sensor_data())
+    eventually(publisher.subscription_count)
+    eventually(camera.subscription_count)
+    picture = camera.type.encode(data=bytes(4_000_000))
+    eventually(lambda: camera.publish_serialized(picture) or seen)
+    os.kill(router.pid, signal.SIGSTOP)
+    for _ in range(5):  # more than the system takes
+        camera.publish_serialized(picture)
+    for number in range(20):
+        publisher.publish(linear={"x": float(number)})
+    os.kill(router.pid, signal.SIGCONT)
+    eventually(lambda: len(received) + publisher.dropped == 20)
+
+
 def test_a_slow_consumer_costs_no_memory(router, start, connect):
     node = connect("cockpit")
     camera = start("-c", CAMERA.format(url=router.url, image=IMAGE))

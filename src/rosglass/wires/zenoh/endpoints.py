@@ -405,10 +405,10 @@ class ZenohWriter(Declaration, Writer):
         # camera images of the same program fill theirs while the network is stuck.
         priority = zenoh.Priority.INTERACTIVE_LOW if reliable else zenoh.Priority.DATA
         if self._window is not None:
+            # Not express: each message would take one of the queue's two batches, and be lost
+            # behind two others without being counted.
             priority = zenoh.Priority.REAL_TIME
-            return session.declare_publisher(
-                key, congestion_control=congestion, priority=priority, express=True
-            )
+            return session.declare_publisher(key, congestion_control=congestion, priority=priority)
         if self._qos.durability is Durability.VOLATILE:
             return session.declare_publisher(key, congestion_control=congestion, priority=priority)
         return zenoh.ext.declare_advanced_publisher(
