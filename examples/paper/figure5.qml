@@ -14,7 +14,7 @@ Rectangle {
     property var speech: Ros2.createPublisher("/humanoid/say", "std_msgs/msg/String", 1)
     property var gesture: Ros2.createPublisher("/humanoid/gesture", "std_msgs/msg/String", 1)
     property var stand: Ros2.createServiceClient("/humanoid/stand", "std_srvs/srv/SetBool")
-    readonly property string state_: state.message ? state.message.data : "unknown"
+    readonly property string state_: posture.message ? posture.message.data : "unknown"
     Component.onCompleted: Ros2.init("humanoid_demonstrator")
 
     function standUp(up) {
@@ -22,7 +22,7 @@ Rectangle {
                                     error => note.text = error.message)
     }
 
-    Subscription { id: state; topic: "/humanoid/state"; qos: Ros2.QoS().reliable().transient_local() }
+    Subscription { id: posture; topic: "/humanoid/state"; qos: Ros2.QoS().reliable().transient_local() }
     Subscription { id: spoken; topic: "/humanoid/spoken"; qos: Ros2.QoS().reliable().transient_local() }
     Subscription { id: joints; topic: "/humanoid/joints"; timeout: 1000 }
     Subscription { id: heat; topic: "/humanoid/heat"; timeout: 1000; throttleRate: 5 }
@@ -54,7 +54,7 @@ Rectangle {
 
         Panel {
             name: "State"
-            old: state.stale
+            old: posture.stale
             Column {
                 spacing: 10
                 Label { textFormat: Text.PlainText; text: root.state_; font.pixelSize: 28 }
@@ -76,7 +76,7 @@ Rectangle {
                     Button {
                         text: modelData
                         contentItem: Label { textFormat: Text.PlainText; text: modelData }
-                        enabled: root.state_ === "standing" && !state.stale
+                        enabled: root.state_ === "standing" && !posture.stale
                         highlighted: root.state_ === modelData
                         onClicked: gesture.publish({data: modelData})
                     }
