@@ -362,9 +362,9 @@ def test_a_picture_that_comes_while_its_stream_is_made(
     answers = []
 
     class Eager(image_stream.ImageStream):
-        def __init__(self, node: Any, topic: str, show: Any, preferred: str, *others: Any) -> None:
-            super().__init__(node, topic, show, preferred, *others)
-            answers.append(others[-1]())  # the first picture is there already
+        def __init__(self, *given: Any, **options: Any) -> None:
+            super().__init__(*given, **options)
+            answers.append(given[-1]())  # the first picture is there already
 
     monkeypatch.setattr(image_stream, "ImageStream", Eager)
     root = load(running)
