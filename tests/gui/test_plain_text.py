@@ -94,3 +94,42 @@ def test_controls_show_markup_as_it_is(bench: Any) -> None:
     assert button > 250
     assert item > 250
     assert less >= word
+
+
+def test_labels_of_controls_are_as_large_as_a_screen(bench: Any) -> None:
+    """In the style Material, 54 kB of text took 840 MB: a button's shadow is as large as it is."""
+    root: Any = bench.load(
+        """Item {
+            Button { id: wide; text: "x".repeat(50000) }
+            Button { id: high; text: "x\\n".repeat(50000) }
+            function sizes() { return JSON.stringify([wide.implicitWidth, high.implicitHeight]) }
+        }""",
+        "import QtQuick 2.15\nimport QtQuick.Controls 2.15",
+    )
+    assert all(4000 < size < 5000 for size in json.loads(root.sizes()))
+
+
+def test_labels_of_controls_have_the_baseline_of_their_text(bench: Any) -> None:
+    root: Any = bench.load(
+        """Item {
+            Label { id: label; text: "x" }
+            Button { id: button; text: "x"; font: label.font; padding: 0 }
+            ItemDelegate { id: item; text: "x"; font: label.font; padding: 0 }
+            function baselines() {
+                return JSON.stringify([label, button, item].map(c => c.baselineOffset))
+            }
+        }""",
+        "import QtQuick 2.15\nimport QtQuick.Controls 2.15",
+    )
+    label, button, item = json.loads(root.baselines())
+    assert 0 < label <= button
+    assert label <= item
+
+
+@pytest.mark.parametrize("version", ["2.4", "2.15", *(["6.0", ""] if QT6 else [])])
+def test_labels_are_plain_whatever_version_is_imported(version: str, bench: Any) -> None:
+    root: Any = bench.load(
+        "IconLabel { property bool ours: !String(this).startsWith('QQuickIconLabel'); text: 'x' }",
+        f"import QtQuick 2.15\nimport QtQuick.Controls.impl {version}",
+    )
+    assert root.property("ours")

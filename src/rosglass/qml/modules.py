@@ -132,9 +132,9 @@ def is_own_window(file: Path) -> bool:
     return file.parent == _OWN
 
 
-#: Module of Qt's that has the labels of controls, and the version of ours: the last that all of
-#: Qt's styles import, and above that which our file imports.
-_IMPL, _IMPL_VERSION = "QtQuick.Controls.impl", (6, 11) if QT6 else (2, 4)
+#: Module of Qt's that has the labels of controls, and the versions of ours: all but that which our
+#: file imports.
+_IMPL, _IMPL_VERSIONS = "QtQuick.Controls.impl", [(2, 4), (6, 0)] if QT6 else [(2, 4)]
 #: Qt's plugin with this module, and the module to load it by.
 _IMPL_PLUGIN, _IMPL_LOADER = (
     ("QtQuick/Controls/impl/*qtquickcontrols2implplugin.*", _IMPL)
@@ -175,7 +175,8 @@ def _show_plain_labels() -> None:
             warnings.simplefilter("ignore", DeprecationWarning)
             engine: Any = QtQml.QQmlEngine()
             engine.importPlugin(str(plugin), _IMPL_LOADER, [])
-        done = _register_label(Path(IMPORT_PATHS[1], "Rosglass/Controls/IconLabel.qml"))
+        file = Path(IMPORT_PATHS[1], "Rosglass/Controls/IconLabel.qml")
+        done = all(_register_label(file, *version) for version in _IMPL_VERSIONS)
     except (OSError, AttributeError):
         done = False
     finally:
@@ -195,17 +196,17 @@ def _qml_folder() -> str:
     return str(info.location(info.Qml2ImportsPath))
 
 
-def _register_label(file: Path) -> bool:
+def _register_label(file: Path, major: int, minor: int) -> bool:
     """Register a QML file as the IconLabel of Qt's module; return whether Qt accepts it."""
     url = QtCore.QUrl.fromLocalFile(str(file))
     if QT6:
         register: Any = QtQml.qmlRegisterType
-        return int(register(url, _IMPL, *_IMPL_VERSION, "IconLabel")) >= 0
+        return int(register(url, _IMPL, major, minor, "IconLabel")) >= 0
     # PySide2 registers Python's classes only.
     call = ctypes.CDLL(_LIBRARY)[_REGISTER]
     call.restype, call.argtypes = ctypes.c_int, [ctypes.c_int, ctypes.c_void_p]
     pointer = ctypes.c_void_p.from_address(address(url)).value
-    made = _CompositeType(pointer, _IMPL.encode(), *_IMPL_VERSION, b"IconLabel")
+    made = _CompositeType(pointer, _IMPL.encode(), major, minor, b"IconLabel")
     return int(call(_COMPOSITE, ctypes.byref(made))) >= 0
 
 

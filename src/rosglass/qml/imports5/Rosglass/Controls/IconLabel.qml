@@ -1,6 +1,6 @@
 // Takes the place of Qt's IconLabel, the content of buttons, menu items and delegates: shows plain text.
 import QtQuick 2.15
-// Qt's own type; ours is of version 2.4.
+// Qt's own type; ours is of all later versions.
 import QtQuick.Controls.impl 2.3 as Impl
 
 Item {
@@ -19,8 +19,10 @@ Item {
     property alias rightPadding: label.rightPadding
     property alias bottomPadding: label.bottomPadding
 
-    implicitWidth: label.implicitWidth
-    implicitHeight: label.implicitHeight
+    // Beyond this it is elided: the style Material draws shadows of a button in its size, in memory.
+    implicitWidth: Math.min(label.implicitWidth, 4096)
+    implicitHeight: Math.min(label.implicitHeight, 4096)
+    baselineOffset: label.baselineOffset
 
     Impl.IconLabel {
         id: label

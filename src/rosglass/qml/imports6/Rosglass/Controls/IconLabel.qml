@@ -1,7 +1,7 @@
 // Takes the place of Qt's IconLabel, the content of buttons, menu items and delegates: shows plain text.
 import QtQuick 2.15
-// Qt's own type; ours is of version 6.11.
-import QtQuick.Controls.impl 6.10 as Impl
+// Qt's own type; ours is of all later versions.
+import QtQuick.Controls.impl 2.3 as Impl
 
 Item {
     id: root
@@ -20,8 +20,10 @@ Item {
     property alias rightPadding: label.rightPadding
     property alias bottomPadding: label.bottomPadding
 
-    implicitWidth: label.implicitWidth
-    implicitHeight: label.implicitHeight
+    // Beyond this it is elided: the style Material draws shadows of a button in its size, in memory.
+    implicitWidth: Math.min(label.implicitWidth, 4096)
+    implicitHeight: Math.min(label.implicitHeight, 4096)
+    baselineOffset: label.baselineOffset
 
     // An alias to what is new in version 6.11 would be an endless loop in Qt's cache of compiled files.
     Binding { target: label; property: "defaultIconColor"; value: root.defaultIconColor }
