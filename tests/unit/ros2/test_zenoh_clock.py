@@ -58,6 +58,16 @@ def test_samples_collected_around_a_jump_of_the_clock_are_new(monkeypatch, jump)
     assert abs(time.time_ns() - received[0]) < HOUR / 60
 
 
+def test_samples_that_waited_in_a_program_that_stalled_are_received_late(monkeypatch):
+    session, received, steady = Session(), [], time.monotonic_ns
+    collected = _Collected(session, "key", 10, lambda _, at: received.append(at), Drain("", 0.1))
+    monkeypatch.setattr(time, "monotonic_ns", lambda: steady() + HOUR)
+    session.samples.append("sample")
+    collected.flush()
+    # By the time between stamp and reception they are late; else they would look fast.
+    assert abs(time.time_ns() - received[0]) < HOUR / 60
+
+
 @pytest.mark.parametrize("jump", JUMPS)
 def test_the_lifespan_of_latched_samples_is_none_of_the_system_clock(monkeypatch, jump):
     qos = QoS(durability=Durability.TRANSIENT_LOCAL, lifespan=Duration.from_seconds(600))

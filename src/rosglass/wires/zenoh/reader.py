@@ -78,14 +78,10 @@ class Drain:
     Args:
         name: The thread's name.
         interval_s: Seconds between two collections.
-
-    Attributes:
-        interval_ns: The same in nanoseconds.
     """
 
     def __init__(self, name: str, interval_s: float) -> None:
         self._name, self._interval_s = name, interval_s
-        self.interval_ns = int(interval_s * 1e9)
         #: Guards the state below; notified when the thread has to end.
         self._lock = threading.Condition()
         self._collected: dict[_Collected, None] = {}
@@ -213,7 +209,6 @@ class _Collected:
         self._take, self._drain = take, drain
         #: Guards reading from the channel; reentrant, as callbacks may take samples.
         self._lock = threading.RLock()
-        self._flushed_at = time.monotonic_ns()
         self._subscriber: Any = session.declare_subscriber(
             key, zenoh.handlers.FifoChannel(room), allowed_origin=_REMOTE
         )
@@ -232,15 +227,14 @@ class _Collected:
     def flush(self) -> None:
         """Hand on the waiting samples, in the calling thread."""
         with self._lock, suppress(zenoh.ZError):  # undeclared, and empty
-            now = time.monotonic_ns()
-            # Samples that waited longer, because the program was stalled, must not look new.
-            received = time.time_ns() - max(0, now - self._flushed_at - self._drain.interval_ns)
+            # Those that waited, because the program was stalled, are late by their stamps. Unless
+            # this is the time by which that is measured, they would look as if in time.
+            received = time.time_ns()
             for _ in range(_MAX_WAITING):
                 sample = self._next()
                 if sample is None:
                     break
                 self._take(sample, received)
-            self._flushed_at = now
 
 
 class _Mode(Enum):
