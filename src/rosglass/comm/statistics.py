@@ -30,8 +30,8 @@ __all__ = [
 _LATE_PERIODS = 1.5
 #: ... and is 0 this many periods or seconds after that, whichever is longer.
 _FADE_PERIODS, _FADE_S = 2.0, 2.0
-#: Number of publishers to remember; only a robot that restarts for days has more.
-_MAX_PUBLISHERS = 256
+#: Number of publishers, or frames, to remember; only a robot that restarts for days has more.
+_MAX_PUBLISHERS = 2048
 #: Largest drift between two clocks; NTP slews a clock by at most 500 ppm.
 _MAX_DRIFT = 500e-6
 #: How long the fastest message is remembered, at least, where stamps are those of headers.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import ConnectionState
@@ -73,6 +74,8 @@ _NS = 1_000_000_000
 UNKNOWN_PUBLISHER = "unknown_publisher"
 #: Number of cached publishers; a peer may create any number.
 _MAX_ORIGINS = 256
+#: Characters of a frame's name by which its delays are known.
+_MAX_SOURCE = 100
 
 
 class TransformListener(Handle):
@@ -148,10 +151,12 @@ class TransformListener(Handle):
 
     def _lateness(self, sample: Sample, items: Sequence[tuple[str, int, Entry]]) -> float:
         """Return the seconds by which dynamic transforms were delayed on their way."""
-        if self.node.clock.is_simulated:
+        if not items or self.node.has_simulated_stamps:
             return 0.0
-        newest = max((stamp for _, stamp, _ in items), default=0)
-        return self._stamps.add(sample.publisher, sample.received_ns, newest)
+        # Some frames are stamped ahead, by AMCL for a second; a bridge passes all of them on.
+        frame, newest, _ = max(items, key=itemgetter(1))
+        source = sample.publisher + frame[:_MAX_SOURCE].encode()
+        return self._stamps.add(source, sample.received_ns, newest)
 
     def _origin(self, topic: str, sample: Sample) -> _Origin:
         key = (topic, sample.publisher)

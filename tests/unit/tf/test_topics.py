@@ -41,6 +41,7 @@ class Node:
         self.wire = "ros1" if ros == 1 else "cdr"
         self.type: Any = rosglass.load(NAME, ros)
         self.clock = Clock("test", IMMEDIATE, Timers("test"))
+        self.has_simulated_stamps = False
         self.subscriptions: dict[str, Subscription] = {}
         self.profiles: dict[str, QoS] = {}
         self.sent: list[tuple[str, bytes]] = []
@@ -119,6 +120,21 @@ def test_sent_and_received(ros: int) -> None:
     assert node.profiles["/tf_static"].durability is Durability.TRANSIENT_LOCAL
     assert node.profiles["/tf"].durability is Durability.VOLATILE
     assert tree["arm"].authority == ("/robot" if ros == 1 else UNKNOWN_PUBLISHER)
+
+
+def test_frames_that_a_bridge_passes_on_are_not_late_because_others_are_stamped_ahead() -> None:
+    node: Any = Node()
+    listener = TransformListener(node)
+    broadcaster = TransformBroadcaster(node)
+    for number in range(40):
+        # AMCL's are a second ahead by default.
+        frame, ahead = ("odom", 30) if number % 2 else ("base", 0)
+        broadcaster.send_transform(place(frame, 100 + number + ahead))
+        topic, data = node.sent[-1]
+        sample = Sample(data, node.wire, node.type, (100 + number) * 10**9, None, b"bridge")
+        deliver(node.subscriptions[topic], sample)
+    assert listener.buffer.silence("map", "base") < 15
+    assert listener.buffer.silence("map", "odom") < 15
 
 
 @pytest.mark.parametrize("ros", [1, 2])
