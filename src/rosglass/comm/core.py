@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.clock import Clock
 from rosglass.comm.executor import Dispatcher
-from rosglass.comm.graph import ConnectionState, GraphView, Status
+from rosglass.comm.graph import ConnectionState, EndpointKind, GraphView, Status
 from rosglass.comm.handle import Handle
 from rosglass.comm.listeners import Listeners
 from rosglass.comm.timers import Timers, Worker
@@ -106,6 +106,13 @@ class NodeCore(ABC):
         self.local_gids: set[bytes] = set()
         self._closed_gids: deque[bytes] = deque()
         self.servers: set[Handle] = set()
+
+    @property
+    def has_simulated_stamps(self) -> bool:
+        """Whether messages may be stamped by a simulation's time; see :class:`Node`."""
+        if self.clock.is_simulated:
+            return True
+        return bool(self.graph.endpoints(EndpointKind.PUBLISHER, "/clock"))
 
     def _start_following(self) -> Worker:
         return Worker(f"{self.name.name} graph", self._follow, _POLL_S)

@@ -292,6 +292,14 @@ class Node(Handle):
         """The node's clock, which follows ``/clock`` if ``use_sim_time`` is set."""
         return self._core.clock
 
+    @property
+    def has_simulated_stamps(self) -> bool:
+        """Whether messages may be stamped by a simulation's time, which says nothing about delays.
+
+        The node's own clock is simulated, or ``/clock`` is published for the clocks of others.
+        """
+        return self._core.has_simulated_stamps
+
     def now(self) -> Time:
         """Return the time of the node's clock."""
         return self._core.clock.now()

@@ -308,7 +308,7 @@ class Subscription(TopicEndpoint):
         feed = self._feed
         if feed is None:
             return self._inbox.lateness(sample, by_header=True) or Duration()
-        late = self._inbox.lateness(sample, by_header=not feed.is_simulated)
+        late = self._inbox.lateness(sample, by_header=not feed.has_simulated_stamps)
         return Duration(feed.lateness(sample.publisher)) if late is None else late
 
     # -- events ----------------------------------------------------------------------------------
@@ -614,9 +614,9 @@ class SubscriptionFeed(NodeMember):
             reader.flush()
 
     @property
-    def is_simulated(self) -> bool:
-        """Whether the node's time is that of a simulation, which stamps of messages follow."""
-        return self._core.clock.is_simulated
+    def has_simulated_stamps(self) -> bool:
+        """Whether headers may be stamped by a simulation's time."""
+        return self._core.has_simulated_stamps
 
     def lateness(self, publisher: bytes) -> int:
         """Return the lateness of a publisher's last sample by its arrival, in nanoseconds."""

@@ -230,7 +230,7 @@ class TfTransform(Element):
     def _lateness(self, stamp: int) -> float:
         """Return how much longer than usual a transform took that has just arrived, in seconds."""
         node, frames = self.node, f"{self.targetFrame} {self.sourceFrame}"
-        if node is None or node.clock.is_simulated:
+        if node is None or node.has_simulated_stamps:
             return 0.0
         return self._stamps.add(frames.encode(), time.time_ns(), stamp)
 

@@ -80,7 +80,7 @@ class Frames(QtCore.QObject):
     @property
     def is_simulated(self) -> bool:
         """Whether the robot's time is that of a simulation or a recording."""
-        return self._node is not None and self._node.clock.is_simulated
+        return self._node is not None and self._node.has_simulated_stamps
 
     def locate(self, frame: str, time: Time | None = None) -> Transform:
         """Return the transform from a frame to the fixed frame.
