@@ -260,14 +260,20 @@ def test_the_router_command_takes_a_file_and_the_environment(
         process.end()
 
 
-def test_a_router_names_what_is_wrong_with_its_files(folder: Path, tmp_path: Path) -> None:
+def test_a_router_names_what_is_wrong_with_its_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with pytest.raises(rosglass.ConnectionLostError, match=r"Missing TLS.*--config FILE with list"):
         Router(f"tls/127.0.0.1:{free_port()}")
     file = tmp_path / "bad.json5"
+    with pytest.raises(rosglass.ArgumentError, match=r"config_file: expected .*bad\.json5"):
+        Router(config_file=str(file))
+    monkeypatch.setenv("ZENOH_ROUTER_CONFIG_URI", str(file))
     with pytest.raises(rosglass.ArgumentError, match="ZENOH_ROUTER_CONFIG_URI"):
         Router(config_file=str(file))
     file.write_text("{ transport: { auth: { usrpwd: { dictionary_file: '/nowhere' } } } }")
-    with pytest.raises(rosglass.ConnectionLostError, match="Invalid user-password dictionary file"):
+    invalid = r"Invalid user-password dictionary file.*\(its files: /nowhere\)"
+    with pytest.raises(rosglass.ConnectionLostError, match=invalid):
         Router(f"tcp/127.0.0.1:{free_port()}", str(file))
 
 

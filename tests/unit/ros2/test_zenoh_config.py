@@ -122,6 +122,14 @@ def test_a_router_listens_where_it_is_told_and_nowhere_else():
     assert setting(config, "scouting/multicast/enabled") is False
 
 
+def test_a_router_with_a_file_without_addresses_is_not_open(tmp_path):
+    file = tmp_path / "router.json5"
+    file.write_text("{ transport: { auth: { usrpwd: { dictionary_file: '/users' } } } }")
+    assert setting(router_config(None, str(file)), "listen/endpoints") == ["tcp/127.0.0.1:7447"]
+    file.write_text("{ listen: { endpoints: ['tcp/[::]:7447'] } }")
+    assert setting(router_config(None, str(file)), "listen/endpoints") == ["tcp/[::]:7447"]
+
+
 def test_zenohs_own_source_is_not_quoted():
     error = zenoh.ZError("no (os error 99) at /root/.cargo/git/zenoh-9c/io/tcp.rs:61.] at /x.rs:3.")
     assert reason(error) == "no (os error 99)]"

@@ -15,9 +15,10 @@ import zenoh
 from rosglass.comm import Handle
 from rosglass.errors import ArgumentError, ConnectionLostError
 from rosglass.wires.zenoh.endpoints import CHANNEL, Pump
-from rosglass.wires.zenoh.options import DEFAULT_PORT, ZenohOptions, locator
+from rosglass.wires.zenoh.options import ZenohOptions, locator
 from rosglass.wires.zenoh.refusal import find_refusal
 from rosglass.wires.zenoh.session import (
+    DEFAULT_LISTEN,
     close_session,
     endpoints,
     limit_silence,
@@ -29,15 +30,19 @@ from rosglass.wires.zenoh.session import (
 
 __all__ = ["DEFAULT_LISTEN", "Router", "is_router_reachable"]
 
-#: The default address to listen on: this machine only.
-DEFAULT_LISTEN = f"tcp/127.0.0.1:{DEFAULT_PORT}"
-
 _LOCATOR = re.compile(
     r"(?P<protocol>tcp|tls)/"
     r"(?:\[(?P<six>[0-9A-Fa-f:.]+)\]|(?P<host>[A-Za-z0-9_.-]+)):(?P<port>\d+)"
 )
 _LOOPBACK = re.compile(r"localhost|127(?:\.\d+){3}|::1")
 _ENCRYPTED = ("tls/", "quic/")
+#: Settings that name a file, which Zenoh's errors do not.
+_FILES = (
+    "auth/usrpwd/dictionary_file",
+    "link/tls/listen_certificate",
+    "link/tls/listen_private_key",
+    "link/tls/root_ca_certificate",
+)
 
 
 class Router(Handle):
@@ -45,7 +50,7 @@ class Router(Handle):
 
     Args:
         listen: Address to listen on, ``tcp/HOST:PORT`` or ``tls/HOST:PORT``; port 0 chooses a free
-            one. None for those of `config_file`, or ``tcp/127.0.0.1:7447`` without a file.
+            one. None for those of `config_file`, or ``tcp/127.0.0.1:7447`` without any.
         config_file: Zenoh configuration, as in ``ZENOH_ROUTER_CONFIG_URI``: users, certificates,
             access control; None for none.
 
@@ -63,8 +68,6 @@ class Router(Handle):
     """
 
     def __init__(self, listen: str | None = None, config_file: str | None = None) -> None:
-        if listen is None and config_file is None:
-            listen = DEFAULT_LISTEN
         if listen is not None:
             protocol, host, port = _parse(listen)
             listen = locator(host, port or _free_port(host), protocol)
@@ -76,6 +79,11 @@ class Router(Handle):
         has_users = json.loads(config.get_json("transport/auth/usrpwd/dictionary_file"))
         has_certificates = json.loads(config.get_json("transport/link/tls/enable_mtls"))
         self.is_restricted = bool(has_users or (has_certificates and self.is_encrypted))
+        self._files = [
+            file
+            for setting in _FILES
+            if (file := json.loads(config.get_json(f"transport/{setting}")))
+        ]
         self._session: zenoh.Session | None = None
         try:
             self._session = open_session(config)
@@ -107,8 +115,10 @@ class Router(Handle):
             needed = "listen_certificate and listen_private_key in its transport.link.tls"
             return f"{problem}: {text.rstrip('.')}; give --config FILE with {needed}"
         if "in use" not in text:
-            address = "; name an address of this machine" if "ssign" in text else ""
-            return f"{problem}: {text}{address}"
+            fix = "; name an address of this machine" if "ssign" in text else ""
+            if self._files and ("file" in text or "keys" in text):
+                fix = f" (its files: {', '.join(self._files)})"
+            return f"{problem}: {text}{fix}"
         if self.url and is_router_reachable(self.url):
             return f"{problem}: a Zenoh router runs there already; use that one, or {other}"
         return f"{problem}: another program uses the port; {other}"

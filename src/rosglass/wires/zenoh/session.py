@@ -30,9 +30,10 @@ from typing import Any
 import zenoh
 
 from rosglass.errors import ArgumentError, UnsupportedError
-from rosglass.wires.zenoh.options import ZenohOptions, locator
+from rosglass.wires.zenoh.options import DEFAULT_PORT, ZenohOptions, locator
 
 __all__ = [
+    "DEFAULT_LISTEN",
     "OPEN_TIMEOUT_S",
     "Heartbeat",
     "check_process",
@@ -46,6 +47,9 @@ __all__ = [
     "session_config",
 ]
 
+
+#: Where a router listens, unless it is given another address.
+DEFAULT_LISTEN = f"tcp/127.0.0.1:{DEFAULT_PORT}"
 
 _log = logging.getLogger("rosglass.ros2")
 #: Seconds that closing a session may take; it has taken minutes with 100 nodes in one process.
@@ -122,7 +126,8 @@ def router_config(listen: str | None, config_file: str | None = None) -> zenoh.C
     """Return the configuration of a router.
 
     Args:
-        listen: Locator such as ``tcp/[::]:7447``; None for those of `config_file`.
+        listen: Locator such as ``tcp/[::]:7447``; None for those of `config_file`, or one on this
+            machine only if it has none, unlike Zenoh's default.
         config_file: Zenoh configuration to start from, as in ``ZENOH_ROUTER_CONFIG_URI``.
 
     Raises:
@@ -141,9 +146,15 @@ def router_config(listen: str | None, config_file: str | None = None) -> zenoh.C
         settings["scouting/multicast/enabled"] = False
         settings["scouting/gossip/enabled"] = True
     else:
-        config = _read(config_file, "ZENOH_ROUTER_CONFIG_URI")
+        variable = "ZENOH_ROUTER_CONFIG_URI"
+        config = _read(
+            config_file, variable if os.environ.get(variable) == config_file else "config_file"
+        )
+    addresses = "listen/endpoints"
+    if listen is None and config.get_json(addresses) == zenoh.Config().get_json(addresses):
+        listen = DEFAULT_LISTEN
     if listen is not None:
-        settings["listen/endpoints"] = [listen]
+        settings[addresses] = [listen]
     _apply(config, settings)
     return config
 
