@@ -15,7 +15,7 @@ Row {
     }
     Column {
         width: 220; spacing: 8
-        Subscriber { id: odom; topic: "/odom"; queueSize: 1 }
+        Subscriber { id: odom; topic: "/odom"; queueSize: 1; timeout: 1000 }
         Label {
             readonly property var at: odom.message ? odom.message.pose.pose.position : null
             textFormat: Text.PlainText
@@ -28,12 +28,12 @@ Row {
             interval: 100; repeat: true; running: true
             onTriggered: clock.text = "now " + Time.now().toSec().toFixed(2) + " s"
         }
-        Button { text: "Stop"; onClicked: stopping.left = 20 }
+        Button { text: "Stop"; onClicked: stopping.left = 400 }
         Timer {
             id: stopping
-            property int left: 0  // one may be lost
+            property int left: 0  // for 2 s, or for 20 s while the robot is lost
             interval: 50; repeat: true; triggeredOnStart: true; running: left > 0
-            onTriggered: { left -= 1; velocity.publish({}) }
+            onTriggered: { left -= odom.stale ? 1 : 10; velocity.publish({}) }
         }
         Button {
             text: "Flashlight"

@@ -109,7 +109,7 @@ def test_dragging_drives_and_letting_go_stops(robot: Robot, view: Any, wait: Any
     test.mouseRelease(view, left, pos=point(20, 290))
     wait(lambda: robot.commands[-1] == (0.0, 0.0))
     begin = len(robot.commands)
-    wait(lambda: len(robot.commands) > begin + 15)
+    wait(lambda: len(robot.commands) > begin + 35)
     wait.nothing_happens(0.5)
     count = len(robot.commands)
     wait.nothing_happens(0.2)
@@ -132,6 +132,33 @@ def test_who_holds_the_stick_without_a_live_picture_stops_the_robot(
     begin = len(robot.commands)
     wait(lambda: len(robot.commands) > begin + 30, "it does not know whether they arrive")
     assert set(robot.commands[begin:]) == {(0.0, 0.0)}
+
+
+def test_who_lets_go_before_an_outage_is_noticed_stops_until_the_robot_is_back(
+    robot: Robot, view: Any, wait: Any
+) -> None:
+    from rosglass.qt import QtCore, optional
+
+    test, point, left = optional("QtTest").QTest, QtCore.QPoint, QtCore.Qt.MouseButton.LeftButton
+    wait(view.isExposed)
+    test.mousePress(view, left, pos=point(200, 195))
+    wait(lambda: robot.commands and robot.commands[-1][0] > 0)
+    robot.freeze()
+    test.mouseRelease(view, left, pos=point(200, 195))
+    begin = len(robot.commands)
+    wait(lambda: len(robot.commands) > begin + 60, "all so far may have been dropped")
+    assert set(robot.commands[begin + 1 :]) == {(0.0, 0.0)}
+
+
+def test_ending_while_driving_stops_the_robot(robot: Robot, view: Any, wait: Any) -> None:
+    from rosglass.qt import QtCore, optional
+
+    test, point, left = optional("QtTest").QTest, QtCore.QPoint, QtCore.Qt.MouseButton.LeftButton
+    wait(view.isExposed)
+    test.mousePress(view, left, pos=point(200, 195))
+    wait(lambda: robot.commands and robot.commands[-1][0] > 0)
+    view.setSource(QtCore.QUrl())
+    wait(lambda: robot.commands[-1] == (0.0, 0.0))
 
 
 def test_the_button_switches_the_lamp(robot: Robot, view: Any, wait: Any) -> None:

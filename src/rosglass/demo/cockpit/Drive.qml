@@ -27,7 +27,8 @@ QtObject {
 
     property var publisher: null
     Component.onCompleted: publisher = Ros2.createPublisher(topic, "geometry_msgs/msg/Twist", Ros2.CommandQoS())
-    // Zeros to send while the robot is there, and in all.
+    // Zeros to send while the robot is there, and in all. The former take a second: longer than it
+    // takes to notice an outage, in which all zeros until then would have been dropped.
     property int zeros: 0
     property int attempts: 0
 
@@ -55,7 +56,7 @@ QtObject {
     }
 
     function halt() {
-        zeros = 8
+        zeros = 20
         attempts = 1200
         send()
         timer.start()
