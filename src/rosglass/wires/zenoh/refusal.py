@@ -178,7 +178,10 @@ class _Probe:
         if "match" in reason or "not valid for" in reason:
             return f"has a certificate for another host ({reason})", "use the name that it is for"
         if "expired" in reason or "not yet valid" in reason:
-            return f"has a certificate that is not valid now ({reason})", "check both clocks"
+            return (
+                f"has a certificate that is not valid now ({reason})",
+                "renew it, or correct a clock",
+            )
         given = self._tls["root_ca_certificate"]
         fix = f"{given} is not that of its authority" if given else f"add {_CA} to the URL"
         return f"has a certificate that is not trusted ({reason})", fix
