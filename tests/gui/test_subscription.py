@@ -8,6 +8,7 @@ import time
 from typing import Any
 
 import pytest
+from waiting import eventually
 
 from rosglass.comm import ConnectionState, QoS, Sample, Time
 from rosglass.comm.qos import Durability, Reliability
@@ -667,3 +668,28 @@ def test_a_message_that_its_stamp_shows_to_be_old_is_stale_as_it_arrives(
     for number, age in enumerate((3600, 3600, 3612.4, 3601.6, 3600)):
         send(number, age)
     assert root.shown() == "0 false,1 false,2 true,3 false,4 false"
+
+
+def test_a_message_that_has_waited_for_a_screen_that_stood_still_is_as_old_as_it_is(
+    running: Any, chat: Any, wait: Any
+) -> None:
+    """Else the last message of a robot that is gone would look live for a while."""
+    root = running.load("""QtObject {
+        property var seen: []
+        property QtObject sub: Subscription {
+            topic: "/chat"; throttleRate: 0
+            onMessageChanged: if (message) seen.push(message.data + " " + stale + " " + (age > 25))
+        }
+        function shown() { return seen.join() }
+    }""")
+    wait(chat.subscription_count)
+    chat.publish(data="before")
+    wait(lambda: "before" in root.shown())
+    endpoint = root.property("sub")._endpoint
+    received = endpoint.statistics().received
+    chat.publish(data="waiting")
+    # The screen stands still.
+    eventually(lambda: endpoint.statistics().received > received)
+    endpoint._inbox._last_time -= 30
+    wait(lambda: "waiting" in root.shown())
+    assert root.shown() == "before false false,waiting true true"

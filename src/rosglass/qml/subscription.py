@@ -275,13 +275,17 @@ class Subscription(TopicElement):
             self._timer.start(self._wait_ms())  # batches come too rarely to wait for
         elif not endpoint.add_waiter(self._wake) and not endpoint.closed:
             self._wake()
+        # They may have waited for their turn, or for a screen that stood still.
+        age = endpoint.statistics().age if samples else None
+        held = 0.0 if age is None else age.seconds
         for sample in samples if self.throttleRate == 0 else samples[-1:]:
-            self._show(sample)
+            self._show(sample, held)
             # A handler may have changed the topic or destroyed this object.
             if not is_alive(self) or endpoint is not self._endpoint:
                 return
 
-    def _show(self, sample: Sample) -> None:
+    def _show(self, sample: Sample, held: float) -> None:
+        """Show a message that arrived `held` seconds ago."""
         try:
             message = sample.type.decode_checked(sample.data, sample.wire)
         except DecodeError as error:
@@ -296,9 +300,9 @@ class Subscription(TopicElement):
             self._found_type = name
         self._sample, self._message, self._value = sample, message, None
         self._current = True
-        self._shown_at = self._steady()
+        self._shown_at = self._steady() - held
         self._late = self._lateness(sample)
-        self._age = 0.0
+        self._age = held
         self._outdated = False
         # Update all properties before emitting the first signal.
         was_stale, self._stale = self._stale, self._is_old()
