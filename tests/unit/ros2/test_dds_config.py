@@ -1,9 +1,11 @@
 from __future__ import annotations
 
 import os
+import re
 import struct
 import threading
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import pytest
 
@@ -192,3 +194,10 @@ def test_what_the_url_and_the_users_configuration_both_say_is_refused(tmp_path, 
 )
 def test_what_only_one_of_them_says_is_taken(url, own):
     assert user_config(config(url, CYCLONEDDS_URI=own)) == own
+
+
+def test_the_documentations_larger_datagrams_are_those_of_this_machine():
+    text = (Path(__file__).parents[3] / "docs" / "ros2.md").read_text()
+    (own,) = re.findall(r"^  export CYCLONEDDS_URI='(.*)'$", text, re.MULTILINE)
+    assert own.removesuffix("</General>") in config("dds://?range=localhost")
+    assert user_config(config(CYCLONEDDS_URI=own)) == own
