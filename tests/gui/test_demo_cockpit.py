@@ -174,7 +174,7 @@ def test_a_key_drives_and_letting_go_stops(cockpit: CockpitProcess, robot: Robot
     released = time.monotonic()
     robot.until(lambda: robot.speed == 0.0)
     assert robot.x > start + 0.1
-    nothing_happens(0.6)
+    nothing_happens(1.0)
     moving = [c for c in robot.commands if c[1] > 0]
     zeros = [c for c in robot.commands if c[1] == c[2] == 0]
     assert len(moving) > 5, robot.commands
@@ -182,7 +182,7 @@ def test_a_key_drives_and_letting_go_stops(cockpit: CockpitProcess, robot: Robot
     assert np.median(gaps) == pytest.approx(0.05, abs=0.04), "20 commands a second"
     assert len(zeros) >= 3, "one lost message must not keep the robot going"
     assert zeros[0][0] - released < 1
-    assert time.monotonic() - robot.commands[-1][0] > 0.15, "then others may drive"
+    eventually(lambda: time.monotonic() - robot.commands[-1][0] > 0.15, "then others may drive")
 
 
 def test_opposite_keys_and_a_lost_release(cockpit: CockpitProcess, robot: RobotSide) -> None:

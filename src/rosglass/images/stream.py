@@ -80,7 +80,6 @@ class ImageStream(Handle):
         wanted: Called from any thread, returns whether to decode a received image; others are not
             counted as dropped. Not called for videos, whose frames depend on each other. None to
             decode all.
-        resting: Whether it does not receive before :meth:`resume`.
 
     Raises:
         InvalidNameError: The topic name breaks ROS's rules.
@@ -94,8 +93,6 @@ class ImageStream(Handle):
         preferred: str = "compressed",
         changed: Callable[[], None] | None = None,
         wanted: Callable[[], bool] | None = None,
-        *,
-        resting: bool = False,
     ) -> None:
         self.topic = node.resolve(topic)
         self._node, self._preferred = node, preferred
@@ -104,7 +101,7 @@ class ImageStream(Handle):
         self._wake = threading.Condition()
         self._samples: deque[tuple[Transport, Sample]] = deque()
         self._overflow = False
-        self._look, self._closing, self._resting = True, False, resting
+        self._look, self._closing, self._resting = True, False, False
         self._arrivals: deque[float] = deque(maxlen=_MAX_ARRIVALS)
         self._choice: Choice | None = None
         self._subscription: Subscription | None = None

@@ -125,13 +125,7 @@ class SharedStream(QtCore.QObject):
         self._balancer = LoadBalancer.of(session)
         executor = session.executor
         self.stream = ImageStream(
-            node,
-            topic,
-            self._render,
-            preferred,
-            lambda: executor.post(self._tell),
-            self._wanted,
-            resting=True,
+            node, topic, self._render, preferred, lambda: executor.post(self._tell), self._wanted
         )
         self._linger = QtCore.QTimer(self)
         self._linger.setSingleShot(True)
@@ -154,7 +148,6 @@ class SharedStream(QtCore.QObject):
         """
         key = (node, topic, preferred)
         stream = session.streams.get(key)
-        is_new = stream is None
         if stream is None:
             first = session.streams[key] = cls(session, node, topic, preferred, look, viewer)
             first._look_at_channels()
@@ -162,10 +155,6 @@ class SharedStream(QtCore.QObject):
         made: SharedStream = stream
         made._linger.stop()
         made.change_look(viewer, look)
-        if is_new:
-            # Only now: an image that was latched comes once, and needs a channel.
-            made.stream.resume()
-            made._asked = None
         return made
 
     def change_look(self, viewer: Viewer, look: Look) -> None:
