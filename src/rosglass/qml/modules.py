@@ -30,6 +30,7 @@ __all__ = [
     "locate",
     "near",
     "register",
+    "show_plain_labels",
 ]
 
 _log = logging.getLogger("rosglass.qml")
@@ -158,7 +159,7 @@ class _CompositeType(ctypes.Structure):
 
 
 @cache
-def _show_plain_labels() -> None:
+def show_plain_labels() -> None:
     """Let buttons, menu items and delegates show plain text; only the first call has an effect.
 
     Qt's IconLabel makes its text without a context, and crashes at the first image in it: one text
@@ -232,7 +233,8 @@ def install(
     Args:
         engine: The engine; it must not yet have loaded a file that imports the modules.
         session: The session to use; None for the application's own, which all such engines share.
-        own_window: Whether it is for a window of rosglass, which does without these modules.
+        own_window: Whether it is for a window of rosglass, which does without these modules, and
+            calls :func:`show_plain_labels` when it loads controls.
 
     Returns:
         The session.
@@ -243,8 +245,8 @@ def install(
     # Qt waits 5 ms before drawing, to collect further changes: a third of the time that a picture
     # takes from the robot to the screen.
     os.environ.setdefault("QT_QPA_UPDATE_IDLE_TIME", "0")
-    _show_plain_labels()
     if not own_window:
+        show_plain_labels()
         register()
     for path in IMPORT_PATHS:
         engine.addImportPath(str(path))

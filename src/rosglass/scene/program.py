@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error, QmlError
-from rosglass.qml.modules import interface_file, locate
+from rosglass.qml.modules import interface_file, locate, show_plain_labels
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qml.runtime import runtime_of
 from rosglass.qt import QtCore, Slot, is_alive
@@ -159,6 +159,11 @@ class ViewProgram(QtCore.QObject):
         self._remember()
         self._timer.start()
         self._refresh()
+
+    @Slot()
+    def prepare_controls(self) -> None:
+        """Make controls of Qt safe for texts of robots, before they are loaded."""
+        show_plain_labels()
 
     def _show_overlays(self, view: SceneView) -> None:
         if not self._overlays:

@@ -26,6 +26,7 @@ Window {
     onPanelsChanged: scene.bare = !panels
 
     function showPanels() {
+        program.prepare_controls()
         around.setSource("WindowPanels.qml", { "window": window, "scene": scene })
         drawn = true
     }
@@ -47,7 +48,7 @@ Window {
         Loader {
             objectName: "imagePanels"
             anchors.fill: parent
-            active: scene.scene.pictureList.length > 0
+            active: window.drawn && scene.scene.pictureList.length > 0
             source: "ImagePanels.qml"
             onLoaded: item.view = scene
         }
