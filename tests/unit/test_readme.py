@@ -48,7 +48,11 @@ def test_every_test_that_the_table_of_peers_names_exists(named: str) -> None:
 
 
 def test_every_cell_of_the_table_of_peers_names_a_test_or_a_reason() -> None:
-    rows = [line for line in PEERS.splitlines() if line.startswith("| ") and "---" not in line]
+    # Other tables have figures.
+    tables = [block for block in PEERS.split("\n\n") if block.startswith("| | ")]
+    lines = "\n".join(tables).splitlines()
+    rows = [line for line in lines if line.startswith("| ") and "---" not in line]
+    assert len(rows) > 20
     cells = [cell.strip() for row in rows for cell in row.strip("| ").split(" | ")[1:]]
     named = ("test_", "the same", "both", "- none: ", "its writers", "ours to it only")
     headings = [cell for row in rows if row.startswith("| | ") for cell in row.split(" | ")]

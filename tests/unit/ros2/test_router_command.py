@@ -14,9 +14,9 @@ def routers(monkeypatch):
     made = []
 
     class FakeRouter(module.Router):
-        def __init__(self, listen):
+        def __init__(self, listen, config_file):
             monkeypatch.setattr(module, "open_session", lambda config: None)
-            super().__init__(listen)
+            super().__init__(listen, config_file)
             made.append(self)
 
         def _watch(self, session):
