@@ -261,7 +261,7 @@ def test_an_overlay_may_be_removed_while_it_is_loaded(
 
     remover = Remover()
     overlay = show("Item {}")
-    overlay.engine.rootContext().setContextProperty("remover", remover)
+    overlay.prepare(lambda engine: engine.rootContext().setContextProperty("remover", remover))
     remover.overlay = overlay
     file.write_text(f"{IMPORTS}Item {{ Component.onCompleted: remover.remove() }}")
     assert not overlay.reload()
@@ -309,7 +309,7 @@ def test_an_overlay_may_be_removed_while_its_call_waits(
 
     waiting = Waiting()
     overlay = waiting.overlay = show("Item {}")
-    overlay.engine.rootContext().setContextProperty("waiting", waiting)
+    overlay.prepare(lambda engine: engine.rootContext().setContextProperty("waiting", waiting))
     overlay.file.write_text(
         f"""{IMPORTS}Item {{ id: root; property int number: 7
         Component.onDestruction: console.warn("goodbye")

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rosglass.errors import QmlError
+from rosglass.errors import Error, QmlError
 from rosglass.qml.live_file import ERRORS, ERRORS_BELOW, PANEL, SCRIPT_ENDED, ErrorView, LiveFile
 from rosglass.qml.modules import interface_file
 from rosglass.qt import QtCore
@@ -17,7 +17,7 @@ from rosglass.rviz.rviz_object import RvizObject
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from rosglass.qml.live_file import Made
     from rosglass.qml.session import Session
@@ -77,6 +77,19 @@ class LiveOverlay(Overlay):
     def engine(self) -> QtQml.QQmlEngine:
         """The engine of the interface; a reload makes another one."""
         return self._live.engine
+
+    def prepare(self, job: Callable[[QtQml.QQmlEngine], None]) -> None:
+        """Call a function with the engine, and with that of each reload before it loads the file.
+
+        Args:
+            job: E.g. ``lambda engine: engine.addImageProvider("plots", Plots())``.
+
+        Raises:
+            Error: The job cannot be called.
+        """
+        if not callable(job):
+            raise Error(f"prepare: expected a function of the engine, got {job!r:.80}")
+        self._live.prepare(job)
 
     def _prepare(self, engine: QtQml.QQmlEngine) -> None:
         engine.addImportPath(str(_IMPORTS))
