@@ -109,7 +109,7 @@ class NodeCore(ABC):
 
     @property
     def has_simulated_stamps(self) -> bool:
-        """Whether messages may be stamped by a simulation's time; see :class:`Node`."""
+        """True if messages may have stamps of a simulation; see :class:`Node`."""
         if self.clock.is_simulated:
             return True
         return bool(self.graph.endpoints(EndpointKind.PUBLISHER, "/clock"))

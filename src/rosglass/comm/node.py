@@ -294,7 +294,7 @@ class Node(Handle):
 
     @property
     def has_simulated_stamps(self) -> bool:
-        """Whether messages may be stamped by a simulation's time, which says nothing about delays.
+        """True if messages may have stamps of a simulation, which say nothing about delays.
 
         The node's own clock is simulated, or ``/clock`` is published for the clocks of others.
         """
