@@ -105,7 +105,7 @@ class Router(Handle):
     def _watch(self, session: zenoh.Session) -> Pump:
         """Disconnect programs whose network is lost, so that they can reconnect at once."""
         events = session.info.declare_transport_events_listener(CHANNEL, history=True)
-        return Pump(events, lambda _: limit_silence(session), f"{self.listen} links")
+        return Pump(events, lambda _: limit_silence(session), f"{self.listen} router links")
 
     def _explain(self, error: zenoh.ZError) -> str:
         problem = f"cannot run a router at {self.listen}"
