@@ -335,23 +335,17 @@ class ZenohMiddleware(Middleware):
             raise ConnectionLostError(f"cannot open a Zenoh session: {reason(error)}") from error
         self._retries_open = False
         self._settled = time.monotonic() + _SETTLING_TIME_S
-        sources: list[Any] = []
         try:
             events = session.info.declare_transport_events_listener(CHANNEL, history=True)
-            sources.append(events)
             tokens = session.liveliness().declare_subscriber(
                 graph_key(self.options.domain), CHANNEL, history=True
             )
-            sources.append(tokens)
             self._pumps = [
                 Pump(events, self._on_transport, f"{self._address} links"),
                 Pump(tokens, self._on_token, f"{self._address} tokens"),
             ]
         except BaseException:  # Ctrl-C
             # A pump that waits in Zenoh while the interpreter shuts down would abort the program.
-            for source in sources:
-                with suppress(zenoh.ZError):
-                    source.undeclare()
             close_session(session)
             raise
         if not self._is_peer:
