@@ -158,7 +158,10 @@ def test_messages_before_their_connection_are_counted_and_played(tmp_path, caplo
         wanted = texts(bag)
         assert len(wanted) == 20
         with Player(node, bag, delay=0.0, paused=True) as player:
-            node.create_subscription("/words", callback=lambda m: found.append(m.data), qos=100)
+            heard = node.create_subscription(
+                "/words", callback=lambda m: found.append(m.data), qos=100
+            )
+            eventually(heard.publisher_count)
             player.resume()
             assert player.wait(30)
         eventually(lambda: found == wanted)
