@@ -45,7 +45,7 @@ _ARRIVAL_TIMEOUT_S = 60.0
 
 def watch_gpu() -> list[float]:
     """Return the seconds that the graphics card takes for each frame, from now on."""
-    from rosglass.scene.renderer import SceneRenderer
+    from rosglass.scene.render.renderer import SceneRenderer
 
     seconds: list[float] = []
     draw = SceneRenderer.render

@@ -279,8 +279,8 @@ class View:
 
         import rosglass.scene
         from rosglass.qml import Session, install
-        from rosglass.scene import display, renderer
-        from rosglass.scene.displays import marker
+        from rosglass.scene.displays import display, marker
+        from rosglass.scene.render import renderer
 
         self.costs = Costs()
         self.costs.watch(display.MessageQueue, "receive", "node")

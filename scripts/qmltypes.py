@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.qml import modules, ros1, ros2
 from rosglass.qt import QtCore
-from rosglass.scene import modules as scene
+from rosglass.scene.app import modules as scene
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -1,6 +1,6 @@
 """Compiles the shaders of the 3D view: ``python scripts/shaders.py [--check]``.
 
-Each ``NAME.vert`` and ``NAME.frag`` of ``src/rosglass/scene/shaders`` becomes a ``.qsb`` beside it,
+Each ``NAME.vert`` and ``NAME.frag`` of ``scene/render/shaders`` becomes a ``.qsb`` beside it,
 with which Qt draws on OpenGL, Vulkan, Metal and Direct3D. ``pyside6-qsb`` comes with
 PySide6-Addons; only developers need it. ``--check`` compares with what is there.
 """
@@ -13,7 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-FOLDER = Path(__file__).parents[1] / "src/rosglass/scene/shaders"
+FOLDER = Path(__file__).parents[1] / "src/rosglass/scene/render/shaders"
 #: GLSL for OpenGL 3.3 and OpenGL ES 3.0, Direct3D 11, Metal 1.2; SPIR-V for Vulkan is always in.
 _TARGETS = ("--glsl", "330,300 es", "--hlsl", "50", "--msl", "12")
 #: Shaders that need the colours of points as well.

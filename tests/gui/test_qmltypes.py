@@ -126,12 +126,11 @@ Item {
 
 
 def test_the_panels_of_the_3d_view_are_known() -> None:
-    panels = IMPORT_PATHS[0].parents[1] / "scene" / "panels"
+    panels = IMPORT_PATHS[0].parents[1] / "scene" / "app" / "panels"
     known = (IMPORT_PATHS[1] / "RosScene" / "qmldir").read_text()
     # Those that are parts of others, and of the program's window.
     hidden = {
         "ColorChooser.qml",
-        "MarkerMenu.qml",
         "PlainComboBox.qml",
         "PlainToolTip.qml",
         "SettingEditor.qml",

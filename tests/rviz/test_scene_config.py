@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 import yaml
 
-from rosglass.scene.rviz_config import DisplayConfig, RvizConfig, ToolConfig, ViewConfig
-from rosglass.scene.rviz_formats import DISPLAYS, TOOLS, VIEWS
+from rosglass.scene.configs.rviz_config import DisplayConfig, RvizConfig, ToolConfig, ViewConfig
+from rosglass.scene.configs.rviz_formats import DISPLAYS, TOOLS, VIEWS
 
 FOLDER = Path(__file__).parents[1] / "unit" / "scene" / "rviz_configs"
 DOCKED = ("rviz/Camera", "rviz/Image")

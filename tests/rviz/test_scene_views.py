@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
-from rosglass.scene.events import Button, Drag, Modifier, Wheel
-from rosglass.scene.views import VIEWS, ViewController, create_view
+from rosglass.scene.view_controllers.events import Button, Drag, Modifier, Wheel
+from rosglass.scene.view_controllers.views import VIEWS, ViewController, create_view
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -17,7 +17,7 @@ from qt_waiting import QtWaiting
 
 from conftest import SceneBench
 from rosglass.demo.processes import VirtualScreen
-from rosglass.scene.drawing import (
+from rosglass.scene.render.drawing import (
     BOX,
     SPHERE,
     Coloring,

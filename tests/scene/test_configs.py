@@ -16,7 +16,7 @@ import yaml
 
 from rosglass.errors import Error
 from rosglass.qt import QtCore
-from rosglass.scene.rviz_config import RvizConfig
+from rosglass.scene.configs.rviz_config import RvizConfig
 
 if TYPE_CHECKING:
     from collections.abc import Collection

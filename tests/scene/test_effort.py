@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import pytest
 
-from rosglass.scene.drawing import CONE, Lines, Mesh
+from rosglass.scene.render.drawing import CONE, Lines, Mesh
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -360,7 +360,7 @@ def test_states_at_a_high_rate_are_drawn_30_times_per_second(
 def test_joint_states_that_stop_fade(
     bench: SceneBench, robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass.scene import display as module
+    from rosglass.scene.displays import display as module
 
     monkeypatch.setattr(module, "_CONTINUOUS_S", 0.5)
     display = add(bench, robot)
@@ -428,7 +428,7 @@ def test_settings_and_joints_are_written_for_either_rviz(bench: SceneBench) -> N
 
 
 def test_the_panel_lists_joints_with_their_efforts(bench: SceneBench, robot: Robot) -> None:
-    from rosglass.scene.panel_models import DisplaysModel
+    from rosglass.scene.app.panel_models import DisplaysModel
 
     display = add(bench, robot)
     robot.place("upper", "lower", "wheel")
@@ -452,7 +452,7 @@ def test_the_panel_lists_joints_with_their_efforts(bench: SceneBench, robot: Rob
 
 
 def test_the_dialog_offers_it_for_joint_states(bench: SceneBench, robot: Robot) -> None:
-    from rosglass.scene.panel_models import DisplaysModel
+    from rosglass.scene.app.panel_models import DisplaysModel
 
     view = bench.load()
     model = DisplaysModel()

@@ -190,8 +190,8 @@ def test_an_old_picture_fades_though_its_publisher_lives(
 def test_a_picture_does_not_fade_while_a_simulation_is_paused(
     bench: SceneBench, load: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass.scene import scene as scenes
     from rosglass.scene.displays import image
+    from rosglass.scene.displays import scene as scenes
 
     monkeypatch.setattr(image, "_MAX_AGE_S", 1.0)
     monkeypatch.setattr(scenes, "_PAUSED_S", 0.3)

@@ -536,7 +536,7 @@ def drawn(display: Any) -> list[Any]:
 
 
 def test_settings(bench: SceneBench, show: Callable[..., Any], hand: Hand) -> None:
-    from rosglass.scene.drawing import Labels
+    from rosglass.scene.render.drawing import Labels
 
     display = show(marker(control(MOVE_AXIS), description="the arm"))
     (labels,) = [one for one in drawn(display) if isinstance(one, Labels)]
@@ -616,7 +616,7 @@ def test_controls_face_the_viewer_or_stay_fixed_or_turn_with_the_marker(
 def test_markers_fade_when_their_frame_is_not_updated(
     bench: SceneBench, show: Callable[..., Any], monkeypatch: Any
 ) -> None:
-    from rosglass.scene import display as displays
+    from rosglass.scene.displays import display as displays
     from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 0.5)
@@ -808,7 +808,7 @@ def test_a_mesh_that_was_missing_is_read_again(
     from web_server import WebServer
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr("rosglass.scene.scene._ASK_AGAIN_S", 0.1)
+    monkeypatch.setattr("rosglass.scene.displays.scene._ASK_AGAIN_S", 0.1)
     with WebServer() as web:
         uri = f"{web.url}/flat.obj"
         mesh = {**BOX, "type": 10, "mesh_resource": uri}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from inside import ask_again_after, device_of, renderers_of
 
-from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Labels, Lines, Mesh, Points, Shape
+from rosglass.scene.render.drawing import BOX, CYLINDER, SPHERE, Labels, Lines, Mesh, Points, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -379,7 +379,7 @@ def test_markers_wait_for_their_frame_and_locked_ones_follow_it(
 def test_locked_markers_fade_when_their_frame_is_not_updated(
     bench: SceneBench, show: Callable[..., Any], monkeypatch: Any
 ) -> None:
-    from rosglass.scene import display as displays
+    from rosglass.scene.displays import display as displays
     from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 0.5)
@@ -704,7 +704,7 @@ def test_meshes_of_markers_that_were_missing_are_read_again(
     from web_server import WebServer
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr("rosglass.scene.scene._ASK_AGAIN_S", 0.1)
+    monkeypatch.setattr("rosglass.scene.displays.scene._ASK_AGAIN_S", 0.1)
     triangle = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
     with WebServer() as web:
         web.files["/flat.obj"] = lambda request: request.send_error(503)

@@ -162,7 +162,7 @@ Visualization Manager:
 
 def test_overlays_of_configs_are_shown_and_kept(bench: Any, panel: Path, tmp_path: Path) -> None:
     from rosglass.scene.access import access_of
-    from rosglass.scene.rviz_config import RvizConfig
+    from rosglass.scene.configs.rviz_config import RvizConfig
 
     panel.write_text(
         'import QtQuick 2.15\nRectangle { color: "#ff0000"; property var config: rviz.config\n'
@@ -259,7 +259,7 @@ def test_popups_follow_points_of_a_view_beside_others(bench: Any, panel: Path) -
 
 
 def test_rosglass_view_shows_a_file_once(bench: Any, panel: Path, tmp_path: Path) -> None:
-    from rosglass.scene.program import ViewProgram
+    from rosglass.scene.app.program import ViewProgram
 
     config, other = tmp_path / "one.rviz", panel.with_name("Other.qml")
     config.write_text(CONFIG.replace("FILE", str(panel)))

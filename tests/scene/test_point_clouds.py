@@ -209,7 +209,7 @@ def test_a_square_faces_the_eye_across_to_y(bench: SceneBench) -> None:
 def test_squares_of_one_vertex_look_as_those_of_four(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch, style: str, view: str
 ) -> None:
-    from rosglass.scene import renderer
+    from rosglass.scene.render import renderer
 
     body = f'view: "{view}"; PointCloud2Display {{ topic: "/cloud"; style: "{style}" }}'
     (display,) = bench.load(body).scene.displays
@@ -591,7 +591,7 @@ def test_color_images_that_stop_are_an_error(bench: SceneBench) -> None:
 
 
 def test_depth_images_that_stop_fade(bench: SceneBench, monkeypatch: pytest.MonkeyPatch) -> None:
-    from rosglass.scene import display as module
+    from rosglass.scene.displays import display as module
 
     monkeypatch.setattr(module, "_CONTINUOUS_S", 0.5)
     camera = Camera(bench)

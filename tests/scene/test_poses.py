@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from rosglass.scene.drawing import CONE, CYLINDER, SPHERE, Lines, Mesh
+from rosglass.scene.render.drawing import CONE, CYLINDER, SPHERE, Lines, Mesh
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -45,7 +45,7 @@ def start(*arguments: str, **environment: str) -> subprocess.Popen[str]:
 @pytest.fixture
 def recorder(bench: SceneBench, tmp_path: Path) -> Iterator[Any]:
     """Records the window of a bench, whose view has a background of one colour."""
-    from rosglass.scene.window_recorder import WindowRecorder
+    from rosglass.scene.app.window_recorder import WindowRecorder
 
     bench.load('background: "#c02020"; GridDisplay { color: "#c02020" }')
     made = WindowRecorder(tmp_path / "video.mp4")
@@ -91,7 +91,7 @@ def test_a_window_at_rest_costs_nothing(bench: SceneBench, recorder: Any) -> Non
 def test_a_picture_too_many_is_none_that_was_dropped(
     bench: SceneBench, recorder: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rosglass.scene.window_recorder._MAX_RATE_HZ", 0.01)
+    monkeypatch.setattr("rosglass.scene.app.window_recorder._MAX_RATE_HZ", 0.01)
     monkeypatch.setattr(type(recorder._writer), "is_full", True)
     recorder.start(bench.window)
     for _ in range(5):
@@ -176,7 +176,7 @@ def test_mistakes_end_the_command(app: Any, tmp_path: Path, name: str, text: str
 
 
 def test_the_status_bar_says_so(bench: SceneBench, recorder: Any) -> None:
-    from rosglass.scene.program import ViewProgram
+    from rosglass.scene.app.program import ViewProgram
 
     program = ViewProgram(recorder=recorder)
     program.begin(bench.view)

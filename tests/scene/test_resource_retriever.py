@@ -13,9 +13,9 @@ from web_server import WebServer
 
 import rosglass
 from rosglass.errors import Error, UnsupportedError
-from rosglass.scene import resource_retriever
-from rosglass.scene.resource_retriever import ResourceRetriever
-from rosglass.scene.resources import ResourceError
+from rosglass.scene.data import resource_retriever
+from rosglass.scene.data.resource_retriever import ResourceRetriever
+from rosglass.scene.data.resources import ResourceError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from inside import ask_again_after
 
-from rosglass.scene.drawing import BOX, CYLINDER, SPHERE
+from rosglass.scene.render.drawing import BOX, CYLINDER, SPHERE
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -132,7 +132,7 @@ def test_meshes_come_from_files_and_missing_ones_are_named(
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    from rosglass.scene import display
+    from rosglass.scene.displays import display
 
     monkeypatch.setattr(display, "_LOGGED_MS", 50)
     corners = ((0, 0, 0), (2, 0, 0), (0, 2, 0))
@@ -222,7 +222,7 @@ def test_textures_beyond_the_limit_are_scaled_down(
 ) -> None:
     """Of ANYmal's 17 textures of 2048 x 2048 pixels, the last one was lost."""
     from rosglass.scene.displays import robot_model
-    from rosglass.scene.drawing import Mesh
+    from rosglass.scene.render.drawing import Mesh
 
     monkeypatch.setattr(robot_model, "MAX_PIXELS", 16 * 64 * 64)
     files = robot_model.MeshFiles(None)  # type: ignore[arg-type] - it reads no file
@@ -306,7 +306,7 @@ def test_a_web_server_that_was_down_is_asked_again(
 ) -> None:
     from web_server import WebServer
 
-    monkeypatch.setattr("rosglass.scene.scene._ASK_AGAIN_S", 0.1)
+    monkeypatch.setattr("rosglass.scene.displays.scene._ASK_AGAIN_S", 0.1)
     with WebServer() as web:
         web.files["/arm.stl"] = web.files["/hand.stl"] = lambda request: request.send_error(503)
         view = bench.load("RobotModelDisplay {}")
@@ -377,7 +377,7 @@ def test_settings_are_written_for_either_rviz(bench: SceneBench) -> None:
 
 def test_links_have_settings_of_their_own(bench: SceneBench) -> None:
     from rosglass import Time
-    from rosglass.scene.drawing import Lines
+    from rosglass.scene.render.drawing import Lines
     from rosglass.tf import Transform, TransformBroadcaster
 
     view = bench.load("RobotModelDisplay {}")
@@ -438,7 +438,7 @@ def test_links_have_settings_of_their_own(bench: SceneBench) -> None:
 
 def test_a_robot_whose_transforms_stop_fades(bench: SceneBench, monkeypatch: Any) -> None:
     from rosglass import Time
-    from rosglass.scene import display
+    from rosglass.scene.displays import display
     from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(display, "_FRAME_TIMEOUT_S", 0.5)
@@ -465,7 +465,7 @@ def test_a_robot_whose_transforms_stop_fades(bench: SceneBench, monkeypatch: Any
 def test_a_robot_fades_when_one_of_its_joints_is_not_updated(
     bench: SceneBench, monkeypatch: Any
 ) -> None:
-    from rosglass.scene import display
+    from rosglass.scene.displays import display
     from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(display, "_FRAME_TIMEOUT_S", 0.5)

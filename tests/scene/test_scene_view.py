@@ -123,7 +123,7 @@ def test_a_scene_that_changes_all_the_time_leaves_frames_to_qml(
 ) -> None:
     from scene_mouse import Hand
 
-    from rosglass.scene.renderer import SceneRenderer
+    from rosglass.scene.render.renderer import SceneRenderer
 
     draw = SceneRenderer.render
 
@@ -330,7 +330,7 @@ def test_what_follows_a_frame_fades_as_soon_as_nobody_publishes_it(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rosglass import Time
-    from rosglass.scene import display as displays
+    from rosglass.scene.displays import display as displays
     from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 3600.0)
@@ -348,7 +348,7 @@ def test_a_broken_display_keeps_no_other_from_fading(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rosglass import Time
-    from rosglass.scene import display as displays
+    from rosglass.scene.displays import display as displays
     from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 0.1)
@@ -379,7 +379,7 @@ def test_transforms_in_the_namespace_of_the_node_have_publishers(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rosglass import Time
-    from rosglass.scene import display as displays
+    from rosglass.scene.displays import display as displays
     from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(displays, "_UNPUBLISHED_TIMEOUT_S", -1.0)
@@ -506,7 +506,7 @@ def test_made_and_destroyed_many_times(bench: SceneBench) -> None:
 
 
 def test_picking_finds_the_nearest_drawable(bench: SceneBench) -> None:
-    from rosglass.scene.drawing import BOX, Mesh, Points, instance_matrix
+    from rosglass.scene.render.drawing import BOX, Mesh, Points, instance_matrix
 
     view = bench.load()
     box, cloud = Mesh(BOX), Points()
@@ -606,7 +606,7 @@ def test_a_view_that_leaves_its_window_has_nothing_on_its_device(bench: SceneBen
 
 def test_frames_fade_one_by_one_and_all_when_transforms_stop(bench: SceneBench) -> None:
     from rosglass import Time
-    from rosglass.scene.drawing import Mesh
+    from rosglass.scene.render.drawing import Mesh
     from rosglass.tf import StaticTransformBroadcaster, Transform, TransformBroadcaster
 
     view = bench.load("TFDisplay { frameTimeout: 3600; showArrows: false }")
@@ -644,7 +644,7 @@ def test_frames_fade_one_by_one_and_all_when_transforms_stop(bench: SceneBench) 
 
 def test_frames_that_do_not_move_follow_another_fixed_frame(bench: SceneBench) -> None:
     from rosglass import Time
-    from rosglass.scene.drawing import Mesh
+    from rosglass.scene.render.drawing import Mesh
     from rosglass.tf import StaticTransformBroadcaster, Transform
 
     view = bench.load("TFDisplay { showArrows: false }")
@@ -667,7 +667,7 @@ def test_frames_that_do_not_move_follow_another_fixed_frame(bench: SceneBench) -
 
 def test_frames_are_updated_at_the_interval_and_at_once_after_it_is_0(bench: SceneBench) -> None:
     from rosglass import Time
-    from rosglass.scene.drawing import Mesh
+    from rosglass.scene.render.drawing import Mesh
     from rosglass.tf import Transform, TransformBroadcaster
 
     view = bench.load("TFDisplay { updateInterval: 1000; showArrows: false }")
@@ -744,8 +744,8 @@ def test_what_follows_frames_fades_without_a_node(bench: SceneBench) -> None:
 
 def test_no_frame_fades_while_a_simulation_is_paused(bench: SceneBench, monkeypatch: Any) -> None:
     from rosglass import Time
-    from rosglass.scene import display as displays
-    from rosglass.scene import scene as scenes
+    from rosglass.scene.displays import display as displays
+    from rosglass.scene.displays import scene as scenes
     from rosglass.tf import Transform, TransformBroadcaster
 
     monkeypatch.setattr(displays, "_FRAME_TIMEOUT_S", 1.0)
@@ -858,7 +858,7 @@ def test_data_of_a_publisher_that_is_gone_stays_so_beside_another(bench: SceneBe
 
 
 def test_displays_of_a_hidden_group_show_nothing_old_later(bench: SceneBench) -> None:
-    from rosglass.scene.display_configs import GroupDisplay
+    from rosglass.scene.view.display_configs import GroupDisplay
 
     view = bench.load()
     group = view.scene.add(GroupDisplay(view.scene, runtime_of(view.scene)))
@@ -1043,7 +1043,7 @@ def test_a_display_of_another_scene_is_refused(bench: SceneBench) -> None:
 
 def test_a_scene_ends_before_its_displays(bench: SceneBench, capfd: Any) -> None:
     from rosglass.qt import is_alive, send_deferred_deletes
-    from rosglass.scene.scene import Scene
+    from rosglass.scene.displays.scene import Scene
 
     view = bench.load()
     scene = Scene(None, runtime_of(view.scene))
@@ -1125,7 +1125,7 @@ def test_the_whole_is_drawn_after_a_move_whose_timer_ends_early(
 
 def boxes_in_a_row(count: int) -> list[Any]:
     """Return red boxes beside each other, as drawables of their own."""
-    from rosglass.scene.drawing import BOX, Mesh, instance_matrix
+    from rosglass.scene.render.drawing import BOX, Mesh, instance_matrix
 
     made = [Mesh(BOX, (1.0, 0.0, 0.0, 1.0), lit=False) for _ in range(count)]
     for number, box in enumerate(made):
@@ -1136,7 +1136,7 @@ def boxes_in_a_row(count: int) -> list[Any]:
 def test_what_is_new_is_uploaded_over_several_pictures(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass.scene import renderer as module
+    from rosglass.scene.render import renderer as module
 
     view = bench.load()
     bench.picture()
@@ -1170,8 +1170,8 @@ def test_what_is_new_is_uploaded_over_several_pictures(
 def test_displays_upload_what_is_new_in_turns(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass.scene import renderer as module
-    from rosglass.scene.drawing import Group
+    from rosglass.scene.render import renderer as module
+    from rosglass.scene.render.drawing import Group
 
     view = bench.load()
     bench.picture()
@@ -1196,7 +1196,7 @@ def test_displays_upload_what_is_new_in_turns(
 
 
 def test_a_grabbed_picture_shows_all(bench: SceneBench, monkeypatch: pytest.MonkeyPatch) -> None:
-    from rosglass.scene import renderer as module
+    from rosglass.scene.render import renderer as module
 
     view = bench.load()
     bench.picture()
@@ -1227,7 +1227,7 @@ def test_a_grabbed_picture_shows_all(bench: SceneBench, monkeypatch: pytest.Monk
 def test_texts_that_are_taken_away_meanwhile_hide_nothing(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass.scene.drawing import Labels
+    from rosglass.scene.render.drawing import Labels
 
     view = bench.load("AxesDisplay {}")
     labels = Labels()
@@ -1253,7 +1253,7 @@ def test_texts_that_are_taken_away_meanwhile_hide_nothing(
 
 
 def test_texts_are_drawn_between_what_is_translucent_by_their_distance(bench: SceneBench) -> None:
-    from rosglass.scene.drawing import BOX, Labels, Mesh, instance_matrix
+    from rosglass.scene.render.drawing import BOX, Labels, Mesh, instance_matrix
 
     view = bench.load('view: "TopDownOrtho"')
     red, green, labels = (1.0, 0.0, 0.0, 0.5), (0.0, 1.0, 0.0), Labels()
@@ -1274,7 +1274,7 @@ def test_texts_are_drawn_between_what_is_translucent_by_their_distance(bench: Sc
 
 
 def test_texts_without_room_are_a_problem(bench: SceneBench) -> None:
-    from rosglass.scene.drawing import Labels
+    from rosglass.scene.render.drawing import Labels
 
     view = bench.load("GridDisplay {}")
     labels = Labels(in_pixels=True)
@@ -1289,8 +1289,8 @@ def test_texts_without_room_are_a_problem(bench: SceneBench) -> None:
 def test_texts_whose_image_is_refused_are_painted_again(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass.scene.drawing import Labels
-    from rosglass.scene.graphics_device import GraphicsDevice
+    from rosglass.scene.render.drawing import Labels
+    from rosglass.scene.render.graphics_device import GraphicsDevice
 
     view = bench.load()
     labels = Labels(in_pixels=True)
@@ -1309,7 +1309,7 @@ def test_texts_whose_image_is_refused_are_painted_again(
 
 
 def test_an_image_beyond_the_limit_keeps_the_walls_of_a_map() -> None:
-    from rosglass.scene.graphics_device import reduce_image
+    from rosglass.scene.render.graphics_device import reduce_image
 
     cells = np.zeros((101, 60), np.int8)
     cells[:, 31] = 100
@@ -1343,8 +1343,7 @@ def test_mistakes_in_qml_are_errors_that_name_the_line(
 ) -> None:
     from PySide6.QtCore import QUrl
 
-    from rosglass.scene import declared
-    from rosglass.scene.displays import image
+    from rosglass.scene.displays import declared, image
 
     monkeypatch.setattr(declared, "_PLACED_MS", 50)
     monkeypatch.setattr(image, "_HIDDEN_CHECK_MS", 50)

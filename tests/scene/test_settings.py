@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from rosglass.errors import Error
-from rosglass.scene.rviz_config import RvizConfig
-from rosglass.scene.settings import Setting
+from rosglass.scene.configs.rviz_config import RvizConfig
+from rosglass.scene.configs.settings import Setting
 
 
 def value(text: str) -> object:

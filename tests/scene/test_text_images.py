@@ -18,7 +18,7 @@ def part(image: Any, text: str, edges: bool = False) -> Any:
 
 
 def test_only_texts_that_are_new_are_painted() -> None:
-    from rosglass.scene.text_images import TextImage
+    from rosglass.scene.render.text_images import TextImage
 
     image = TextImage(4096)
     assert image.set_texts(["one", "two"]) == (0, len(image.pixels))
@@ -39,7 +39,7 @@ def test_only_texts_that_are_new_are_painted() -> None:
 
 
 def test_a_text_that_is_wider_than_the_image_is_painted_as_a_whole() -> None:
-    from rosglass.scene.text_images import TextImage
+    from rosglass.scene.render.text_images import TextImage
 
     image = TextImage(4096)
     for texts in (["9.9"], ["9.8"]):  # from the second time on, there is room below
@@ -52,7 +52,7 @@ def test_a_text_that_is_wider_than_the_image_is_painted_as_a_whole() -> None:
 
 
 def test_an_image_of_ever_other_texts_stays_small() -> None:
-    from rosglass.scene.text_images import TextImage
+    from rosglass.scene.render.text_images import TextImage
 
     image = TextImage(4096)
     kept = [f"label {number}" for number in range(50)]
@@ -66,7 +66,7 @@ def test_an_image_of_ever_other_texts_stays_small() -> None:
 
 
 def test_texts_have_places_and_sizes_in_lines_or_no_room() -> None:
-    from rosglass.scene.text_images import TextImage
+    from rosglass.scene.render.text_images import TextImage
 
     image = TextImage(256)
     texts = ["a", "b\nc", "", "wide " * 100]
@@ -86,7 +86,7 @@ def test_texts_have_places_and_sizes_in_lines_or_no_room() -> None:
 
 @pytest.mark.parametrize("limit", [64, 256, 1000])
 def test_random_texts_are_beside_each_other_in_the_image(limit: int) -> None:
-    from rosglass.scene.text_images import TextImage
+    from rosglass.scene.render.text_images import TextImage
 
     chance = random.Random(limit)
     for outlined in (False, True) * 5:
@@ -112,7 +112,7 @@ def test_random_texts_are_beside_each_other_in_the_image(limit: int) -> None:
 
 
 def test_edges_are_texts_of_their_own_around_the_letters() -> None:
-    from rosglass.scene.text_images import TextImage
+    from rosglass.scene.render.text_images import TextImage
 
     image = TextImage(4096)
     image.set_texts(["one"], outlined=True)

@@ -33,7 +33,7 @@ def listen(bench: SceneBench, topic: str, message_type: str) -> list[Any]:
 
 
 def add_box(view: Any, position: Any = (0, 0, 0), owner: Any = "box") -> Any:
-    from rosglass.scene.drawing import BOX, Mesh, instance_matrix
+    from rosglass.scene.render.drawing import BOX, Mesh, instance_matrix
 
     box = Mesh(BOX, (1, 0, 0, 1))
     box.owner = owner
@@ -327,7 +327,7 @@ def test_f_and_focus_camera_turn_the_camera(
     start = view.camera().focus
     # It turns, and does not jump.
     with monkeypatch.context() as patch:
-        patch.setattr("rosglass.scene.scene_view._TURN_S", 3600.0)
+        patch.setattr("rosglass.scene.view.scene_view._TURN_S", 3600.0)
         hand.key(hand.keys.Key_F)
         assert view.is_turning
         assert np.linalg.norm(np.array(view.camera().focus) - start) < 0.5
@@ -642,7 +642,7 @@ def test_a_goal_of_an_action_is_canceled(bench: SceneBench, hand: Hand, nav2: An
 def test_escape_drops_a_goal_that_waits_for_its_server(
     bench: SceneBench, hand: Hand, nav2: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rosglass.scene.publishing_tools._MATCH_TIMEOUT_S", 60.0)
+    monkeypatch.setattr("rosglass.scene.tools.publishing_tools._MATCH_TIMEOUT_S", 60.0)
     view = bench.load('Nav2GoalTool { name: "Go" }\ntool: "Go"')
     goal = view.tools.current
     bench.wait(lambda: endpoint_of(goal) is not None)
@@ -660,7 +660,7 @@ def test_escape_drops_a_goal_that_waits_for_its_server(
 def test_cancel_stops_the_robot_while_another_goal_waits(
     bench: SceneBench, hand: Hand, nav2: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rosglass.scene.publishing_tools._MATCH_TIMEOUT_S", 60.0)
+    monkeypatch.setattr("rosglass.scene.tools.publishing_tools._MATCH_TIMEOUT_S", 60.0)
     view = bench.load('Nav2GoalTool { name: "Go" }\ntool: "Go"')
     driver, goal = Driver(nav2), view.tools.current
     hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
@@ -678,7 +678,7 @@ def test_cancel_stops_the_robot_while_another_goal_waits(
 def test_a_config_does_not_silently_drop_a_goal_that_waits(
     bench: SceneBench, hand: Hand, monkeypatch: pytest.MonkeyPatch, caplog: Any
 ) -> None:
-    monkeypatch.setattr("rosglass.scene.publishing_tools._MATCH_TIMEOUT_S", 60.0)
+    monkeypatch.setattr("rosglass.scene.tools.publishing_tools._MATCH_TIMEOUT_S", 60.0)
     view = bench.load()
     view.tools.add("GoalTool")
     view.tools.select("GoalTool")
@@ -696,7 +696,7 @@ def test_qml_does_not_silently_destroy_a_tool_with_a_goal(
 ) -> None:
     from rosglass.qt import send_deferred_deletes
 
-    monkeypatch.setattr("rosglass.scene.publishing_tools._MATCH_TIMEOUT_S", 60.0)
+    monkeypatch.setattr("rosglass.scene.tools.publishing_tools._MATCH_TIMEOUT_S", 60.0)
     view = bench.load(
         "id: top; property bool wanted: true\n"
         "Loader { active: top.wanted; sourceComponent: Item { \n"
@@ -741,7 +741,7 @@ def test_a_goal_to_an_action_without_server_says_so(
     bench.wait(lambda: endpoint_of(goal) is not None)
     said: list[str] = []
     view.statusTextChanged.connect(lambda: said.append(view.statusText))
-    monkeypatch.setattr("rosglass.scene.publishing_tools._MATCH_TIMEOUT_S", 0.2)
+    monkeypatch.setattr("rosglass.scene.tools.publishing_tools._MATCH_TIMEOUT_S", 0.2)
     hand.drag(hand.at((0, 0, 0)), hand.at((0, 1, 0)))
     bench.wait(lambda: "not sent" in goal.problem, lambda: goal.problem)
     assert "/navigate_to_pose" in goal.problem
@@ -794,7 +794,7 @@ def test_a_distance_is_measured(bench: SceneBench, hand: Hand) -> None:
 
 
 def test_a_rectangle_selects(bench: SceneBench, hand: Hand) -> None:
-    from rosglass.scene.drawing import Points, instance_matrix
+    from rosglass.scene.render.drawing import Points, instance_matrix
 
     view = bench.load('tool: "Select"; property int count: selection.count')
 
@@ -849,8 +849,8 @@ def test_a_rectangle_selects(bench: SceneBench, hand: Hand) -> None:
 def test_a_cell_of_a_large_map_is_selected_without_the_others(bench: SceneBench) -> None:
     import tracemalloc
 
-    from rosglass.scene.drawing import MapImage
-    from rosglass.scene.picking import Selected
+    from rosglass.scene.render.drawing import MapImage
+    from rosglass.scene.render.picking import Selected
 
     view = bench.load()
     image = MapImage()
@@ -871,7 +871,7 @@ def test_a_cell_of_a_large_map_is_selected_without_the_others(bench: SceneBench)
 
 
 def test_the_panel_follows_what_is_selected(bench: SceneBench) -> None:
-    from rosglass.scene.drawing import instance_matrix
+    from rosglass.scene.render.drawing import instance_matrix
 
     view = bench.load("SelectionPanel { width: 200; height: 300; view: parent }")
     box = add_box(view, owner=view.scene.add("Path", "Way"))
@@ -925,7 +925,7 @@ def test_parts_are_listed_by_display_and_expanded_by_a_click(bench: SceneBench, 
 
 
 def test_selected_points_are_dropped_with_their_cloud(bench: SceneBench) -> None:
-    from rosglass.scene.drawing import Points
+    from rosglass.scene.render.drawing import Points
 
     view = bench.load()
     cloud = Points()
@@ -1020,7 +1020,7 @@ def test_points_keep_the_digits_of_utm_coordinates(bench: SceneBench, hand: Hand
 
 
 def test_an_own_tool_in_python_may_fail(bench: SceneBench, hand: Hand, caplog: Any) -> None:
-    from rosglass.scene.tools import Tool
+    from rosglass.scene.tools.tool import Tool
 
     class Broken(Tool):
         NAME = "Broken"
@@ -1040,9 +1040,9 @@ def test_an_own_tool_in_python_may_fail(bench: SceneBench, hand: Hand, caplog: A
 def test_an_own_tool_may_fail_when_it_is_selected_or_not(
     bench: SceneBench, hand: Hand, caplog: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass.scene.tools import Tool
+    from rosglass.scene.tools.tool import Tool
 
-    monkeypatch.setattr("rosglass.scene.tools._OUTCOME_MS", 100)
+    monkeypatch.setattr("rosglass.scene.tools.tool._OUTCOME_MS", 100)
 
     class Broken(Tool):
         NAME = "Broken"

@@ -45,7 +45,7 @@ def near(found: Any, wanted: Any, within: float = 0.01) -> bool:
 
 
 def control(bench: SceneBench) -> Any:
-    from rosglass.scene.view_control import control_of
+    from rosglass.scene.overlays.view_control import control_of
 
     return control_of(bench.view)
 
@@ -268,7 +268,7 @@ def test_a_view_of_hector_rviz_plugins_becomes_an_orbit(bench: SceneBench, tmp_p
 def test_saved_views_of_hector_rviz_plugins_are_named_and_kept(
     bench: SceneBench, tmp_path: Path
 ) -> None:
-    from rosglass.scene.rviz_config import RvizConfig
+    from rosglass.scene.configs.rviz_config import RvizConfig
 
     file = tmp_path / "saved.rviz"
     current = HECTOR.partition("    Current:\n")[2]

@@ -32,7 +32,7 @@ Visualization Manager:
 @pytest.fixture
 def model(bench: SceneBench) -> Any:
     """The rows of a Displays panel of a view with a grid."""
-    from rosglass.scene.panel_models import DisplaysModel
+    from rosglass.scene.app.panel_models import DisplaysModel
 
     view = bench.load("GridDisplay {}")
     bench.wait(lambda: view.scene.displays)
@@ -248,7 +248,7 @@ def test_a_display_is_duplicated_with_its_settings(bench: SceneBench, grouped: A
     axes[1].length = 1.0
     assert axes[0].length == 2.5
     # What rosglass does not have is kept, too.
-    from rosglass.scene.display_configs import UnknownDisplay
+    from rosglass.scene.view.display_configs import UnknownDisplay
 
     scene.adopt(UnknownDisplay(scene, class_id="other/Radar"))
     model.refresh()
@@ -313,7 +313,7 @@ def test_a_move_that_is_none_is_an_error(bench: SceneBench, grouped: Any) -> Non
 def test_namespaces_and_links_are_rows_with_check_boxes(
     bench: SceneBench, model: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass.scene import panel_models
+    from rosglass.scene.app import panel_models
 
     monkeypatch.setattr(panel_models, "_MAX_PARTS", 3)
     markers = bench.view.scene.add("MarkerArray", topic="/markers")
@@ -454,7 +454,7 @@ def test_the_program_loads_only_what_its_window_shows() -> None:
         "{'rosglass.scene.displays.marker', 'rosglass.images', 'rosglass.qml.ros2', "
         "'rosglass.connection', 'rosglass.interfaces.library', 'rosglass.tf.buffer', 'yaml'}"
     )
-    code = f"import rosglass.scene.program, sys; print(sorted({late} & set(sys.modules)))"
+    code = f"import rosglass.scene.app.program, sys; print(sorted({late} & set(sys.modules)))"
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
     assert done.stdout.strip() == "[]"
@@ -548,7 +548,7 @@ def test_the_command_shows_overlays(app: Any, tmp_path: Path) -> None:
 def test_typed_paths_are_taken_as_they_are(app: Any, chosen: str, meant: str) -> None:
     from PySide6.QtCore import QUrl
 
-    from rosglass.scene.program import ViewProgram
+    from rosglass.scene.app.program import ViewProgram
 
     url = QUrl("file:")
     url.setPath(chosen)
@@ -558,7 +558,7 @@ def test_typed_paths_are_taken_as_they_are(app: Any, chosen: str, meant: str) ->
 
 def test_what_would_be_lost_is_asked_for(bench: SceneBench, tmp_path: Path) -> None:
     from rosglass import Time
-    from rosglass.scene.program import ViewProgram
+    from rosglass.scene.app.program import ViewProgram
     from rosglass.tf import StaticTransformBroadcaster, Transform
 
     view = bench.load()
@@ -594,7 +594,7 @@ def window(bench: SceneBench, request: pytest.FixtureRequest) -> Iterator[Any]:
 
     from rosglass.qml import install
     from rosglass.qt import send_deferred_deletes
-    from rosglass.scene.program import WINDOW, ViewProgram
+    from rosglass.scene.app.program import WINDOW, ViewProgram
 
     engine, program = QQmlApplicationEngine(), ViewProgram(**getattr(request, "param", {}))
     install(engine, bench.session)
@@ -1032,7 +1032,7 @@ def test_docks_are_hidden_as_the_config_says_and_saved(
     from PySide6.QtCore import QMetaObject, QObject
     from PySide6.QtQml import qmlContext
 
-    from rosglass.scene.rviz_config import RvizConfig
+    from rosglass.scene.configs.rviz_config import RvizConfig
 
     program = qmlContext(window).contextProperty("program")
     scene = window.findChild(QObject, "scene")
@@ -1101,7 +1101,7 @@ def test_the_program_follows_configs_of_overlays(
     from PySide6.QtQml import qmlContext
 
     from rosglass.scene.access import access_of
-    from rosglass.scene.rviz_config import RvizConfig
+    from rosglass.scene.configs.rviz_config import RvizConfig
 
     program = qmlContext(window).contextProperty("program")
     access = access_of(window.findChild(QObject, "scene"))

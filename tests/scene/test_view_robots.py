@@ -30,7 +30,7 @@ class SceneCamera(Camera):
         from qt_waiting import QtWaiting
 
         from rosglass.scene.access import access_of
-        from rosglass.scene.view_control import control_of
+        from rosglass.scene.overlays.view_control import control_of
 
         self._bench, self.session = bench, bench.session
         self._scene_view = bench.load("ViewControllerDisplay { animationDuration: 0.2 }")
@@ -120,7 +120,7 @@ def test_the_command_offers_it_also_to_another_master(app: Any, tmp_path: Path) 
 def test_of_two_views_with_the_same_names_one_waits_for_the_other(
     make_bench: Callable[[str], SceneBench], ros_master: RosMaster
 ) -> None:
-    from rosglass.scene.view_control import control_of
+    from rosglass.scene.overlays.view_control import control_of
 
     with closing(make_bench(ros_master.url)) as bench:
         first = bench.load(

@@ -141,3 +141,19 @@ def test_names_of_nodes_are_valid_or_not_without_a_node() -> None:
 
 def test_packages_are_attributes() -> None:
     assert run("import rosglass; print(rosglass.comm.IMMEDIATE is not None)") == "True"
+
+
+@pytest.mark.parametrize(
+    ("module", "name"),
+    [
+        ("drawing", "Points"),
+        ("meshes", "load_mesh_cached"),
+        ("rviz_config", "RvizConfig"),
+        ("settings", "Setting"),
+        ("urdf", "parse_urdf"),
+    ],
+)
+def test_former_modules_of_scene_have_their_public_names(module: str, name: str) -> None:
+    pytest.importorskip("PySide6")
+    code = f"from rosglass.scene.{module} import {name}; print({name}.__name__)"
+    assert run(code) == name

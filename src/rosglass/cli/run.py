@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.qml.application import Application
-    from rosglass.scene.window_recorder import WindowRecorder
+    from rosglass.scene.app.window_recorder import WindowRecorder
 
 __all__ = [
     "Picture",
@@ -67,7 +67,7 @@ def make_recorder(args: argparse.Namespace) -> WindowRecorder | None:
     try:
         load_qt()
         # Not all programs need numpy and PyAV.
-        from rosglass.scene.window_recorder import WindowRecorder  # noqa: PLC0415
+        from rosglass.scene.app.window_recorder import WindowRecorder  # noqa: PLC0415
     except ModuleNotFoundError as error:
         if not str(error.name).startswith("PySide6"):
             raise

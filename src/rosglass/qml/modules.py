@@ -39,7 +39,7 @@ _LIBRARIES = {".so", ".dylib", ".dll"}
 _PACKAGE = "package://"
 _REMOTE = ("http://", "https://", "ftp://")
 #: Where the windows of rosglass itself are, whose program registers the types that they use.
-_OWN = Path(__file__).parents[1] / "scene/panels"
+_OWN = Path(__file__).parents[1] / "scene/app/panels"
 
 
 def locate(place: str | os.PathLike[str]) -> Path:

@@ -6,39 +6,61 @@ before their first window.
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rosglass.scene.display import Display, TopicDisplay
-    from rosglass.scene.modules import register
-    from rosglass.scene.overlay import SceneOverlay, add_overlay
-    from rosglass.scene.scene import Scene
-    from rosglass.scene.scene_view import SceneView
-    from rosglass.scene.tools import PointerEvent, Tool
+    from rosglass.scene.app.modules import register
+    from rosglass.scene.configs.rviz_config import RvizConfig
+    from rosglass.scene.configs.settings import Setting
+    from rosglass.scene.data.meshes import load_mesh_cached
+    from rosglass.scene.data.urdf import parse_urdf
+    from rosglass.scene.displays.display import Display, TopicDisplay
+    from rosglass.scene.displays.scene import Scene
+    from rosglass.scene.overlays.scene_overlay import SceneOverlay, add_overlay
+    from rosglass.scene.tools.tool import PointerEvent, Tool
+    from rosglass.scene.view.scene_view import SceneView
 
 __all__ = [
     "Display",
     "PointerEvent",
+    "RvizConfig",
     "Scene",
     "SceneOverlay",
     "SceneView",
+    "Setting",
     "Tool",
     "TopicDisplay",
     "add_overlay",
+    "load_mesh_cached",
+    "parse_urdf",
     "register",
 ]
 
 _HOMES = {
-    "Display": "display",
-    "PointerEvent": "tools",
-    "Scene": "scene",
-    "SceneOverlay": "overlay",
-    "SceneView": "scene_view",
-    "Tool": "tools",
-    "TopicDisplay": "display",
-    "add_overlay": "overlay",
-    "register": "modules",
+    "Display": "displays.display",
+    "PointerEvent": "tools.tool",
+    "RvizConfig": "configs.rviz_config",
+    "Scene": "displays.scene",
+    "SceneOverlay": "overlays.scene_overlay",
+    "SceneView": "view.scene_view",
+    "Setting": "configs.settings",
+    "Tool": "tools.tool",
+    "TopicDisplay": "displays.display",
+    "add_overlay": "overlays.scene_overlay",
+    "load_mesh_cached": "data.meshes",
+    "parse_urdf": "data.urdf",
+    "register": "app.modules",
+}
+#: Former modules that programs import, and where their names are now.
+_FORMER = {
+    "drawing": "render.drawing",
+    "meshes": "data.meshes",
+    "rviz_config": "configs.rviz_config",
+    "settings": "configs.settings",
+    "urdf": "data.urdf",
 }
 
 
@@ -53,3 +75,20 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     return sorted(__all__)
+
+
+def _former_module(name: str, home: str) -> ModuleType:
+    """Return a module whose names are those of another, imported on first use."""
+    module = ModuleType(f"{__name__}.{name}", f"The names of :mod:`{__name__}.{home}`.")
+
+    def find(attribute: str) -> object:
+        if attribute.startswith("__"):  # which debuggers ask of all modules
+            raise AttributeError(attribute)
+        return getattr(import_module(f"{__name__}.{home}"), attribute)
+
+    vars(module)["__getattr__"] = find
+    return module
+
+
+for _name, _home in _FORMER.items():
+    globals()[_name] = sys.modules[f"{__name__}.{_name}"] = _former_module(_name, _home)

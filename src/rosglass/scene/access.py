@@ -26,23 +26,23 @@ from rosglass.rviz.orbit import Orbit, Point
 from rosglass.rviz.property_values import KINDS
 from rosglass.rviz.trackers import Frames, Trackers
 from rosglass.rviz.view import CurrentView, View, Views
-from rosglass.scene.rviz_config import RvizConfig
-from rosglass.scene.rviz_formats import DISPLAYS as DISPLAY_IDS
-from rosglass.scene.rviz_formats import TOOLS as TOOL_IDS
-from rosglass.scene.rviz_formats import VIEWS as VIEW_IDS
-from rosglass.scene.rviz_formats import class_id_of, display_type, tool_type, view_type
-from rosglass.scene.tools import Tools
-from rosglass.scene.views import VIEWS, TopDownOrthoView
+from rosglass.scene.configs.rviz_config import RvizConfig
+from rosglass.scene.configs.rviz_formats import DISPLAYS as DISPLAY_IDS
+from rosglass.scene.configs.rviz_formats import TOOLS as TOOL_IDS
+from rosglass.scene.configs.rviz_formats import VIEWS as VIEW_IDS
+from rosglass.scene.configs.rviz_formats import class_id_of, display_type, tool_type, view_type
+from rosglass.scene.tools.tool import Tools
+from rosglass.scene.view_controllers.views import VIEWS, TopDownOrthoView
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from rosglass.qml.session import Session
     from rosglass.rviz.property_values import Kind
-    from rosglass.scene.display import Display
-    from rosglass.scene.scene import Scene
-    from rosglass.scene.scene_view import SceneView
-    from rosglass.scene.tools import Tool
+    from rosglass.scene.displays.display import Display
+    from rosglass.scene.displays.scene import Scene
+    from rosglass.scene.tools.tool import Tool
+    from rosglass.scene.view.scene_view import SceneView
 
 __all__ = ["SceneAccess", "access_of"]
 
@@ -289,7 +289,7 @@ class SceneCamera:
         return self._camera != before
 
     def project(self, point: Any) -> Any:
-        """Return where a point is seen; see :meth:`rosglass.scene.camera.Camera.project`."""
+        """Return where a point is seen; see :meth:`rosglass.scene.render.camera.Camera.project`."""
         return self._camera.project(point)
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rosglass.errors import Error
-from rosglass.scene.camera import Camera, PinholeCamera, interpolate
-from rosglass.scene.views import OrbitView, TopDownOrthoView
+from rosglass.scene.render.camera import Camera, PinholeCamera, interpolate
+from rosglass.scene.view_controllers.views import OrbitView, TopDownOrthoView
 
 
 def looking(eye: tuple[float, float, float], focus: tuple[float, float, float]) -> Camera:

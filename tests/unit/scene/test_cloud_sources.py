@@ -10,7 +10,7 @@ import pytest
 
 from rosglass.errors import ArgumentError, DecodeError
 from rosglass.messages import load
-from rosglass.scene.cloud_sources import (
+from rosglass.scene.data.cloud_sources import (
     OcclusionBuffer,
     cloud_from_columns,
     cloud_from_depth_image,

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from rosglass.errors import ArgumentError, Error, UnsupportedError
-from rosglass.scene import meshes, triangles
-from rosglass.scene.meshes import MeshError, MeshPart, load_mesh, load_mesh_cached
+from rosglass.scene.data import meshes, triangles
+from rosglass.scene.data.meshes import MeshError, MeshPart, load_mesh, load_mesh_cached
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from rosglass.scene.drawing import BOX, Group, Labels, Mesh
-from rosglass.scene.picking import pick
-from rosglass.scene.views import OrbitView
+from rosglass.scene.render.drawing import BOX, Group, Labels, Mesh
+from rosglass.scene.render.picking import pick
+from rosglass.scene.view_controllers.views import OrbitView
 
 
 def test_a_ray_does_not_pass_between_two_triangles() -> None:

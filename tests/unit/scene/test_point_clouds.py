@@ -11,7 +11,7 @@ from point_clouds import packed_color, point_cloud2, random_points
 
 from rosglass.errors import ArgumentError, DecodeError, Error
 from rosglass.messages import load
-from rosglass.scene.point_clouds import (
+from rosglass.scene.data.point_clouds import (
     Channel,
     Cloud,
     CloudHistory,

@@ -9,8 +9,8 @@ import pytest
 from point_clouds import packed_color, point_cloud2, random_points
 
 from rosglass.errors import ArgumentError
-from rosglass.scene.point_clouds import Channel, Cloud
-from rosglass.scene.point_colors import (
+from rosglass.scene.data.point_clouds import Channel, Cloud
+from rosglass.scene.render.point_colors import (
     COLOR_TRANSFORMERS,
     AxisColor,
     FlatColor,

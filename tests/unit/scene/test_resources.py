@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from rosglass.errors import ArgumentError, Error, UnsupportedError
-from rosglass.scene.resources import ResourceError, check_texture, locate_resource
+from rosglass.scene.data.resources import ResourceError, check_texture, locate_resource
 
 if TYPE_CHECKING:
     from pathlib import Path

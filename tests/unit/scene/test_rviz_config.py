@@ -13,8 +13,8 @@ import yaml
 
 from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.errors import Error
-from rosglass.scene.rviz_config import DisplayConfig, RvizConfig, ToolConfig, ViewConfig
-from rosglass.scene.rviz_formats import (
+from rosglass.scene.configs.rviz_config import DisplayConfig, RvizConfig, ToolConfig, ViewConfig
+from rosglass.scene.configs.rviz_formats import (
     DescriptionSetting,
     TopicSetting,
     display_type,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rosglass.errors import ArgumentError
-from rosglass.scene.urdf import (
+from rosglass.scene.data.urdf import (
     Box,
     Capsule,
     Cylinder,

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from rosglass.errors import ArgumentError, Error
-from rosglass.scene.events import Action, Button, Drag, Modifier, Touch, Wheel
-from rosglass.scene.rviz_formats import FIXED_FRAME
-from rosglass.scene.views import (
+from rosglass.scene.configs.rviz_formats import FIXED_FRAME
+from rosglass.scene.view_controllers.events import Action, Button, Drag, Modifier, Touch, Wheel
+from rosglass.scene.view_controllers.views import (
     VIEWS,
     FPSView,
     FrameAlignedView,

@@ -1,1 +1,1 @@
-"""The displays of RViz, one module for each family."""
+"""The displays of RViz, and the scene that they fill."""

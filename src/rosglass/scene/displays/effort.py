@@ -15,15 +15,15 @@ from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot, is_alive
-from rosglass.scene.display import Status
+from rosglass.scene.configs.settings import Setting
+from rosglass.scene.data.urdf import parse_urdf
+from rosglass.scene.displays.display import Status
 from rosglass.scene.displays.geometry import HistoryDisplay
+from rosglass.scene.displays.parts import Parts
 from rosglass.scene.displays.robot_model import DescriptionLoader, DescriptionSource
 from rosglass.scene.displays.shapes import rotation_of_z_to
-from rosglass.scene.drawing import CONE, Lines, Mesh
-from rosglass.scene.parts import Parts
-from rosglass.scene.point_colors import rainbow
-from rosglass.scene.settings import Setting
-from rosglass.scene.urdf import parse_urdf
+from rosglass.scene.render.drawing import CONE, Lines, Mesh
+from rosglass.scene.render.point_colors import rainbow
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
-    from rosglass.scene.drawing import Group
-    from rosglass.scene.urdf import Joint
+    from rosglass.scene.data.urdf import Joint
+    from rosglass.scene.render.drawing import Group
 
 __all__ = ["EffortDisplay"]
 

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from rosglass.errors import Error
-from rosglass.scene.display import MOST_WAITING, TopicDisplay
+from rosglass.scene.configs.settings import Setting, rgb_of
+from rosglass.scene.displays.display import MOST_WAITING, TopicDisplay
 from rosglass.scene.displays.shapes import (
     ArrowShapes,
     pose_along,
     read_columns,
     rotation_of_z_to,
 )
-from rosglass.scene.drawing import (
+from rosglass.scene.render.drawing import (
     CONE,
     SPHERE,
     Group,
@@ -26,7 +27,6 @@ from rosglass.scene.drawing import (
     check_numbers,
     instance_matrix,
 )
-from rosglass.scene.settings import Setting, rgb_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rosglass.scene.display import Display
+from rosglass.scene.configs.rviz_formats import FIXED_FRAME
+from rosglass.scene.configs.settings import Setting, rgb_of
+from rosglass.scene.displays.display import Display
 from rosglass.scene.displays.shapes import AxesShapes
-from rosglass.scene.drawing import Group, Lines
-from rosglass.scene.rviz_formats import FIXED_FRAME
-from rosglass.scene.settings import Setting, rgb_of
+from rosglass.scene.render.drawing import Group, Lines
 
 if TYPE_CHECKING:
     from rosglass.qml.runtime import Runtime

@@ -29,12 +29,17 @@ from rosglass.qml.image_sinks import ImageItem, Sink
 from rosglass.qml.log import declared_at, log_from_qml
 from rosglass.qml.properties import ReadOnly, Writable, report
 from rosglass.qt import Property, QtCore, QtGui, QtQml, Signal, Slot, is_alive
-from rosglass.scene.camera import PinholeCamera
-from rosglass.scene.display import MessageQueue, OneTopicDisplay, Subscriptions, drop_oldest
-from rosglass.scene.parts import Parts
-from rosglass.scene.rviz_formats import read_number
-from rosglass.scene.scene_view import SceneView
-from rosglass.scene.settings import Setting
+from rosglass.scene.configs.rviz_formats import read_number
+from rosglass.scene.configs.settings import Setting
+from rosglass.scene.displays.display import (
+    MessageQueue,
+    OneTopicDisplay,
+    Subscriptions,
+    drop_oldest,
+)
+from rosglass.scene.displays.parts import Parts
+from rosglass.scene.render.camera import PinholeCamera
+from rosglass.scene.view.scene_view import SceneView
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -45,11 +50,11 @@ if TYPE_CHECKING:
     from rosglass.qml.image_stream import SharedStream
     from rosglass.qml.runtime import Runtime
     from rosglass.qml.session import Session
-    from rosglass.scene.camera import Camera
-    from rosglass.scene.display import Display
-    from rosglass.scene.drawing import Item
-    from rosglass.scene.renderer import Frame
-    from rosglass.scene.scene import Scene
+    from rosglass.scene.displays.display import Display
+    from rosglass.scene.displays.scene import Scene
+    from rosglass.scene.render.camera import Camera
+    from rosglass.scene.render.drawing import Item
+    from rosglass.scene.render.renderer import Frame
 
 __all__ = [
     "CameraDisplay",

@@ -20,7 +20,9 @@ from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import QtCore, QtQml, Signal, Slot, is_alive
-from rosglass.scene.display import (
+from rosglass.scene.configs.rviz_formats import read_marker_namespace, write_marker_namespace
+from rosglass.scene.configs.settings import Setting
+from rosglass.scene.displays.display import (
     OUTDATED_ALPHA,
     MessageQueue,
     OneTopicDisplay,
@@ -38,9 +40,7 @@ from rosglass.scene.displays.interactive_marker_messages import (
     read_update,
 )
 from rosglass.scene.displays.marker_meshes import MarkerMeshes
-from rosglass.scene.drawing import Group
-from rosglass.scene.rviz_formats import read_marker_namespace, write_marker_namespace
-from rosglass.scene.settings import Setting
+from rosglass.scene.render.drawing import Group
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
@@ -49,10 +49,10 @@ if TYPE_CHECKING:
     from rosglass.comm.qos import QoS
     from rosglass.messages import Message
     from rosglass.qml.runtime import Runtime
-    from rosglass.scene.camera import Camera
-    from rosglass.scene.resource_retriever import ResourceRetriever
-    from rosglass.scene.scene import Scene
-    from rosglass.scene.tools import PointerEvent
+    from rosglass.scene.data.resource_retriever import ResourceRetriever
+    from rosglass.scene.displays.scene import Scene
+    from rosglass.scene.render.camera import Camera
+    from rosglass.scene.tools.tool import PointerEvent
 
 
 __all__ = ["InteractiveMarkersDisplay"]
@@ -67,7 +67,7 @@ _KEEP_ALIVE_TIMEOUT_S = 3.0
 _RETRY_MS = 2000
 #: Milliseconds between two feedbacks of a drag.
 _FEEDBACK_MS = 33
-_MENU_FILE = Path(__file__).parents[1] / "panels" / "MarkerMenu.qml"
+_MENU_FILE = Path(__file__).with_name("MarkerMenu.qml")
 
 
 class _Connection:

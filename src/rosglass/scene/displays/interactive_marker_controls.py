@@ -15,7 +15,6 @@ import numpy as np
 from rosglass.comm.time import Time
 from rosglass.errors import Error, TransformException
 from rosglass.qt import is_alive
-from rosglass.scene.camera import inverse, quaternion_of
 from rosglass.scene.displays.interactive_marker_messages import (
     BUTTON,
     FIXED,
@@ -37,15 +36,16 @@ from rosglass.scene.displays.interactive_marker_messages import (
 from rosglass.scene.displays.marker import MarkerGroup
 from rosglass.scene.displays.marker_messages import MESH, MarkerRecord
 from rosglass.scene.displays.shapes import AxesShapes
-from rosglass.scene.drawing import Group, Lines, instance_matrix
-from rosglass.scene.events import Button, Modifier
+from rosglass.scene.render.camera import inverse, quaternion_of
+from rosglass.scene.render.drawing import Group, Lines, instance_matrix
+from rosglass.scene.view_controllers.events import Button, Modifier
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rosglass.scene.camera import Camera
     from rosglass.scene.displays.interactive_marker import InteractiveMarkersDisplay
-    from rosglass.scene.tools import PointerEvent
+    from rosglass.scene.render.camera import Camera
+    from rosglass.scene.tools.tool import PointerEvent
 
     Vector = NDArray[np.float64]
     Matrix = NDArray[np.float64]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rosglass.errors import Error
-from rosglass.scene.display import frame_and_stamp, matrix_of
+from rosglass.scene.displays.display import frame_and_stamp, matrix_of
 from rosglass.scene.displays.marker_messages import (
     ARROW,
     TEXT,
@@ -19,7 +19,7 @@ from rosglass.scene.displays.marker_messages import (
     MarkerRecord,
     read_marker,
 )
-from rosglass.scene.drawing import check_numbers, instance_matrix
+from rosglass.scene.render.drawing import check_numbers, instance_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

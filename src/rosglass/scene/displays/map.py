@@ -11,10 +11,10 @@ import numpy as np
 from rosglass.comm.qos import QoS, Reliability
 from rosglass.errors import Error
 from rosglass.qml.properties import ReadOnly, report
-from rosglass.scene.display import TopicDisplay, matrix_of
+from rosglass.scene.configs.settings import Setting, rgb_of
+from rosglass.scene.displays.display import TopicDisplay, matrix_of
 from rosglass.scene.displays.shapes import read_columns
-from rosglass.scene.drawing import MapImage, Points, are_drawable, check_numbers
-from rosglass.scene.settings import Setting, rgb_of
+from rosglass.scene.render.drawing import MapImage, Points, are_drawable, check_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

@@ -20,7 +20,7 @@ from rosglass.errors import Error, TransformException
 from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot, is_alive
-from rosglass.scene.display import OUTDATED_ALPHA, Status, TopicDisplay
+from rosglass.scene.displays.display import OUTDATED_ALPHA, Status, TopicDisplay
 from rosglass.scene.displays.marker_batches import (
     MAX_JOINED_POINTS,
     LineBatch,
@@ -49,7 +49,8 @@ from rosglass.scene.displays.marker_messages import (
     read_markers,
     triangles_of,
 )
-from rosglass.scene.drawing import (
+from rosglass.scene.displays.parts import Parts
+from rosglass.scene.render.drawing import (
     OPAQUE,
     Drawable,
     Group,
@@ -59,7 +60,6 @@ from rosglass.scene.drawing import (
     Points,
     Shape,
 )
-from rosglass.scene.parts import Parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable
@@ -69,8 +69,8 @@ if TYPE_CHECKING:
 
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
-    from rosglass.scene.resource_retriever import ResourceRetriever
-    from rosglass.scene.scene import Scene
+    from rosglass.scene.data.resource_retriever import ResourceRetriever
+    from rosglass.scene.displays.scene import Scene
 
     Matrix: TypeAlias = NDArray[np.float64]
     _Joint: TypeAlias = LineBatch | TextBatch | TriangleBatch

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rosglass.scene.drawing import Labels, Lines, Mesh, Shape, instance_matrix
+from rosglass.scene.render.drawing import Labels, Lines, Mesh, Shape, instance_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

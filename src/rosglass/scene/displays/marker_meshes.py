@@ -9,19 +9,19 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from rosglass.errors import Error
+from rosglass.scene.data.meshes import ending_of
 from rosglass.scene.displays.marker_messages import MarkerRecord, scale_matrix
 from rosglass.scene.displays.robot_model import STL_ENDINGS, MeshFiles, material_of
-from rosglass.scene.drawing import (
+from rosglass.scene.render.drawing import (
     OPAQUE,
     Mesh,
     Shape,
 )
-from rosglass.scene.meshes import ending_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable
 
-    from rosglass.scene.resource_retriever import ResourceRetriever
+    from rosglass.scene.data.resource_retriever import ResourceRetriever
 
 
 __all__ = ["MarkerMeshes"]

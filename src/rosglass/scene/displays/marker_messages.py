@@ -9,7 +9,7 @@ import numpy as np
 
 from rosglass.errors import Error
 from rosglass.scene.displays.shapes import poses_matrices
-from rosglass.scene.drawing import (
+from rosglass.scene.render.drawing import (
     BOX,
     CONE,
     CYLINDER,

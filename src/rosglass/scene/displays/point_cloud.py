@@ -1,7 +1,7 @@
 """The displays of point clouds: PointCloud2, PointCloud, LaserScan, DepthCloud, measured values.
 
-The node's thread reads a message as a :class:`~rosglass.scene.point_clouds.Cloud` and prepares its
-vertices; the GUI thread places it and sets a few numbers of the shader.
+The node's thread reads a message as a :class:`~rosglass.scene.data.point_clouds.Cloud` and
+prepares its vertices; the GUI thread places it and sets a few numbers of the shader.
 """
 # ruff: noqa: N815 - the names of properties are QML's
 
@@ -22,17 +22,18 @@ from rosglass.images.compressed import decompress, decompress_depth
 from rosglass.images.transports import camera_info_topic
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import Slot
-from rosglass.scene.cloud_sources import (
+from rosglass.scene.configs.settings import Setting, rgb_of
+from rosglass.scene.data.cloud_sources import (
     OcclusionBuffer,
     cloud_from_columns,
     cloud_from_depth_image,
     cloud_from_laser_scan,
     cloud_from_point_cloud,
 )
-from rosglass.scene.display import TopicDisplay, drop_oldest, frame_and_stamp
-from rosglass.scene.drawing import Points
-from rosglass.scene.point_clouds import Cloud, CloudHistory, is_ordered, order_points
-from rosglass.scene.point_colors import (
+from rosglass.scene.data.point_clouds import Cloud, CloudHistory, is_ordered, order_points
+from rosglass.scene.displays.display import TopicDisplay, drop_oldest, frame_and_stamp
+from rosglass.scene.render.drawing import Points
+from rosglass.scene.render.point_colors import (
     COLOR_TRANSFORMERS,
     AxisColor,
     FlatColor,
@@ -43,7 +44,6 @@ from rosglass.scene.point_colors import (
     choose_color_transformer,
     supported_color_transformers,
 )
-from rosglass.scene.settings import Setting, rgb_of
 from rosglass.tf import Transform
 
 if TYPE_CHECKING:
@@ -54,8 +54,8 @@ if TYPE_CHECKING:
     from rosglass.messages import Message
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
-    from rosglass.scene.point_clouds import CloudEntry, VertexData
-    from rosglass.scene.point_colors import ColorTransformer, PointColors
+    from rosglass.scene.data.point_clouds import CloudEntry, VertexData
+    from rosglass.scene.render.point_colors import ColorTransformer, PointColors
 
 __all__ = [
     "DepthCloudDisplay",

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from rosglass.errors import Error
-from rosglass.scene.display import TopicDisplay, matrix_of
+from rosglass.scene.configs.settings import Setting, rgb_of
+from rosglass.scene.displays.display import TopicDisplay, matrix_of
 from rosglass.scene.displays.geometry import HistoryDisplay
 from rosglass.scene.displays.shapes import (
     ALONG,
@@ -18,8 +19,7 @@ from rosglass.scene.displays.shapes import (
     poses_matrices,
     read_columns,
 )
-from rosglass.scene.drawing import CONE, CYLINDER, SPHERE, Group, Lines, Mesh, check_numbers
-from rosglass.scene.settings import Setting, rgb_of
+from rosglass.scene.render.drawing import CONE, CYLINDER, SPHERE, Group, Lines, Mesh, check_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

@@ -18,21 +18,30 @@ from rosglass.qml.callbacks import weak_callback
 from rosglass.qml.element import single_shot
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import QtGui, Signal, Slot, is_alive
-from rosglass.scene.display import Display, Status
-from rosglass.scene.displays.shapes import AxesShapes
-from rosglass.scene.drawing import BOX, CYLINDER, SPHERE, Group, Lines, Mesh, Shape, move_items
-from rosglass.scene.meshes import ending_of, load_mesh_cached
-from rosglass.scene.parts import Parts
-from rosglass.scene.resources import check_texture, locate_resource
-from rosglass.scene.rviz_formats import (
+from rosglass.scene.configs.rviz_formats import (
     DescriptionSetting,
     TopicSetting,
     read_description,
     write_description,
 )
-from rosglass.scene.settings import Setting
-from rosglass.scene.triangles import MAX_TRIANGLES, moved
-from rosglass.scene.urdf import Box, Capsule, Cylinder, MeshFile, Robot, Sphere, parse_urdf
+from rosglass.scene.configs.settings import Setting
+from rosglass.scene.data.meshes import ending_of, load_mesh_cached
+from rosglass.scene.data.resources import check_texture, locate_resource
+from rosglass.scene.data.triangles import MAX_TRIANGLES, moved
+from rosglass.scene.data.urdf import Box, Capsule, Cylinder, MeshFile, Robot, Sphere, parse_urdf
+from rosglass.scene.displays.display import Display, Status
+from rosglass.scene.displays.parts import Parts
+from rosglass.scene.displays.shapes import AxesShapes
+from rosglass.scene.render.drawing import (
+    BOX,
+    CYLINDER,
+    SPHERE,
+    Group,
+    Lines,
+    Mesh,
+    Shape,
+    move_items,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -43,10 +52,10 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Node
     from rosglass.qml.runtime import Runtime
     from rosglass.qt import QtCore
-    from rosglass.scene.resource_retriever import ResourceRetriever
-    from rosglass.scene.scene import Scene
-    from rosglass.scene.triangles import MeshPart
-    from rosglass.scene.urdf import Link, Visual
+    from rosglass.scene.data.resource_retriever import ResourceRetriever
+    from rosglass.scene.data.triangles import MeshPart
+    from rosglass.scene.data.urdf import Link, Visual
+    from rosglass.scene.displays.scene import Scene
 
 __all__ = [
     "DescriptionLoader",

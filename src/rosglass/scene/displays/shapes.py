@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rosglass.scene.drawing import CONE, CYLINDER, Group, Mesh
+from rosglass.scene.render.drawing import CONE, CYLINDER, Group, Mesh
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

@@ -13,11 +13,11 @@ import numpy as np
 from rosglass.errors import Error
 from rosglass.qml.properties import ReadOnly, report
 from rosglass.qt import QtCore, Signal, Slot
-from rosglass.scene.display import OUTDATED_ALPHA, Display
+from rosglass.scene.configs.settings import Setting
+from rosglass.scene.displays.display import OUTDATED_ALPHA, Display
+from rosglass.scene.displays.parts import Parts
 from rosglass.scene.displays.shapes import ArrowShapes, AxesShapes, pose_along, stack_poses
-from rosglass.scene.drawing import Labels
-from rosglass.scene.parts import Parts
-from rosglass.scene.settings import Setting
+from rosglass.scene.render.drawing import Labels
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

@@ -1,0 +1,1 @@
+"""The program ``rosglass view``: window, panels, recorder, and the QML module ``RosScene``."""

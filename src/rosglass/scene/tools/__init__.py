@@ -1,0 +1,1 @@
+"""The tools of RViz, which get the mouse, and the selection."""

@@ -1,0 +1,1 @@
+"""The ``SceneView``, the QML item that shows a scene."""

@@ -1,0 +1,1074 @@
+"""The item ``SceneView``: a scene in a QML interface, drawn by Qt's own graphics layer."""
+# ruff: noqa: N802, N815 - the names of slots, signals and events are Qt's
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from PySide6.QtGui import QColor, QEventPoint, QGuiApplication
+from PySide6.QtQuick import QQuickRhiItem, QQuickWindow, QSGRendererInterface
+from shiboken6 import Shiboken
+
+from rosglass.errors import ArgumentError, Error, shown
+from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
+from rosglass.rviz.orbit import ease
+from rosglass.scene.configs.rviz_config import RvizConfig, ToolConfig, ViewConfig
+from rosglass.scene.configs.rviz_formats import FIXED_FRAME, ros_of
+from rosglass.scene.displays.display import Display
+from rosglass.scene.displays.scene import Scene
+from rosglass.scene.render.camera import interpolate
+from rosglass.scene.render.drawing import SPHERE, Group, Mesh, instance_matrix
+from rosglass.scene.render.picking import pick
+from rosglass.scene.render.renderer import Frame, SceneRenderer
+from rosglass.scene.tools.selection import Selection
+from rosglass.scene.tools.tool import PointerEvent, Tool, Tools
+from rosglass.scene.view.display_configs import (
+    add_controller,
+    check_panels,
+    check_saved_views,
+    collect_displays,
+    create_saved_view,
+    show_displays,
+)
+from rosglass.scene.view_controllers.events import Button, Modifier, Touch, Wheel
+from rosglass.scene.view_controllers.views import VIEWS, ViewController, create_view
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import NDArray
+
+    from rosglass.qml.runtime import Runtime
+    from rosglass.scene.render.camera import Camera
+    from rosglass.scene.render.drawing import Drawable
+    from rosglass.scene.render.picking import Hit
+
+__all__ = ["NO_GPU", "SceneView"]
+
+NO_GPU = (
+    "The 3D view needs OpenGL, Vulkan, Metal or Direct3D, which this program does not have: Qt "
+    "draws with its software renderer. Unset QT_QUICK_BACKEND; without a graphics card, Mesa's "
+    "llvmpipe will do (on Debian: sudo apt install libgl1-mesa-dri)."
+)
+#: Seconds after its last move at which a camera counts as still.
+_STILL_S = 0.2
+#: Seconds that the camera takes to what it is to look at, and milliseconds between two pictures.
+_TURN_S, _TURN_MS = 0.4, 16
+#: Milliseconds from a change of the scene to a look at what is under the mouse now: RViz's.
+_HOVER_MS = 33
+#: The longest pause after a picture, in seconds.
+_MAX_PAUSE_S = 0.5
+_SCENE_GONE = "The scene was that of another view, which is gone: nothing is shown."
+#: RViz's background.
+_BACKGROUND = (48, 48, 48)
+
+
+class SceneView(QQuickRhiItem):
+    """A 3D view of the robot and what it sees.
+
+    Displays, tools and views are declared inside it or added at run time. It draws only when
+    something has changed. See its page in ``docs/scene.md``.
+    """
+
+    fixedFrameChanged = Signal()
+    backgroundChanged = Signal()
+    problemChanged = Signal()
+    viewChanged = Signal()
+    savedViewsChanged = Signal()
+    toolChanged = Signal()
+    statusTextChanged = Signal()
+    #: The camera was moved, or the size changed.
+    cameraChanged = Signal()
+    sceneChanged = Signal()
+    bareChanged = Signal()
+    focusOnClickChanged = Signal()
+    #: A config is about to replace what is shown.
+    configLoading = Signal()
+    #: A config was shown: its file, if any.
+    configLoaded = Signal(str)
+    #: What is shown was saved to a file.
+    configSaved = Signal(str)
+
+    def __init__(self, parent: Any = None, runtime: Runtime | None = None) -> None:
+        super().__init__(parent)
+        self._runtime = runtime
+        self._background = QColor(*_BACKGROUND)
+        self._bare = self._focus_on_click = False
+        self._problem = ""
+        #: Whether it showed the scene of another view, which is gone.
+        self._scene_is_gone = False
+        #: The renderers that C++ still has: letting go of one too early frees it twice.
+        self._renderers: list[SceneRenderer] = []
+        #: The one that draws in the GUI thread, as Qt's basic render loop does; None elsewhere.
+        self._drawing: SceneRenderer | None = None
+        #: When the window began its frame, whether a picture of this view is part of it, and before
+        #: when no other one is drawn: all by the clock of :func:`time.monotonic`.
+        self._frame_began = self._next_picture = 0.0
+        self._is_in_frame = False
+        #: When the wheel or a finger has last moved the camera.
+        self._touched_at = -math.inf
+        #: Whether a change waits until then.
+        self._is_late = False
+        self._later = QtCore.QTimer(self)
+        self._later.setSingleShot(True)
+        self._later.timeout.connect(self._draw_late)
+        #: Whether the mouse is in the view, and when something has moved under it.
+        self._is_hovered = False
+        self._hover = QtCore.QTimer(self)
+        self._hover.setSingleShot(True)
+        self._hover.setInterval(_HOVER_MS)
+        self._hover.timeout.connect(self._hover_again)
+        #: Connections to the window: to each frame, and to the end of the first one until then.
+        self._frames: list[Any] = []
+        self._first_frame: Any = None
+        #: What the view itself draws into the scene: its tools, the marks of what is selected.
+        self.overlay = Group()
+        #: What is selected.
+        self._selection = Selection(self, self.overlay, self._drawables, self.camera)
+        self.sceneChanged.connect(self._selection.clear)
+        self._scene = Scene(self, runtime)
+        self._watch_scene()
+        #: Pictures that renderers have drawn which are gone.
+        self._painted = 0
+        #: The config that was loaded; None before.
+        self.config: RvizConfig | None = None
+        #: Whether its view is of an unknown type, and is kept until another one is chosen.
+        self._keeps_view = False
+        #: What the program around it keeps in ``Window Geometry`` of configs.
+        self.window_geometry: dict[str, Any] = {}
+        self._view: ViewController = create_view("Orbit")
+        self._view.on_change, self._view.on_target = self.camera_moved, self._on_placed
+        #: Why the camera does not follow its target frame.
+        self._view_problem = ""
+        self._still = QtCore.QTimer(self)
+        self._still.setSingleShot(True)
+        self._still.setInterval(int(_STILL_S * 1000))
+        self._still.timeout.connect(self._draw)
+        self.setAcceptHoverEvents(True)
+        self.setFlag(QQuickRhiItem.Flag.ItemAcceptsInputMethod, False)
+        self.windowChanged.connect(self._on_window)
+        self.setAcceptTouchEvents(True)
+        self._pointed = QtCore.QPointF()
+        self._fingers: dict[int, QtCore.QPointF] = {}
+        #: Whether a finger is the left button of a tool.
+        self._finger_is_button = False
+        #: From where the camera turns to what it is to look at, and since when; None while it does
+        #: not.
+        self._turn: tuple[Camera, float] | None = None
+        self._turning = QtCore.QTimer(self)
+        self._turning.setInterval(_TURN_MS)
+        self._turning.timeout.connect(self._on_turning)
+        #: RViz's flat ball at the focal point, while the camera is dragged.
+        self._focal = Mesh(SPHERE, lit=True)
+        self._focal.visible = False
+        self.overlay.add(self._focal)
+        #: The tools, and the one that has the mouse.
+        self._tools = Tools(self, runtime)
+        self._tools.currentChanged.connect(self.toolChanged)
+        self.cameraChanged.connect(self._hover_later)
+        self.toolChanged.connect(self._hover_later)
+        self._tools.statusTextChanged.connect(self.statusTextChanged)
+        #: The tool that QML wants, which may be declared further down.
+        self._wanted_tool = ""
+        self._clean_up_when_destroyed()
+
+    def _clean_up_when_destroyed(self) -> None:
+        # PySide never frees the Python half of an item that QML has made.
+        state, renderers, root = self.__dict__, self._renderers, self._scene.root
+        overlay = self.overlay
+
+        def end() -> None:
+            root.on_change = None
+            overlay.remove()
+            root.clear()
+            kept = list(renderers)
+            for renderer in kept:
+                # C++ has deleted it before or does so a little later, with the scene graph; what
+                # Python has made on the device is freed by neither.
+                renderer.close()
+            state.clear()
+            _ORPHANS.extend(kept)
+            _drop_orphans()
+
+        self.destroyed.connect(end)
+
+    # -- the scene -------------------------------------------------------------------------------
+
+    @Slot()
+    def _on_scene(self) -> None:
+        self._request_picture()
+        self._selection.on_scene()
+        self._hover_later()
+
+    def _watch_scene(self) -> None:
+        self._scene.changed.connect(self._on_scene)
+        self._scene.placed.connect(self._on_placed)
+        self._scene.fixedFrameChanged.connect(self.fixedFrameChanged)
+        self._scene.problemChanged.connect(self.problemChanged)
+        self._scene.destroyed.connect(self._on_scene_destroyed)
+        self._scene.root.add(self.overlay)
+
+    def _get_scene(self) -> Scene:
+        return self._scene
+
+    def _set_scene(self, scene: Any) -> None:
+        before = self._scene
+        if scene is before or scene is None:
+            return
+        if not isinstance(scene, Scene):
+            before._refuse(f"SceneView: scene: expected that of another SceneView, got {scene!r}")
+            return
+        if is_alive(before):
+            before.changed.disconnect(self._on_scene)
+            before.placed.disconnect(self._on_placed)
+            before.fixedFrameChanged.disconnect(self.fixedFrameChanged)
+            before.problemChanged.disconnect(self.problemChanged)
+            before.destroyed.disconnect(self._on_scene_destroyed)
+            if before.parent() is self:
+                before.deleteLater()
+        self._show_scene(scene)
+
+    def _show_scene(self, scene: Scene, *, is_gone: bool = False) -> None:
+        self._scene, self._scene_is_gone = scene, is_gone
+        self._watch_scene()
+        self.sceneChanged.emit()
+        self.fixedFrameChanged.emit()
+        self.problemChanged.emit()
+        self.update()
+
+    @Slot()
+    def _on_scene_destroyed(self) -> None:
+        # Later: this view may be about to be destroyed as well.
+        QtCore.QTimer.singleShot(0, self._replace_scene)
+
+    @Slot()
+    def _replace_scene(self) -> None:
+        """Show an empty scene instead of that of another view that is gone."""
+        if is_alive(self) and not is_alive(self._scene):
+            self._show_scene(Scene(self, self._runtime), is_gone=True)
+            self._scene._log(_SCENE_GONE, logging.WARNING)
+
+    if TYPE_CHECKING:
+        scene: Scene
+    else:
+        #: What is shown: its own, or that of another view, which it shows from elsewhere.
+        scene = Property(QtCore.QObject, _get_scene, _set_scene, notify=sceneChanged)
+
+    # -- properties ------------------------------------------------------------------------------
+
+    def _get_fixed_frame(self) -> str:
+        return self.scene.fixed_frame
+
+    def _set_fixed_frame(self, frame: str) -> None:
+        try:
+            self.scene.fixed_frame = frame
+        except Error as error:
+            self.scene._refuse(f"SceneView: fixedFrame: {error}")
+
+    #: The frame in which everything is placed.
+    fixedFrame = Property(str, _get_fixed_frame, _set_fixed_frame, notify=fixedFrameChanged)
+
+    def _get_background(self) -> QColor:
+        return self._background
+
+    def _set_background(self, color: QColor) -> None:
+        if color != self._background:
+            self._background = QColor(color)
+            self.setAlphaBlending(color.alpha() < 255)
+            self.backgroundChanged.emit()
+            self.update()
+
+    #: What is behind everything; where it is translucent, items below the view shine through.
+    background = Property(QColor, _get_background, _set_background, notify=backgroundChanged)
+
+    def _set_bare(self, bare: bool) -> None:
+        if bare != self._bare:
+            self._bare = bare
+            self.bareChanged.emit()
+
+    #: Whether the view is to be shown alone, as overlays ask for; the program hides its panels.
+    bare = Property(bool, lambda self: self._bare, _set_bare, notify=bareChanged)
+
+    def _set_focus_on_click(self, focus: bool) -> None:
+        if focus != self._focus_on_click:
+            self._focus_on_click = focus
+            self.focusOnClickChanged.emit()
+
+    #: Whether a click gives it the keyboard; otherwise, the keys of the interface around it stay as
+    #: they are: they may drive the robot, or stop it.
+    focusOnClick = Property(
+        bool, lambda self: self._focus_on_click, _set_focus_on_click, notify=focusOnClickChanged
+    )
+
+    #: Why nothing, or not everything, is drawn, or the camera does not follow its target frame;
+    #: empty without a problem.
+    problem = Property(str, lambda self: self._get_problem(), notify=problemChanged)
+
+    def _get_problem(self) -> str:
+        if self._scene_is_gone or not is_alive(self._scene):
+            return _SCENE_GONE
+        return self._problem or self._scene.problem or self._view_problem
+
+    def _get_view_name(self) -> str:
+        return self._view.TYPE
+
+    def _set_view_name(self, name: str) -> None:
+        try:
+            self.select_view(name)
+        except Error as error:
+            self.scene._refuse(f"SceneView: view: {error}")
+
+    #: The type of the view: ``Orbit``, ``XYOrbit``, ``FPS``, ``TopDownOrtho``,
+    #: ``ThirdPersonFollower``, ``FrameAligned``.
+    view = Property(str, _get_view_name, _set_view_name, notify=viewChanged)
+
+    #: What is selected.
+    selection: Any = Property(QtCore.QObject, lambda self: self._selection, constant=True)
+
+    #: The tools: a list, and the current one.
+    tools: Any = Property(QtCore.QObject, lambda self: self._tools, constant=True)
+
+    def _get_tool(self) -> str:
+        tool = self._tools._current
+        return "" if tool is None else tool.TYPE or tool.name
+
+    def _set_tool(self, name: str) -> None:
+        if not self.isComponentComplete():
+            self._wanted_tool = name
+            return
+        try:
+            self._tools.select(name)
+        except Error as error:
+            self.scene._refuse(f"SceneView: tool: {error}")
+
+    #: The current tool: its type, e.g. ``Measure``; of an own tool, its name.
+    tool = Property(str, _get_tool, _set_tool, notify=toolChanged)
+
+    #: What the current tool says for a status bar, and what tools have done; bold as in HTML.
+    statusText = Property(str, lambda self: self._tools.statusText, notify=statusTextChanged)
+
+    # -- displays and tools ----------------------------------------------------------------------
+
+    def componentComplete(self) -> None:
+        """Take the displays and tools that were declared, and select the tool that is wanted.
+
+        Now, not from the event loop: a program may load a config next, which replaces them.
+        """
+        super().componentComplete()
+        with self.scene.changing():
+            for child in self.children():
+                if isinstance(child, Tool):
+                    self.adopt_tool(child)
+                elif isinstance(child, Display):
+                    self.adopt_display(child)
+        wanted, self._wanted_tool = self._wanted_tool, ""
+        if wanted:
+            self._set_tool(wanted)
+
+    def adopt_tool(self, tool: Tool) -> None:
+        """Take a tool that QML has declared inside this view."""
+        self._tools.adopt(tool, declared=True)
+
+    @Slot()
+    def reset(self) -> None:
+        """Drop all data that was received, e.g. as a recording begins anew."""
+        self.scene.reset()
+
+    def adopt_display(self, display: Display) -> None:
+        """Show a display that QML has declared inside this view."""
+        self.scene.adopt(display)
+
+    # -- the camera ------------------------------------------------------------------------------
+
+    @property
+    def controller(self) -> ViewController:
+        """What moves the camera."""
+        return self._view
+
+    def select_view(self, name: str) -> None:
+        """Change to another type of view, which starts where this one is.
+
+        Raises:
+            Error: There is no such type.
+        """
+        made = create_view(name)
+        self._keeps_view = False
+        if type(made) is not type(self._view):
+            made.mimic(self._view)
+            self.show_view(made)
+
+    def show_view(self, view: ViewController) -> None:
+        """Look through another view.
+
+        Raises:
+            ArgumentError: It is none.
+        """
+        if not isinstance(view, ViewController):
+            raise ArgumentError("view", view, "a view controller; select_view() takes its type")
+        self._keeps_view = False
+        self._view.on_change = self._view.on_target = None
+        self._view = view
+        view.on_change, view.on_target = self.camera_moved, self._on_placed
+        self._on_placed()
+        self.viewChanged.emit()
+        self.camera_moved()
+
+    #: The types of views.
+    viewTypes = Property(list, lambda self: list(VIEWS), constant=True)  # noqa: ARG005
+
+    @Slot(result="QVariantList")
+    def viewSettings(self) -> list[dict[str, Any]]:
+        """Return the settings of the view: name, kind, value and choices for SettingEditor."""
+        return [
+            {
+                "name": one["path"],
+                "kind": one["kind"],
+                "value": _setting_text(one["value"]),
+                "choices": self._choices_of(one),
+                "description": one["description"],
+            }
+            for one in self._view.describe()
+        ]
+
+    def _choices_of(self, setting: dict[str, Any]) -> list[str]:
+        if setting["kind"] == "frame":
+            return [FIXED_FRAME, *self.scene.frames()]
+        return list(setting.get("choices", ()))
+
+    @Slot(str, str, result=str)
+    def setViewSetting(self, name: str, text: str) -> str:
+        """Change a setting of the view; return why it does not fit, or an empty text."""
+        try:
+            self._view.set(name, _setting_value(self._view.get(name), text))
+        except Error as error:
+            return str(error)
+        self.camera_moved()
+        return ""
+
+    @Slot()
+    def resetView(self) -> None:
+        """Return to where the view was at first."""
+        self._view.reset()
+        self.camera_moved()
+
+    # -- saved views -----------------------------------------------------------------------------
+
+    def _saved_views(self) -> list[ViewConfig]:
+        return [] if self.config is None else self.config.saved_views
+
+    #: Names of the saved views, not unique.
+    savedViews = Property(
+        list, lambda self: [one.name for one in self._saved_views()], notify=savedViewsChanged
+    )
+
+    #: The type of each, e.g. ``Orbit``.
+    savedViewTypes = Property(
+        list,
+        lambda self: [one.class_id.rpartition("/")[2] for one in self._saved_views()],
+        notify=savedViewsChanged,
+    )
+
+    def save_view(self, name: str) -> None:
+        """Save where the camera is, as the last of the saved views.
+
+        Raises:
+            ArgumentError: The name is no text.
+        """
+        if not isinstance(name, str):
+            raise ArgumentError("name", name, "a text")
+        if self.config is None:
+            self.config = RvizConfig(self._ros())
+        self.config.saved_views.append(self._view_config(name, self.config.ros))
+        self.savedViewsChanged.emit()
+
+    def _ros(self) -> int:
+        """Return the RViz of the config, 1 or 2; that of the robot if there is none."""
+        if self.config is not None:
+            return self.config.ros
+        node = self.scene.node
+        return 1 if node is not None and node.wire == "ros1" else 2
+
+    def _view_config(self, name: str, ros: int) -> ViewConfig:
+        """Return the view for a config of one RViz, also if it is one of the other RViz."""
+        view = self._view
+        if ros_of(view.class_id) in (None, ros):
+            return ViewConfig({**view.state(), "Name": name})
+        return ViewConfig.new(view.TYPE, ros, name=name, settings=view.state())
+
+    def show_saved_view(self, index: int) -> list[str]:
+        """Look through a saved view.
+
+        Returns:
+            Settings of it that were left out, a line each.
+
+        Raises:
+            Error: There is none at this index, or it is of a type that does not exist here.
+        """
+        saved = self._saved_views()[self._saved_index(index)]
+        notes: list[str] = []
+        made = create_saved_view(saved, notes)
+        if made is None:
+            raise Error(
+                f"rosglass has no {saved.class_id}, the type of the saved view {saved.name!r}"
+            )
+        add_controller(self.scene, saved, notes)
+        self.show_view(made)
+        return notes
+
+    def remove_saved_view(self, index: int) -> None:
+        """Remove a saved view.
+
+        Raises:
+            Error: There is none at this index.
+        """
+        del self._saved_views()[self._saved_index(index)]
+        self.savedViewsChanged.emit()
+
+    def _saved_index(self, index: int) -> int:
+        count = len(self._saved_views())
+        if not isinstance(index, int) or not 0 <= index < count:
+            raise Error(f"there is no saved view {shown(index)}; there are {count}")
+        return index
+
+    @Slot(str, result=str)
+    def saveView(self, name: str) -> str:
+        """Save the view instead of one of this name; return what is wrong, or an empty text."""
+        name = name.strip() or self._view.TYPE
+        if not name.isprintable():
+            return f"expected a name of one line, got {name!r}"
+        names = [one.name for one in self._saved_views()]
+        if name in names:
+            self.remove_saved_view(names.index(name))
+        self.save_view(name)
+        return ""
+
+    @Slot(int, result=str)
+    def showSavedView(self, index: int) -> str:
+        """Look through a saved view; return what is wrong with it, or an empty text."""
+        try:
+            return "; ".join(self.show_saved_view(index))
+        except Error as error:
+            return str(error)
+
+    @Slot(int)
+    def removeSavedView(self, index: int) -> None:
+        """Remove a saved view."""
+        try:
+            self.remove_saved_view(index)
+        except Error as error:
+            self.scene._refuse(f"SceneView: removeSavedView: {error}")
+
+    def pictures_drawn(self) -> int:
+        """Return how many pictures were drawn."""
+        return self._painted + sum(one.count for one in self._renderers)
+
+    # -- config files ----------------------------------------------------------------------------
+
+    def load_config(self, path: str | os.PathLike[str]) -> list[str]:
+        """Replace what is shown by an RViz config (``.rviz``).
+
+        Returns:
+            What was left out, a line each.
+
+        Raises:
+            Error: It cannot be read; nothing has changed then.
+        """
+        return self.show_config(RvizConfig.load(path))
+
+    def show_config(self, config: RvizConfig) -> list[str]:
+        """Replace what is shown by a config; return what was left out, a line each."""
+        self.configLoading.emit()
+        notes = show_displays(self.scene, config)
+        red, green, blue, _ = config.background_color
+        self.setProperty("background", QColor.fromRgbF(red, green, blue))
+        if config.tools:
+            notes += self.tools.load_configs(one.settings for one in config.tools)
+        saved = config.current_view
+        made = None if saved is None else create_saved_view(saved, notes)
+        if made is not None:
+            self.show_view(made)
+        self._keeps_view = saved is not None and made is None
+        notes += check_saved_views(config) + check_panels(config)
+        self.config = config
+        self.savedViewsChanged.emit()
+        self.configLoaded.emit(config.source)
+        return notes
+
+    def collect_config(self, ros: int | None = None) -> RvizConfig:
+        """Return the config of what is shown, with what its file had beside that.
+
+        Args:
+            ros: The RViz that a new config is for, 1 or 2; by default that of the robot.
+        """
+        config = self.config or RvizConfig(ros or self._ros())
+        config.fixed_frame = self.scene.fixed_frame
+        config.background_color = cast("tuple[float, ...]", self._background.getRgbF())
+        config.displays[:] = collect_displays(self.scene, config.ros)
+        config.tools[:] = [ToolConfig(one) for one in self.tools.save_configs(config.ros)]
+        if self.window_geometry:
+            before = config.root.get("Window Geometry")
+            geometry = before if isinstance(before, dict) else {}
+            config.root["Window Geometry"] = {**geometry, **self.window_geometry}
+        if not self._keeps_view:
+            current = config.current_view
+            before = {} if current is None else current.settings
+            state = self._view_config(self._view.name, config.ros).settings
+            config.current_view = ViewConfig({**before, **state})
+        return config
+
+    def save_config(self, path: str | os.PathLike[str] = "") -> None:
+        """Write what is shown into an RViz config.
+
+        Args:
+            path: The file; by default the one that was loaded.
+
+        Raises:
+            Error: It cannot be written, or none was loaded.
+        """
+        config = self.collect_config()
+        if not (path or config.source):
+            raise Error("no config file is loaded; say where to save it")
+        config.save(path or config.source)
+        config.source = str(path or config.source)
+        self.config = config
+        self.configSaved.emit(config.source)
+
+    def camera(self) -> Camera:
+        """Return the camera of the next picture; its pixels are units of this item."""
+        goal = self._view.camera(self.width(), self.height())
+        if self._turn is None:
+            return goal
+        start, since = self._turn
+        return interpolate(start, goal, ease((time.monotonic() - since) / _TURN_S))
+
+    def move_camera(self, change: Callable[[ViewController], bool | None]) -> bool:
+        """Change the view, and turn the camera there instead of jumping.
+
+        Args:
+            change: Called with the view controller, e.g. to look at a point; may return False for
+                no change.
+
+        Returns:
+            Whether there was a change.
+        """
+        start = self.camera()
+        if change(self._view) is False:
+            return False
+        self._turn = (start, time.monotonic())
+        self._turning.start()
+        self.camera_moved()
+        return True
+
+    @Slot()
+    def _on_turning(self) -> None:
+        if self._turn is not None and time.monotonic() - self._turn[1] >= _TURN_S:
+            self._stop_turning()
+        self.camera_moved()
+
+    def _stop_turning(self) -> None:
+        self._turn = None
+        self._turning.stop()
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the last picture showed all: new data is uploaded over several pictures."""
+        return all(one.is_complete for one in self._renderers if Shiboken.isValid(one))
+
+    @property
+    def is_loading(self) -> bool:
+        """Whether meshes or other files of what it shows are being read."""
+        return is_alive(self._scene) and self._scene.is_loading
+
+    def camera_moved(self) -> None:
+        """Draw from where the camera is now."""
+        self._still.start()
+        self._show_focal_shape()
+        self.cameraChanged.emit()
+        self._request_picture()
+
+    @Slot()
+    def _on_placed(self) -> None:
+        """Let the camera follow its target frame."""
+        scene, view = self.scene, self._view
+        if view.target_frame != FIXED_FRAME:
+            pose, reason = None, ""
+            try:
+                pose = scene.look_up(view.target_frame)
+            except Error as error:
+                reason = str(error)
+            if view.update_target(pose, reason):
+                self.cameraChanged.emit()
+                self._request_picture()
+        # Without transforms, displays say so.
+        buffer = scene.transforms
+        is_connected = buffer is not None and buffer.has_frame(scene.fixed_frame)
+        problem = view.problem if is_connected else ""
+        if problem != self._view_problem:
+            self._view_problem = problem
+            self.problemChanged.emit()
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the camera was moved just now, so that large clouds are thinned out."""
+        return self._still.isActive()
+
+    @property
+    def is_turning(self) -> bool:
+        """Whether the camera is on its way to what it is to look at."""
+        return self._turn is not None
+
+    def pick(self, x: float, y: float, radius: float = 2.0) -> Hit | None:
+        """Return what is nearest to the camera at a place; None for nothing.
+
+        Args:
+            x: Units of this item, from its left edge.
+            y: The same, from its upper edge.
+            radius: How far from there points and lines may be.
+        """
+        return pick(self._drawables(), self.camera(), x, y, radius)
+
+    def _drawables(self) -> Iterator[tuple[Drawable, NDArray[np.float64], float]]:
+        return self.scene.root.drawables()
+
+    def geometryChange(self, new: Any, old: Any) -> None:
+        """Draw in the new size."""
+        super().geometryChange(new, old)
+        if new.size() != old.size() and is_alive(self):
+            self.cameraChanged.emit()
+            self.update()
+
+    # -- drawing ---------------------------------------------------------------------------------
+
+    def createRenderer(self) -> SceneRenderer:
+        """Return what draws; called by Qt in the render thread."""
+        made = SceneRenderer(self._take_frame, self._on_problem)
+        self._renderers.append(made)
+        self._drawing = made if QtCore.QThread.currentThread() == self.thread() else None
+        # C++ deletes the one of the window before later.
+        QtCore.QTimer.singleShot(0, self, self._drop_renderers)
+        return made
+
+    @Slot()
+    def _drop_renderers(self) -> None:
+        """Drop the renderers that C++ has deleted, e.g. those of a window that it has left."""
+        for one in self._renderers:
+            if not Shiboken.isValid(one):
+                one.close()
+                self._painted += one.count
+        self._renderers[:] = [one for one in self._renderers if Shiboken.isValid(one)]
+
+    def _take_frame(self) -> Frame:
+        if not is_alive(self._scene):  # it was that of a view that is gone
+            return Frame([], self.camera(), self._background)
+        if any(one.draws_in_software for one in self._renderers) != self.scene.draws_in_software:
+            QtCore.QTimer.singleShot(0, self, self._report_device)
+        self._is_in_frame, self._is_late = True, False
+        return Frame(
+            list(self._drawables()),
+            self.camera(),
+            self._background,
+            # Not by the clock: the timer, after which the whole is drawn, may end early.
+            self.is_moving,
+        )
+
+    def _request_picture(self) -> None:
+        """Draw what has changed; where the processor draws, QML has half of the time.
+
+        What the user moves is drawn at once.
+        """
+        now = time.monotonic()
+        if now >= self._next_picture or self._is_moved_by_user(now):
+            self._draw()
+            return
+        self._is_late = True
+        if not self._later.isActive():
+            self._later.start(math.ceil(1000 * (self._next_picture - now)))
+
+    @Slot()
+    def _draw(self) -> None:
+        """Draw the next picture; the window once with it, where the GUI thread draws."""
+        renderer = self._drawing
+        if renderer is not None and Shiboken.isValid(renderer) and self.isVisible():
+            renderer.draw_again()
+        else:
+            self.update()
+
+    def _is_moved_by_user(self, now: float) -> bool:
+        is_touched = self._tools.holds_mouse or now - self._touched_at < _STILL_S
+        return is_touched or self.is_turning
+
+    @Slot()
+    def _draw_late(self) -> None:
+        if self._is_late:
+            self._request_picture()
+
+    @Slot()
+    def _on_frame(self) -> None:
+        self._frame_began = time.monotonic()
+
+    @Slot()
+    def _on_frame_swapped(self) -> None:
+        if self._is_in_frame:
+            self._is_in_frame = False
+            if self.scene.draws_in_software:
+                now = time.monotonic()
+                self._next_picture = now + min(now - self._frame_began, _MAX_PAUSE_S)
+
+    @Slot()
+    def _take_mouse(self) -> None:
+        # After the window's first frame, as PySide then makes all of Qt's enumerations, in 12 ms.
+        self.setAcceptedMouseButtons(QtCore.Qt.MouseButton.AllButtons)
+        self._forget_first_frame()
+
+    def _forget_first_frame(self) -> None:
+        # Where another thread draws, the ends of further frames may be on their way already.
+        first, self._first_frame = self._first_frame, None
+        if first is not None:
+            QtCore.QObject.disconnect(first)
+
+    @Slot()
+    def _report_device(self) -> None:
+        in_software = any(one.draws_in_software for one in self._renderers)
+        self.scene.set_draws_in_software(in_software)
+
+    def _on_problem(self, problem: str) -> None:
+        # From the render thread, in the middle of drawing.
+        QtCore.QTimer.singleShot(0, self, lambda: self._set_problem(problem))
+
+    def _set_problem(self, problem: str) -> None:
+        if is_alive(self) and problem != self._problem:
+            self._problem = problem
+            self.problemChanged.emit()
+            if is_alive(self._scene):
+                self._scene._log(problem, logging.WARNING)
+
+    @Slot(QQuickWindow)
+    def _on_window(self, window: QQuickWindow | None) -> None:
+        while self._frames:
+            QtCore.QObject.disconnect(self._frames.pop())
+        self._forget_first_frame()
+        self._free_devices()
+        self._drawing = None
+        if window is None:
+            return
+        self._frames.append(window.sceneGraphInvalidated.connect(self._free_devices))
+        self._frames.append(window.afterAnimating.connect(self._on_frame))
+        self._frames.append(window.frameSwapped.connect(self._on_frame_swapped))
+        self._first_frame = window.afterFrameEnd.connect(self._take_mouse)
+        api = window.rendererInterface().graphicsApi()
+        self._set_problem(NO_GPU if api == QSGRendererInterface.GraphicsApi.Software else "")
+
+    @Slot()
+    def _free_devices(self) -> None:
+        """Free what is on the device before the window, which has it, is gone."""
+        if self._drawing is not None:
+            for renderer in self._renderers:
+                renderer.close()
+
+    # -- mouse, touch, keys ----------------------------------------------------------------------
+
+    def _event(self, event: Any) -> PointerEvent:
+        """Return an event of the mouse, and remember where it is."""
+        at, before = event.position(), self._pointed
+        self._pointed = at
+        return PointerEvent(
+            self,
+            (at.x(), at.y()),
+            (at.x() - before.x(), at.y() - before.y()),
+            Button(event.button().value & _BUTTONS),
+            Button(event.buttons().value & _BUTTONS),
+            Modifier(event.modifiers().value & _MODIFIERS),
+        )
+
+    def _event_at(self, at: QtCore.QPointF, event: Any, *, finger: bool = False) -> PointerEvent:
+        """Return an event that is none of the mouse's."""
+        held = Modifier(event.modifiers().value & _MODIFIERS)
+        before, self._pointed = self._pointed, at
+        moved = (at.x() - before.x(), at.y() - before.y()) if finger else (0.0, 0.0)
+        return PointerEvent(self, (at.x(), at.y()), moved, modifiers=held)
+
+    def mousePressEvent(self, event: Any) -> None:
+        """Give a press to the tool, or start to drag the camera."""
+        if self._focus_on_click:
+            self.forceActiveFocus(QtCore.Qt.FocusReason.MouseFocusReason)
+        self._stop_turning()
+        event.accept()
+        self._tools.on_press(self._event(event))
+        if is_alive(self):
+            self._show_focal_shape()
+
+    def mouseMoveEvent(self, event: Any) -> None:
+        """Give a drag to the tool, or drag the camera."""
+        self._tools.on_move(self._event(event))
+        event.accept()
+
+    def mouseReleaseEvent(self, event: Any) -> None:
+        """End a drag."""
+        event.accept()
+        self._tools.on_release(self._event(event))
+        if is_alive(self):
+            self._show_focal_shape()
+
+    def mouseUngrabEvent(self) -> None:
+        """Drop a drag that another item has taken over."""
+        if is_alive(self):
+            self._tools.cancel()
+            self._show_focal_shape()
+
+    def hoverEnterEvent(self, event: Any) -> None:
+        """Show what is under the mouse, which may not move again."""
+        self.hoverMoveEvent(event)
+
+    def hoverMoveEvent(self, event: Any) -> None:
+        """Show what is under the mouse."""
+        self._is_hovered = True
+        self._tools.on_move(self._event_at(event.position(), event))
+
+    def hoverLeaveEvent(self, event: Any) -> None:
+        """Show nothing any more of what was under the mouse."""
+        super().hoverLeaveEvent(event)
+        if is_alive(self):
+            self._is_hovered = False
+            self._tools.on_leave()
+
+    @Slot()
+    def _hover_later(self) -> None:
+        if self._is_hovered and not self._hover.isActive():
+            self._hover.start()
+
+    @Slot()
+    def _hover_again(self) -> None:
+        """Show what is under the mouse, which has stayed where it is."""
+        if self._is_hovered and not self._tools.holds_mouse:
+            modifiers = Modifier(QGuiApplication.keyboardModifiers().value & _MODIFIERS)
+            at = (self._pointed.x(), self._pointed.y())
+            self._tools.on_move(PointerEvent(self, at, modifiers=modifiers))
+            if is_alive(self):
+                # What a tool shows of it is no reason to look once more.
+                self._hover.stop()
+
+    def wheelEvent(self, event: Any) -> None:
+        """Zoom."""
+        self._stop_turning()
+        self._touched_at = time.monotonic()
+        at = self._event_at(event.position(), event)
+        self._tools.on_wheel(at, Wheel(event.angleDelta().y() / 120, at.modifiers))
+        event.accept()
+
+    def touchEvent(self, event: Any) -> None:
+        """Let one finger be the tool's left button; otherwise rotate, move and zoom by fingers."""
+        event.accept()
+        self._stop_turning()
+        self._touched_at = time.monotonic()
+        points = event.points()
+        now = {point.id(): point.position() for point in points}
+        held = {p.id(): p.position() for p in points if p.state() != QEventPoint.State.Released}
+        if self._finger_is_button and len(now) > 1:
+            self._finger_is_button = False
+            self._tools.cancel()
+        elif len(now) == 1:
+            (point,) = points
+            pointer = self._event_at(point.position(), event, finger=True)
+            # Not a finger that has stayed after a pinch: its release would send a goal.
+            if not self._fingers and point.state() == QEventPoint.State.Pressed:
+                pointer.button = pointer.buttons = Button.LEFT
+                self._finger_is_button = self._tools.on_press(pointer)
+                if not self._finger_is_button:
+                    self._tools.cancel()
+            elif self._finger_is_button:
+                if not held:
+                    pointer.button = Button.LEFT
+                    self._tools.on_release(pointer)
+                    self._finger_is_button = False
+                else:
+                    pointer.buttons = Button.LEFT
+                    self._tools.on_move(pointer)
+                self._fingers = held
+                return
+        self._drag_by_fingers(now)
+        self._fingers = held
+
+    def _drag_by_fingers(self, now: dict[int, QtCore.QPointF]) -> None:
+        ids = [one for one in now if one in self._fingers]
+        if ids and len(now) == len(self._fingers):
+            before = [(self._fingers[one].x(), self._fingers[one].y()) for one in ids]
+            after = [(now[one].x(), now[one].y()) for one in ids]
+            self._tools.on_touch(Touch.between(before, after, (self.width(), self.height())))
+
+    def touchUngrabEvent(self) -> None:
+        """Drop what another item has taken over."""
+        if is_alive(self):
+            self._fingers, self._finger_is_button = {}, False
+            self._tools.cancel()
+
+    def keyPressEvent(self, event: Any) -> None:
+        """Handle the keys of tools, F and Z, and Escape."""
+        self._tools.on_modifiers(Modifier(event.modifiers().value & _MODIFIERS))
+        used = False
+        if event.key() == QtCore.Qt.Key.Key_Escape:
+            used = self._tools.on_escape()
+        elif event.text() and not (event.isAutoRepeat() or event.modifiers().value & _COMMAND_KEYS):
+            used = self._tools.on_key(event.text(), self._event_at(self._pointed, event))
+        event.setAccepted(used)
+
+    def keyReleaseEvent(self, event: Any) -> None:
+        """Follow keys like Shift."""
+        self._tools.on_modifiers(Modifier(event.modifiers().value & _MODIFIERS))
+        event.ignore()
+
+    def _show_focal_shape(self) -> None:
+        """Show what the camera turns around, while it is dragged."""
+        shape = self._view.focal_shape() if self._tools.moves_camera else None
+        if shape is not None:
+            self._focal.pose = shape.pose
+            size = instance_matrix(scale=shape.size)[np.newaxis]
+            self._focal.set_instances(size, shape.color)
+        self._focal.visible = shape is not None
+
+
+#: With these, a key is a command of the program and no tool's.
+_COMMAND_KEYS = int(Modifier.CTRL | Modifier.ALT | Modifier.META)
+_BUTTONS = int(Button.LEFT | Button.RIGHT | Button.MIDDLE)
+_MODIFIERS = int(Modifier.SHIFT | Modifier.CTRL | Modifier.ALT)
+
+
+def _setting_text(value: Any) -> Any:
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, dict):
+        return "; ".join(_coordinate_text(number) for number in value.values())
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _coordinate_text(metres: float) -> str:
+    # Of UTM coordinates, too.
+    return f"{round(metres, 5):.12g}"
+
+
+def _setting_value(before: Any, text: str) -> Any:
+    """Return a text as what a setting of a view holds; texts that do not fit stay texts."""
+    if isinstance(before, bool):
+        return {"true": True, "false": False}.get(text.strip().lower(), text)
+    if isinstance(before, tuple):
+        numbers = text.replace(";", " ").replace(",", " ").split()
+        if len(numbers) != 3:
+            return text
+        # Coordinates that were not edited keep the digits that are not shown.
+        return {
+            axis: old if new == _coordinate_text(old) else new
+            for axis, old, new in zip("XYZ", before, numbers, strict=True)
+        }
+    return text
+
+
+#: Renderers of items that are gone, until C++ has deleted them.
+_ORPHANS: list[SceneRenderer] = []
+
+
+def _drop_orphans() -> None:
+    _ORPHANS[:] = [one for one in _ORPHANS if Shiboken.isValid(one)]

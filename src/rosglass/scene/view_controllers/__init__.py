@@ -1,0 +1,1 @@
+"""RViz's view controllers, which move the camera by mouse, wheel and touch."""
