@@ -103,7 +103,7 @@ def shown(value: object) -> str:
     """Return the repr of a value for an error message, shortened if it is long."""
     try:
         text = repr(value)
-    except Exception as error:  # an integer of 5,000 digits, or a class of the user's
+    except Exception as error:  # noqa: BLE001 - an integer of 5,000 digits, or a class of the user's
         text = f"a value that cannot be shown ({type(error).__name__}: {error})"
     return f"{text[:77]}..." if len(text) > 80 else text
 

@@ -7,12 +7,12 @@ no ``seq``, field names are lower case, some types have moved, some have more fi
 
 from __future__ import annotations
 
+import logging
 import re
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from rosglass.errors import Error, UnsupportedError
+from rosglass.errors import Error, TypeNotFoundError, UnsupportedError
 from rosglass.interfaces.definition import (
     ActionDefinition,
     ArrayKind,
@@ -230,9 +230,16 @@ class Counterparts:
         return found, first, second, third
 
     def _candidates(self, name: str, ros: int) -> Iterator[InterfaceDefinition]:
-        for other in _names(name, ros):
-            with suppress(Error):
+        for other in dict.fromkeys(_names(name, ros)):
+            try:
                 yield self._library.definition(other, ros=3 - ros)
+            except TypeNotFoundError:  # noqa: PERF203 - a few names
+                continue
+            except Error as error:
+                logging.getLogger("rosglass.interfaces").warning(
+                    "%s of ROS %d is not used as the counterpart of %s: %s",
+                    other, 3 - ros, name, error,
+                )  # fmt: skip
 
     def _derived(self, source: Definition) -> Definition:
         """Derive the definition for the other ROS."""

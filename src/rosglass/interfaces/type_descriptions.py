@@ -95,7 +95,7 @@ def _source(definition: InterfaceDefinition) -> dict[str, str]:
     name, text = definition.name, definition.text.partition("\n===")[0]
     kind = name.split("/")[1]
     for encoding in (kind, "idl"):
-        with suppress(Error):
+        with suppress(DefinitionError):
             parsed = _parse(name, encoding, text)
             if _fields(parsed) == _fields(definition):
                 return _record(name, encoding, text)
@@ -218,7 +218,7 @@ class _Texts:
         if not encoding:
             return None, True
         restored, whole = (text, True) if self._verbatim else _restore(text)
-        with suppress(Error):
+        with suppress(DefinitionError, InvalidNameError):
             return _parse(name, encoding, restored, self._provider), whole
         return None, True
 

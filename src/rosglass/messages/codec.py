@@ -17,7 +17,7 @@ from rosglass.messages.layout import ANYWHERE, START, Cursor, Wire
 from rosglass.messages.message import await_fill, complete, convert, plain_class, shell_class
 from rosglass.messages.schema import Kind
 from rosglass.messages.sequences import MessageSequence
-from rosglass.messages.source import MAX_EMPTY, OddValueError, Source
+from rosglass.messages.source import MAX_EMPTY, OddValueError, Source, TooShortError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,7 +26,14 @@ if TYPE_CHECKING:
     from rosglass.messages.message import Message
     from rosglass.messages.schema import Member, Schema
 
-__all__ = ["Codec", "Walk", "codec_of", "encapsulation_error", "explain"]
+__all__ = ["UNREADABLE", "Codec", "Walk", "codec_of", "encapsulation_error", "explain"]
+
+#: Errors of generated code for bytes that are not the message: too few, or invalid lengths, texts
+#: and numbers; of struct, of memoryviews and arrays, and of NumPy. Others are defects.
+UNREADABLE = (
+    DecodeError, TooShortError, struct.error,
+    IndexError, OverflowError, MemoryError, TypeError, ValueError,
+)  # fmt: skip
 
 
 # OMG DDS-XTypes 1.3, table 59.
@@ -314,7 +321,7 @@ class Codec:
             items, end = read(buffer, offset, count)
             if end > len(buffer):
                 raise DecodeError(self.schema.name, "the buffer ends early", "", len(buffer))
-        except Exception as error:
+        except UNREADABLE as error:
             self._explain_many(buffer, offset, count, error)
         return items  # type: ignore[no-any-return]
 
@@ -336,7 +343,7 @@ class Codec:
         """Return the offset after the message at `offset`."""
         try:
             end: int = self.skipper(buffer, offset)
-        except Exception as error:
+        except UNREADABLE as error:
             raise explain(self.schema, self.wire, buffer, offset, error) from None
         return end
 
@@ -359,7 +366,7 @@ class Codec:
         """Decode everything at once."""
         try:
             return self.reader(buffer)
-        except Exception as error:
+        except UNREADABLE as error:
             raise self.explain(buffer, error) from None
 
     @property
@@ -381,7 +388,7 @@ class Codec:
         read = self.made("checked", self._checked)
         try:
             found: tuple[Message, int] = read(buffer)
-        except Exception as error:
+        except UNREADABLE as error:
             raise self.explain(buffer, error) from None
         return found
 
@@ -399,7 +406,7 @@ class Codec:
         scan = self.made("scan", self._scan)
         try:
             end: int = scan(buffer)
-        except Exception as error:
+        except UNREADABLE as error:
             raise self.explain(buffer, error) from None
         return end
 
@@ -424,8 +431,8 @@ class Codec:
             if from_dict:
                 try:
                     return self._converted_writer(True, joined)(complete(self.schema, value))
-                except Exception:
-                    pass  # the conversion below handles it
+                except Exception:  # noqa: BLE001 - whatever objects of the user raise; see below
+                    pass  # converting field by field finds it again, and names the field
             message = convert(self.schema, value)
             try:
                 return self._converted_writer(False, joined)(message)

@@ -25,7 +25,7 @@ from rosglass.errors import (
 from rosglass.interfaces.definition import ActionDefinition, Definition, ServiceDefinition
 from rosglass.interfaces.names import join_name, split_name
 from rosglass.interfaces.resolver import Resolver
-from rosglass.messages.codec import Codec, codec_of, encapsulation_error
+from rosglass.messages.codec import UNREADABLE, Codec, codec_of, encapsulation_error
 from rosglass.messages.emit_read import path_function
 from rosglass.messages.layout import Wire, leaves
 from rosglass.messages.message import convert
@@ -339,7 +339,7 @@ class MessageType:
             read = self._at_once = self._codec("ros1", False, _width(None)).reader
         try:
             return list(map(read, buffers)) if len(buffers[0]) <= _SMALL else None
-        except Exception:  # reading the fields raises the error
+        except UNREADABLE:  # reading the fields raises the error
             return None
 
     def decode_all(
@@ -848,7 +848,7 @@ def mend(name: str, text: str, md5: str, library: Library | None = None) -> Mess
             raise DefinitionError(f"{owner.name}.{field.name}: {wanted} is not a message")
         return found
 
-    with suppress(Error):
+    with suppress(Error):  # the text's own error is the one to report
         made = MessageType(Resolver(find).message(parsed))
         return made if made.md5 == md5 else None
     return None

@@ -217,6 +217,19 @@ uint32 nanosec
         back.encode(there.type.encode({"short": "too long"}))
 
 
+def test_broken_counterpart_is_reported(tmp_path, caplog):
+    folder = tmp_path / "my_msgs/msg"
+    folder.mkdir(parents=True)
+    (folder / "Own.msg").write_text("int32 x\nint32\n")
+    library = Library()
+    library.add_path(tmp_path)
+    ours = MessageType.from_text("my_msgs/msg/Own", "int32 x")
+    assert Translation(ours, library=library).derived
+    (line,) = caplog.messages
+    assert line.startswith("my_msgs/msg/Own of ROS 1 is not used as the counterpart of my_msgs/")
+    assert "Own.msg:2" in line
+
+
 def test_names_that_differ_only_in_case_are_refused():
     with pytest.raises(UnsupportedError, match="differ only in case"):
         Translation(MessageType.from_text("m/msg/X", "int8 a\nint8 A\n", ros=1))
