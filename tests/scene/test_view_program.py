@@ -1305,7 +1305,7 @@ def test_choices_are_never_rich_text(bench: SceneBench) -> None:
     import rosglass.scene
     from rosglass.qt import QtCore
 
-    panels = QtCore.QUrl.fromLocalFile(f"{rosglass.scene.__path__[0]}/panels").toString()
+    panels = QtCore.QUrl.fromLocalFile(f"{rosglass.scene.__path__[0]}/app/panels").toString()
     bench.load(
         'SettingEditor { width: 200; kind: "frame"\n'
         'choices: ["map", "<b>bold</b>"]; value: "<b>bold</b>" }',
