@@ -85,6 +85,8 @@ _FRAGMENTS_BYTES, _FRAGMENTS_S = 128 * 2**20, 3
 _NO_NETWORK = "connect a network, or for this machine alone: sudo ip link set lo up multicast on"
 #: The fix for names that break ROS's rules.
 _RENAME = "rename them where they are made: letters, digits, '_' and '/', no digit first"
+#: Types of messages that may be megabytes.
+_LARGE_TYPES = {"sensor_msgs/msg/Image", "sensor_msgs/msg/PointCloud2"}
 #: Seconds to explore a graph, and a domain of ``--scan``.
 _EXPLORE_S, _SCAN_S = 3.0, 1.5
 
@@ -296,6 +298,27 @@ def _robot(url: str, timeout: float) -> Iterator[_Finding]:
         yield _Finding("ok", url, status.detail or "connected")
         await_graph(node, _EXPLORE_S)
         yield from _graph(node)
+        if url.lower().startswith("dds:"):
+            yield from _large_messages(node)
+
+
+def _large_messages(node: Node) -> Iterator[_Finding]:
+    """Yield whether programs on Fast DDS subscribe to what rosglass sends them too slowly."""
+    from rosglass.wires.dds.domain import DdsOptions, large_sample_advice  # noqa: PLC0415 - an extra
+    from rosglass.wires.dds.flow_control import is_fast_dds  # noqa: PLC0415
+
+    fix = large_sample_advice(DdsOptions.parse(node.url, os.environ))
+    topics = [
+        topic
+        for topic, types in node.topics().items()
+        if _LARGE_TYPES & set(types) and any(is_fast_dds(s.gid) for s in node.subscriptions(topic))
+    ]
+    if fix and topics:
+        text = (
+            f"programs on Fast DDS subscribe to {_several(topics)}: what rosglass publishes there "
+            "reaches them at 40 MB/s at most, in datagrams of one packet"
+        )
+        yield _Finding("note", node.url, text, fix)
 
 
 def _advice(url: str) -> str:

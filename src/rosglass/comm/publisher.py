@@ -282,7 +282,8 @@ class Publisher(TopicEndpoint):
         """The number of messages that were dropped on this machine.
 
         In ROS 1, those on the topic that a subscriber was too slow for; over Zenoh, those that
-        could not be sent within the profile's ``send_timeout``. Always 0 over DDS.
+        could not be sent within the profile's ``send_timeout``; over DDS, large ones that
+        subscribers on Fast DDS were too slow for. :attr:`problem` gives the reason for 10 s.
         """
         return self._writer.lost()
 

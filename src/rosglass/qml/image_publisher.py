@@ -370,7 +370,7 @@ class ImagePublisher(Element):
         self._converting = False
         if endpoint is not self._endpoint:
             return
-        self._set_problem(f"ImagePublisher: {problem}" if problem else "")
+        self._set_problem(f"ImagePublisher: {problem}" if problem else endpoint.problem)
         if not problem:
             note_time(self._sent, time.monotonic())
             self._measure()
@@ -427,6 +427,12 @@ class _Publishers:
             except Error:
                 self.pictures.close()
                 raise
+
+    @property
+    def problem(self) -> str:
+        """Why subscribers receive nothing, or not everything; empty if all is well."""
+        pictures = self.pictures
+        return pictures.problem and f"{pictures.topic}: {pictures.problem}"
 
     def has_subscriber(self) -> bool:
         """Return whether a subscription matches; raises Error if the node is closed."""

@@ -219,7 +219,24 @@ def test_rclpy_answers_while_images_displace_each_other(start_rclpy_peer, node):
         assert peer.event("received /displaced")
         assert do(peer, "graph")["nodes"]
         assert publisher.dropped > 0
+        eventually(lambda: publisher.problem.endswith("publish smaller ones, or fewer"))
     peer.end()
+
+
+def test_who_loses_large_images_says_what_to_do(on_two_machines, rclpy_python):
+    """Fast DDS takes 40 MB/s in datagrams of one packet, the default if there is a network."""
+    script = Path(__file__).parent / "peers/one_machine_fastdds.py"
+    env = {"ROS_DOMAIN_ID": "0", "CYCLONEDDS_URI": ""}
+    seen = on_two_machines(script, str(rclpy_python), env=env)
+    assert seen["before"] == ""
+    assert seen["dropped"] > 0
+    assert seen["problem"].startswith("large messages are dropped here, as subscribers on Fast DDS")
+    (finding,) = seen["doctor"]
+    assert "/camera" in finding["text"]
+    for text in (seen["problem"], finding["fix"]):
+        assert "dds://?range=localhost" in text
+        assert "CYCLONEDDS_URI='<General><MaxMessageSize>31000B<" in text
+    assert seen["logged"] == [f"/camera: {seen['problem']}"]
 
 
 # -- services --------------------------------------------------------------------------------------

@@ -11,7 +11,9 @@ import pytest
 
 import rosglass
 from rosglass.wires.dds import domain as dds_domain
-from rosglass.wires.dds.domain import DdsOptions, domain_config, user_config
+from rosglass.wires.dds.domain import DdsOptions, domain_config, large_sample_advice, user_config
+
+ROS2_PAGE = Path(__file__).parents[3] / "docs" / "ros2.md"
 
 
 def config(url="dds://", **env):
@@ -197,7 +199,17 @@ def test_what_only_one_of_them_says_is_taken(url, own):
 
 
 def test_the_documentations_larger_datagrams_are_those_of_this_machine():
-    text = (Path(__file__).parents[3] / "docs" / "ros2.md").read_text()
-    (own,) = re.findall(r"^  export CYCLONEDDS_URI='(.*)'$", text, re.MULTILINE)
+    (own,) = re.findall(r"^  export CYCLONEDDS_URI='(.*)'$", ROS2_PAGE.read_text(), re.MULTILINE)
     assert own.removesuffix("</General>") in config("dds://?range=localhost")
     assert user_config(config(CYCLONEDDS_URI=own)) == own
+
+
+def test_who_sends_single_packets_is_advised_to_send_the_documentations_datagrams(monkeypatch):
+    monkeypatch.setattr(dds_domain, "_datagram_size", lambda _: 1472)
+
+    def advice(url="dds://", **env):
+        return large_sample_advice(DdsOptions.parse(url, env))
+
+    (own,) = re.findall(r"CYCLONEDDS_URI='(.*?)'", advice())
+    assert f"  export CYCLONEDDS_URI='{own}'\n" in ROS2_PAGE.read_text()
+    assert advice("dds://?range=localhost") == advice(CYCLONEDDS_URI=own) == ""

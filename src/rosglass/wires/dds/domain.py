@@ -479,9 +479,28 @@ def _general(options: DdsOptions) -> str:
 
 def fragment_size(options: DdsOptions) -> int:
     """Return the size in bytes of the largest sample that is sent in one piece."""
-    if any(_has_element(options, name) for name in ("MaxMessageSize", "FragmentSize")):
+    if _has_own_size(options):
         return _MIN_DATAGRAM - _RTPS_HEADERS
     return _datagram_size_of(options) - _RTPS_HEADERS
+
+
+def large_sample_advice(options: DdsOptions) -> str:
+    """Return what to do for large samples to Fast DDS; empty if datagrams are large already."""
+    if _has_own_size(options) or _datagram_size_of(options) >= _MAX_DATAGRAM:
+        return ""
+    own = (
+        f"<General><MaxMessageSize>{_MAX_DATAGRAM}B</MaxMessageSize>"
+        f"<FragmentSize>{_MAX_DATAGRAM - _RTPS_HEADERS}B</FragmentSize></General>"
+    )
+    return (
+        "if all subscribers run on this machine, connect to dds://?range=localhost; otherwise "
+        f"publish smaller images, or export CYCLONEDDS_URI='{own}' and set the kernel of every "
+        "machine that receives as rosglass doctor says there"
+    )
+
+
+def _has_own_size(options: DdsOptions) -> bool:
+    return any(_has_element(options, name) for name in ("MaxMessageSize", "FragmentSize"))
 
 
 def _is_local(options: DdsOptions) -> bool:

@@ -47,6 +47,8 @@ _WRITE_SLICE_S = 0.1
 _DELIVERY_TIMEOUT_S = 0.001
 #: Seconds that leaving the domain waits for a write in another thread.
 _STOP_TIMEOUT_S = 5.0
+#: How long :attr:`DdsWriter.problem` names dropped samples.
+_REPORT_S = 10.0
 #: Writers that a reader remembers; only a robot that restarts for days has more.
 _MAX_WRITERS = 1024
 
@@ -367,6 +369,20 @@ class DdsWriter(SampleWriter, Writer):
     def lost(self) -> int:
         """Return how many large samples were displaced while others were not acknowledged."""
         return 0 if self._flow is None else self._flow.displaced
+
+    @property
+    def problem(self) -> str:  # type: ignore[override]
+        """That large samples were displaced in the last 10 s, in words; empty if none was."""
+        if self._flow is None or time.monotonic() - self._flow.displaced_at > _REPORT_S:
+            return ""
+        speed = "are too slow for them"
+        advice = self._participant.large_sample_advice
+        if advice:
+            speed = "take at most about 40 MB/s in datagrams of one packet"
+        return (
+            f"large messages are dropped here, as subscribers on Fast DDS {speed}: "
+            f"{advice or 'publish smaller ones, or fewer'}"
+        )
 
     def write(self, data: bytes | bytearray) -> None:
         """Send a payload; a reliable KEEP_ALL writer waits for slow readers."""

@@ -14,6 +14,7 @@ name the first sample that is left.
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from typing import TYPE_CHECKING
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
     from rosglass.wires.dds.participant import Pump
 
-__all__ = ["FlowControl"]
+__all__ = ["FlowControl", "is_fast_dds"]
 
 #: First two bytes of the GUIDs of Fast DDS.
 _FAST_DDS = b"\x01\x0f"
@@ -37,6 +38,11 @@ _WINDOW_BYTES, _WINDOW = 1_000_000, 2
 _STALL_S = 0.5
 #: Seconds without a request for a repetition after which the other readers have got everything.
 _QUIET_S = 0.05
+
+
+def is_fast_dds(guid: bytes) -> bool:
+    """Return whether a GUID is that of an entity of Fast DDS."""
+    return guid.startswith(_FAST_DDS)
 
 
 class FlowControl:
@@ -55,6 +61,7 @@ class FlowControl:
 
     Attributes:
         displaced: Number of samples that were displaced before they were sent.
+        displaced_at: Monotonic time in seconds when that last happened.
     """
 
     def __init__(
@@ -72,7 +79,7 @@ class FlowControl:
         self._limit = 0 if latched else max(depth - 1, 1)
         self._window = min(_WINDOW, self._limit)
         self._pump, self._poll = pump, poll
-        self.displaced = 0
+        self.displaced, self.displaced_at = 0, -math.inf
         #: The samples that wait, which hold a reference each, and their sizes.
         self._waiting: deque[tuple[int, int]] = deque()
         #: Number and size of the samples from the first large one that is not acknowledged.
@@ -105,6 +112,7 @@ class FlowControl:
         if len(self._waiting) == self._depth:
             discard(self._waiting.popleft()[0])
             self.displaced += 1
+            self.displaced_at = time.monotonic()
         self._waiting.append((serdata, size))
         self._pump.poll(-self._writer, self._poll)
         return True
@@ -178,6 +186,6 @@ class FlowControl:
         readers = cyclone.matched_subscriptions(self._writer)
         if readers != self._readers:
             found = (cyclone.matched_subscription(self._writer, reader) for reader in readers)
-            self._needed = any(each and each.guid.startswith(_FAST_DDS) for each in found)
+            self._needed = any(each and is_fast_dds(each.guid) for each in found)
             self._readers = readers
         return self._needed

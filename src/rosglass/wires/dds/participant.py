@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from rosglass.errors import NodeClosedError
 from rosglass.wires.dds import cyclone
 from rosglass.wires.dds.cyclone import Event, Qos, Waitset, set_events
-from rosglass.wires.dds.domain import Domain, fragment_size
+from rosglass.wires.dds.domain import Domain, fragment_size, large_sample_advice
 from rosglass.wires.dds.graph import PARTICIPANT_USER_DATA, NodeEntities
 
 if TYPE_CHECKING:
@@ -51,6 +51,8 @@ class Participant:
         entity: Cyclone's number for it.
         guid: Its 16 bytes of identity.
         fragment_size: Size in bytes of the largest sample that is sent in one piece.
+        large_sample_advice: What to do if readers on Fast DDS are too slow for larger ones; may be
+            empty.
         born: Monotonic time when it joined the domain.
         pump: Handles the events of its entities.
         lingering: The closed writers whose samples are not acknowledged yet.
@@ -78,6 +80,7 @@ class Participant:
         self._closed = False
         self._domain = Domain(options)
         self.fragment_size = fragment_size(options)
+        self.large_sample_advice = large_sample_advice(options)
         try:
             qos = Qos()
             qos.set_user_data(PARTICIPANT_USER_DATA)
