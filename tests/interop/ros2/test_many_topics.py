@@ -62,6 +62,30 @@ def test_thousands_of_announced_topics_cost_their_share(router, connect, run_com
     assert time.process_time() - began < CPU
 
 
+def test_topics_that_come_and_go_announce_the_same_tokens(router, connect):
+    """Every program in the graph keeps the key of each token for ever."""
+    node, keys = connect("cockpit", "?domain=0"), set()
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([router.listen]))
+    with zenoh.open(config) as session:
+        watch = session.liveliness().declare_subscriber(
+            "@ros2_lv/**", lambda sample: keys.add(str(sample.key_expr))
+        )
+        counts = []
+        for turn in range(4):
+            topics = [f"/panel/t{number}" for number in range(100)]
+            made = [node.create_subscription(topic, "std_msgs/msg/String") for topic in topics]
+            last = node.create_subscription(f"/turn/t{turn}", "std_msgs/msg/String")
+            eventually(lambda turn=turn: any(f"%turn%t{turn}/" in key for key in keys))
+            counts.append(sum("%panel%" in key for key in keys))
+            for subscription in (*made, last):
+                subscription.close()
+        watch.undeclare()
+    # Those closed last rest, and so have two tokens.
+    assert 100 == counts[0] < counts[1] == counts[2] == counts[3] < 200
+
+
 @pytest.fixture
 def run_command(run_command, monkeypatch):
     monkeypatch.setenv("ROS_DOMAIN_ID", "0")

@@ -526,3 +526,13 @@ def test_gids_of_closed_publishers_are_not_kept_for_ever(node):
     for _ in range(1005):
         node.create_publisher("/t", STRING).close()
     assert len(kept) == 1000
+
+
+def test_a_publisher_with_the_gid_of_a_closed_one_stays_the_nodes_own(node):
+    core = core_of(node)
+    core.add_gid(b"again")
+    core.retire_gid(b"again")
+    core.add_gid(b"again")
+    for number in range(2000):
+        core.retire_gid(number.to_bytes(16, "little"))
+    assert b"again" in core.local_gids

@@ -75,7 +75,7 @@ _Kind = TypeVar("_Kind", bound=Declaration)
 
 _log = logging.getLogger("rosglass.ros2")
 #: Number of closed endpoints before the number of the oldest is used again.
-_MIN_UNUSED_NUMBERS = 8
+_MIN_UNUSED_NUMBERS = 64
 #: Seconds between two heartbeats to the router.
 _HEARTBEAT_INTERVAL_S = 0.9
 #: Seconds that a router has to send all tokens: for 10,000, Zenoh needs 4 to 13.
@@ -106,7 +106,9 @@ class ZenohMiddleware(Middleware):
         self._session: zenoh.Session | None = None
         self._id = json.loads(self._config.get_json("id"))
         self._numbers = itertools.count(1)
-        self._used_numbers: deque[str] = deque()
+        #: Numbers of closed endpoints by the part of their tokens behind it; the last closed ones.
+        self._used_numbers: dict[str, deque[str]] = {}
+        self._just_closed: deque[str] = deque()
         #: Guards what several threads change: declarations, links, the session.
         self._lock = threading.Lock()
         self._declared: dict[int, Declaration] = {}
@@ -274,9 +276,14 @@ class ZenohMiddleware(Middleware):
     def recycle(self, declaration: Declaration) -> None:
         """Reuse the number of a declaration whose token is gone.
 
-        Every program in the graph, and the router, stores each token's key for ever.
+        Only for the same endpoint, whose token is the same then: every program in the graph, and
+        the router, stores each token's key for ever.
         """
-        self._used_numbers.append(Token.parse(declaration.token).entity_id)
+        with self._lock:
+            self._just_closed.append(declaration.token)
+            if len(self._just_closed) > _MIN_UNUSED_NUMBERS:
+                *_, number, rest = self._just_closed.popleft().split("/", 5)
+                self._used_numbers.setdefault(rest, deque()).append(number)
 
     def name_of(self, gid: bytes) -> str | None:
         """Return the topic or service that a publisher or client was announced for, if any."""
@@ -299,12 +306,13 @@ class ZenohMiddleware(Middleware):
         return session.liveliness().get(self._no_token, channel, timeout=timeout)
 
     def _token(self, endpoint: EndpointInfo) -> str:
-        with self._lock:
-            again = len(self._used_numbers) > _MIN_UNUSED_NUMBERS
-            number = self._used_numbers.popleft() if again else str(next(self._numbers))
         if self.options.humble:
             endpoint = replace(endpoint, type_hash="")
-        return Token(self.options.domain, self._id, "0", number, endpoint.node, endpoint).key()
+        token = Token(self.options.domain, self._id, "0", "", endpoint.node, endpoint)
+        with self._lock:
+            used = self._used_numbers.get(token.key().split("/", 5)[5])
+            number = used.popleft() if used else str(next(self._numbers))
+        return replace(token, entity_id=number).key()
 
     def _add(self, declaration: _Kind) -> _Kind:
         with self._lock:
