@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import threading
 import time
 from collections import deque
@@ -73,7 +72,6 @@ class Publisher(TopicEndpoint):
         self._core, self._wire = core, core.wire
         self._hash = type.type_hash
         self._closed = False
-        self._process = os.getpid()
         #: The subscriptions in the graph at the last update; None requests another one.
         self._known: list[EndpointInfo] | None = None
         self._left: deque[EndpointInfo] = deque(maxlen=_MAX_LEFT)
@@ -93,7 +91,7 @@ class Publisher(TopicEndpoint):
         endpoint = EndpointInfo(kind, topic, type.name, node, self.qos, self._hash)
         self._writer = core.create_writer(endpoint, type)
         if self._writer.gid:
-            core.local_gids.add(self._writer.gid)
+            core.add_gid(self._writer.gid)
         # If the wire does not count its subscribers, the graph does.
         self._graph = core.graph if self._writer.subscribers() is None else None
         core.add(self, self._follow)  # closes this publisher if the node is closed
@@ -132,7 +130,7 @@ class Publisher(TopicEndpoint):
             raise ArgumentError(
                 "", fields, "either a message or keyword fields, not both", self.type.name
             )
-        if self._closed or self._process != os.getpid():
+        if self._closed or self._core.forked:
             raise self._closed_error()
         if message is None:
             # Most likely a missing return statement: it must not become an all-zero command.
@@ -168,7 +166,7 @@ class Publisher(TopicEndpoint):
                 definition of the type.
             NodeClosedError: The publisher is closed.
         """
-        if self._closed or self._process != os.getpid():
+        if self._closed or self._core.forked:
             raise self._closed_error()
         if isinstance(data, Sample):
             data = self._check_sample(data)
@@ -195,7 +193,7 @@ class Publisher(TopicEndpoint):
             NodeClosedError: The publisher is closed.
             UnsupportedError: ROS 1 cannot carry it.
         """
-        if self._closed or self._process != os.getpid():
+        if self._closed or self._core.forked:
             raise self._closed_error()
         self._writer.assert_liveliness()
         self._asserted_at = time.monotonic()
@@ -239,7 +237,7 @@ class Publisher(TopicEndpoint):
             self._start_watchdogs()
 
     def _closed_error(self) -> NodeClosedError:
-        if self._process != os.getpid():
+        if self._core.forked:
             return NodeClosedError(
                 f"the publisher of {self.topic} belongs to the process that created it, and does "
                 "not work after a fork; connect again in this process"
@@ -257,7 +255,7 @@ class Publisher(TopicEndpoint):
             watchdog.close()
         self._remove_listeners()
         self._liveliness_listeners.clear()
-        if self._process != os.getpid():
+        if self._core.forked:
             return
         if isinstance(self._graph, Graph):
             self._graph.unwatch(self.topic, self._on_endpoint_removed)

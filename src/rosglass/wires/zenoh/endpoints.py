@@ -52,6 +52,7 @@ _T = TypeVar("_T")
 _log = logging.getLogger("rosglass.ros2")
 #: Seconds between the heartbeats by which subscriptions notice a lost last sample (rmw_zenoh's).
 _HEARTBEAT_INTERVAL_S = 0.5
+_FAILURE = "handling received data failed"
 #: Part of the names of an action's topics.
 _ACTION = "/_action/"
 #: Seconds that closing waits for another thread's write or query.
@@ -328,10 +329,11 @@ class ZenohWriter(Declaration, Writer):
             note = ATTACHMENT_FULL.pack(number, now, 16, self.gid)
             if self._latched:
                 self._history.append((data, note, time.monotonic_ns()))
-            if self._window is None:
-                self._put(payload, note)
-            else:
+            if self._window is not None:
                 self._window.send(bytes(payload), note)
+            else:  # as _put() does, which costs a call per message
+                for publisher in self._publishers:
+                    publisher.put(payload, attachment=note)
             for reader in self._readers.find(self._place):
                 reader.on_local_sample(bytes(data), now, self.gid, number, self._type_hash)
         except zenoh.ZError as error:
@@ -426,21 +428,16 @@ class ZenohWriter(Declaration, Writer):
         )
 
 
-def _log_exceptions(callback: Callable[[Any], None]) -> Callable[[Any], None]:
-    """Log the exceptions of a callback; Zenoh would only print them."""
+def receive_directly(callback: Callable[[Any], None]) -> Any:
+    """Run a callback on the receiving thread; only for data of other sessions."""
 
     def guarded(item: Any) -> None:
         try:
             callback(item)
-        except Exception:
-            _log.exception("handling received data failed")
+        except Exception:  # Zenoh would only print it
+            _log.exception(_FAILURE)
 
-    return guarded
-
-
-def receive_directly(callback: Callable[[Any], None]) -> Any:
-    """Run a callback on the receiving thread; only for data of other sessions."""
-    return zenoh.handlers.Callback(_log_exceptions(callback), indirect=False)
+    return zenoh.handlers.Callback(guarded, indirect=False)
 
 
 class Pump:
@@ -458,7 +455,7 @@ class Pump:
     """
 
     def __init__(self, source: Any, callback: Callable[[Any], None], name: str) -> None:
-        self._source, self._callback = source, _log_exceptions(callback)
+        self._source, self._callback = source, callback
         # Not available any more once the source is undeclared.
         self._items = source.handler
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
@@ -481,8 +478,12 @@ class Pump:
         return not self._thread.is_alive()
 
     def _work(self) -> None:
+        callback = self._callback
         for item in self._items:
-            self._callback(item)
+            try:
+                callback(item)
+            except Exception:  # noqa: PERF203 - a failure must not end the thread
+                _log.exception(_FAILURE)
 
 
 #: The channel of a :class:`Pump`, long enough never to be full while its thread lives.

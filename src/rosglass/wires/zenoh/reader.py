@@ -187,7 +187,7 @@ class _Pumped:
         self._pump: Pump | None = None
 
     def begin(self) -> None:
-        self._pump = Pump(self._subscriber, self._receive, self._name)
+        self._pump = Pump(self._subscriber, self._take, self._name)
 
     def end(self) -> None:
         if self._pump is None:
@@ -195,9 +195,6 @@ class _Pumped:
         assert self._pump is not None
         if not self._pump.undeclare(self._timeout):
             self._drain.join_later(self._pump)
-
-    def _receive(self, sample: zenoh.Sample) -> None:
-        self._take(sample, time.time_ns())
 
 
 class _Collected:
