@@ -197,7 +197,7 @@ def arrays() -> tuple[float, float, float]:
 
     import rosglass
     from rosglass.qml import Session, install
-    from rosglass.qml.runtime import runtime_of
+    from rosglass.qml.engine.runtime import runtime_of
 
     app = QCoreApplication.instance() or QCoreApplication([])
     engine = QQmlEngine()

@@ -16,14 +16,14 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from reference_members import NOTES, REFERENCE
 
-from rosglass.qml import ros1, ros2
-from rosglass.qml.action_client import ActionClient, RosActionClient
-from rosglass.qml.goal_handle import GoalHandle, RosGoalHandle, ServerGoalHandle
-from rosglass.qml.logger import Console, Logger
-from rosglass.qml.publisher import Publisher, RosPublisher
-from rosglass.qml.ros1 import Package
-from rosglass.qml.services import ServiceClient
-from rosglass.qml.yaml_io import Io
+from rosglass.qml.elements import ros1, ros2
+from rosglass.qml.elements.action_client import ActionClient, RosActionClient
+from rosglass.qml.elements.goal_handle import GoalHandle, RosGoalHandle, ServerGoalHandle
+from rosglass.qml.elements.logger import Console, Logger
+from rosglass.qml.elements.publisher import Publisher, RosPublisher
+from rosglass.qml.elements.ros1 import Package
+from rosglass.qml.elements.services import ServiceClient
+from rosglass.qml.elements.yaml_io import Io
 from rosglass.qt import QtCore
 
 PAGE = Path(__file__).parents[1] / "docs" / "compatibility.md"

@@ -12,14 +12,15 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rosglass.qml import modules, ros1, ros2
+from rosglass.qml.elements import ros1, ros2
+from rosglass.qml.run import modules
 from rosglass.qt import QtCore
 from rosglass.scene.app import modules as scene
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-FOLDER = Path(modules.__file__).with_name("imports")
+FOLDER = modules.IMPORT_PATHS[0]
 #: Of modules that need Qt 6.
 FOLDER6 = FOLDER.with_name("imports6")
 #: What JavaScript may be given anything for, or gets objects of types that have no name in QML.

@@ -151,7 +151,7 @@ def running(bench: Bench, wait: Callable[..., None]) -> Bench:
 @pytest.fixture
 def messages(app: QCoreApplication) -> Iterator[None]:
     """Have Qt's own messages logged, as the runner does."""
-    from rosglass.qml.log import install_message_handler
+    from rosglass.qml.engine.log import install_message_handler
     from rosglass.qt import QtCore
 
     install_message_handler()

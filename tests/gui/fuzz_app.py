@@ -20,9 +20,10 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from local_world import LocalWorld
 
-from rosglass.qml import Session, install, ros1, ros2, services, tf_buffer
-from rosglass.qml.log import LocationFormatter, install_message_handler
-from rosglass.qml.waiting import wait_for
+from rosglass.qml import Session, install
+from rosglass.qml.elements import ros1, ros2, services, tf_buffer
+from rosglass.qml.engine.log import LocationFormatter, install_message_handler
+from rosglass.qml.engine.waiting import wait_for
 from rosglass.qt import QtCore, QtGui, QtQml, Slot, send_deferred_deletes
 
 SCRIPT = Path(__file__).with_name("fuzz.js").as_uri()

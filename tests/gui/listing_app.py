@@ -16,8 +16,8 @@ os.environ["QSG_RENDER_LOOP"] = "basic"
 os.environ["QT_LOGGING_RULES"] = "qt.multimedia.*=false"
 
 from rosglass.qml import Session
-from rosglass.qml.log import install_message_handler
-from rosglass.qml.runner import Runner
+from rosglass.qml.engine.log import install_message_handler
+from rosglass.qml.run.runner import Runner
 from rosglass.qt import QtCore, QtGui, optional
 
 app = QtGui.QGuiApplication([])

@@ -164,7 +164,7 @@ def test_a_handle(live: Bench, robot: Robot, wait: Any) -> None:
 def test_a_forgotten_cancel_is_told_of(
     live: Bench, robot: Robot, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.goal_handle._REMINDER", 50)
+    monkeypatch.setattr("rosglass.qml.elements.goal_handle._REMINDER", 50)
     root = offer(live, robot, "execute: function (goal, h) { handle = h }")
     goal = robot.send(5)
     wait(lambda: run(root, "Boolean(handle)"))

@@ -74,7 +74,7 @@ def test_grown_arrays_can_be_sent(bench: Any, count: int) -> None:
 @pytest.mark.parametrize("count", [3, 200])
 def test_changed_arrays_can_be_sent_back(bench: Any, count: int) -> None:
     import rosglass
-    from rosglass.qml.runtime import runtime_of
+    from rosglass.qml.engine.runtime import runtime_of
 
     kind = rosglass.load(SCAN)
     message = runtime_of(bench.engine).message(kind.create(ranges=[1.0] * count))
@@ -87,8 +87,8 @@ def test_changed_arrays_can_be_sent_back(bench: Any, count: int) -> None:
 @pytest.mark.parametrize("count", [2, 40])
 def test_received_arrays_of_messages_can_be_sent_to_the_other_ros(bench: Any, count: int) -> None:
     import rosglass
-    from rosglass.qml.dialect import Dialect
-    from rosglass.qml.runtime import runtime_of
+    from rosglass.qml.engine.dialect import Dialect
+    from rosglass.qml.engine.runtime import runtime_of
 
     kind = rosglass.load("tf2_msgs/msg/TFMessage", ros=1)
     value = {"transforms": [{"header": {"seq": 3, "stamp": {"secs": i}}} for i in range(count)]}

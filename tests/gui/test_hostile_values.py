@@ -10,9 +10,9 @@ from values import convert, show
 
 from rosglass.errors import ConversionError
 from rosglass.messages import MessageType
-from rosglass.qml.dialect import Dialect
-from rosglass.qml.from_js import fields_from_js
-from rosglass.qml.runtime import runtime_of
+from rosglass.qml.engine.dialect import Dialect
+from rosglass.qml.engine.from_js import fields_from_js
+from rosglass.qml.engine.runtime import runtime_of
 
 SCAN, HEADER = "sensor_msgs/msg/LaserScan", "std_msgs/msg/Header"
 #: A few values, each in the next one twice: who follows them all never comes to the end.
@@ -172,7 +172,7 @@ def test_the_largest_types_go_to_javascript_and_back(bench: Any, shape: str) -> 
 def test_what_would_block_the_interface_is_refused(
     bench: Any, tmp_path: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.from_js._READ_TIMEOUT_S", -1.0)
+    monkeypatch.setattr("rosglass.qml.engine.from_js._READ_TIMEOUT_S", -1.0)
     path = tmp_path / "slow.yaml"
     text = bench.run(
         f"try {{ Ros2.io.writeYaml('{path}', Array(300).fill(1)) }} catch (e) {{ return '' + e }}"

@@ -50,7 +50,7 @@ def jpeg(colour: tuple = RED) -> dict:
 
 def colour(root: Any) -> tuple | None:
     """Return the colour that the item shows, None when it is blank."""
-    from rosglass.qml.image_sinks import ImageItem
+    from rosglass.qml.elements.image_sinks import ImageItem
 
     item = root.property("item")
     assert isinstance(item, ImageItem)
@@ -341,7 +341,7 @@ def test_pictures_that_a_silent_link_kept_back_are_not_live(
 def test_a_camera_that_nobody_publishes_is_told(
     running: Any, camera: Any, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.element.NO_PEER_MS", 20)
+    monkeypatch.setattr("rosglass.qml.elements.element.NO_PEER_MS", 20)
     caplog.set_level("INFO", "rosglass.qml")
     root = load(running, 'topic: "/camm"')
     wait(lambda: "/camm: this topic has no publisher; did you mean /cam?" in caplog.text)
@@ -357,7 +357,7 @@ def test_a_camera_that_nobody_publishes_is_told(
 def test_a_picture_that_comes_while_its_stream_is_made(
     running: Any, camera: Any, wait: Any, monkeypatch: Any
 ) -> None:
-    from rosglass.qml import image_stream
+    from rosglass.qml.elements import image_stream
 
     answers = []
 

@@ -12,7 +12,7 @@ import pytest
 from inside import image_of
 
 from rosglass.comm import Time
-from rosglass.qml.image_sinks import ImageItem
+from rosglass.qml.elements.image_sinks import ImageItem
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -126,7 +126,7 @@ def test_a_view_changes_without_a_gap(running: Any, camera: Any, wait: Any) -> N
 def test_viewers_of_one_camera_look_at_it_differently(
     running: Any, camera: Any, wait: Any, monkeypatch: Any
 ) -> None:
-    from rosglass.qml import image_rendering
+    from rosglass.qml.elements import image_rendering
 
     conversions: list[Any] = []
     real = image_rendering.convert

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from rosglass.qml.process import QuitOnSignal
+from rosglass.qml.engine.process import QuitOnSignal
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 PROGRAM = """
 import threading, time
-from rosglass.qml.process import end_process_within
+from rosglass.qml.engine.process import end_process_within
 
 def fail(_):
     raise OSError(22, "Invalid argument")  # as under libfaketime, when a clock is set

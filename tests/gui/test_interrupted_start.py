@@ -103,7 +103,8 @@ def test_ctrl_c_at_any_moment_of_the_start_ends_it(
 
 
 @pytest.mark.parametrize(
-    "module", ["rosglass.qml.log", "QtCore", "rosglass.qml.session", "rosglass.qml.runner"]
+    "module",
+    ["rosglass.qml.engine.log", "QtCore", "rosglass.qml.engine.session", "rosglass.qml.run.runner"],
 )
 def test_ctrl_c_while_modules_are_imported_ends_the_script_afterwards(
     module: str, platform: dict[str, str]

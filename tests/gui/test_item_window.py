@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rosglass.qml.image_sinks import Sink, window_of
+from rosglass.qml.elements.image_sinks import Sink, window_of
 from rosglass.qt import is_alive
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ import pytest
 
 from rosglass.comm.handle import Handle
 from rosglass.qml import Session
-from rosglass.qml.element import Element
-from rosglass.qml.goal_handle import GoalHandle, ServerGoalHandle
-from rosglass.qml.parameter import ParameterLink
+from rosglass.qml.elements.element import Element
+from rosglass.qml.elements.goal_handle import GoalHandle, ServerGoalHandle
+from rosglass.qml.elements.parameter import ParameterLink
 from rosglass.tf import TransformBuffer
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def test_transforms_are_not_followed_any_more(
 def test_who_leaves_at_once_leaves_no_listener(
     running: Bench, wait: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass.qml.tf_buffer import TfLink
+    from rosglass.qml.elements.tf_buffer import TfLink
 
     told: list[str] = []
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from rosglass.qml.log import LocationFormatter, RateLimit
+from rosglass.qml.engine.log import LocationFormatter, RateLimit
 
 
 @pytest.fixture

@@ -265,7 +265,7 @@ def test_it_shows_what_a_subscription_receives(running: Any, wait: Any) -> None:
 
 
 def test_qts_own_checks_of_models_pass(bench: Any) -> None:
-    from rosglass.qml.message_item_model import MessageItemModel
+    from rosglass.qml.elements.message_item_model import MessageItemModel
     from rosglass.qt import optional
 
     test = optional("QtTest")

@@ -161,7 +161,7 @@ def test_ready_is_said_of_what_the_node_has_told(live: Bench, wait: Any) -> None
 @ROS2
 def test_a_change_that_went_unheard_is_found(ros2: Bench, wait: Any, monkeypatch: Any) -> None:
     """The first moments after a node appears, its changes may be heard of by nobody."""
-    from rosglass.qml.parameter import ParameterLink
+    from rosglass.qml.elements.parameter import ParameterLink
 
     monkeypatch.setattr(ParameterLink, "_on_event", lambda link, event: None)
     root: Any = ros2.load(QML)

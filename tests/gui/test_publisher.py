@@ -205,7 +205,7 @@ def test_what_is_held_at_shutdown_is_told(
 def test_who_forgot_to_ask_for_a_node_is_told(
     bench: Any, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.session._FORGOTTEN", 20)
+    monkeypatch.setattr("rosglass.qml.engine.session._FORGOTTEN", 20)
     root = load(bench)
     wait(lambda: "nothing is received or sent: no node was asked for" in caplog.text)
     caplog.clear()
@@ -216,7 +216,7 @@ def test_who_forgot_to_ask_for_a_node_is_told(
 def test_who_asked_for_a_node_is_told_nothing(
     running: Any, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.session._FORGOTTEN", 0)
+    monkeypatch.setattr("rosglass.qml.engine.session._FORGOTTEN", 0)
     root = load(running)
     wait(lambda: root.property("advertised") == 1)
     wait.settled(running.session)
@@ -344,7 +344,7 @@ def test_what_keep_all_could_not_send_is_told(running: Any, wait: Any, caplog: A
 def test_a_topic_without_subscribers_is_named_with_the_near_name(
     running: Any, received: list, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.publisher.NO_PEER_MS", 20)
+    monkeypatch.setattr("rosglass.qml.elements.publisher.NO_PEER_MS", 20)
     caplog.set_level("INFO", "rosglass.qml")
     running.robot.create_publisher("/cmd_vel", TWIST)  # topics() of this graph shows published ones
     code = 'QtObject { property var pub: Ros2.createPublisher("TOPIC", "geometry_msgs/Twist") }'

@@ -13,7 +13,7 @@ from rosglass.comm import ConnectionState
 from rosglass.errors import ConnectionLostError, Error, UnsupportedError
 from rosglass.extras import install_command
 from rosglass.qml import IMPORT_PATHS, Session, install
-from rosglass.qml.modules import register
+from rosglass.qml.run.modules import register
 from rosglass.qt import QtCore, QtQml
 
 LOG = """QtObject {
@@ -392,7 +392,7 @@ def test_folders_that_do_not_answer(bench: Any, monkeypatch: Any, caplog: Any) -
         return []
 
     monkeypatch.setattr("os.listdir", wait_for_ever)
-    monkeypatch.setattr("rosglass.qml.ros2.FOLDER_TIMEOUT_S", 0.1)
+    monkeypatch.setattr("rosglass.qml.elements.ros2.FOLDER_TIMEOUT_S", 0.1)
     monkeypatch.setenv("AMENT_PREFIX_PATH", "/far/away")
     assert bench.run("return AmentIndex.getPackages()") == []
     assert "AMENT_PREFIX_PATH did not answer within 0.1 s" in caplog.text

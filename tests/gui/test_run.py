@@ -358,7 +358,7 @@ def test_a_program_of_rosglass_reads_no_sources(python: Any) -> None:
         "import linecache\n"
         "from rosglass.cli.run import load_qt\n"
         "load_qt()\n"
-        "import rosglass.qml.application, rosglass.qml.ros2\n"
+        "import rosglass.qml.run.application, rosglass.qml.elements.ros2\n"
         "print(sorted(file for file in linecache.cache if 'rosglass' in file))"
     )
     program = python(text)

@@ -10,8 +10,8 @@ from local_world import LocalNode, LocalWorld
 from rosglass.errors import QmlError
 from rosglass.extras import install_command
 from rosglass.qml import Session
-from rosglass.qml.runner import Runner, needs_widgets
-from rosglass.qml.waiting import wait_for
+from rosglass.qml.engine.waiting import wait_for
+from rosglass.qml.run.runner import Runner, needs_widgets
 from rosglass.qt import QtCore, Signal, is_alive
 from rosglass.tf import Transform, TransformBroadcaster
 
@@ -331,7 +331,7 @@ def test_errors_at_run_time_do_not_stop_a_reload(
 
 
 def test_a_reload_is_deferred_while_a_call_waits(runner: Runner, file: Path, wait: Any) -> None:
-    from rosglass.qml.waiting import wait_for
+    from rosglass.qml.engine.waiting import wait_for
     from rosglass.qt import QtCore
 
     file.write_text(UI % ("new", "lime"))
@@ -432,7 +432,7 @@ def test_errors_say_what_to_do(
 
 @pytest.mark.parametrize("module", ["QtMultimedia", "QtQuick.Controls"])
 def test_errors_name_the_package_that_is_missing(file: Path, module: str) -> None:
-    from rosglass.qml.live_file import error_list
+    from rosglass.qml.run.live_file import error_list
     from rosglass.qt import QT6, QtCore, QtQml
 
     error = QtQml.QQmlError()
@@ -451,7 +451,7 @@ def test_errors_name_the_package_that_is_missing(file: Path, module: str) -> Non
 def test_a_kiosk_stays_open_and_hides_the_pointer(
     app: Any, file: Path, world: LocalWorld, wait: Any, monkeypatch: Any
 ) -> None:
-    from rosglass.qml import runner as module
+    from rosglass.qml.run import runner as module
     from rosglass.qt import QtCore, optional
 
     monkeypatch.setattr(module, "_STILL", 50)
@@ -484,7 +484,7 @@ def test_connecting_waits_for_the_first_frame(
     app: Any, file: Path, world: LocalWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     order: list[str] = []
-    monkeypatch.setattr("rosglass.qml.session._MAX_DEFER_MS", 60_000)
+    monkeypatch.setattr("rosglass.qml.engine.session._MAX_DEFER_MS", 60_000)
 
     def connect(*arguments: Any) -> LocalNode:
         order.append("connected")
@@ -506,7 +506,7 @@ def test_connecting_waits_for_the_first_frame(
 def test_connecting_does_not_wait_for_a_window_that_nobody_sees(
     app: Any, file: Path, world: LocalWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.session._MAX_DEFER_MS", 60_000)
+    monkeypatch.setattr("rosglass.qml.engine.session._MAX_DEFER_MS", 60_000)
     file.write_text(
         """import QtQuick 2.15
         import QtQuick.Window 2.15
@@ -524,7 +524,7 @@ def test_connecting_does_not_wait_for_a_window_that_nobody_sees(
 def test_connecting_waits_for_a_frame_that_never_comes_only_so_long(
     app: Any, world: LocalWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.session._MAX_DEFER_MS", 50)
+    monkeypatch.setattr("rosglass.qml.engine.session._MAX_DEFER_MS", 50)
     session = Session(connect=world.connect)
     session.defer_connecting()
     session.init("ui")
@@ -536,7 +536,7 @@ def test_connecting_waits_for_a_frame_that_never_comes_only_so_long(
 def test_connecting_does_not_wait_while_a_call_of_qml_does(
     app: Any, world: LocalWorld, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.session._MAX_DEFER_MS", 60_000)
+    monkeypatch.setattr("rosglass.qml.engine.session._MAX_DEFER_MS", 60_000)
     session = Session(connect=world.connect)
     session.defer_connecting()
     session.init("ui")
@@ -569,7 +569,7 @@ def test_an_interface_that_asks_for_no_node_is_shown_the_line_to_add(
     module: str,
     element: str,
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.session._FORGOTTEN", 20)
+    monkeypatch.setattr("rosglass.qml.engine.session._FORGOTTEN", 20)
     text = f"""import QtQuick 2.15
         import {module} 1.0
         Item {{ {element} {{ topic: "/x" }} }}"""

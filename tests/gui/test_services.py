@@ -82,7 +82,7 @@ def test_no_server(live: Bench, wait: Any, caplog: Any) -> None:
 
 def test_a_request_does_not_outlast_its_server(live: Bench, wait: Any, monkeypatch: Any) -> None:
     """One that was made while a dead server seemed to be there is not for the next one."""
-    monkeypatch.setattr("rosglass.qml.services._GRACE_S", 0.1)
+    monkeypatch.setattr("rosglass.qml.elements.services._GRACE_S", 0.1)
     go = threading.Event()
     live.robot.create_service_server("/dock", "std_srvs/srv/Trigger", lambda _: go.wait(60))
     root: Any = live.load("""
@@ -197,7 +197,7 @@ def test_failing_handlers_are_answered_at_once(
 
 
 def test_open_requests_are_limited(live: Bench, wait: Any, monkeypatch: Any) -> None:
-    monkeypatch.setattr("rosglass.qml.callbacks._MAX_OPEN", 2)
+    monkeypatch.setattr("rosglass.qml.engine.callbacks._MAX_OPEN", 2)
     root: Any = live.load("""
         QtObject {
             property var open: []

@@ -13,7 +13,7 @@ from waiting import eventually
 from rosglass.comm import ConnectionState, QoS, Sample, Time
 from rosglass.comm.qos import Durability, Reliability
 from rosglass.messages import OpaqueType
-from rosglass.qml.log import LocationFormatter
+from rosglass.qml.engine.log import LocationFormatter
 
 TEXT = "std_msgs/msg/String"
 
@@ -566,7 +566,7 @@ def test_a_successor_that_has_said_nothing_is_not_trusted(live: Any, wait: Any) 
 def test_a_topic_that_nobody_publishes_is_told(
     running: Any, wait: Any, caplog: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.element.NO_PEER_MS", 20)
+    monkeypatch.setattr("rosglass.qml.elements.element.NO_PEER_MS", 20)
     caplog.set_level("INFO", "rosglass.qml")
     running.robot.create_publisher("/odom", "std_msgs/msg/String")
     published = running.load('Subscription { topic: "/odom" }')

@@ -83,7 +83,7 @@ def test_every_renamed_field_of_types_that_both_have_is_known() -> None:
     from rosglass.errors import Error
     from rosglass.interfaces import Counterparts, Definition, Library
     from rosglass.messages.schema import schema_of
-    from rosglass.qml.dialect import Dialect
+    from rosglass.qml.engine.dialect import Dialect
 
     library, found = Library(), set()
     for name in library.names(1, "msg"):
@@ -268,9 +268,9 @@ def test_what_is_no_time_is_named(bench: Any, script: str) -> None:
 
 
 def test_python_gives_and_takes_times(bench: Any) -> None:
-    from rosglass.qml.dialect import Dialect
-    from rosglass.qml.js_values import duration_from_js, time_from_js
-    from rosglass.qml.runtime import runtime_of
+    from rosglass.qml.engine.dialect import Dialect
+    from rosglass.qml.engine.js_values import duration_from_js, time_from_js
+    from rosglass.qml.engine.runtime import runtime_of
 
     runtime = runtime_of(bench.engine)
     for dialect in Dialect:

@@ -127,7 +127,7 @@ def test_bytes_are_a_buffer(bench: Any) -> None:
 
 
 def test_long_arrays_are_let_go_when_javascript_has_let_go(bench: Any, wait: Any) -> None:
-    from rosglass.qml.runtime import runtime_of
+    from rosglass.qml.engine.runtime import runtime_of
 
     for _ in range(20):
         show(bench, "sensor_msgs/msg/LaserScan", {"ranges": [1.0] * 500}, "m.ranges.length")
@@ -213,8 +213,8 @@ def test_byte_buffers_fit(bench: Any) -> None:
 
 @pytest.mark.parametrize("count", [3, 500])
 def test_received_messages_can_be_sent_back(bench: Any, count: int) -> None:
-    from rosglass.qml.from_js import fields_from_js
-    from rosglass.qml.runtime import runtime_of
+    from rosglass.qml.engine.from_js import fields_from_js
+    from rosglass.qml.engine.runtime import runtime_of
 
     kind = rosglass.load("sensor_msgs/msg/LaserScan")
     value = {"header": POSE["header"], "ranges": [0.5 * i for i in range(count)]}

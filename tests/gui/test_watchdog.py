@@ -10,10 +10,10 @@ from local_world import LocalWorld
 
 from rosglass.errors import Error
 from rosglass.qml import Session
-from rosglass.qml.runner import Runner
-from rosglass.qml.runtime import runtime_of
-from rosglass.qml.waiting import wait_for
-from rosglass.qml.watchdog import Watchdog
+from rosglass.qml.engine.runtime import runtime_of
+from rosglass.qml.engine.waiting import wait_for
+from rosglass.qml.engine.watchdog import Watchdog
+from rosglass.qml.run.runner import Runner
 from rosglass.qt import Property, QtCore, Signal, Slot
 
 if TYPE_CHECKING:
@@ -177,7 +177,7 @@ def test_qml_of_rosglass_itself_is_never_ended(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("rosglass.qml.watchdog._OURS", str(tmp_path))
+    monkeypatch.setattr("rosglass.qml.engine.watchdog._OURS", str(tmp_path))
     runner = run("helper.compute(3)", 0.5)
     QtCore.QMetaObject.invokeMethod(runner.root, "begin")
     wait(lambda: "after" in done(runner))
@@ -332,7 +332,7 @@ def test_that_more_may_have_ended_is_told(
     run: Callable[..., Runner], wait: Callable[..., None], monkeypatch: Any
 ) -> None:
     # As if this thread had been kept from its processor.
-    monkeypatch.setattr("rosglass.qml.watchdog._LATE", -1.0)
+    monkeypatch.setattr("rosglass.qml.engine.watchdog._LATE", -1.0)
     runner = run("while (true) {}", 0.5)
     QtCore.QMetaObject.invokeMethod(runner.root, "begin")
     wait(lambda: panel(runner))

@@ -157,7 +157,7 @@ def test_arrays_of_wide_integers_come_back(
     file = tmp_path / "a.yaml"
     most = str(2**64 - 1 if kind == "UInt64" else -(2**63))
     import rosglass
-    from rosglass.qml.runtime import runtime_of
+    from rosglass.qml.engine.runtime import runtime_of
 
     values = [1, int(most), *[7] * (count - 2)]
     received = rosglass.load(f"std_msgs/msg/{kind}MultiArray").create(data=values)
@@ -250,8 +250,8 @@ def test_wrong_arguments_throw_or_are_refused(bench: Any) -> None:
 def test_a_drive_that_does_not_answer(bench: Any, tmp_path: Path, monkeypatch: Any) -> None:
     go = threading.Event()
     for name in ("_read", "_replace"):
-        monkeypatch.setattr(f"rosglass.qml.yaml_io.{name}", lambda *_: go.wait(60))
-    monkeypatch.setattr("rosglass.qml.yaml_io.FILE_TIMEOUT_S", 0.1)
+        monkeypatch.setattr(f"rosglass.qml.elements.yaml_io.{name}", lambda *_: go.wait(60))
+    monkeypatch.setattr("rosglass.qml.elements.yaml_io.FILE_TIMEOUT_S", 0.1)
     file = tmp_path / "far.yaml"
     assert read(bench, file) is False
     assert write(bench, file, "{a: 1}") is False

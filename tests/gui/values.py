@@ -15,8 +15,8 @@ def show(
 
     `module` is the QML module whose value it is, `ros` what the robot speaks.
     """
-    from rosglass.qml.dialect import Dialect
-    from rosglass.qml.runtime import runtime_of
+    from rosglass.qml.engine.dialect import Dialect
+    from rosglass.qml.engine.runtime import runtime_of
 
     kind = rosglass.load(type_name, ros=ros)
     message = kind.decode(kind.encode(value))
@@ -39,8 +39,8 @@ def convert(bench: Any, type_name: str, script: str, *, module: int = 2, ros: in
 
 def converted(value: Any, type_name: Any, *, module: int = 2, ros: int = 2) -> dict:
     """Return the message that a JavaScript value is, as a dict; of a type, or of its name."""
-    from rosglass.qml.dialect import Dialect
-    from rosglass.qml.from_js import fields_from_js
+    from rosglass.qml.engine.dialect import Dialect
+    from rosglass.qml.engine.from_js import fields_from_js
 
     kind = rosglass.load(type_name, ros=ros) if isinstance(type_name, str) else type_name
     dialect = Dialect.ROS1 if module == 1 else Dialect.ROS2

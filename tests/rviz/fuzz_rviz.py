@@ -13,7 +13,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from rosglass.qml import from_js
+from rosglass.qml.engine import from_js
 from rosglass.qt import QtCore, Slot, send_deferred_deletes
 from rosglass.rviz import Application
 

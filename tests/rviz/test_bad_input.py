@@ -53,7 +53,7 @@ def press(app: Any) -> Callable[[float, float], bool]:
 @pytest.fixture
 def messages(caplog: pytest.LogCaptureFixture) -> Iterator[Callable[[], list[str]]]:
     """Return the log messages of Qt and QML, as ``file:line: text``."""
-    from rosglass.qml.log import install_message_handler
+    from rosglass.qml.engine.log import install_message_handler
     from rosglass.qt import QtCore
 
     install_message_handler()
@@ -287,7 +287,7 @@ def test_an_overlay_may_be_removed_while_it_is_loaded(
 def test_an_overlay_may_be_removed_while_its_call_waits(
     app: Any, show: Any, wait: Any, press: Any, grab: Any, goes_on: Any, messages: Any, how: str
 ) -> None:
-    from rosglass.qml.waiting import wait_for
+    from rosglass.qml.engine.waiting import wait_for
     from rosglass.qt import QtCore, Slot
 
     class Waiting(QtCore.QObject):

@@ -378,7 +378,7 @@ def test_hidden_overlays_reload_when_they_are_visible_again(
 def test_a_reload_is_deferred_while_a_call_waits(
     show: Any, file: Path, app: Any, wait: Any
 ) -> None:
-    from rosglass.qml.waiting import wait_for
+    from rosglass.qml.engine.waiting import wait_for
     from rosglass.qt import QtCore
 
     overlay = show(BLUE_UI)

@@ -155,7 +155,7 @@ def test_the_renderer_cannot_be_changed_later(
 
 
 def test_a_graphics_card_is_used(monkeypatch: pytest.MonkeyPatch, app: Any) -> None:
-    from rosglass.qml import renderer_choice as qml_choice
+    from rosglass.qml.run import renderer_choice as qml_choice
     from rosglass.rviz.rendering import OverlayRendererChoice
 
     monkeypatch.setattr(qml_choice, "taken_renderer", lambda: "")
@@ -192,7 +192,7 @@ def test_a_graphics_card_is_used(monkeypatch: pytest.MonkeyPatch, app: Any) -> N
 def test_later_need_for_opengl_is_found_in_the_files(
     text: str, imports: str, need: str, qml: Any, app: Any, tmp_path: Path
 ) -> None:
-    from rosglass.qml.renderer_choice import need_in_file
+    from rosglass.qml.run.renderer_choice import need_in_file
     from rosglass.qt import QtQml
 
     qml("Late", f"Item {{ {SHADER} }}")
@@ -207,7 +207,7 @@ def test_later_need_for_opengl_is_found_in_the_files(
 
 
 def test_folders_that_import_each_other_are_looked_through_once(tmp_path: Path) -> None:
-    from rosglass.qml.renderer_choice import need_in_file
+    from rosglass.qml.run.renderer_choice import need_in_file
 
     places = {"First": "Parts", "Second": "More Pages", "Third": "Looks"}
     imports = "".join(f'import "../{folder}"\n' for folder in places.values())

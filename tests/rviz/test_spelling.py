@@ -60,7 +60,7 @@ def test_each_object_reports_misspelled_members(
 def test_an_uncaught_assignment_is_reported_with_its_place(
     show: Any, said: Any, app: Any, wait: Any
 ) -> None:
-    from rosglass.qml.log import install_message_handler
+    from rosglass.qml.engine.log import install_message_handler
     from rosglass.qt import QtCore
 
     install_message_handler()

@@ -110,7 +110,7 @@ class SceneBench:
         import numpy as np
         from PySide6.QtGui import QImage
 
-        from rosglass.qml.image_sinks import grab
+        from rosglass.qml.elements.image_sinks import grab
 
         # What has changed is drawn after a pause, in which the last picture would be grabbed.
         for view in (self.view, *self.view.findChildren(type(self.view))):

@@ -174,7 +174,7 @@ class Pair:
         """Return our picture."""
         from PySide6.QtCore import QCoreApplication
 
-        from rosglass.qml.image_sinks import grab
+        from rosglass.qml.elements.image_sinks import grab
 
         QCoreApplication.processEvents()
         return _pixels(grab(self.window))

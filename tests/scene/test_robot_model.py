@@ -555,7 +555,7 @@ def test_screenshots_wait_for_meshes_that_are_being_read(
     bench: SceneBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rosglass.cli.run import Picture
-    from rosglass.qml.image_sinks import is_loading
+    from rosglass.qml.elements.image_sinks import is_loading
     from rosglass.scene.displays import robot_model
 
     may_read, load = threading.Event(), robot_model.load_mesh_cached

@@ -93,7 +93,7 @@ def test_a_topic_that_is_none_is_a_status_until_it_is_one(bench: SceneBench) -> 
 def test_the_status_says_why_nothing_was_received(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    from rosglass.qml import element
+    from rosglass.qml.elements import element
     from rosglass.scene.displays.display import OneTopicDisplay
 
     monkeypatch.setattr(element, "NO_PEER_MS", 50)
@@ -123,7 +123,7 @@ def test_the_status_says_why_nothing_was_received(
 def test_depth_images_that_have_no_publisher_are_named_where_a_calibration_came(
     bench: SceneBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass.qml import element
+    from rosglass.qml.elements import element
 
     monkeypatch.setattr(element, "NO_PEER_MS", 1500)
     view = bench.load('DepthCloudDisplay { topic: "/depth/image" }')

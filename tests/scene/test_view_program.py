@@ -451,7 +451,7 @@ def view_command(*arguments: str, timeout: float = 100) -> subprocess.CompletedP
 
 def test_the_program_loads_only_what_its_window_shows() -> None:
     late = (
-        "{'rosglass.scene.displays.marker', 'rosglass.images', 'rosglass.qml.ros2', "
+        "{'rosglass.scene.displays.marker', 'rosglass.images', 'rosglass.qml.elements.ros2', "
         "'rosglass.connection', 'rosglass.interfaces.library', 'rosglass.tf.buffer', 'yaml'}"
     )
     code = f"import rosglass.scene.app.program, sys; print(sorted({late} & set(sys.modules)))"

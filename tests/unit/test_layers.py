@@ -41,6 +41,8 @@ RANK = {
     "cli": 13,
     "demo": 12,
 }
+#: The folders of a large package, from the lowest; each imports itself and those before it.
+ROOMS = {"qml": ["engine", "elements", "run"]}
 QT = {"PySide6", "PySide2", "PyQt5", "PyQt6", "shiboken6", "shiboken2"}
 MODULES = sorted(ROOT.rglob("*.py"))
 
@@ -80,6 +82,27 @@ def test_imports_point_downwards(path: Path) -> None:
             continue
         other = room_of(parts[1:])
         assert other == room or RANK[other] < RANK[room], f"{path} imports {name}"
+
+
+@pytest.mark.parametrize("package", ROOMS)
+def test_imports_between_rooms_point_one_way(package: str) -> None:
+    rooms = ROOMS[package]
+    folders = {file.parent.name for file in (ROOT / package).glob("*/__init__.py")}
+    assert folders == set(rooms)
+    for path in (ROOT / package).glob("*/**/*.py"):
+        own = path.relative_to(ROOT / package).parts[0]
+        for name in imports(path):
+            parts = name.split(".")
+            if parts[:2] != ["rosglass", package]:
+                continue
+            room = parts[2] if len(parts) > 2 else ""
+            assert room in rooms, f"{path} imports {name}, which is for users"
+            assert rooms.index(room) <= rooms.index(own), f"{path} imports {name}"
+
+
+@pytest.mark.parametrize("package", ROOMS)
+def test_a_package_with_rooms_has_few_modules_outside_them(package: str) -> None:
+    assert len(list((ROOT / package).glob("*.py"))) <= 4
 
 
 def test_modules_import_each_other_in_pairs_at_most() -> None:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Callable
 
-    from rosglass.qml.application import Application
+    from rosglass.qml.run.application import Application
     from rosglass.scene.app.window_recorder import WindowRecorder
 
 __all__ = [
@@ -154,7 +154,7 @@ def show(
             file, screenshot, after, verbose, end_process, longest_script, recorder, options
         )
         if end_process:
-            from rosglass.qml.process import end_process as end_now  # noqa: PLC0415 - with Qt
+            from rosglass.qml.engine.process import end_process as end_now  # noqa: PLC0415 - with Qt
 
             end_now(code)
         return code
@@ -180,8 +180,8 @@ def _show(
     options: dict[str, Any],
 ) -> int:
     load_qt()
-    from rosglass.qml.application import Application  # noqa: PLC0415
-    from rosglass.qml.log import install_message_handler  # noqa: PLC0415
+    from rosglass.qml.engine.log import install_message_handler  # noqa: PLC0415
+    from rosglass.qml.run.application import Application  # noqa: PLC0415
 
     format_log(verbose)
     install_message_handler()
@@ -323,7 +323,7 @@ def _call_later(delay_s: float, job: Callable[[], None]) -> None:
 
 def format_log(verbose: bool) -> None:
     """Print messages of QML with file and line, from their logger's level on."""
-    from rosglass.qml.log import LocationFormatter  # noqa: PLC0415
+    from rosglass.qml.engine.log import LocationFormatter  # noqa: PLC0415
 
     for handler in logging.getLogger().handlers:
         handler.setFormatter(LocationFormatter())

@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     os.environ["ROSGLASS_QT"] = "pyside2"
     received: list[int] = []
     with _noting_signals(received):
-        from rosglass.qml.process import QuitOnSignal  # noqa: PLC0415
+        from rosglass.qml.engine.process import QuitOnSignal  # noqa: PLC0415
 
         with QuitOnSignal(received.append, _QUIT_TIMEOUT_S):
             try:
@@ -56,8 +56,8 @@ def _noting_signals(received: list[int]) -> Iterator[None]:
 
 
 def _show(args: argparse.Namespace, config: str, remappings: list[str], received: list[int]) -> int:
-    from rosglass.qml.log import install_message_handler  # noqa: PLC0415
-    from rosglass.qml.modules import interface_file  # noqa: PLC0415
+    from rosglass.qml.engine.log import install_message_handler  # noqa: PLC0415
+    from rosglass.qml.run.modules import interface_file  # noqa: PLC0415
 
     format_log(verbose=args.verbose > 1)
     # Files that are missing are reported before RViz is loaded, which takes a while.

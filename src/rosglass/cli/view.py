@@ -41,7 +41,7 @@ def _run(args: argparse.Namespace) -> int:
         )
     try:
         load_qt()
-        from rosglass.qml.modules import interface_file  # noqa: PLC0415 - loads Qt
+        from rosglass.qml.run.modules import interface_file  # noqa: PLC0415 - loads Qt
         from rosglass.scene.app.program import WINDOW, ViewProgram  # noqa: PLC0415 - loads Qt
     except ModuleNotFoundError as error:
         if not str(error.name).startswith("PySide6"):

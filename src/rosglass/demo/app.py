@@ -18,10 +18,10 @@ from rosglass.demo import framecode, pictures
 from rosglass.demo.camera import CODE_POSITION
 from rosglass.errors import Error, QmlError
 from rosglass.qml import Session
-from rosglass.qml.log import install_message_handler
-from rosglass.qml.process import QuitOnSignal, close_network, quiet_qt, require_display
-from rosglass.qml.runner import Runner
-from rosglass.qml.subscription import Subscription
+from rosglass.qml.elements.subscription import Subscription
+from rosglass.qml.engine.log import install_message_handler
+from rosglass.qml.engine.process import QuitOnSignal, close_network, quiet_qt, require_display
+from rosglass.qml.run.runner import Runner
 from rosglass.qt import QtCore, QtGui, QtQml, QtQuick, optional
 
 if TYPE_CHECKING:

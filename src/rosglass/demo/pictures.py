@@ -18,7 +18,7 @@ import numpy as np
 
 from rosglass.comm import Dispatcher, QoS
 from rosglass.errors import Error
-from rosglass.qml.element import TopicElement
+from rosglass.qml.elements.element import TopicElement
 from rosglass.qt import Property, QtCore, QtGui, QtQml, QtQuick, Signal, Slot
 
 if TYPE_CHECKING:

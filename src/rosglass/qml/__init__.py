@@ -8,13 +8,13 @@ with its own QML engine calls :func:`install`.
 from rosglass.interrupts import InterruptsDeferred
 
 with InterruptsDeferred():
-    from rosglass.qml.modules import IMPORT_PATHS, install
-    from rosglass.qml.session import GuiExecutor, Session
+    from rosglass.qml.engine.session import GuiExecutor, Session
+    from rosglass.qml.run.modules import IMPORT_PATHS, install
 
 # Saves importing `typing`; type checkers recognise this name.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from rosglass.qml.application import Application
+    from rosglass.qml.run.application import Application
 
 __all__ = ["IMPORT_PATHS", "Application", "GuiExecutor", "Session", "install"]
 
@@ -23,7 +23,7 @@ def __getattr__(name: str) -> object:
     # Programs with their own engine do not need it.
     if name == "Application":
         with InterruptsDeferred():
-            from rosglass.qml.application import Application  # noqa: PLC0415
+            from rosglass.qml.run.application import Application  # noqa: PLC0415
 
         return Application
     raise AttributeError(f"module 'rosglass.qml' has no attribute {name!r}")

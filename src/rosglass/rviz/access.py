@@ -18,7 +18,7 @@ from rosglass.rviz.view import RvizCurrentView, RvizViews, View
 from rosglass.rviz.window import config_file
 
 if TYPE_CHECKING:
-    from rosglass.qml.session import Session
+    from rosglass.qml.engine.session import Session
     from rosglass.rviz.camera import Picker
     from rosglass.rviz.displays import Displays
     from rosglass.rviz.tools import Tools

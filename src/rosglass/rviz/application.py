@@ -12,10 +12,15 @@ from rosglass.comm import Handle
 from rosglass.comm.log import warn_on_terminal
 from rosglass.comm.names import validate_node_name
 from rosglass.errors import ConnectionLostError, Error, UnsupportedError
-from rosglass.qml.log import LocationFormatter
-from rosglass.qml.modules import import_folder
-from rosglass.qml.process import QuitOnSignal, close_network, end_process_within, require_display
-from rosglass.qml.session import Session
+from rosglass.qml.engine.log import LocationFormatter
+from rosglass.qml.engine.process import (
+    QuitOnSignal,
+    close_network,
+    end_process_within,
+    require_display,
+)
+from rosglass.qml.engine.session import Session
+from rosglass.qml.run.modules import import_folder
 from rosglass.qt import QtCore, run_event_loop
 from rosglass.ros1.options import Arguments, Ros1Options
 from rosglass.rviz import roscpp

@@ -8,7 +8,7 @@ from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error, QmlError
-from rosglass.qml.modules import locate
+from rosglass.qml.run.modules import locate
 from rosglass.qt import QtCore, Signal, Slot, is_alive
 from rosglass.rviz.host import AfterEvent, pyqt, rviz
 from rosglass.rviz.overlay import (
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
-    from rosglass.qml.session import Session
+    from rosglass.qml.engine.session import Session
     from rosglass.rviz.overlay import Overlay
     from rosglass.rviz.stack import Stack
     from rosglass.rviz.trackers import Frames

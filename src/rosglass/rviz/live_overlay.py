@@ -8,8 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error, QmlError
-from rosglass.qml.live_file import ERRORS, ERRORS_BELOW, PANEL, SCRIPT_ENDED, ErrorView, LiveFile
-from rosglass.qml.modules import interface_file
+from rosglass.qml.run.live_file import (
+    ERRORS,
+    ERRORS_BELOW,
+    PANEL,
+    SCRIPT_ENDED,
+    ErrorView,
+    LiveFile,
+)
+from rosglass.qml.run.modules import interface_file
 from rosglass.qt import QtCore
 from rosglass.rviz.overlay import Overlay
 from rosglass.rviz.qt5 import QtQuick
@@ -19,8 +26,8 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Sequence
 
-    from rosglass.qml.live_file import Made
-    from rosglass.qml.session import Session
+    from rosglass.qml.engine.session import Session
+    from rosglass.qml.run.live_file import Made
     from rosglass.qt import QtQml
     from rosglass.rviz.access import Access
 

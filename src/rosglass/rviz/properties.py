@@ -21,7 +21,7 @@ from rosglass.rviz.trackers import FIXED_FRAME
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from rosglass.qml.session import Session
+    from rosglass.qml.engine.session import Session
     from rosglass.rviz.registered_properties import RegisteredProperties
     from rosglass.rviz.trackers import Frames
 

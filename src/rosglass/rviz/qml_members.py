@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error
-from rosglass.qml.from_js import plain_from_js
-from rosglass.qml.js_values import object_of
-from rosglass.qml.log import log_from_qml
+from rosglass.qml.engine.from_js import plain_from_js
+from rosglass.qml.engine.js_values import object_of
+from rosglass.qml.engine.log import log_from_qml
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, QtQml, Signal, Slot
 from rosglass.rviz.property_values import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.rviz.plugins import PluginList
 
 __all__ = [

@@ -7,7 +7,7 @@ import time
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rosglass.qml.renderer_choice import need_in_file, need_in_items
+from rosglass.qml.run.renderer_choice import need_in_file, need_in_items
 from rosglass.qt import QtCore, Signal, is_alive
 from rosglass.rviz.input import (
     DRAG,
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rosglass.qml.session import Session
+    from rosglass.qml.engine.session import Session
     from rosglass.rviz.rendering import Renderer
     from rosglass.rviz.window import Window
 

@@ -7,7 +7,7 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
-from rosglass.qml.from_js import plain_from_js
+from rosglass.qml.engine.from_js import plain_from_js
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 from rosglass.rviz.property_values import KINDS, merged, shown, to_storable
 from rosglass.rviz.qml_members import VARIANT, boolean, errors_to_js, spell_checked, text, to_python
@@ -15,7 +15,7 @@ from rosglass.rviz.qml_members import VARIANT, boolean, errors_to_js, spell_chec
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.rviz.property_values import Kind
 
 __all__ = ["RegisteredProperties", "RegisteredProperty"]

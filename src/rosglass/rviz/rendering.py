@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from rosglass.errors import UnsupportedError
-from rosglass.qml.renderer_choice import RendererChoice, ask_for_software
+from rosglass.qml.run.renderer_choice import RendererChoice, ask_for_software
 from rosglass.rviz.host import ogre
 from rosglass.rviz.qt5 import QtCore, QtGui
 
@@ -346,7 +346,7 @@ class OverlayRendererChoice(RendererChoice):
         """Set the user's choice, which overrides Qt's environment variables.
 
         Args:
-            renderer: One of :data:`rosglass.qml.renderer_choice.RENDERERS`.
+            renderer: One of :data:`rosglass.qml.run.renderer_choice.RENDERERS`.
 
         Raises:
             Error: The renderer is unknown, or Qt uses another one already.

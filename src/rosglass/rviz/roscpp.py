@@ -20,7 +20,7 @@ from urllib.parse import urlsplit
 from rosglass.comm import anonymous_name
 from rosglass.connection import connect
 from rosglass.errors import ConnectionLostError, Error, InvalidNameError
-from rosglass.qml.session import GuiExecutor
+from rosglass.qml.engine.session import GuiExecutor
 from rosglass.qt import QtCore, Signal, run_event_loop
 from rosglass.rviz.host import cpp_function
 from rosglass.rviz.qt5 import QtWidgets

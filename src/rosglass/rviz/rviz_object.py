@@ -12,9 +12,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
-from rosglass.qml.callbacks import weak_callback
-from rosglass.qml.log import Caller, log_from_qml, plain_path
-from rosglass.qml.runtime import runtime_of
+from rosglass.qml.engine.callbacks import weak_callback
+from rosglass.qml.engine.log import Caller, log_from_qml, plain_path
+from rosglass.qml.engine.runtime import runtime_of
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, QtQml, Signal, Slot
 from rosglass.rviz.property_values import shown
 from rosglass.rviz.qml_members import (
@@ -41,7 +41,7 @@ from rosglass.rviz.registered_properties import RegisteredProperties
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.rviz.access import Access
     from rosglass.rviz.orbit import Point
     from rosglass.rviz.overlay import Overlay

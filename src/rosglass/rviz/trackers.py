@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm.names import similar
 from rosglass.comm.statistics import StampMonitor
 from rosglass.errors import Error, LookupException, TransformException
-from rosglass.qml.element import DEFAULT_TIMEOUT_MS
-from rosglass.qml.tf_buffer import TfLink
+from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS
+from rosglass.qml.elements.tf_buffer import TfLink
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, Signal, is_alive
 from rosglass.rviz.property_values import shown
 from rosglass.rviz.qml_members import VARIANT, errors_to_js, point_of, to_python
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from rosglass.comm.node import Node
     from rosglass.comm.time import Time
-    from rosglass.qml.runtime import Runtime
-    from rosglass.qml.session import Session
+    from rosglass.qml.engine.runtime import Runtime
+    from rosglass.qml.engine.session import Session
     from rosglass.rviz.camera import Camera
     from rosglass.tf import TransformBuffer
 

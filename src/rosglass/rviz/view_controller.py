@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.qos import QoS
 from rosglass.errors import Error, ServiceError
-from rosglass.qml.log import RateLimit
+from rosglass.qml.engine.log import RateLimit
 from rosglass.qt import QtCore, Signal, Slot, is_alive
 from rosglass.rviz.qt5 import QtCore as Qt5Core
 from rosglass.rviz.view import ViewMode
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Node
     from rosglass.comm.publisher import Publisher
     from rosglass.messages import Message
-    from rosglass.qml.session import Session
+    from rosglass.qml.engine.session import Session
     from rosglass.rviz.view import View
 
 __all__ = ["ViewKeys", "ViewServices"]

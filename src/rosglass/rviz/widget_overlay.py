@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rosglass.errors import Error
-from rosglass.qml.modules import locate
+from rosglass.qml.run.modules import locate
 from rosglass.qt import Signal, is_alive
 from rosglass.rviz.input import DRAG, KEYS, MOUSE, PRESS, position, releases
 from rosglass.rviz.overlay import Overlay, guarded

@@ -12,7 +12,7 @@ import yaml
 
 from rosglass.comm.text_files import check_yaml
 from rosglass.errors import Error
-from rosglass.qml.modules import locate, near
+from rosglass.qml.run.modules import locate, near
 from rosglass.qt import QtCore, Signal, is_alive
 from rosglass.rviz.host import AfterEvent, as_pyside, pyqt, rviz
 from rosglass.rviz.qt5 import QtCore as Qt5Core

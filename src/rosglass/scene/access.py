@@ -15,9 +15,9 @@ from PySide6.QtQuick import QQuickWindow
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error
-from rosglass.qml.image_sinks import grab, window_of
-from rosglass.qml.modules import locate
-from rosglass.qml.runtime import runtime_of
+from rosglass.qml.elements.image_sinks import grab, window_of
+from rosglass.qml.engine.runtime import runtime_of
+from rosglass.qml.run.modules import locate
 from rosglass.qt import QtCore, QtGui, Slot, is_alive
 from rosglass.rviz import displays, tools
 from rosglass.rviz.access import Access
@@ -37,7 +37,7 @@ from rosglass.scene.view_controllers.views import VIEWS, TopDownOrthoView
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from rosglass.qml.session import Session
+    from rosglass.qml.engine.session import Session
     from rosglass.rviz.property_values import Kind
     from rosglass.scene.displays.display import Display
     from rosglass.scene.displays.scene import Scene

@@ -12,7 +12,7 @@ from PySide6.QtGui import QColor
 
 from rosglass.errors import Error
 from rosglass.interfaces.names import ros1_name
-from rosglass.qml.properties import Writable
+from rosglass.qml.engine.properties import Writable
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import FIXED_FRAME
 from rosglass.scene.displays.display import OneTopicDisplay

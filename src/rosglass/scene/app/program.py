@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error, QmlError
-from rosglass.qml.modules import interface_file, locate, show_plain_labels
-from rosglass.qml.properties import ReadOnly, report
-from rosglass.qml.runtime import runtime_of
+from rosglass.qml.engine.properties import ReadOnly, report
+from rosglass.qml.engine.runtime import runtime_of
+from rosglass.qml.run.modules import interface_file, locate, show_plain_labels
 from rosglass.qt import QtCore, Slot, is_alive
 from rosglass.scene.app.modules import register_window
 from rosglass.scene.configs.rviz_config import RvizConfig
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Sequence
 
-    from rosglass.qml.session import Session
+    from rosglass.qml.engine.session import Session
     from rosglass.scene.app.window_recorder import WindowRecorder
     from rosglass.scene.view.scene_view import SceneView
 

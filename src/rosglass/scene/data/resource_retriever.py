@@ -24,7 +24,7 @@ from urllib.parse import quote, urlsplit, urlunsplit
 
 from rosglass.errors import Error, UnsupportedError
 from rosglass.interfaces.type_descriptions import system_cache_folder
-from rosglass.qml.process import NETWORK_HINT, is_network_closed
+from rosglass.qml.engine.process import NETWORK_HINT, is_network_closed
 from rosglass.scene.data.meshes import read_mesh_file
 from rosglass.scene.data.resources import ResourceError, forget_packages, locate_resource, make_room
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rosglass.qt import QtCore, QtQml, is_alive
 
 if TYPE_CHECKING:
-    from rosglass.qml.element import Element
+    from rosglass.qml.elements.element import Element
 
 __all__ = ["expect_view", "find_view"]
 

@@ -22,10 +22,10 @@ from rosglass.comm.names import similar
 from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.errors import ArgumentError, Error, TransformException
 from rosglass.interfaces.names import ros1_name
-from rosglass.qml.callbacks import weak_callback
-from rosglass.qml.element import TopicElement, single_shot
-from rosglass.qml.log import log_from_qml
-from rosglass.qml.properties import ReadOnly, Writable, report
+from rosglass.qml.elements.element import TopicElement, single_shot
+from rosglass.qml.engine.callbacks import weak_callback
+from rosglass.qml.engine.log import log_from_qml
+from rosglass.qml.engine.properties import ReadOnly, Writable, report
 from rosglass.qt import QtQml, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import FIXED_FRAME, TopicSetting, read_topic, write_topic
 from rosglass.scene.configs.settings import Configurable, Setting
@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from rosglass.comm.inbox import Sample
     from rosglass.comm.node import Node
     from rosglass.messages import Message
-    from rosglass.qml.log import Caller
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.log import Caller
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.displays.parts import Parts
     from rosglass.scene.displays.scene import Scene

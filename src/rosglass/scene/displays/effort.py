@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 
 from rosglass.errors import Error, ExtrapolationException, TransformException
-from rosglass.qml.callbacks import weak_callback
-from rosglass.qml.element import single_shot
-from rosglass.qml.properties import ReadOnly, report
+from rosglass.qml.elements.element import single_shot
+from rosglass.qml.engine.callbacks import weak_callback
+from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot, is_alive
 from rosglass.scene.configs.settings import Setting
 from rosglass.scene.data.urdf import parse_urdf
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.data.urdf import Joint
     from rosglass.scene.render.drawing import Group

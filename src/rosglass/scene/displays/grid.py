@@ -14,7 +14,7 @@ from rosglass.scene.displays.shapes import AxesShapes
 from rosglass.scene.render.drawing import Group, Lines
 
 if TYPE_CHECKING:
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.qt import QtCore
 
 __all__ = ["AxesDisplay", "GridDisplay"]

@@ -23,11 +23,11 @@ from rosglass.images import TRANSPORTS
 from rosglass.images.depth import GreyRange
 from rosglass.images.transports import camera_info_topic
 from rosglass.interfaces.names import ros1_name
-from rosglass.qml.callbacks import weak_callback
-from rosglass.qml.element import DEFAULT_TIMEOUT_MS
-from rosglass.qml.image_sinks import ImageItem, Sink
-from rosglass.qml.log import declared_at, log_from_qml
-from rosglass.qml.properties import ReadOnly, Writable, report
+from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS
+from rosglass.qml.elements.image_sinks import ImageItem, Sink
+from rosglass.qml.engine.callbacks import weak_callback
+from rosglass.qml.engine.log import declared_at, log_from_qml
+from rosglass.qml.engine.properties import ReadOnly, Writable, report
 from rosglass.qt import Property, QtCore, QtGui, QtQml, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import read_number
 from rosglass.scene.configs.settings import Setting
@@ -46,10 +46,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rosglass.qml.image_rendering import Look, Picture
-    from rosglass.qml.image_stream import SharedStream
-    from rosglass.qml.runtime import Runtime
-    from rosglass.qml.session import Session
+    from rosglass.qml.elements.image_rendering import Look, Picture
+    from rosglass.qml.elements.image_stream import SharedStream
+    from rosglass.qml.engine.runtime import Runtime
+    from rosglass.qml.engine.session import Session
     from rosglass.scene.displays.display import Display
     from rosglass.scene.displays.scene import Scene
     from rosglass.scene.render.camera import Camera
@@ -200,7 +200,7 @@ class PictureDisplay(OneTopicDisplay):
         report(self, active=self.shown)
 
     def _create_endpoint(self, wanted: tuple[Any, ...]) -> None:
-        from rosglass.qml.image_stream import SharedStream as Stream  # noqa: PLC0415 - QtMultimedia
+        from rosglass.qml.elements.image_stream import SharedStream as Stream  # noqa: PLC0415 - QtMultimedia
 
         session = self._session
         assert session is not None
@@ -242,7 +242,7 @@ class PictureDisplay(OneTopicDisplay):
 
     def _look(self) -> Look:
         """Return how pictures are converted: not larger than the largest panel shows them."""
-        from rosglass.qml.image_rendering import Look  # noqa: PLC0415 - loads QtMultimedia
+        from rosglass.qml.elements.image_rendering import Look  # noqa: PLC0415 - loads QtMultimedia
 
         rooms = [sink.room() for sink in self._sinks if sink.is_alive]
         known = [room for room in rooms if room is not None]

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 from rosglass.errors import Error
-from rosglass.qml.callbacks import weak_callback
-from rosglass.qml.element import single_shot
-from rosglass.qml.properties import ReadOnly, report
+from rosglass.qml.elements.element import single_shot
+from rosglass.qml.engine.callbacks import weak_callback
+from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qt import QtCore, QtQml, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import read_marker_namespace, write_marker_namespace
 from rosglass.scene.configs.settings import Setting
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Node
     from rosglass.comm.qos import QoS
     from rosglass.messages import Message
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.scene.data.resource_retriever import ResourceRetriever
     from rosglass.scene.displays.scene import Scene
     from rosglass.scene.render.camera import Camera

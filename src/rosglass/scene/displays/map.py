@@ -10,7 +10,7 @@ import numpy as np
 
 from rosglass.comm.qos import QoS, Reliability
 from rosglass.errors import Error
-from rosglass.qml.properties import ReadOnly, report
+from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.scene.configs.settings import Setting, rgb_of
 from rosglass.scene.displays.display import TopicDisplay, matrix_of
 from rosglass.scene.displays.shapes import read_columns
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.qt import QtCore
 
 __all__ = ["GridCellsDisplay", "MapDisplay", "palette"]

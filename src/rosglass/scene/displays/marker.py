@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar, cast
 import numpy as np
 
 from rosglass.errors import Error, TransformException
-from rosglass.qml.element import single_shot
-from rosglass.qml.properties import ReadOnly, report
+from rosglass.qml.elements.element import single_shot
+from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qt import Signal, Slot, is_alive
 from rosglass.scene.displays.display import OUTDATED_ALPHA, Status, TopicDisplay
 from rosglass.scene.displays.marker_batches import (
@@ -67,7 +67,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.data.resource_retriever import ResourceRetriever
     from rosglass.scene.displays.scene import Scene

@@ -20,7 +20,7 @@ from rosglass.comm.time import Time
 from rosglass.errors import Error, TransformException
 from rosglass.images.compressed import decompress, decompress_depth
 from rosglass.images.transports import camera_info_topic
-from rosglass.qml.properties import ReadOnly, report
+from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qt import Slot
 from rosglass.scene.configs.settings import Setting, rgb_of
 from rosglass.scene.data.cloud_sources import (
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rosglass.messages import Message
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.data.point_clouds import CloudEntry, VertexData
     from rosglass.scene.render.point_colors import ColorTransformer, PointColors

@@ -14,9 +14,9 @@ import numpy as np
 from rosglass.comm.qos import QoS
 from rosglass.errors import Error, UnsupportedError
 from rosglass.images.encodings import MAX_PIXELS
-from rosglass.qml.callbacks import weak_callback
-from rosglass.qml.element import single_shot
-from rosglass.qml.properties import ReadOnly, report
+from rosglass.qml.elements.element import single_shot
+from rosglass.qml.engine.callbacks import weak_callback
+from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qt import QtGui, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import (
     DescriptionSetting,
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm.inbox import Sample
     from rosglass.comm.node import Node
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.data.resource_retriever import ResourceRetriever
     from rosglass.scene.data.triangles import MeshPart

@@ -16,10 +16,10 @@ from rosglass.comm.executor import Dispatcher
 from rosglass.comm.names import similar
 from rosglass.comm.time import Time
 from rosglass.errors import ArgumentError, Error, LookupException, TransformException
-from rosglass.qml.callbacks import weak_callback
-from rosglass.qml.element import Element, single_shot
-from rosglass.qml.runtime import runtime_of
-from rosglass.qml.tf_buffer import TfLink
+from rosglass.qml.elements.element import Element, single_shot
+from rosglass.qml.elements.tf_buffer import TfLink
+from rosglass.qml.engine.callbacks import weak_callback
+from rosglass.qml.engine.runtime import runtime_of
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.rviz.property_values import shown
 from rosglass.scene.displays.display import Display
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rosglass.comm.clock import Jump
-    from rosglass.qml.runtime import Runtime
-    from rosglass.qml.session import Session
+    from rosglass.qml.engine.runtime import Runtime
+    from rosglass.qml.engine.session import Session
     from rosglass.scene.data.resource_retriever import ResourceRetriever
     from rosglass.tf import TransformBuffer
 

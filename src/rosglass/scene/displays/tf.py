@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 
 from rosglass.errors import Error
-from rosglass.qml.properties import ReadOnly, report
+from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qt import QtCore, Signal, Slot
 from rosglass.scene.configs.settings import Setting
 from rosglass.scene.displays.display import OUTDATED_ALPHA, Display
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rosglass.errors import TransformException
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.tf import FrameInfo, FrameTree
 
 __all__ = ["TFDisplay"]

@@ -7,8 +7,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
-from rosglass.qml.element import Element
-from rosglass.qml.properties import ReadOnly, Writable, report
+from rosglass.qml.elements.element import Element
+from rosglass.qml.engine.properties import ReadOnly, Writable, report
 from rosglass.qt import QtCore, QtQml, Slot, is_alive
 from rosglass.rviz.property_values import from_plain, to_plain
 from rosglass.scene.configs.settings import Setting
@@ -18,7 +18,7 @@ from rosglass.scene.displays.display import Display
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.scene.overlays.scene_overlay import SceneOverlay
 
 __all__ = ["OverlayElement", "QmlOverlayDisplay"]

@@ -15,7 +15,7 @@ from rosglass.scene.displays.display import Display
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.qt import QtCore
     from rosglass.scene.overlays.view_control import ViewControl
 

@@ -14,8 +14,8 @@ import numpy as np
 from rosglass.comm.names import similar
 from rosglass.comm.qos import QoS
 from rosglass.errors import Error
-from rosglass.qml.callbacks import weak_callback
-from rosglass.qml.properties import ReadOnly, report
+from rosglass.qml.engine.callbacks import weak_callback
+from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qt import QtCore, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import (
     TopicSetting,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm.action_client import CancelAnswer, ClientGoal, GoalStatus
     from rosglass.comm.promise import Promise
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.rviz.orbit import Point
 
 __all__ = [

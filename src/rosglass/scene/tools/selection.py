@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from rosglass.qml.element import single_shot
+from rosglass.qml.elements.element import single_shot
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.rviz.orbit import Point
 from rosglass.scene.configs.settings import Configurable

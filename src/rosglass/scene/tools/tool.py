@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from rosglass.comm.names import similar
 from rosglass.errors import ArgumentError, Error
-from rosglass.qml.element import Element, single_shot
-from rosglass.qml.properties import ReadOnly, Writable, report
-from rosglass.qml.runtime import runtime_of
+from rosglass.qml.elements.element import Element, single_shot
+from rosglass.qml.engine.properties import ReadOnly, Writable, report
+from rosglass.qml.engine.runtime import runtime_of
 from rosglass.qt import Property, QtCore, QtGui, Signal, Slot, is_alive
 from rosglass.rviz.orbit import Point
 from rosglass.rviz.property_values import shown
@@ -29,7 +29,7 @@ from rosglass.scene.view_controllers.events import Action, Button, Drag, Modifie
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.scene.displays.scene import Scene
     from rosglass.scene.render.camera import Camera
     from rosglass.scene.render.picking import Hit

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
-from rosglass.qml.properties import ReadOnly, report
+from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qt import QtCore, QtQml, Signal
 from rosglass.rviz.orbit import Point
 from rosglass.scene.configs.settings import Setting, rgb_of
@@ -16,7 +16,7 @@ from rosglass.scene.tools.tool import PointerEvent, Tool, camera_cursor, point_t
 from rosglass.scene.view_controllers.events import Button, Modifier, Wheel
 
 if TYPE_CHECKING:
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.scene.tools.selection import Change
 
 __all__ = [

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rosglass.qml.runtime import Runtime
+    from rosglass.qml.engine.runtime import Runtime
     from rosglass.scene.render.camera import Camera
     from rosglass.scene.render.drawing import Drawable
     from rosglass.scene.render.picking import Hit

@@ -1,0 +1,1 @@
+"""The types that QML imports: elements, and the singletons of each module."""

@@ -1,0 +1,1 @@
+"""Runs QML files: modules, windows, live reload and whole programs."""

@@ -1,0 +1,260 @@
+"""Finds QML files, and registers the QML modules with Qt and engines."""
+# ruff: noqa: PTH112, PTH113, PTH208 - the names of slots and signals are QML's
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import os
+import warnings
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from rosglass.comm.names import similar
+from rosglass.errors import Error, QmlError
+from rosglass.qml.engine.runtime import Runtime, runtime_of
+from rosglass.qt import QT6, QtCore, QtQml, address
+
+if TYPE_CHECKING:
+    from rosglass.qml.engine.session import Session
+
+
+__all__ = [
+    "IMPORT_PATHS",
+    "import_folder",
+    "install",
+    "interface_file",
+    "is_own_window",
+    "locate",
+    "near",
+    "register",
+    "show_plain_labels",
+]
+
+_log = logging.getLogger("rosglass.qml")
+_LIBRARY = "libQt5Qml.so.5"
+_LIBRARIES = {".so", ".dylib", ".dll"}
+_PACKAGE = "package://"
+_REMOTE = ("http://", "https://", "ftp://")
+#: Where the windows of rosglass itself are, whose program registers the types that they use.
+_OWN = Path(__file__).parents[2] / "scene/app/panels"
+
+
+def locate(place: str | os.PathLike[str]) -> Path:
+    """Return the path of a file or folder, optionally in a ROS package.
+
+    Args:
+        place: A path, or ``package://name/path``; packages are searched in ``ROS_PACKAGE_PATH``,
+            ``AMENT_PREFIX_PATH`` and ``CMAKE_PREFIX_PATH``.
+
+    Raises:
+        QmlError: The package is not in these paths.
+    """
+    text = os.fspath(place)
+    if not text.startswith(_PACKAGE):
+        return Path(text).absolute()
+    package, _, rest = text.removeprefix(_PACKAGE).partition("/")
+    if not package:
+        raise QmlError(f"{text}: expected package://name/path")
+    # Slow to import; most files are not named so.
+    from rosglass.interfaces.provider import workspace  # noqa: PLC0415
+
+    folder = workspace(os.environ).package(package)
+    if not folder:
+        raise QmlError(
+            f"{text}: there is no package {package!r} in ROS_PACKAGE_PATH, AMENT_PREFIX_PATH and "
+            "CMAKE_PREFIX_PATH; source its workspace first"
+        )
+    return Path(folder, rest).absolute()
+
+
+def interface_file(place: str | os.PathLike[str]) -> Path:
+    """Return the path of a QML file.
+
+    Args:
+        place: See :func:`locate`.
+
+    Raises:
+        QmlError: The file does not exist, or is not a QML file.
+    """
+    if os.fspath(place).lower().startswith(_REMOTE):
+        raise QmlError(f"{os.fspath(place)}: interfaces are run from files of this machine only")
+    path = locate(place)
+    shown = path if os.fspath(place).startswith(_PACKAGE) else place
+    if os.path.isdir(path):
+        inside = sorted(file.name for file in path.glob("*.qml"))
+        hint = f"name a file in it: {', '.join(inside[:5])}" if inside else "it has no QML files"
+        raise QmlError(f"{shown}: this is a folder; {hint}")
+    if not os.path.isfile(path):
+        raise QmlError(f"{shown}: there is no such file{near(path)}")
+    if path.suffix == ".rviz":
+        raise QmlError(f"{shown}: a config file of RViz, no QML file: rosglass rviz {shown}")
+    if path.suffix != ".qml":
+        raise QmlError(f"{shown}: not a QML file, whose name would end in .qml")
+    return path
+
+
+def near(path: Path) -> str:
+    """Return a hint at a file with a similar name; empty if there is none."""
+    with suppress(OSError, ValueError):
+        return similar(path.name, (n for n in os.listdir(path.parent) if n.endswith(path.suffix)))
+    return ""
+
+
+def import_folder(place: str | os.PathLike[str]) -> Path:
+    """Return the path of a folder with QML modules.
+
+    Args:
+        place: See :func:`locate`.
+
+    Raises:
+        QmlError: The folder does not exist.
+    """
+    path = locate(place)
+    if not os.path.isdir(path):
+        raise QmlError(f"{os.fspath(place)}: there is no such folder to import QML modules from")
+    return path
+
+
+#: Directories for the QML import path: modules for all Qt versions, and those for this version
+#: only. The types also need :func:`register`.
+IMPORT_PATHS = tuple(
+    Path(__file__).parents[1] / name for name in ("imports", "imports6" if QT6 else "imports5")
+)
+
+
+def is_own_window(file: Path) -> bool:
+    """Return whether a file is the window of ``rosglass view``.
+
+    It uses neither ``Ros`` nor ``Ros2``, nor most types of ``RosScene``, whose import takes long.
+    """
+    return file.parent == _OWN
+
+
+#: Module of Qt's that has the labels of controls, and the versions of ours: all but that which our
+#: file imports.
+_IMPL, _IMPL_VERSIONS = "QtQuick.Controls.impl", [(2, 4), (6, 0)] if QT6 else [(2, 4)]
+#: Qt's plugin with this module, and the module to load it by.
+_IMPL_PLUGIN, _IMPL_LOADER = (
+    ("QtQuick/Controls/impl/*qtquickcontrols2implplugin.*", _IMPL)
+    if QT6
+    else ("QtQuick/Controls.2/*qtquickcontrols2plugin.*", "QtQuick.Controls")
+)
+#: QQmlPrivate::qmlregister(), mangled by the Itanium C++ ABI, and its argument for a QML file.
+_REGISTER, _COMPOSITE = "_ZN11QQmlPrivate11qmlregisterENS_16RegistrationTypeEPv", 4
+
+
+class _CompositeType(ctypes.Structure):
+    """QQmlPrivate::RegisterCompositeType of Qt 5."""
+
+    _fields_: ClassVar = [
+        ("url", ctypes.c_void_p),
+        ("uri", ctypes.c_char_p),
+        ("major", ctypes.c_int),
+        ("minor", ctypes.c_int),
+        ("name", ctypes.c_char_p),
+    ]
+
+
+@cache
+def show_plain_labels() -> None:
+    """Let buttons, menu items and delegates show plain text; only the first call has an effect.
+
+    Qt's IconLabel makes its text without a context, and crashes at the first image in it: one text
+    of a robot would end the interface. Of two types of one name, Qt takes the one that was
+    registered last, so ours follows Qt's own.
+    """
+    folder = Path(_qml_folder())
+    plugin = next((p for p in folder.glob(_IMPL_PLUGIN) if p.suffix in _LIBRARIES), None)
+    if plugin is None:
+        return  # without controls
+    handler = QtCore.qInstallMessageHandler(lambda *_: None)  # "it cannot be protected"
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)
+            engine: Any = QtQml.QQmlEngine()
+            engine.importPlugin(str(plugin), _IMPL_LOADER, [])
+        file = Path(IMPORT_PATHS[1], "Rosglass/Controls/IconLabel.qml")
+        done = all(_register_label(file, *version) for version in _IMPL_VERSIONS)
+    except (OSError, AttributeError):
+        done = False
+    finally:
+        QtCore.qInstallMessageHandler(handler)
+    if not done:
+        _log.warning(
+            "controls were loaded before rosglass.qml.install(): a text with <img ...> in a Button "
+            "or MenuItem ends the program; call install() before other QML is loaded"
+        )
+
+
+def _qml_folder() -> str:
+    """Return the folder of Qt's QML modules."""
+    info: Any = QtCore.QLibraryInfo
+    if QT6:
+        return str(info.path(info.LibraryPath.QmlImportsPath))
+    return str(info.location(info.Qml2ImportsPath))
+
+
+def _register_label(file: Path, major: int, minor: int) -> bool:
+    """Register a QML file as the IconLabel of Qt's module; return whether Qt accepts it."""
+    url = QtCore.QUrl.fromLocalFile(str(file))
+    if QT6:
+        register: Any = QtQml.qmlRegisterType
+        return int(register(url, _IMPL, major, minor, "IconLabel")) >= 0
+    # PySide2 registers Python's classes only.
+    call = ctypes.CDLL(_LIBRARY)[_REGISTER]
+    call.restype, call.argtypes = ctypes.c_int, [ctypes.c_int, ctypes.c_void_p]
+    pointer = ctypes.c_void_p.from_address(address(url)).value
+    made = _CompositeType(pointer, _IMPL.encode(), major, minor, b"IconLabel")
+    return int(call(_COMPOSITE, ctypes.byref(made))) >= 0
+
+
+@cache
+def register() -> None:
+    """Register the types with Qt; only the first call has an effect."""
+    # Half of all that an interface loads, and rosglass view needs none of it.
+    from rosglass.qml.elements import ros1, ros2  # noqa: PLC0415
+
+    register_type: Any = QtQml.qmlRegisterType
+    for uri, module in (("Ros", ros1), ("Ros2", ros2)):
+        for name, native in module.NATIVE.items():
+            register_type(native, f"{uri}.Native", 1, 0, name)
+        for name, kind in module.TYPES.items():
+            register_type(kind, uri, 1, 0, name)
+
+
+def install(
+    engine: QtQml.QQmlEngine, session: Session | None = None, *, own_window: bool = False
+) -> Session:
+    """Make ``import Ros 1.0`` and ``import Ros2 1.0`` work in an engine.
+
+    Args:
+        engine: The engine; it must not yet have loaded a file that imports the modules.
+        session: The session to use; None for the application's own, which all such engines share.
+        own_window: Whether it is for a window of rosglass, which does without these modules, and
+            calls :func:`show_plain_labels` when it loads controls.
+
+    Returns:
+        The session.
+
+    Raises:
+        Error: The engine already has a session.
+    """
+    # Qt waits 5 ms before drawing, to collect further changes: a third of the time that a picture
+    # takes from the robot to the screen.
+    os.environ.setdefault("QT_QPA_UPDATE_IDLE_TIME", "0")
+    if not own_window:
+        show_plain_labels()
+        register()
+    for path in IMPORT_PATHS:
+        engine.addImportPath(str(path))
+    if session is None:
+        found = runtime_of(engine)
+        assert found is not None
+        return found.session
+    if engine.findChild(Runtime) is not None:
+        raise Error("this QML engine has a session already; install() it only once")
+    Runtime(engine, session)
+    return session
