@@ -5,7 +5,7 @@ SHELL := /bin/bash
 BIN := .venv/bin
 export PYTHON
 
-.PHONY: help demo rviz-demo view-demo check test setup dev lint types docs wheel coverage bench clean
+.PHONY: help demo rviz-demo view-demo check test test-all setup dev lint types docs wheel coverage bench clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -25,9 +25,13 @@ view-demo: ## open a dashboard over the 3D view of a simulated ROS 2 robot, with
 check: dev ## run lint, types and the quick unit tests, for between two edits
 	@scripts/check.sh
 
-test: ## run lint, types, docs and all tests in both environments
+test: ## run lint, types, docs and the tests in both environments (10 minutes on two cores)
 	@scripts/setup.sh test
 	@scripts/test.sh
+
+test-all: ## run every test in both versions of Qt and in RViz, all mutants, and every type against every peer
+	@scripts/setup.sh test
+	@scripts/test.sh --all
 
 setup: ## prepare both environments without running anything
 	@scripts/setup.sh test

@@ -1,40 +1,69 @@
 #!/usr/bin/env bash
-# Every check, quickest first; ends with pytest's own closing line.
+# Every check, quickest first: scripts/test.sh [--all] [ARGUMENT OF PYTEST...]
+#   --all  every test in both versions of Qt and in RViz, all mutants, and every type against every peer
+# Runs all groups even if one has failed. Ends with the seconds of each group and, in the last line,
+# with pytest's closing line for all of them.
+# BASE=COMMIT is what RViz's sources are compared with (scripts/unchanged.sh).
 set -euo pipefail
 cd "$(dirname "$0")/.."
+all=
+if [[ ${1-} == --all ]]; then
+  all=1
+  shift
+fi
 say() { printf '==> %s\n' "$*"; }
 export QT_LOGGING_RULES=${QT_LOGGING_RULES:-qt.multimedia.*=false}
 # Hundreds of processes load the same modules: what one has compiled need not be by all others.
 unset PYTHONDONTWRITEBYTECODE
 
-# Types take longest, on one core: they are checked beside everything else up to the unit tests, in
-# the time that those leave, and must not slow them down.
-types=$(mktemp)
-output=$(mktemp)
-interfaces=$(mktemp)
-beside=
+results=$(mktemp -d)
+beside=()
 end() {
-  kill $(jobs -p) 2>/dev/null || true
-  [[ -z $beside ]] || kill -- "-$beside" 2>/dev/null || true
-  rm -f "$types" "$output" "$interfaces"
+  for process in "${beside[@]}"; do kill -- "-$process" 2>/dev/null || true; done
+  rm -rf "$results"
 }
 trap end EXIT
 trap 'exit 130' INT
-nice -n 19 .venv/bin/mypy >"$types" 2>&1 &
-checked=$!
-say "lint and format (ruff)"
-.venv/bin/ruff check .
-.venv/bin/ruff format --check .
-say "words (the glossary of CONTRIBUTING.md)"
-.venv/bin/python scripts/words.py
-say "documentation (mkdocs --strict)"
-NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict --quiet
-say "wheel"
-scripts/check_wheel.sh
-if [[ -e /usr/include/ros/ros.h ]]; then
-  say "a node of roscpp to test against"
-  .venv/bin/python tests/interop/ros1/peers/build_roscpp.py .pytest_cache/d/roscpp
-fi
+
+# A group: prints its output, and notes its seconds, exit code and last line.
+group() { # NAME COMMAND...
+  local name=$1 begin=$SECONDS code=0 output
+  shift
+  say "$name"
+  output=$(mktemp -p "$results")
+  "$@" 2>&1 | tee "$output" || code=$?
+  # No test of a group may match the arguments, as those of `-k`.
+  ((code != 5)) || [[ -z ${arguments[*]-} ]] || code=0
+  printf '%s\t%s\t%s\t%s\n' "$((SECONDS - begin))" "$code" "$name" "$(tail -n 1 "$output")" >>"$results/rows"
+  say "$name: $((SECONDS - begin)) s, exit code $code"
+}
+# A group that is not run, and why.
+leave_out() { # NAME REASON
+  say "$1: NOT RUN: $2"
+  printf -- '-\t0\t%s\tnot run: %s\n' "$1" "$2" >>"$results/rows"
+}
+# Groups beside the following ones; `gather` waits for them and prints their output.
+background() { # GROUP...
+  local output
+  output=$(mktemp -p "$results")
+  set -m # a process group of its own, to end all of it
+  "$@" >"$output" 2>&1 </dev/null &
+  set +m
+  beside+=($!)
+  outputs+=("$output")
+}
+gather() {
+  local at
+  for at in "${!beside[@]}"; do
+    wait "${beside[at]}" || true
+    cat "${outputs[at]}"
+  done
+  beside=()
+  outputs=()
+}
+outputs=()
+arguments=("$@")
+
 # Most tests wait for others most of the time: six side by side, each file in one process.
 # RViz draws on the processor: four of them keep two cores busy.
 # A process that crashes fails its test and is not replaced: the others would wait for it for ever.
@@ -44,57 +73,68 @@ run() { # ENVIRONMENT PROCESSES ARGUMENT...
   local environment=$1 processes=$2
   shift 2
   scripts/private_network.sh "$environment/bin/python" -m pytest -q -n "$processes" --dist loadfile \
-    --no-loadscope-reorder --max-worker-restart=0 "$@"
+    --no-loadscope-reorder --max-worker-restart=0 "$@" "${arguments[@]}"
 }
+lint() { .venv/bin/ruff check . && .venv/bin/ruff format --check .; }
+version() { "$1/bin/python" -c 'import sys; print("%d.%d" % sys.version_info[:2])'; }
+
+# What tests/rviz depends on; the client below it has its own tests.
+rviz_sources=(src/rosglass/{overlay,rviz,qml,qt,images,demo} tests/rviz tests/helpers tests/conftest.py
+  examples pyproject.toml scripts/setup.sh scripts/test.sh)
+
 # Once more what failed, with windows and other programs: those can fail on machines under load.
 # Each is listed at the end.
 once_more=(--reruns 1 --rerun-show-tracebacks)
 units=(tests/unit/ros[12] tests/contract tests/unit/[!r_]*/ tests/unit/test_*.py)
-version() { "$1/bin/python" -c 'import sys; print("%d.%d" % sys.version_info[:2])'; }
-# Unit tests need no Qt: once for each Python is enough. Debian's has genpy to compare with.
-# The same holds for tests of interfaces that are marked `one_qt`: they run in Qt 6 only.
-say "unit tests, and what holds on every wire ($(.venv-system/bin/python -V), Debian's own)"
-run .venv-system 6 "${units[@]}" "$@"
-say "types (mypy --strict)"
-failed=0
-wait "$checked" || failed=$?
-cat "$types"
-((failed == 0)) || exit "$failed"
-say "tests of interfaces in Qt 5 ($(.venv-system/bin/python -V), PySide2)"
-run .venv-system 6 "${once_more[@]}" -m "not one_qt" tests/gui "$@"
-say "tests in RViz ($(.venv-system/bin/python -V))"
-# Apart from tests/gui: a process has one Qt application, and RViz needs one of its own kind.
-run .venv-system 4 "${once_more[@]}" tests/rviz "$@"
-if [[ "$(version .venv)" != "$(version .venv-system)" ]]; then
-  say "unit tests, and what holds on every wire ($(.venv/bin/python -V))"
-  run .venv 6 -m "not exhaustive" "${units[@]}" "$@"
+qt5="tests of interfaces in Qt 5 ($(.venv-system/bin/python -V), PySide2)"
+qt6="tests of interfaces in Qt 6 ($(.venv/bin/python -V), PySide6)"
+in_rviz="tests in RViz ($(.venv-system/bin/python -V))"
+holds_everywhere="unit tests, and what holds on every wire"
+
+# Types take longest, on one core: they are checked beside everything else up to the unit tests, in
+# the time that those leave, and must not slow them down.
+background group "types (mypy --strict)" nice -n 19 .venv/bin/mypy
+group "lint and format (ruff)" lint
+group "words (the glossary of CONTRIBUTING.md)" .venv/bin/python scripts/words.py
+group "documentation (mkdocs --strict)" env NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict --quiet
+group "wheel" scripts/check_wheel.sh
+if [[ -e /usr/include/ros/ros.h ]]; then
+  group "a node of roscpp to test against" .venv/bin/python tests/interop/ros1/peers/build_roscpp.py .pytest_cache/d/roscpp
 fi
-say "tests of the 3D view ($(.venv/bin/python -V), PySide6)"
+
+# Unit tests need no Qt: once for each Python is enough. Debian's has genpy to compare with.
+system="$(.venv-system/bin/python -V), Debian's own"
+if [[ -n $all ]]; then
+  group "$holds_everywhere ($system), every mutant" run .venv-system 6 --exhaustive "${units[@]}"
+else
+  group "$holds_everywhere ($system), a tenth of the mutants" run .venv-system 6 "${units[@]}"
+fi
+if [[ "$(version .venv)" != "$(version .venv-system)" ]]; then
+  group "$holds_everywhere ($(.venv/bin/python -V))" run .venv 6 -m "not exhaustive" "${units[@]}"
+fi
+gather
+if [[ -n $all ]]; then
+  group "$qt5" run .venv-system 6 "${once_more[@]}" tests/gui
+else
+  group "$qt5, where it can differ from Qt 6" run .venv-system 6 "${once_more[@]}" -m both_qt tests/gui
+fi
+# Apart from tests/gui: a process has one Qt application, and RViz needs one of its own kind.
+if [[ -z $all ]] && reason=$(scripts/unchanged.sh "${rviz_sources[@]}"); then
+  leave_out "$in_rviz" "$reason (make test-all runs them)"
+else
+  group "$in_rviz" run .venv-system 4 "${once_more[@]}" tests/rviz
+fi
 # Apart from tests/gui: it needs an X server, the others are drawn offscreen.
-run .venv 3 "${once_more[@]}" tests/scene "$@"
+group "tests of the 3D view ($(.venv/bin/python -V), PySide6)" run .venv 3 "${once_more[@]}" tests/scene
 # These two beside each other: interfaces keep the processor busy while programs wait for each other.
 # One after the other where they would share a network, and with it ROS domains.
-programs() {
-  say "tests with other programs ($(.venv/bin/python -V))"
-  run .venv "$1" "${once_more[@]}" -m "not exhaustive" tests/interop "${@:2}"
-}
+programs="tests with other programs ($(.venv/bin/python -V))"
 if scripts/private_network.sh sh -c '[ -n "${ROSGLASS_PRIVATE_NETWORK-}" ]' 2>/dev/null; then
-  set -m # a process group of its own, to end all of it
-  programs 4 "$@" >"$output" 2>&1 </dev/null &
-  set +m
-  beside=$!
-fi
-failed=0
-say "tests of interfaces in Qt 6 ($(.venv/bin/python -V), PySide6)"
-run .venv 4 "${once_more[@]}" tests/gui "$@" | tee "$interfaces" || failed=1
-qt6_failed=$failed
-if [[ -n $beside ]]; then
-  wait "$beside" || failed=1
-  beside=
-  cat "$output"
+  background group "$programs" run .venv 4 "${once_more[@]}" tests/interop
+  group "$qt6" run .venv 4 "${once_more[@]}" tests/gui
+  gather
 else
-  programs 6 "$@" || failed=1
+  group "$qt6" run .venv 4 "${once_more[@]}" tests/gui
+  group "$programs" run .venv 6 "${once_more[@]}" tests/interop
 fi
-# The last line is not that of the others, which passed.
-((qt6_failed == 0)) || tail -n 1 "$interfaces"
-exit "$failed"
+.venv/bin/python scripts/closing_line.py "$SECONDS" <"$results/rows"

@@ -8,6 +8,8 @@ import random
 import signal
 import subprocess
 import sys
+import zlib
+from collections import defaultdict
 from typing import TYPE_CHECKING, Any
 
 import ports
@@ -29,8 +31,34 @@ DOMAINS, DOMAIN_SHARES = 100, 8
 #: Whether a test has failed.
 FAILED = pytest.StashKey[bool]()
 
+#: Of each exhaustive test, one case in this many runs without ``--exhaustive``.
+EXHAUSTIVE_SHARE = 10
+
 # Whoever starts the tests in the background has Ctrl-C ignored, in everything they start as well.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--exhaustive", action="store_true", help="run all cases of exhaustive tests, not a tenth"
+    )
+
+
+@pytest.hookimpl(trylast=True)  # after -k and -m: a case that is asked for by its name runs
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("exhaustive"):
+        return
+    cases = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("exhaustive"):
+            cases[item.nodeid.partition("[")[0]].append(item)
+    left_out: set[pytest.Item] = set()
+    for name, found in cases.items():
+        # Each test begins elsewhere, so that they try different types.
+        start = zlib.crc32(name.encode()) % min(EXHAUSTIVE_SHARE, len(found))
+        left_out.update(set(found) - set(found[start::EXHAUSTIVE_SHARE]))
+    config.hook.pytest_deselected(items=[item for item in items if item in left_out])
+    items[:] = [item for item in items if item not in left_out]
 
 
 @pytest.fixture(scope="session")

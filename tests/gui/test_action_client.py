@@ -145,6 +145,7 @@ def test_cancelling_until_a_time(live: Bench, counter: Counter, wait: Any) -> No
     wait(lambda: root.both() == "5,2")
 
 
+@pytest.mark.both_qt
 def test_promises(live: Bench, counter: Counter, wait: Any) -> None:
     counter.offer()
     root: Any = live.load(f"""
@@ -238,6 +239,7 @@ def test_cancelling_what_nobody_hears_of_any_more_is_told(
     assert told[0][1] in caplog.text
 
 
+@pytest.mark.both_qt
 def test_misuse_throws(live: Bench, counter: Counter, wait: Any) -> None:
     counter.offer()
     root: Any = live.load(f"""
@@ -358,6 +360,7 @@ def test_a_goal_nobody_will_hear_of_any_more(client: Client, counter: Counter, w
     assert client.of("status")[-1] == [0]
 
 
+@pytest.mark.both_qt
 def test_nobody_holds_the_client(live: Bench, counter: Counter, wait: Any) -> None:
     """It stays, and so do its goals, until these have ended."""
     counter.offer()
@@ -382,6 +385,7 @@ def test_nobody_holds_the_client(live: Bench, counter: Counter, wait: Any) -> No
     wait(lambda: root.property("count") == 3)
 
 
+@pytest.mark.both_qt
 def test_the_engine_goes_away_while_a_goal_runs(
     live: Bench, counter: Counter, wait: Any, tmp_path: Path, caplog: Any
 ) -> None:
@@ -405,6 +409,7 @@ def test_the_engine_goes_away_while_a_goal_runs(
     assert "callback failed" not in caplog.text
 
 
+@pytest.mark.both_qt
 def test_goals_leave_nothing_behind(
     live: Bench, client: Client, counter: Counter, wait: Any
 ) -> None:

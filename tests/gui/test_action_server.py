@@ -114,6 +114,7 @@ def test_ends(live: Bench, robot: Robot, wait: Any, execute: str, end: Any, capl
     assert run(root, "[server.ready, server.enabled, server.problem]") == [True, True, ""]
 
 
+@pytest.mark.both_qt
 def test_a_handle(live: Bench, robot: Robot, wait: Any) -> None:
     root = offer(
         live,
@@ -193,6 +194,7 @@ def test_a_refused_cancel(live: Bench, robot: Robot, wait: Any) -> None:
     assert robot.end(goal) == (SUCCEEDED, [1])
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize("accept", ["function () { }", "function () { throw new Error('odd') }"])
 def test_a_goal_is_accepted_by_true_alone(
     live: Bench, robot: Robot, wait: Any, accept: str, caplog: Any
@@ -320,6 +322,7 @@ def test_goals_that_no_handler_ends_are_aborted_at_once(
     wait(lambda: run(root, "server.activeGoals") == 0)
 
 
+@pytest.mark.both_qt
 def test_an_error_of_a_binding_ends_no_goal(live: Bench, robot: Robot, wait: Any) -> None:
     """It belongs to a label, not to the handler that changed what the label shows."""
     root = offer_by_signal(live, robot, "onGoalAccepted: h => { root.handle = h }")
@@ -376,6 +379,7 @@ def test_withdrawing_ends_the_goals(live: Bench, robot: Robot, wait: Any) -> Non
     assert robot.end(goal)[0] is SUCCEEDED
 
 
+@pytest.mark.both_qt
 def test_an_engine_that_goes_away_ends_the_goals(
     live: Bench, robot: Robot, wait: Any, tmp_path: Path, caplog: Any
 ) -> None:
@@ -400,6 +404,7 @@ def test_an_engine_that_goes_away_ends_the_goals(
     assert "callback failed" not in caplog.text
 
 
+@pytest.mark.both_qt
 def test_servers_of_functions(live: Bench, robot: Robot, wait: Any) -> None:
     root: Any = live.load(f"""
         QtObject {{

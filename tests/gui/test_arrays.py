@@ -10,6 +10,8 @@ from values import convert, converted, show
 
 from rosglass.errors import ConversionError
 
+pytestmark = pytest.mark.both_qt
+
 SCAN = "sensor_msgs/msg/LaserScan"
 
 

@@ -11,6 +11,8 @@ from values import convert, converted
 import rosglass
 from rosglass.errors import ConversionError
 
+pytestmark = pytest.mark.both_qt
+
 POINT = {"x": 1.0, "y": 2.0, "z": 3.0}
 XYZ, XYZW = "geometry_msgs/msg/Vector3", "geometry_msgs/msg/Quaternion"
 

@@ -21,7 +21,7 @@ from rosglass.wires.zenoh.router import Router
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-pytestmark = [pytest.mark.xvfb, pytest.mark.one_qt]
+pytestmark = pytest.mark.xvfb
 
 
 class Side:

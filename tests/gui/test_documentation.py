@@ -12,8 +12,7 @@ import pytest
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-# Examples that are files are shown by both Qt versions (test_examples.py); these are snippets.
-pytestmark = [pytest.mark.one_qt, pytest.mark.xvfb]
+pytestmark = pytest.mark.xvfb
 
 DOCS = Path(__file__).parents[2] / "docs"
 #: Run by tests of their own: over RViz, with Python, and beside a robot.

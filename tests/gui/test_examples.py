@@ -16,7 +16,7 @@ from waiting import eventually
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-pytestmark = pytest.mark.xvfb
+    from conftest import Bench
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 #: The paper's figures, and the programs that they are shown beside.
@@ -61,13 +61,41 @@ def partner(request: Any, world: str) -> Iterator[None]:
     program.wait(10)
 
 
-@pytest.fixture(params=FILES, ids=lambda file: file.stem)
+#: Examples that are drawn in both versions of Qt; every one is loaded in both.
+DRAWN_IN_BOTH = {"camera", "figure4", "figure5", "image_publisher", "message_tree", "panel"}
+
+
+@pytest.fixture(
+    params=[
+        pytest.param(
+            file,
+            id=file.stem,
+            marks=[pytest.mark.both_qt] if file.stem in DRAWN_IN_BOTH else [],
+        )
+        for file in FILES
+    ]
+)
 def file(request: Any) -> Path:
     """An example."""
     made: Path = request.param
     return made
 
 
+@pytest.mark.both_qt
+@pytest.mark.usefixtures("messages")
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_it_loads(path: Path, running: Bench, caplog: pytest.LogCaptureFixture) -> None:
+    from rosglass.qt import QtCore, QtQml
+
+    component = QtQml.QQmlComponent(running.engine, QtCore.QUrl.fromLocalFile(str(path)))
+    root = component.create()
+    assert root is not None, component.errorString()
+    said = [record.getMessage() for record in caplog.records]
+    assert [text for text in said if any(word in text for word in MISTAKES)] == []
+    root.deleteLater()
+
+
+@pytest.mark.xvfb
 @pytest.mark.usefixtures("partner")
 def test_it_runs(file: Path, world: str, screen: str, start: Any, tmp_path: Path) -> None:
     from rosglass.qt import QtGui
@@ -209,6 +237,7 @@ class Operated:
 OPERATED = sorted({*BUTTONS, *SIGNS})
 
 
+@pytest.mark.xvfb
 @pytest.mark.parametrize("name", OPERATED)
 def test_every_button_works_and_a_lost_robot_is_seen(
     name: str, screen: str, start: Any, tmp_path: Path
@@ -237,6 +266,7 @@ def test_every_button_works_and_a_lost_robot_is_seen(
         operated.close()
 
 
+@pytest.mark.xvfb
 def test_iterations_of_figure_4_are_not_mixed_up(screen: str, start: Any, tmp_path: Path) -> None:
     """Values stand under the iteration that they belong to, or say so at once."""
     source = (EXAMPLES / "paper/figure4.qml").read_text()
@@ -263,6 +293,7 @@ def test_iterations_of_figure_4_are_not_mixed_up(screen: str, start: Any, tmp_pa
         operated.close()
 
 
+@pytest.mark.xvfb
 def test_titles_of_figure_5_are_not_drawn_over(screen: str, start: Any, tmp_path: Path) -> None:
     operated = Operated(start, EXAMPLES / "paper/figure5.qml", screen, tmp_path)
     try:

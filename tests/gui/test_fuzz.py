@@ -21,6 +21,8 @@ PROGRAM = Path(__file__).with_name("fuzz_app.py")
 #: Seconds that a chunk may take on machines under load; one call may take 10.
 LIMIT = 120
 CHUNKS = ["singletons", "given", "types", "lifecycle"]
+#: What is tried in both versions of Qt: values that are given, and objects that go away.
+IN_BOTH = {("given", "Ros2"), ("lifecycle", "Ros2")}
 
 
 @pytest.fixture(scope="module")
@@ -57,8 +59,19 @@ def drive(chunk: str, uri: str, url: str, platform: dict[str, str], folder: Path
         assert not found, f"{chunk} of {uri} says:\n{found}"
 
 
-@pytest.mark.parametrize("uri", ["Ros", "Ros2"])
-@pytest.mark.parametrize("chunk", CHUNKS)
+@pytest.mark.parametrize(
+    ("chunk", "uri"),
+    [
+        pytest.param(
+            chunk,
+            uri,
+            marks=[pytest.mark.both_qt] if (chunk, uri) in IN_BOTH else [],
+            id=f"{chunk}-{uri}",
+        )
+        for chunk in CHUNKS
+        for uri in ("Ros", "Ros2")
+    ],
+)
 def test_nothing_crashes_hangs_or_raises(
     chunk: str, uri: str, platform: dict[str, str], tmp_path: Path
 ) -> None:

@@ -7,8 +7,12 @@ import threading
 import time
 from typing import TYPE_CHECKING, Any
 
+import pytest
+
 if TYPE_CHECKING:
     from qt_waiting import QtWaiting
+
+pytestmark = pytest.mark.both_qt
 
 
 def test_no_other_thread_collects_while_there_is_a_session(app: Any, wait: QtWaiting) -> None:

@@ -20,6 +20,7 @@ WEB = "(() => { let a = [1]; for (let i = 0; i < 60; i++) a = [a, a]; return a }
 OBJECTS = "(() => { let a = {x: 1}; for (let i = 0; i < 60; i++) a = {x: a, y: a}; return a })()"
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(
     ("type_name", "script"),
     [
@@ -61,6 +62,7 @@ def test_disguises_are_refused(bench: Any, type_name: str, script: str) -> None:
         convert(bench, type_name, script, module=1)
 
 
+@pytest.mark.both_qt
 def test_a_foreign_source_gives_nothing(bench: Any) -> None:
     bench.load("Item {}", "import QtQuick 2.15")
     script = """(() => { const s = m.ranges['#source']
@@ -70,6 +72,7 @@ def test_a_foreign_source_gives_nothing(bench: Any) -> None:
     assert shown == [True] * 5
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(
     "call",
     [
@@ -94,6 +97,7 @@ def test_functions_throw_what_javascript_can_catch(bench: Any, call: str) -> Non
     assert bench.run(script) is True
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(
     "text",
     [
@@ -169,6 +173,7 @@ def test_the_largest_types_go_to_javascript_and_back(bench: Any, shape: str) -> 
     assert time.process_time() - begun < 10
 
 
+@pytest.mark.both_qt
 def test_what_would_block_the_interface_is_refused(
     bench: Any, tmp_path: Any, monkeypatch: Any
 ) -> None:

@@ -93,6 +93,7 @@ def near(found: Any, wanted: tuple[int, ...], off: int = 2) -> bool:
     return bool(np.all(np.abs(np.asarray(found, int)[: len(wanted)] - wanted) <= off))
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize("module", ["Ros2 1.0", "Ros 1.0"])
 def test_a_panel_as_pictures(live: Bench, robot: Robot, module: str, wait: Any) -> None:
     live.module = module
@@ -114,6 +115,7 @@ def test_a_panel_as_pictures(live: Bench, robot: Robot, module: str, wait: Any) 
     assert stamps[0] > 0
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(
     ("encoding", "bar"),
     [("bgr8", (40, 50, 230, 255)), ("rgba8", (40, 50, 230, 255)), ("mono8", (68,))],
@@ -128,6 +130,7 @@ def test_encodings(
     assert near(picture[4, 16], bar, 4), picture[4, 16]
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(("kind", "encoding"), [("jpeg", "rgb8"), ("png", "rgba8")])
 def test_compressed(live: Bench, robot: Robot, kind: str, encoding: str, wait: Any) -> None:
     found = robot.listen("/panel/image/compressed", COMPRESSED)
@@ -300,6 +303,7 @@ def test_what_is_in_no_window_has_no_picture(live: Bench, wait: Any) -> None:
     wait(lambda: "in no window that is shown" in root.problem())
 
 
+@pytest.mark.both_qt
 def test_a_screen_with_large_pixels(
     url: str, start: Any, screen: str, tmp_path: Path, wait: Any
 ) -> None:

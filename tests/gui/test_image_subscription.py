@@ -63,6 +63,7 @@ def camera(running: Any) -> Any:
     return running.robot.create_publisher("/cam", RAW)
 
 
+@pytest.mark.both_qt
 def test_raw_pictures_are_shown(running: Any, camera: Any, wait: Any) -> None:
     root = load(running)
     sub = root.property("sub")
@@ -209,6 +210,7 @@ def test_bad_pictures_are_named_once_and_the_stream_goes_on(
     wait(lambda: sub.property("problem") == "")
 
 
+@pytest.mark.both_qt
 def test_malformed_messages_are_named(running: Any, camera: Any, wait: Any) -> None:
     root = load(running)
     sub = root.property("sub")
@@ -236,6 +238,7 @@ def test_what_cannot_be_shown_is_said(
     wait(lambda: reason in sub.property("problem"))
 
 
+@pytest.mark.both_qt
 def test_other_sinks_are_refused(running: Any, caplog: Any) -> None:
     running.load(
         "Item { id: i; property QtObject s: ImageTransportSubscription { videoSink: i } }",
@@ -291,6 +294,7 @@ def test_rate_and_latency_are_not_rounded(running: Any, camera: Any, wait: Any) 
     assert sub.property("latency") == sub.property("networkLatency") == -1
 
 
+@pytest.mark.both_qt
 def test_a_sink_that_is_destroyed_ends_the_subscription(
     running: Any, camera: Any, wait: Any
 ) -> None:

@@ -88,6 +88,7 @@ def show(running: Any, camera: Any, wait: Any, root: Any, picture: dict) -> np.n
     return found
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(
     ("properties", "expected"),
     [
@@ -208,6 +209,7 @@ def test_impossible_values_are_refused_and_the_picture_is_shown_as_before(
     np.testing.assert_array_equal(show(running, camera, wait, root, quarters()), QUARTERS)
 
 
+@pytest.mark.both_qt
 class TestDepth:
     def depths(self) -> dict:
         near, far = np.full((8, 8), 500), np.full((8, 8), 3000)
@@ -427,6 +429,7 @@ class TestPlayback:
         assert running.run(f"return [{names}]") == [0, 1, 2]
 
 
+@pytest.mark.both_qt
 class TestSnapshot:
     def load(self, running: Any, properties: str = "") -> Any:
         element = ELEMENTS[running.module]
@@ -568,6 +571,7 @@ class TestReduction:
         wait(lambda: camera.publish(large) or self.width(root) == 128)
 
 
+@pytest.mark.both_qt
 @pytest.mark.usefixtures("running")
 def test_an_item_lets_a_source_go_that_is_gone_already() -> None:
     from rosglass.qt import QtCore, send_deferred_deletes

@@ -16,6 +16,8 @@ from rosglass.qml.engine.process import QuitOnSignal
 if TYPE_CHECKING:
     from pathlib import Path
 
+pytestmark = pytest.mark.both_qt
+
 PROGRAM = """
 import threading, time
 from rosglass.qml.engine.process import end_process_within

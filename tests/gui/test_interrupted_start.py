@@ -17,6 +17,8 @@ from rosglass.qt import BINDING
 if TYPE_CHECKING:
     from pathlib import Path
 
+pytestmark = pytest.mark.both_qt
+
 #: How a shell tells it: by the exit code, or the signal that ended the process.
 INTERRUPTED = {130, -signal.SIGINT}
 STARTS = 12

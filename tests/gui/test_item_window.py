@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import pytest
+
 from rosglass.qml.elements.image_sinks import Sink, window_of
 from rosglass.qt import is_alive
 
 if TYPE_CHECKING:
     from conftest import Bench
+
+pytestmark = pytest.mark.both_qt
 
 BODY = """
     Window {

@@ -122,6 +122,7 @@ def test_last_messages_arrive_over_dds(ros_domains: list[int], start: Any, tmp_p
         robot.node.close()
 
 
+@pytest.mark.both_qt
 def test_a_reload_sends_the_same(url: str, robot: Robot, start: Any, tmp_path: Path) -> None:
     file = tmp_path / "Main.qml"
     file.write_text(ROS2)
@@ -150,6 +151,7 @@ run_event_loop(app)
 """
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize("close", ["session.close()", "sys.exit(0)"])
 def test_a_program_with_an_engine_of_its_own_sends_them(
     close: str, url: str, robot: Robot, python: Any, tmp_path: Path

@@ -19,6 +19,8 @@ from rosglass.tf import TransformBuffer
 if TYPE_CHECKING:
     from conftest import Bench
 
+pytestmark = pytest.mark.both_qt
+
 
 class Watch(Handle):
     """A handle that counts itself among those that are open."""

@@ -98,6 +98,7 @@ def told(robot: Talk, what: str) -> list[dict[str, Any]]:
     return [json.loads(line) for line in robot.lines if what in line]
 
 
+@pytest.mark.both_qt
 def test_listing1(panel: Talk, robot: Talk, tmp_path: Path) -> None:
     # The camera's orange fills the window; the joystick lies over it.
     until(lambda: panel.ask("pixel 30 60") in {"#e67814", "#e57814", "#e67813"}, panel, robot)

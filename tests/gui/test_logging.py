@@ -25,6 +25,7 @@ LEVELS = {
 }
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize("name", LEVELS)
 @pytest.mark.parametrize("logger", ["Ros2", "Ros2.getLogger('arm')"])
 def test_levels_and_places(bench: Any, records: Any, name: str, logger: str) -> None:
@@ -61,6 +62,7 @@ def test_levels_can_be_set(bench: Any, records: Any, caplog: Any) -> None:
     assert "setLoggerLevel: 7 is not one of Ros2LoggerLevel" in texts
 
 
+@pytest.mark.both_qt
 def test_console_and_warnings_are_logged_with_their_place(
     bench: Any, messages: Any, records: Any
 ) -> None:

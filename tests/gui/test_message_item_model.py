@@ -49,6 +49,7 @@ def run(bench: Any, script: str) -> Any:
     return None if text is None else json.loads(text)
 
 
+@pytest.mark.both_qt
 def test_the_tree_of_a_message(bench: Any) -> None:
     script = """message = Ros2.createEmptyMessage('geometry_msgs/msg/PointStamped')
         return [messageType, columnCount(), tree()]"""
@@ -79,6 +80,7 @@ def test_the_tree_index_is_the_row(bench: Any) -> None:
     assert run(bench, script) == "position"
 
 
+@pytest.mark.both_qt
 def test_only_values_have_an_edit_role(bench: Any) -> None:
     """As editors of qml6_ros2_plugin tell names from fields by it, such as RQml's."""
     script = """message = {"#messageType": "geometry_msgs/msg/PointStamped", point: {x: 1.5}}
@@ -105,6 +107,7 @@ def test_an_edit_leaves_the_field_alone_that_is_typed_in(bench: Any) -> None:
     assert changed == [[0]]  # not the edit role
 
 
+@pytest.mark.both_qt
 def test_leaves_can_be_edited(bench: Any) -> None:
     script = """message = Ros2.createEmptyMessage('geometry_msgs/msg/PointStamped')
         const before = messages
@@ -141,6 +144,7 @@ def test_what_does_not_fit_changes_nothing(bench: Any, rows: str, column: int, v
     assert message["header"] == {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
 
 
+@pytest.mark.both_qt
 def test_elements_can_be_edited_inserted_and_removed(bench: Any) -> None:
     script = f"""message = {JOINTS}; log = []
         const names = at([1], 0), positions = at([2], 0)
@@ -234,6 +238,7 @@ def test_what_is_no_message_leaves_the_last_one(bench: Any, caplog: Any, value: 
     assert found[0].pathname.endswith(".qml")
 
 
+@pytest.mark.both_qt
 def test_wide_integers_and_long_arrays(bench: Any) -> None:
     script = """message = {'#messageType': 'std_msgs/msg/UInt64', data: '18446744073709551615'}
         const i = at([0], 1)
@@ -264,6 +269,7 @@ def test_it_shows_what_a_subscription_receives(running: Any, wait: Any) -> None:
     wait(lambda: root.shown() == 4.5)
 
 
+@pytest.mark.both_qt
 def test_qts_own_checks_of_models_pass(bench: Any) -> None:
     from rosglass.qml.elements.message_item_model import MessageItemModel
     from rosglass.qt import optional

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     from conftest import Bench
 
+pytestmark = pytest.mark.both_qt
+
 #: Read with every message, as a binding of an interface does; what is said is of its lines.
 SCREEN = """
     QtObject {

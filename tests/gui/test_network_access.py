@@ -106,6 +106,7 @@ def interface(folder: Path, server: Server, imported: str = "") -> Path:
     return file
 
 
+@pytest.mark.both_qt
 def test_nothing_is_fetched(start: Any, tmp_path: Path, server: Server) -> None:
     program = start("run", interface(tmp_path, server), "--screenshot", tmp_path / "shot.png")
     program.until("all are asked for")
@@ -114,6 +115,7 @@ def test_nothing_is_fetched(start: Any, tmp_path: Path, server: Server) -> None:
     assert server.requests == 0
 
 
+@pytest.mark.both_qt
 def test_an_import_from_another_machine_is_not_fetched(
     start: Any, tmp_path: Path, server: Server
 ) -> None:
@@ -165,6 +167,7 @@ app.close()
     assert server.requests == 0
 
 
+@pytest.mark.both_qt
 def test_javascript_reads_and_writes_no_files(start: Any, tmp_path: Path) -> None:
     read, written, file = (tmp_path / name for name in ("read.txt", "written.txt", "Main.qml"))
     read.write_text("secret")
@@ -179,6 +182,7 @@ def test_javascript_reads_and_writes_no_files(start: Any, tmp_path: Path) -> Non
     assert not written.exists()
 
 
+@pytest.mark.both_qt
 @pytest.mark.skipif(not QT6, reason="Debian's Qt 5 leaves films to GStreamer")
 @pytest.mark.parametrize("scheme", ["http", "rtsp"])
 def test_films_are_fetched_only_where_that_is_allowed(

@@ -15,9 +15,6 @@ import pytest
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-# What a node's restart leads to; test_parameter.py shows the element in both versions of Qt.
-pytestmark = pytest.mark.one_qt
-
 ROOT = Path(__file__).parents[2]
 RESTARTS = 10
 #: As examples/parameters.qml shows a parameter.

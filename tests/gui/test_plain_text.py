@@ -14,6 +14,8 @@ from rosglass.qt import QT6
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+pytestmark = pytest.mark.both_qt
+
 COCKPIT = Path(rosglass.demo.__file__).with_name("cockpit")
 CONTROLS = Path(__file__).with_name("controls_with_texts.qml")
 #: Debian's Qt 5 lacks QtGraphicalEffects, which its style Imagine needs.

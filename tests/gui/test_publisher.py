@@ -58,6 +58,7 @@ def test_partial_messages_get_defaults(running: Any, received: list, wait: Any) 
     }
 
 
+@pytest.mark.both_qt
 def test_what_does_not_fit_throws_and_is_logged_once_by_qt(
     running: Any, received: list, messages: None, wait: Any, caplog: Any
 ) -> None:
@@ -240,6 +241,7 @@ def test_shutdown_withdraws_and_init_advertises_again(
     assert received[0].linear.x == 2.0
 
 
+@pytest.mark.both_qt
 def test_a_publisher_lives_as_long_as_javascript_holds_it(running: Any, wait: Any) -> None:
     root = load(running, "function drop() { pub = null; gc() }")
     wait(lambda: len(running.world.publishers) == 1)
@@ -251,6 +253,7 @@ def test_a_publisher_lives_as_long_as_javascript_holds_it(running: Any, wait: An
     wait(lambda: not running.world.publishers)
 
 
+@pytest.mark.both_qt
 def test_properties(running: Any, wait: Any, received: list) -> None:
     root = running.load(
         """QtObject {
@@ -274,6 +277,7 @@ def test_properties(running: Any, wait: Any, received: list) -> None:
     assert running.run('return Ros2.createPublisher("/x", "std_msgs/msg/Bool").queueSize') == 10
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
@@ -375,6 +379,7 @@ def test_publishing_at_the_end_of_the_program_is_no_mistake(
     assert caplog.text == ""
 
 
+@pytest.mark.both_qt
 def test_what_waits_for_its_topic_is_sent_after_the_engine(
     running: Any, wait: Any, tmp_path: Any
 ) -> None:

@@ -53,6 +53,7 @@ def test_a_subscription_asks_for_what_is_available(
     assert asked.deadline == asked.lease_duration == BEST_AVAILABLE
 
 
+@pytest.mark.both_qt
 def test_every_policy_can_be_read(bench: Any) -> None:
     read = """const q = CODE
         return [q.reliability, q.durability, q.liveliness, q.deadlineMs, q.lifespanMs, q.leaseMs]"""
@@ -77,6 +78,7 @@ def test_every_policy_can_be_read(bench: Any) -> None:
     ]
 
 
+@pytest.mark.both_qt
 def test_a_profile_comes_back_as_it_was_given(running: Any) -> None:
     script = f"""const p = Ros2.createPublisher('/a', 'std_msgs/msg/Bool', {ALL})
         const q = p.qos

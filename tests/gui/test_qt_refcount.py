@@ -10,6 +10,8 @@ import pytest
 from rosglass.errors import UnsupportedError
 from rosglass.qt import _refuse_broken_binding, choose_binding
 
+pytestmark = pytest.mark.both_qt
+
 
 def test_none_keeps_its_references(app) -> None:
     app.processEvents()

@@ -90,6 +90,7 @@ def view(app: Any, url: str, wait: Any) -> Iterator[Any]:
     session.close()
 
 
+@pytest.mark.both_qt
 def test_dragging_drives_and_letting_go_stops(robot: Robot, view: Any, wait: Any) -> None:
     from rosglass.qt import QtCore, optional
 

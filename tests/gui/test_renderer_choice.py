@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from conftest import Program
 
-pytestmark = pytest.mark.xvfb
+pytestmark = [pytest.mark.xvfb, pytest.mark.both_qt]
 
 PLAIN = "import QtQuick 2.15\nRectangle { width: 200; height: 100 }\n"
 SHADER = "import QtQuick 2.15\nItem { width: 200; height: 100; ShaderEffect { } }\n"

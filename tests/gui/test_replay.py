@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 
     from conftest import Bench
 
-# What is played and when; test_examples.py shows the element in both versions of Qt.
-pytestmark = pytest.mark.one_qt
-
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND
 STRING = "std_msgs/msg/String"

@@ -80,6 +80,7 @@ def test_shutdown_is_told(up: Bench) -> None:
     assert (root.property("n"), other.property("n")) == (0, 1)
 
 
+@pytest.mark.both_qt
 def test_publishing(up: Bench, wait: Any) -> None:
     received: list[Any] = []
     up.robot.create_subscription("/base/speed", "geometry_msgs/msg/Twist", received.append)
@@ -132,6 +133,7 @@ def test_latched_publishers(up: Bench, wait: Any) -> None:
     assert late[0].data == "auto"
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(
     "call",
     [

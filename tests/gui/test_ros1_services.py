@@ -88,6 +88,7 @@ def test_asynchronously(live: Bench, told: list[Any], wait: Any) -> None:
     assert told == [True]
 
 
+@pytest.mark.both_qt
 def test_the_interface_lives_while_a_call_waits(live: Bench, told: list[Any], wait: Any) -> None:
     """A timer runs, and the page that called is destroyed, while its handler waits."""
     go = threading.Event()
@@ -129,6 +130,7 @@ def test_the_interface_lives_while_a_call_waits(live: Bench, told: list[Any], wa
     assert root.property("ticks") > 30
 
 
+@pytest.mark.both_qt
 def test_calls_that_wait_within_each_other_leave_the_stop_button_alive(
     live: Bench, told: list[Any], wait: Any, caplog: Any
 ) -> None:

@@ -58,6 +58,7 @@ def test_an_engine_that_was_not_prepared_says_what_to_do(
     assert "Ros2 cannot be used yet" in caplog.text
 
 
+@pytest.mark.both_qt
 def test_elements_that_are_gone_at_once_say_nothing(bench: Any, wait: Any, caplog: Any) -> None:
     bench.load(
         """import QtQuick 2.15
@@ -260,6 +261,7 @@ def test_an_address_that_cannot_be_used_yet_is_tried_again(
     made.close()
 
 
+@pytest.mark.both_qt
 def test_engines_share_a_session_and_may_go_first(running: Any, wait: Any, tmp_path: Any) -> None:
     engine = QtQml.QQmlEngine()
     install(engine, running.session)
@@ -277,6 +279,7 @@ def test_engines_share_a_session_and_may_go_first(running: Any, wait: Any, tmp_p
     assert running.run("return Ros2.getName()") == "ui"
 
 
+@pytest.mark.both_qt
 def test_engines_without_a_session_share_the_application_s(app: Any) -> None:
     engines = [QtQml.QQmlEngine(), QtQml.QQmlEngine()]
     sessions = {install(engine) for engine in engines}
@@ -323,6 +326,7 @@ def test_the_graph_can_be_asked(running: Any, wait: Any) -> None:
     ]
 
 
+@pytest.mark.both_qt
 def test_empty_messages(bench: Any, caplog: Any) -> None:
     script = """const m = Ros2.createEmptyMessage("geometry_msgs/PoseStamped");
         return [m.pose.orientation.w, m.header.frame_id, m["#messageType"],

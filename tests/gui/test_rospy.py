@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 
     from conftest import Bench
 
-# What rospy and the module say to each other; other tests have its values in both versions of Qt.
-pytestmark = pytest.mark.one_qt
-
 #: Of the worlds that `url` has, ROS 1 alone.
 ros1 = pytest.mark.parametrize("url", ["ros1"], indirect=True)
 RECEIVER = """

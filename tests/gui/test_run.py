@@ -25,6 +25,7 @@ def file(tmp_path: Path) -> Path:
     return tmp_path / "Main.qml"
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(
     ("text", "place", "message"),
     [
@@ -57,6 +58,7 @@ def test_a_text_for_a_camera_is_explained(start: Any, file: Path) -> None:
     program.end()
 
 
+@pytest.mark.both_qt
 def test_errors_in_other_files_name_them(start: Any, file: Path) -> None:
     file.write_text("import QtQuick 2.15\nItem { Part {} }")
     file.with_name("Part.qml").write_text("import QtQuick 2.15\nItem {\n  oops: 1\n}")
@@ -71,6 +73,7 @@ def test_a_missing_file(start: Any, tmp_path: Path) -> None:
     assert program.text == f"{tmp_path / 'none.qml'}: there is no such file"
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signals_end_it(start: Any, file: Path, number: int) -> None:
     file.write_text(GOOD)
@@ -83,6 +86,7 @@ def test_signals_end_it(start: Any, file: Path, number: int) -> None:
     assert "Traceback" not in program.text
 
 
+@pytest.mark.both_qt
 def test_ctrl_c_ends_an_interface_that_hangs(start: Any, file: Path) -> None:
     file.write_text(
         """import QtQuick 2.15
@@ -115,6 +119,7 @@ def test_arguments_exit_codes_and_runtime_warnings(start: Any, file: Path) -> No
     assert program.end() == 7
 
 
+@pytest.mark.both_qt
 def test_no_display_is_said_before_qt_aborts(start: Any, file: Path) -> None:
     file.write_text(GOOD)
     program = start("run", file, display=None)
@@ -126,6 +131,7 @@ def test_no_display_is_said_before_qt_aborts(start: Any, file: Path) -> None:
     assert "the display :3999 does not answer" in program.text
 
 
+@pytest.mark.both_qt
 @pytest.mark.xvfb
 @pytest.mark.parametrize("root", ["item", "window"])
 def test_screenshot(start: Any, file: Path, tmp_path: Path, screen: str, root: str) -> None:
@@ -193,6 +199,7 @@ def test_a_screenshot_that_was_not_taken_is_missed(
     assert not target.exists()
 
 
+@pytest.mark.both_qt
 def test_live_reload_keeps_the_last_good_interface(start: Any, file: Path) -> None:
     part = file.with_name("Part.qml")
     file.write_text(GOOD.replace("width: 200", "Part {}\nwidth: 200"))
@@ -241,6 +248,7 @@ def test_other_files_than_qml_are_refused(start: Any, tmp_path: Path) -> None:
     assert "there is no such folder to import QML modules from" in program.text
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize("number", [1, 2])
 def test_closing_windows_ends_it(start: Any, file: Path, number: int) -> None:
     """Of windows of equal rank the last one; what a window has opened itself does not count."""
@@ -267,6 +275,7 @@ def test_closing_windows_ends_it(start: Any, file: Path, number: int) -> None:
     assert ("still here" in program.text) is (number == 2)
 
 
+@pytest.mark.both_qt
 @pytest.mark.xvfb
 def test_a_kiosk_ignores_the_window_manager(start: Any, file: Path, screen: str) -> None:
     # What a window manager sends for Alt-F4 reaches Qt as a close event.
@@ -352,6 +361,7 @@ def test_a_url_that_can_never_work_ends_it(start: Any, file: Path, url: str, rea
     assert reason in errors[0]
 
 
+@pytest.mark.both_qt
 def test_a_program_of_rosglass_reads_no_sources(python: Any) -> None:
     # PySide looks for its features in those of all modules.
     text = (

@@ -11,6 +11,8 @@ import pytest
 
 from rosglass.qt import BINDING, QT6
 
+pytestmark = pytest.mark.both_qt
+
 ROOT = Path(__file__).parents[2]
 HEAD = "import sys\nfrom rosglass.qml import Application, Session, install\n"
 WAITING = """import QtQuick 2.15

@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-# Calls of nodes are given up; test_run.py ends programs in both versions of Qt.
-pytestmark = pytest.mark.one_qt
-
 #: Seconds: 2 are promised; the machines that run the tests are busy.
 SOON = 5.0
 

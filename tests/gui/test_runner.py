@@ -59,6 +59,7 @@ def colour(runner: Runner) -> str:
     return runner.grab().pixelColor(20, 150).name()
 
 
+@pytest.mark.both_qt
 def test_reload_keeps_the_node_and_collects_the_old_interface(
     runner: Runner, file: Path, world: LocalWorld, wait: Any
 ) -> None:
@@ -109,6 +110,7 @@ class Arm(QtCore.QObject):
     moved = Signal()
 
 
+@pytest.mark.both_qt
 def test_functions_of_a_file_end_when_it_is_reloaded(
     app: Any, file: Path, world: LocalWorld, wait: Any
 ) -> None:
@@ -152,6 +154,7 @@ def test_functions_of_a_file_end_when_it_is_reloaded(
         session.close()
 
 
+@pytest.mark.both_qt
 def test_errors_are_shown_over_the_last_good_interface(
     runner: Runner, file: Path, wait: Any, caplog: Any
 ) -> None:
@@ -170,6 +173,7 @@ def test_errors_are_shown_over_the_last_good_interface(
     assert colour(runner) == before
 
 
+@pytest.mark.both_qt
 def test_roots_may_change_between_item_and_window(runner: Runner, file: Path, wait: Any) -> None:
     first = runner.window
     window = UI.replace("Rectangle", "Window").replace("property string title", "title")
@@ -191,6 +195,7 @@ def test_roots_may_change_between_item_and_window(runner: Runner, file: Path, wa
     assert (runner.window.title(), colour(runner)) == ("item", "#00ff00")
 
 
+@pytest.mark.both_qt
 def test_a_file_with_errors_leaves_nothing_open(app: Any, file: Path, world: LocalWorld) -> None:
     file.write_text("import QtQuick 2.15\nItem { x: }")
     session = Session(connect=world.connect)
@@ -200,6 +205,7 @@ def test_a_file_with_errors_leaves_nothing_open(app: Any, file: Path, world: Loc
     assert not world.nodes
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(
     ("line", "expected"),
     [
@@ -240,6 +246,7 @@ def overlays(runner: Runner) -> int:
     )
 
 
+@pytest.mark.both_qt
 def test_several_windows(runner: Runner, file: Path, wait: Any, caplog: Any) -> None:
     file.write_text(WINDOWS)
     assert runner.reload()
@@ -272,6 +279,7 @@ def test_several_windows(runner: Runner, file: Path, wait: Any, caplog: Any) -> 
     assert titles(runner) == ["alone"]
 
 
+@pytest.mark.both_qt
 def test_windows_within_a_window(runner: Runner, file: Path, wait: Any) -> None:
     file.write_text(
         """import QtQuick 2.15
@@ -307,6 +315,7 @@ def test_a_root_without_windows_may_get_one_later(
     assert runner.window.title() == "back"
 
 
+@pytest.mark.both_qt
 def test_errors_at_run_time_do_not_stop_a_reload(
     runner: Runner, file: Path, world: LocalWorld, wait: Any
 ) -> None:
@@ -330,6 +339,7 @@ def test_errors_at_run_time_do_not_stop_a_reload(
     wait(lambda: len(world.publishers) == 1)
 
 
+@pytest.mark.both_qt
 def test_a_reload_is_deferred_while_a_call_waits(runner: Runner, file: Path, wait: Any) -> None:
     from rosglass.qml.engine.waiting import wait_for
     from rosglass.qt import QtCore
@@ -350,6 +360,7 @@ def test_a_reload_is_deferred_while_a_call_waits(runner: Runner, file: Path, wai
     wait(lambda: runner.window.title() == "new")
 
 
+@pytest.mark.both_qt
 def test_import_paths_and_packages(
     app: Any, tmp_path: Path, world: LocalWorld, monkeypatch: Any
 ) -> None:
@@ -430,6 +441,7 @@ def test_errors_say_what_to_do(
     session.close()
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize("module", ["QtMultimedia", "QtQuick.Controls"])
 def test_errors_name_the_package_that_is_missing(file: Path, module: str) -> None:
     from rosglass.qml.run.live_file import error_list
@@ -480,6 +492,7 @@ def test_a_kiosk_stays_open_and_hides_the_pointer(
     session.close()
 
 
+@pytest.mark.both_qt
 def test_connecting_waits_for_the_first_frame(
     app: Any, file: Path, world: LocalWorld, wait: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

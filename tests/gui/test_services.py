@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 EVERY_WIRE = pytest.mark.parametrize("url", ["zenoh", "dds", "ros1"], indirect=True, scope="module")
 
 
+@pytest.mark.both_qt
 def test_a_client(live: Bench, wait: Any) -> None:
     live.robot.create_service_server(
         "/lamp", "std_srvs/srv/SetBool", lambda request: {"message": f"{request.data}"}
@@ -120,6 +121,7 @@ def test_the_robot_loses_its_server(live: Bench, wait: Any) -> None:
     wait(lambda: not root.ready())
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(
     ("handler", "message"),
     [
@@ -216,6 +218,7 @@ def test_open_requests_are_limited(live: Bench, wait: Any, monkeypatch: Any) -> 
     assert [call.done() for call in calls[:2]] == [False, False]
 
 
+@pytest.mark.both_qt
 @EVERY_WIRE
 def test_servers_in_the_way_of_qml6_ros2_plugin(live: Bench, wait: Any, caplog: Any) -> None:
     root: Any = live.load("""

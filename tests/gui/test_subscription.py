@@ -72,6 +72,7 @@ def test_a_topic_set_to_its_absolute_name_stays_there(
     assert sub.property("topic") == "/right/chat"
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize("extension", ["property int mine: 7", "function mine() { return 7 }"])
 def test_interfaces_may_extend_it(running: Any, chat: Any, wait: Any, extension: str) -> None:
     # PySide loses the undecorated methods of an object that QML gives properties of its own.
@@ -83,6 +84,7 @@ def test_interfaces_may_extend_it(running: Any, chat: Any, wait: Any, extension:
     wait(lambda: sub.property("stale"))
 
 
+@pytest.mark.both_qt
 def test_type_is_discovered_and_signals_come_in_order(running: Any, chat: Any, wait: Any) -> None:
     root = load(running)
     sub = root.property("sub")
@@ -231,6 +233,7 @@ def test_changing_the_topic_in_the_handler(running: Any, chat: Any, wait: Any) -
     assert "d" not in texts(root)
 
 
+@pytest.mark.both_qt
 def test_an_element_may_destroy_itself_in_its_handler(running: Any, chat: Any, wait: Any) -> None:
     root = running.load(
         """QtObject {
@@ -250,6 +253,7 @@ def test_an_element_may_destroy_itself_in_its_handler(running: Any, chat: Any, w
     assert root.property("count") >= 1
 
 
+@pytest.mark.both_qt
 def test_a_destroyed_element_is_left_alone_and_holds_nothing(
     running: Any, chat: Any, wait: Any, caplog: Any, capfd: Any
 ) -> None:
@@ -282,6 +286,7 @@ def test_a_destroyed_element_is_left_alone_and_holds_nothing(
     assert not [record for record in caplog.records if record.exc_info]
 
 
+@pytest.mark.both_qt
 def test_subscriptions_made_by_a_function_end_with_their_owner(
     running: Any, chat: Any, wait: Any
 ) -> None:
@@ -463,6 +468,7 @@ def test_an_impossible_profile_is_refused_with_its_place(running: Any, caplog: A
     assert caplog.records[0].pathname.endswith(".qml")
 
 
+@pytest.mark.both_qt
 def test_every_property_reads_back(running: Any) -> None:
     shown = running.run(
         """const qos = Ros2.QoS().reliable().keep_last(3);
@@ -585,6 +591,7 @@ def test_a_name_that_is_none_is_told_with_its_file(running: Any, wait: Any, capl
     assert LocationFormatter().format(record).startswith(f"{record.pathname}: WARNING: ")
 
 
+@pytest.mark.both_qt
 def test_what_a_function_made_is_told_with_its_line(running: Any, wait: Any, caplog: Any) -> None:
     root = running.load("""QtObject {
         property var sub

@@ -77,6 +77,7 @@ def test_what_belongs_together_comes_together(live: Bench, module: str, wait: An
     wait(lambda: root.state().startswith("true"))
 
 
+@pytest.mark.both_qt
 def test_three_topics_with_their_types(live: Bench, wait: Any) -> None:
     robot = Robot(live, wait, 3)
     wanted = f'[{{topic: "/a", type: "{IMU}"}}, "/b", {{topic: "c", qos: 5}}]'

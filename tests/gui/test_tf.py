@@ -268,6 +268,7 @@ def test_enabled_frames_and_rate(live: Bench, robot: Robot, wait: Any) -> None:
     assert not root.valid()
 
 
+@pytest.mark.both_qt
 def test_lookups(live: Bench, robot: Robot, wait: Any) -> None:
     live.run("TfTransformListener.initialize()")
     wait(lambda: live.run('return TfTransformListener.canTransform("map", "laser")') is True)
@@ -418,6 +419,7 @@ def test_changes_are_told(live: Bench, robot: Robot, wait: Any) -> None:
     wait(lambda: root.property("transforms") > 3 and root.property("frames") > 0)
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize("static", ["true", "false"])
 def test_broadcasting(live: Bench, static: str, wait: Any) -> None:
     live.load(

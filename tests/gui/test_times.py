@@ -18,6 +18,7 @@ def header(bench: Any, script: str, module: int = 2, ros: int = 2) -> Any:
     return show(bench, HEADER, {"stamp": STAMP[ros]}, script, module=module, ros=ros)
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize("ros", [1, 2])
 @pytest.mark.parametrize(
     ("module", "script", "expected"),
@@ -104,6 +105,7 @@ def test_every_renamed_field_of_types_that_both_have_is_known() -> None:
     assert found == set("DKRPT")
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(
     ("script", "expected"),
     [
@@ -130,6 +132,7 @@ def test_arithmetic_is_exact(bench: Any, script: str, expected: Any) -> None:
     assert header(bench, script) == expected
 
 
+@pytest.mark.both_qt
 def test_today_is_exact_too(bench: Any) -> None:
     script = """const a = Ros2.time('1795000000.123456789'), b = Ros2.time(1795000000, 123456788);
         return [a.exactNanoseconds(), a.subtract(b).exactNanoseconds(), a.compare(b)]"""
@@ -160,6 +163,7 @@ def test_arithmetic_with_anything_else_throws(bench: Any, script: str) -> None:
     assert "TypeError: expected " in header(bench, thrown)
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(
     ("script", "expected"),
     [
@@ -194,6 +198,7 @@ def test_times_can_be_made(bench: Any, script: str, expected: Any) -> None:
     assert bench.run(f"return {script}") == expected
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(
     "arguments", ["'x'", "NaN", "1.5, 2", "{}", "null", "[1]", "Ros2.duration(1)", "undefined"]
 )
@@ -252,6 +257,7 @@ def test_headers_of_ros1_can_be_sent_to_ros2(bench: Any) -> None:
         convert(bench, HEADER, "{seq: 4}")
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize("module", [1, 2])
 def test_arrays_of_times_and_durations(bench: Any, module: int) -> None:
     script = "{points: [{time_from_start: 1500}, {time_from_start: {sec: 1, nsec: 5}}]}"
@@ -267,6 +273,7 @@ def test_what_is_no_time_is_named(bench: Any, script: str) -> None:
     assert error.value.path.startswith("stamp")
 
 
+@pytest.mark.both_qt
 def test_python_gives_and_takes_times(bench: Any) -> None:
     from rosglass.qml.engine.dialect import Dialect
     from rosglass.qml.engine.js_values import duration_from_js, time_from_js

@@ -403,6 +403,7 @@ SAME: dict[tuple[str, str], dict[str, Any]] = {
 }  # fmt: skip
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(("module", "type"), SAME, ids=lambda value: value)
 def test_members_answer_as_in_the_reference(bench: Any, wait: Any, module: str, type: str) -> None:
     bench.module = f"{module} 1.0"
@@ -440,6 +441,7 @@ def test_members_answer_as_in_the_reference(bench: Any, wait: Any, module: str, 
         )
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(("module", "type"), NUMBERS, ids=lambda value: value)
 def test_enumerators_have_the_numbers_of_ros(bench: Any, module: str, type: str) -> None:
     names = NUMBERS[module, type]

@@ -9,6 +9,7 @@ import pytest
 from values import caught
 
 
+@pytest.mark.both_qt
 def test_empty_messages_have_every_field(bench: Any) -> None:
     script = """const m = Ros2.createEmptyMessage('geometry_msgs/TransformStamped');
         return [m, m['#messageType'], m.header.stamp.isZero()]"""
@@ -17,6 +18,7 @@ def test_empty_messages_have_every_field(bench: Any) -> None:
     assert (name, zero) == ("geometry_msgs/msg/TransformStamped", True)
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(
     ("module", "call", "expected"),
     [
@@ -57,6 +59,7 @@ def test_unknown_types_give_undefined_and_a_warning(bench: Any, caplog: Any, cal
     ] == [True]
 
 
+@pytest.mark.both_qt
 def test_constants(bench: Any) -> None:
     script = "return Ros2.constants('action_msgs/msg/GoalStatus').STATUS_EXECUTING"
     assert bench.run(script) == 2

@@ -14,6 +14,8 @@ import rosglass
 from rosglass.comm import Time
 from rosglass.errors import ConversionError
 
+pytestmark = pytest.mark.both_qt
+
 POSE = {
     "header": {"stamp": {"sec": 12, "nanosec": 345_678_901}, "frame_id": "map ü"},
     "pose": {"position": {"x": 1.5, "y": -2.0, "z": 0.1}},

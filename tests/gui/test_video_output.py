@@ -81,6 +81,7 @@ def show(file: Path, screen: str, encodings: list[str], renderer: str = "") -> d
 SHOWN = [("Ros2", "native"), ("Ros2", "painted"), ("Ros2", "source"), ("Ros", "source")]
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize("renderer", ["", "software"])
 @pytest.mark.parametrize(("module", "form"), SHOWN)
 def test_every_encoding_shows_the_right_colours(
@@ -117,6 +118,7 @@ def test_a_turned_output_looks_the_same_with_every_renderer(
     np.testing.assert_allclose(painted["rgb8"], by_opengl["rgb8"], atol=1)
 
 
+@pytest.mark.both_qt
 def test_the_rotation_of_the_camera_is_that_of_every_qt(tmp_path: Path, screen: str) -> None:
     """Qt 5 turns by `orientation` against the clock, Qt 6 with it: docs/elements/VideoOutput.md."""
     from rosglass.qt import QT6
@@ -136,6 +138,7 @@ def test_the_rotation_of_the_camera_is_that_of_every_qt(tmp_path: Path, screen: 
         np.testing.assert_allclose(found, clockwise, atol=1, err_msg=name)
 
 
+@pytest.mark.both_qt
 def test_a_stream_shown_in_both_ways_at_once(tmp_path: Path, screen: str) -> None:
     seen = show(interface(tmp_path, "both"), screen, ["rgb8", "yuv422", "mono8"])
     # Each half shows the whole picture: left column of each is its middle.

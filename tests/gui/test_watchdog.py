@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
+pytestmark = pytest.mark.both_qt
+
 UI = """import QtQuick 2.15
 Item {
     property var done: []

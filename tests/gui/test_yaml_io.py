@@ -24,6 +24,7 @@ def write(bench: Any, path: Any, value: str, module: str = "Ros2") -> Any:
     return bench.run(f"return {module}.io.writeYaml({json.dumps(str(path))}, {value})", imports)
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize("module", ["Ros", "Ros2"])
 @pytest.mark.parametrize(
     "value",
@@ -70,6 +71,7 @@ def test_times_come_back(bench: Any, tmp_path: Path) -> None:
     assert read(bench, file, "v.t.toSec()", "Ros") == 5.000000006
 
 
+@pytest.mark.both_qt
 def test_messages_models_and_objects_are_written(bench: Any, tmp_path: Path) -> None:
     file = tmp_path / "a.yaml"
     root = bench.load(
@@ -93,6 +95,7 @@ def test_messages_models_and_objects_are_written(bench: Any, tmp_path: Path) -> 
     assert shown["bag"] == {"x": 1, "y": [2]}
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize(
     ("value", "text", "back"),
     [
@@ -149,6 +152,7 @@ def test_integers_beyond_those_of_javascript_stay_integers_in_the_file(
     assert file.read_text() == text
 
 
+@pytest.mark.both_qt
 @pytest.mark.parametrize("kind", ["UInt64", "Int64"])
 @pytest.mark.parametrize("count", [3, 40])
 def test_arrays_of_wide_integers_come_back(
@@ -243,6 +247,7 @@ def test_what_cannot_be_written_leaves_the_file_alone(
     assert file.read_text() == "before: 1\n"
 
 
+@pytest.mark.both_qt
 def test_wrong_arguments_throw_or_are_refused(bench: Any) -> None:
     assert bench.run("return [Ros2.io.readYaml(5), Ros2.io.readYaml({})]") == [False, False]
 
