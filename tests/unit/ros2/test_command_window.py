@@ -119,6 +119,20 @@ def test_an_outage_is_no_round_trip(rig):
     assert rig.sent == ["a", "b", "c"], "0.1 s as before, not 16 s"
 
 
+@pytest.mark.parametrize("end", [lambda rig: rig.window.close(), lambda rig: rig.pass_time(0.01)])
+def test_command_that_waits_when_the_session_closes_is_counted(rig, end):
+    def fail(*_):
+        raise zenoh.ZError("the session is closed")
+
+    rig.answered = False
+    rig.send("a")
+    rig.send("stop", after=0.2)
+    assert rig.sent == ["a"]
+    rig.answered, rig.window._send = True, fail
+    end(rig)
+    assert (rig.sent, rig.window.lost) == (["a"], 1)
+
+
 def test_without_a_link_commands_are_dropped_and_counted(rig):
     rig.linked = False
     rig.send("a")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import zenoh
@@ -104,14 +103,12 @@ class CommandWindow:
 
     def close(self) -> None:
         """Send the message that waits, if any: it may be a stop. Safe to call twice."""
-        with self._lock, suppress(zenoh.ZError):
+        with self._lock:
             if self._held is not None:
-                data, note, _ = self._held
-                self._held = None
-                self._send(data, note)
+                self._release(self._send, *self._held[:2])
 
     def _poll(self) -> None:
-        with self._lock, suppress(zenoh.ZError):  # the session is closed
+        with self._lock:
             self._polls = False
             if self._held is None:
                 return
@@ -119,11 +116,18 @@ class CommandWindow:
             if time.monotonic() > expiry:
                 self._drop()
             elif self._is_open():
-                self._held = None
-                self._send_now(data, note)
+                self._release(self._send_now, data, note)
             else:
                 self._polls = True
                 self._timers.after(_POLL_S, self._poll)
+
+    def _release(self, send: Callable[[bytes, bytes], None], data: bytes, note: bytes) -> None:
+        """Send the message that waited."""
+        try:
+            send(data, note)
+        except zenoh.ZError:  # the session is closed
+            self._drop()
+        self._held = None
 
     def _is_open(self) -> bool:
         """Return whether the router confirms the messages in time."""
