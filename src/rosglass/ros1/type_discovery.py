@@ -92,7 +92,7 @@ def fetch(
         f"{name} was not received", core.dispatcher, cancellable=True
     )
     if hash:
-        with suppress(Error):
+        with suppress(Error):  # then it is fetched
             promise.set_result(load(name, ros=1, library=core.types.library, hash=hash))
             return promise
     made = _Fetch(core, topics, services, name, hash, node, promise)
@@ -391,16 +391,21 @@ class ActionDiscovery:
         if result is None or feedback is None:
             self.problem = ""
             return None
-        with suppress(Error):
+        fault = ""
+        try:
             types = ActionTypes.of(self._core.types.action(type_name), self._core.types)
             if (types.result.md5, types.feedback.md5) == (result.md5, feedback.md5):
                 return types
+        except TypeNotFoundError:
+            pass
+        except Error as error:  # the server's definitions may serve
+            fault = f"{error}; "
         goal = known[GOAL] or self._goal(type_name.replace("/action/", "/msg/") + "ActionGoal")
         if goal is None:
             short = ros1_name(type_name.replace("/action/", "/msg/"))
             self.problem = (
-                f"no definition of {short}Goal is known, and the server of {self._name} does not "
-                f"send it: {adding_definitions(type_name, 1)}"
+                f"{fault}no definition of {short}Goal is known, and the server of {self._name} "
+                f"does not send it: {adding_definitions(type_name, 1)}"
             )
             return None
         action = assemble(type_name, goal, result, feedback)
@@ -422,7 +427,7 @@ class ActionDiscovery:
 
     def _goal(self, name: str) -> MessageType | None:
         """Return the type of goals, from the library or the server."""
-        with suppress(Error):
+        with suppress(Error):  # as that of the action
             return self._core.types.message(name)
         if self._goal_probe is None:
             topic = self._core.resolve(action_topic(self._name, GOAL))
@@ -458,7 +463,7 @@ class GoalProbe(Member):
         for _, header in self._waiting:
             text = header.get("message_definition", "")
             if header.get("type") == ros1_name(self._name) and text.strip():
-                with suppress(Error):
+                with suppress(Error):  # the next header may have a definition that fits
                     return self._core.types.learn(self._name, header.get("md5sum", ""), text)
         return None
 

@@ -19,6 +19,7 @@ from rosglass.wires.tcpros.connection import encode_header
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     from tests.unit.ros1.conftest import FakeMaster
 
@@ -99,6 +100,19 @@ def test_an_action_comes_from_its_topics(
     assert found.md5 == md5_of(GO)
     assert dict(found.constants["goal"]) == {"FAST": 1}
     assert user.fetch_type("my_msgs/Go", timeout=30).md5 == found.md5
+
+
+def test_broken_action_file_is_reported(
+    join: Callable[..., Any], eventually: Callable[..., Any], tmp_path: Path
+) -> None:
+    folder = tmp_path / "my_msgs/action"
+    folder.mkdir(parents=True)
+    (folder / "Go.action").write_text("uint8\n---\n---\n")
+    own = Library()
+    own.add_path(tmp_path)
+    join("robot", robot_library()).create_action_server("/go", GO, lambda goal: None)
+    client = join("cockpit", own).create_action_client("/go")
+    eventually(lambda: "Go.action:1:1: expected a type and a name" in client.problem)
 
 
 def test_what_comes_later_is_waited_for(join: Callable[..., Any]) -> None:
