@@ -91,7 +91,7 @@ class McapBag(ScannedBag):
         summary = None
         try:
             summary = SeekingReader(self._file).get_summary()
-        except Exception:  # damaged data may raise anything
+        except Exception:  # noqa: BLE001 - damaged data may raise anything
             self._add_problem("it was not closed properly: its end is missing or damaged")
         if summary is not None and summary.statistics is not None and summary.channels:
             # A damaged index may name a chunk several times.
@@ -140,7 +140,7 @@ class McapBag(ScannedBag):
             chunk = next(StreamReader(file, skip_magic=True, emit_chunks=True).records)
             if not isinstance(chunk, Chunk):
                 raise BagError("the index names a chunk, and there is none")
-        except Exception as error:  # damaged data may raise anything
+        except Exception as error:  # noqa: BLE001 - damaged data may raise anything
             self._leave_out(index.chunk_start_offset, error)
             return
         for record in self._unpacked(chunk, index.chunk_start_offset):
@@ -206,7 +206,7 @@ class McapBag(ScannedBag):
                 elif opcode == Opcode.CHANNEL:
                     yield ChannelRecord.read(ReadDataStream(io.BytesIO(data[place:end])))
                 place = end
-        except Exception as error:  # damaged data may raise anything
+        except Exception as error:  # noqa: BLE001 - damaged data may raise anything
             self._leave_out(offset, error)
 
     def _add(self, number: int, channel: Any, schema: Any, count: int) -> None:

@@ -339,7 +339,7 @@ class Player(Handle):
             self._play(self._begin)
         except NodeClosedError:
             pass  # the node was closed first
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - damaged data; shown as the problem
             self.problems[""] = str(error)
             _log.exception("playing %s failed", self._bag.path)
         with self._lock:

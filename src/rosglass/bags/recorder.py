@@ -340,7 +340,7 @@ class Recorder(Handle):
                     break
             self._file.finish()
             self._file.close()  # writes what is buffered
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - of the disk or the format; shown as the failure
             reason = getattr(error, "strerror", None) or error
             self._failure = f"{self.path} cannot be written: {reason}; nothing more is recorded"
             _log.error(self._failure, exc_info=not isinstance(error, OSError))

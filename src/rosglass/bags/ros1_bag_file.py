@@ -257,7 +257,7 @@ class Ros1BagFile(RecordingFile):
 
     def close(self) -> None:
         """Close the file."""
-        with suppress(OSError):
+        with suppress(OSError):  # what is incomplete is not read anyway
             self._writer.abort()
 
     def _release_index(self) -> None:

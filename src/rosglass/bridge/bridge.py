@@ -6,7 +6,7 @@ import logging
 import re
 import threading
 import time
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass
 from enum import Enum
 from fnmatch import fnmatchcase, translate
@@ -549,8 +549,7 @@ class Bridge(Handle):
         self._published_at = now
         line = self.status().line()
         for publisher in self._statistics:
-            with suppress(Error):
-                publisher.publish(data=line)
+            publisher.publish(data=line)
 
 
 def _absolute(name: str) -> str:
@@ -646,11 +645,8 @@ def _entry(
     sign = "->" if side.number == 0 else "<-"
     found = end.type
     if found is None:
-        problem = ""
-        with suppress(Error):
-            problem = end.problem
         known = side.offered(kind)
-        problem = problem or "its type is unknown, and no node describes it"
+        problem = end.problem or "its type is unknown, and no node describes it"
         return SurveyEntry(kind, name, other, sign, ", ".join(known.get(name, [])), problem=problem)
     if side.node.wire == side.other.node.wire:
         return SurveyEntry(kind, name, other, sign, found.name, found.name)

@@ -203,7 +203,7 @@ class Outbox:
                 self._size -= len(sample.data)
             try:
                 self._handle(sample)
-            except Exception:
+            except Exception:  # noqa: BLE001 - the next samples must be relayed
                 _log.exception("%s failed", self._name)
 
 
@@ -389,7 +389,7 @@ class TopicRelay:
             if end.node == self._target.name or not end.type:
                 continue
             for version in (end.type_hash, ""):
-                with suppress(Error):
+                with suppress(Error):  # a version that cannot be loaded is not preferred
                     known = load(end.type, 3 - ros, hash=version)
                     if isinstance(known, MessageType) and known not in found:
                         found.append(known)
@@ -517,7 +517,7 @@ class TopicRelay:
             made.close()
         if closed:
             return None
-        with suppress(Error):
+        with suppress(NodeClosedError):
             made.on_matched(lambda _: self._wake(), IMMEDIATE)
         return kept
 
@@ -745,7 +745,7 @@ class ServiceRelay(OfferedRelay[ServiceClient, ServiceServer, ServiceType, Servi
                 response = call.result()
                 if translation is not None:
                     response = translation.response.convert(response)
-            except Exception as error:
+            except Exception as error:  # noqa: BLE001 - the client waits for an answer
                 self._fail(answer, error)
             else:
                 self._count += 1
@@ -939,7 +939,7 @@ class ActionRelay(OfferedRelay[ActionClient, ActionServer, ActionType, ActionTra
         """Stop relaying, and cancel the goals; safe to call twice."""
         client, self._client = self._client, None
         if client is not None:
-            with suppress(Error):
+            with suppress(Error):  # their server, or the node, may be gone
                 asked = [goal.cancel(_CANCEL_TIMEOUT_S) for goal in client.goals]
                 deadline = time.monotonic() + _CANCEL_TIMEOUT_S
                 for answer in asked:

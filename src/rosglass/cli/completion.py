@@ -65,7 +65,7 @@ def complete_names(
     """
     try:
         return [name for name in _names(what, parsed_args) if name.startswith(prefix)]
-    except Exception:  # nothing may be printed into the line that is being typed
+    except Exception:  # noqa: BLE001 - nothing may be printed into the line that is being typed
         return []
 
 

@@ -322,7 +322,7 @@ def _wait_for_connection(node: Node, timeout: float, wait_for_start: bool) -> No
 def names_ros1(args: argparse.Namespace) -> bool:
     """Return whether the options, or else the environment, name a ROS 1 master."""
     url = getattr(args, "url", "")
-    with suppress(Error):
+    with suppress(Error):  # connecting reports it
         url = url or default_url(os.environ)
     return str(url).lower().startswith("ros1:")
 

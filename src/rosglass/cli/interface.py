@@ -112,7 +112,7 @@ def _nested(node: Node, args: argparse.Namespace) -> MessageType | None:
 
 
 def _is_known(name: str, ros: int) -> bool:
-    with suppress(Error):
+    with suppress(Error):  # or it has a mistake here, and the node's is shown
         load(name, ros)
         return True
     return False

@@ -79,7 +79,7 @@ def nearby_url() -> str:
 
     For commands without a setting for the robot's URL; also empty if there is one.
     """
-    with suppress(Error):
+    with suppress(Error):  # no URL is set, or an unknown middleware is
         default_url(os.environ)
         return ""
     if os.environ.get("RMW_IMPLEMENTATION"):  # an unknown one
@@ -87,7 +87,7 @@ def nearby_url() -> str:
     for port, url in ((_PORT, "zenoh://127.0.0.1:7447"), (11311, "ros1://127.0.0.1:11311")):
         if url.startswith("zenoh:") and find_spec("zenoh") is None:
             continue
-        with suppress(OSError):
+        with suppress(OSError):  # nothing listens there
             socket.create_connection(("127.0.0.1", port), _CONNECT_TIMEOUT_S).close()
             return url
     return ""
@@ -103,10 +103,9 @@ def ros1_options(url: str) -> Ros1Options:
 def ros1_url() -> str:
     """Return the URL of the ROS 1 master that the environment selects; empty for none."""
     url = ""
-    with suppress(Error):
+    with suppress(Error):  # connecting to it reports what is wrong
         if default_url(os.environ) == "ros1://":
             url = "ros1://"
-            # Connecting to it reports what is wrong.
             url += ros1_options(url).master.removeprefix("http://")
     return url
 

@@ -189,7 +189,7 @@ def _prepare_output() -> None:
 
 def _drop_output() -> None:
     """Drop unwritten output, which would make Python's exit fail."""
-    with suppress(OSError, ValueError):
+    with suppress(OSError, ValueError):  # closed, or no file
         null = os.open(os.devnull, os.O_WRONLY)
         os.dup2(null, sys.stdout.fileno())
         os.close(null)

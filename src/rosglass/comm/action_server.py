@@ -475,7 +475,7 @@ class ActionServer(Handle):
         """Run a user's callback; return False if its executor raises."""
         try:
             self._decider.post(decide)
-        except Exception:
+        except Exception:  # noqa: BLE001 - a user's executor
             self._log.exception(
                 "%s: the executor of accept and cancel raised: goals are rejected, and cancelled",
                 self.name,
@@ -498,7 +498,7 @@ class ActionServer(Handle):
         decision: Any
         try:
             decision = decide()
-        except Exception:
+        except Exception:  # noqa: BLE001 - a user's callback
             self._log.exception("%s: %s failed; %s goal %s", self.name, name, effect, goal.id_text)
             return default
         if decision is not True and decision is not False:
@@ -530,7 +530,7 @@ class ActionServer(Handle):
             with self._protocol.lock:  # so that close() joins it
                 thread.start()
                 self._threads.add(thread)
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - a user's executor; or no thread can start
             self._log.error(
                 "%s: aborting goal %s, which cannot be executed: %r", self.name, goal.id_text, error
             )
@@ -551,7 +551,7 @@ class ActionServer(Handle):
             return
         try:
             result: Any = self._execute(goal)
-        except BaseException as error:
+        except BaseException as error:  # noqa: BLE001 - sys.exit() in a user's callback ends the goal
             self._on_failure(goal, error)
             self._protocol.on_returned()
             return
@@ -571,7 +571,7 @@ class ActionServer(Handle):
         """End a goal whose execution returned a future."""
         try:
             result = done.result(0)
-        except BaseException as error:
+        except BaseException as error:  # noqa: BLE001 - as above, of a future
             self._on_failure(goal, error)
         else:
             self._on_result(goal, result)

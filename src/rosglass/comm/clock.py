@@ -279,7 +279,7 @@ class Clock(Unique):
         for timer in due:
             try:
                 timer.fire()
-            except BaseException:  # noqa: PERF203 - sys.exit() must not end the others
+            except BaseException:  # noqa: BLE001, PERF203 - sys.exit() must not end the others
                 _log.exception("%s asked to end its thread, which goes on", timer)
 
 
@@ -342,7 +342,7 @@ class Timer(Handle):
         try:
             if not self._closed:
                 self._callback()
-        except (Exception, SystemExit) as error:
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - a user's callback
             reraise_exit(error)
             self._failures.exception("the callback of %s failed", self)
         finally:

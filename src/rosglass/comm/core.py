@@ -6,7 +6,6 @@ import atexit
 import os
 import threading
 from abc import ABC, abstractmethod
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.clock import Clock
@@ -280,14 +279,12 @@ class NodeCore(ABC):
         with self._lock:
             members = list(self._members.items())
         for member, follow in members:
-            # Another thread may close the node, or this member, at any time.
-            with suppress(NodeClosedError):
-                try:
-                    follow(moved, idle)
-                except NodeClosedError:
-                    raise
-                except Exception:
-                    self.log.exception("%s cannot follow the graph", member)
+            try:
+                follow(moved, idle)
+            except NodeClosedError:  # noqa: PERF203 - another thread may close it at any time
+                pass
+            except Exception:  # the other members must follow it all the same
+                self.log.exception("%s cannot follow the graph", member)
         if moved:
             self.graph_listeners.notify(None)
 

@@ -54,7 +54,7 @@ def run_job(job: Callable[[], None]) -> None:
     """Run `job` and log an exception that it raises."""
     try:
         job()
-    except (Exception, SystemExit) as error:
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - a user's callback
         reraise_exit(error)
         _log.exception("a callback failed")
 
@@ -146,7 +146,7 @@ class Dispatcher(Executor):
                 return
             try:
                 run_job(job)
-            except BaseException:  # sys.exit() in one callback must not stop the others
+            except BaseException:  # noqa: BLE001 - sys.exit() in one callback must not stop the others
                 _log.exception("%s: a callback asked to end its thread, which goes on", self._name)
             count += 1
             if count == _RATE_JOBS:
@@ -182,7 +182,7 @@ class RetryingExecutor(Executor):
         if not self._rejected:
             try:
                 self._executor.post(job)
-            except Exception:
+            except Exception:  # noqa: BLE001 - a user's executor, e.g. one that is full
                 self._log_failure()
             else:
                 return
@@ -204,7 +204,7 @@ class RetryingExecutor(Executor):
         while not self._closed:
             try:
                 self._executor.post(self._rejected[0])
-            except Exception:
+            except Exception:  # noqa: BLE001 - as above
                 if time.monotonic() - self._rejected_at >= self._give_up_s:
                     self._give_up()
                     return
@@ -345,7 +345,7 @@ class InOrder:
                 job = self._jobs.popleft()
             try:
                 job()
-            except Exception:
+            except Exception:  # noqa: BLE001 - the next jobs must run all the same
                 _log.exception("a job failed")
             except BaseException:  # Ctrl-C: the next thread that adds a job continues
                 with self._lock:

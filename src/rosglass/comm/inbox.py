@@ -357,7 +357,7 @@ class Inbox:
                 break
             try:
                 call(argument)
-            except (Exception, SystemExit) as error:
+            except (Exception, SystemExit) as error:  # noqa: BLE001 - a user's callback
                 reraise_exit(error)
                 self._log_failure()
 
@@ -441,7 +441,7 @@ class ImmediateInbox(Inbox):
         self._count(sample, 1, len(sample[0]))
         try:
             self._call_one(sample)
-        except (Exception, SystemExit):
+        except (Exception, SystemExit):  # noqa: BLE001 - a user's callback
             self._log_failure()
 
     def _handle(self, given: list[Sample]) -> list[Sample]:
@@ -461,7 +461,7 @@ class ImmediateInbox(Inbox):
                 return left
             try:
                 call(argument)
-            except (Exception, SystemExit):
+            except (Exception, SystemExit):  # noqa: BLE001 - a user's callback
                 self._log_failure()
         return []
 

@@ -210,7 +210,7 @@ class RosoutHandler(logging.Handler, NodeMember):
             if not self._closed and self._admit(record.created):
                 self._waiting.append(self._topic.fields(record))
                 self._wake()
-        except Exception:
+        except Exception:  # noqa: BLE001 - logging must not raise; the loss is published
             self._lost += 1
 
     def close(self) -> None:
@@ -248,20 +248,19 @@ class RosoutHandler(logging.Handler, NodeMember):
         worker.wake()
 
     def _publish(self) -> None:
-        # Errors are not logged, as their records would end up here.
-        with suppress(Error, OSError):
+        with suppress(Error, OSError):  # not logged: the record of it would end up here
             self.open()
         publisher = self._publisher
         if publisher is not None:
             self._await_subscription(publisher)
         while self._waiting:
             fields = self._waiting.popleft()
-            with suppress(Error, OSError):
+            with suppress(Error, OSError):  # as above
                 if publisher is not None:
                     publisher.publish(fields)
         if self._lost and publisher is not None and not self._closed:
             lost, self._lost = self._lost, 0
-            with suppress(Error, OSError):
+            with suppress(Error, OSError):  # as above
                 publisher.publish(self._topic.fields(self._loss(lost)))
 
     def _await_subscription(self, publisher: Publisher) -> None:
@@ -341,7 +340,7 @@ class _TerminalHandler(logging.Handler):
             return
         try:
             sys.stderr.write(f"{escape_controls(self.format(record))}\n")
-        except Exception:
+        except Exception:  # noqa: BLE001 - as logging's own handlers do
             self.handleError(record)
 
 

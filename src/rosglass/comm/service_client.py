@@ -397,7 +397,7 @@ class ServiceClient(Client):
                 pending.call.set_exception(
                     ServiceError(f"the call of {self.name} failed: {reason}")
                 )
-        except Exception:
+        except Exception:  # noqa: BLE001 - on a receiving thread, which must go on
             _log.exception("%s: processing a response failed", self.name)
 
     def _complete(self, pending: PendingCall, data: bytes | memoryview) -> None:

@@ -146,7 +146,7 @@ class ServiceServer(Handle):
             return
         try:
             self._executor.post(lambda: self._serve(request, data))
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - a user's executor
             with self._lock:
                 self._waiting -= 1
             self._on_failure(request, error)
@@ -165,7 +165,7 @@ class ServiceServer(Handle):
             return
         try:
             answer = self._callback(message)
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - a user's callback
             self._on_failure(request, error)
             return
         if inspect.iscoroutine(answer):
@@ -195,7 +195,7 @@ class ServiceServer(Handle):
             answer = future.result(0)
         except CancelledError:
             self._refuse(request, "the callback's future was cancelled")
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - a user's coroutine
             self._on_failure(request, error)
         else:
             self._respond(request, answer)

@@ -145,7 +145,7 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
                 file.close()
                 part.replace(target)
             except BaseException:
-                with suppress(OSError):
+                with suppress(OSError):  # the first error is the one to report
                     part.unlink()
                 raise
     except OSError as error:

@@ -100,7 +100,7 @@ class Timers:
                         self._cancelled = max(0, self._cancelled - 1)
             try:
                 job()
-            except BaseException:  # sys.exit() in one job must not end the others
+            except BaseException:  # noqa: BLE001 - sys.exit() in one job must not end the others
                 _log.exception("%s: a job failed", self._name)
 
 
@@ -172,7 +172,7 @@ class Worker:
                 due = now + self._pause
             try:
                 self._job(regular)
-            except Exception:
+            except Exception:  # noqa: BLE001 - the next round must come
                 _log.exception("%s failed", self._thread.name)
             self._closed.wait(min(_MAX_REST_S, _REST_FACTOR * (time.monotonic() - now)))
 

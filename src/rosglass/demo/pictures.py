@@ -168,7 +168,7 @@ class _Picture(TopicElement):
             result: object = self.paint(message)
         except Error as error:
             result = error
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - shown in place of the frame
             _log.exception("%s: cannot be painted", self._topic)
             result = Error(f"internal error: {error}")
         with suppress(RuntimeError):  # the QML object was destroyed while its picture was painted

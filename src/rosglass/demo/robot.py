@@ -190,8 +190,7 @@ class Robot:
                 work()
             except NodeClosedError:
                 pass  # the node was closed first
-            except Exception:
-                # A robot that cannot see or report must stop driving.
+            except Exception:  # noqa: BLE001 - a robot that cannot see or report stops driving
                 _log.exception("the robot failed")
             finally:
                 self._ending.set()

@@ -127,7 +127,7 @@ def _start_master(stack: ExitStack) -> str:
     stack.callback(_end, master)
     until = time.monotonic() + _MASTER_TIMEOUT_S
     while time.monotonic() < until and master.poll() is None:
-        with suppress(OSError), socket.create_connection(("127.0.0.1", port), 1.0):
+        with suppress(OSError), socket.create_connection(("127.0.0.1", port), 1.0):  # not yet
             print(f"started ROS's master on port {port}", flush=True)
             return f"ros1://127.0.0.1:{port}"
         time.sleep(0.05)

@@ -334,7 +334,7 @@ class ImageStream(Handle):
             with self._wake:
                 self._invalid += 1
             self._set_problem(str(error))
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - no image may end the stream
             _log.exception("%s: a picture could not be converted", self.topic)
             self._set_problem(f"internal error: {error}")
         return None

@@ -169,11 +169,11 @@ class VideoWriter:
             while isinstance(item := self._queue.get(), _Picture):
                 self._encode(item)
             self._finish(item)
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - of the disk, PyAV or a codec; shown as the problem
             reason = getattr(error, "strerror", "") or str(error)
             _log.debug("%s", self.path, exc_info=True)
             self._set_problem(f"{self.path} cannot be written: {reason}")
-            with suppress(Exception):
+            with suppress(Exception):  # it fails as writing did
                 self._close_file()
 
     def _encode(self, item: _Picture) -> None:

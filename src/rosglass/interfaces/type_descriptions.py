@@ -542,7 +542,7 @@ class TypeCache:
         except _RUBBISH as error:
             # It is useless, whatever wrote it.
             _log.warning("%s is no definition of %s and is removed: %s", path, name, error)
-            with suppress(OSError):
+            with suppress(OSError):  # another process was faster
                 os.unlink(path)
             return None
 
@@ -585,14 +585,14 @@ class TypeCache:
         entries = []
         with os.scandir(self.folder) as found:
             for entry in found:
-                with suppress(OSError):
+                with suppress(OSError):  # another process removed it
                     about = entry.stat()
                     entries.append((about.st_mtime, about.st_size, entry.path))
         total = size + sum(entry[1] for entry in entries)
         for _, taken, path in sorted(entries):
             if total <= _MAX_TOTAL:
                 return
-            with suppress(OSError):
+            with suppress(OSError):  # another process was faster
                 os.unlink(path)
             total -= taken
 

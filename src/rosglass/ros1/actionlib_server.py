@@ -16,7 +16,7 @@ from rosglass.comm import IMMEDIATE, GoalStatus, Publisher, QoS, Subscription, T
 from rosglass.comm.action_server import ActionServerProtocol, ServerGoal
 from rosglass.comm.executor import InOrder
 from rosglass.comm.handle import check_flag
-from rosglass.errors import ArgumentError, DecodeError, MasterError, NodeClosedError
+from rosglass.errors import ArgumentError, DecodeError, Error, MasterError, NodeClosedError
 from rosglass.ros1.actionlib import (
     CANCEL,
     FEEDBACK,
@@ -487,7 +487,7 @@ class ActionlibServer(ActionServerProtocol[ActionlibServerGoal], Member):
 
     def _recall(self, goal: ActionlibServerGoal, text: str) -> None:
         goal._supersede()
-        with suppress(Exception):
+        with suppress(Error):  # it has ended by itself
             goal.canceled(text=text)
 
     # -- cancelling ------------------------------------------------------------------------------

@@ -461,7 +461,7 @@ class MasterCallQueue:
         failure: Exception | None = None
         try:
             promise.set_result(job())
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - the promise raises it
             failure = error
             promise.set_exception(error)
         self._core.loop.call(lambda: self._on_done(failure))
@@ -696,7 +696,7 @@ class ParameterWatch(Member):
             self._read(self._core.master)
         except Error:
             pass  # the core looks for a master that is gone, and registers this again
-        except Exception:
+        except Exception:  # noqa: BLE001 - the next change reads again
             _log.exception("%s failed", self)
         self._core.loop.call(self._on_read)
 

@@ -697,7 +697,7 @@ class _ClientEndpoints(Handle):
                         self._take_status(kind, data)
             except DecodeError as error:
                 self._log_ignored(topic, gid, str(error))
-            except Exception:
+            except Exception:  # noqa: BLE001 - on a receiving thread, which must go on
                 _log.exception("%s: taking %s failed", self._name, topic)
 
         return receive

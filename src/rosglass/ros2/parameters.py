@@ -434,7 +434,7 @@ class _Validator(Handle):
     def ask(self, values: Mapping[str, ParameterValue]) -> str:
         try:
             reason = self._validate(values)
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - a user's callback
             _log.exception("%s: a callback of on_set() failed", self._owner.node)
             return f"it was refused with {type(error).__name__}: {error}"
         if isinstance(reason, str):

@@ -348,7 +348,7 @@ class Ros2Requester(ServiceRequester):
             requester.send(pending.number, data, left)
         except Error as problem:
             error = problem
-        except Exception as problem:
+        except Exception as problem:  # noqa: BLE001 - the caller waits for it
             _log.exception("%s: sending a request failed", self._name)
             error = ServiceError(f"{self._name}: the request could not be sent: {problem}")
         else:

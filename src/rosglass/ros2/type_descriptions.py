@@ -171,7 +171,7 @@ def describe(types: Types, name: str, type_hash: str, *, sources: bool) -> dict[
         known = {text["type_name"] for text in texts}
         for owner, _ in derived_from(definition.name, 2):
             # Only the text of the action or service has the constants of its goal or request.
-            with suppress(Error):
+            with suppress(Error):  # it is known without them
                 texts += [
                     text
                     for text in type_sources(types.library.definition(owner))[:1]
@@ -353,7 +353,7 @@ class TypeFetcher(NodeMember):
             f"{name} has not been received", self._core.dispatcher, cancellable=True
         )
         if hash:
-            with suppress(Error):
+            with suppress(Error):  # then it is fetched
                 promise.set_result(self._load(name, hash))
                 return promise
         if timeout is not None:
@@ -480,7 +480,7 @@ class TypeFetcher(NodeMember):
                 self._advance(request, self._users[1], now)
             except NodeClosedError:
                 self._closed = True
-            except Exception:
+            except Exception:  # noqa: BLE001 - the other requests must go on
                 _log.exception("fetching %s failed", request.name)
 
     def _advance(self, request: TypeRequest, users: _Users, now: float) -> None:
@@ -503,8 +503,11 @@ class TypeFetcher(NodeMember):
         """Continue with the request for the version in the graph."""
         if not request.searched_library:
             request.searched_library = True
-            with suppress(Error):
+            try:
                 found = self._core.types.library.definition(name, hash=announced)
+            except Error:
+                pass  # unknown, or with a mistake: the one in the graph is fetched
+            else:
                 self._on_definition(request, found)
                 return
         target = self._request((name, announced, ""))
@@ -932,7 +935,7 @@ class Lookup:
                 self.found = self._middleware.describe_type(endpoint, _LOOKUP_TIMEOUT_S)
             except Error as error:
                 self.problem = f"{endpoint.node}: {error}"
-            except Exception as error:
+            except Exception as error:  # noqa: BLE001 - the next endpoint may answer
                 _log.exception("looking up the type of %s failed", endpoint.name)
                 self.problem = f"{endpoint.node}: {error}"
             if self.found is not None:

@@ -28,6 +28,7 @@ from rosglass.errors import (
     NodeClosedError,
     TimeoutException,
     TransformException,
+    UnsupportedError,
 )
 from rosglass.tf.frames import (
     FrameInfo,
@@ -275,7 +276,7 @@ def check_may_wait_for(promise: Promise[Transform], what: str) -> None:
     """
     try:
         check_may_wait(what)
-    except Exception:
+    except UnsupportedError:
         promise.cancel()
         raise
 

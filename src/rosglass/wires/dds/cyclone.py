@@ -485,7 +485,7 @@ def _reader_flags(address: int, identity: bytes) -> int | None:
         for (found,) in struct.iter_unpack("=Q", words[: len(words) // 8 * 8]):
             if not 0 < found < _LAST_ADDRESS:
                 continue
-            with suppress(OSError):
+            with suppress(OSError):  # no address
                 data = os.pread(file, 400, found)
                 at = data.find(back) + _FLAGS
                 if data[4:20] == own and _FLAGS <= at < len(data) and at % 8 == 0:

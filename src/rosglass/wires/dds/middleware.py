@@ -134,7 +134,7 @@ class DdsDiscovery:
     def _put_endpoint(self, found: Discovered, *, reader: bool) -> None:
         try:
             self._seen.put_endpoint(found, reader=reader)
-        except Exception:  # the others must not be lost with it
+        except Exception:  # noqa: BLE001 - the others must not be lost with it
             _log.exception("the discovered DDS endpoint %s is not understood", found.guid.hex())
 
     def _take_participants(self) -> None:

@@ -270,7 +270,7 @@ class Pump:
             return None
         try:
             return act()
-        except BaseException:  # the other handlers must go on, whatever this one raises
+        except BaseException:  # noqa: BLE001 - the other handlers must go on, whatever this one raises
             if not self._closed:
                 _log.exception("%s: what arrived cannot be handed on", self._thread.name)
                 time.sleep(_BACKOFF_S)

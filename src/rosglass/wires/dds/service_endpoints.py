@@ -567,7 +567,7 @@ class Outbox:
                 return True
         except NodeClosedError:
             return True
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - its caller must not keep waiting
             _log.warning(
                 "what was to be sent is lost: %s", error, exc_info=not isinstance(error, Error)
             )

@@ -262,7 +262,7 @@ class DdsRequester(Requester):
                 continue
             try:
                 self._take(None if server is None else server.guid, data, origin)
-            except Exception:
+            except Exception:  # noqa: BLE001 - the others must not be lost with it
                 _log.exception("%s: a reply is lost", self._service)
 
     def _take(self, server: bytes | None, data: bytes | memoryview, origin: Origin | None) -> None:
@@ -479,7 +479,7 @@ class DdsReplier(Replier):
                 return False
         try:
             self._take(client, data, origin)
-        except Exception:
+        except Exception:  # noqa: BLE001 - the others must not be lost with it
             _log.exception("%s: a request is lost", self._service)
         return True
 
@@ -493,7 +493,7 @@ class DdsReplier(Replier):
                     self._take(client, data, origin)
                 else:
                     _log.error("%s: a request is lost: who sent it is gone", self._service)
-            except Exception:
+            except Exception:  # noqa: BLE001 - as above
                 _log.exception("%s: a request is lost", self._service)
             if origin is not None:
                 self._on_pumped(origin)

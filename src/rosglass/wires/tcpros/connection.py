@@ -875,7 +875,7 @@ class Connection:
         try:
             for frame in frames:
                 self._on_frame(frame, first)
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - of ours: the link is made anew
             _log.exception("%s: handling a message failed", self.peer)
             self._lose(f"an error of ours, {error!r}")
 
@@ -930,7 +930,7 @@ class Connection:
             self._limit.cancel()
         self._loop.linger(self, False)
         self._loop.watch(self._sock, 0, self)
-        with suppress(OSError):
+        with suppress(OSError):  # the peer was faster
             # A forked process has the socket, too, and would keep it connected.
             self._sock.shutdown(socket.SHUT_RDWR)
         self._close_socket()

@@ -184,7 +184,7 @@ class TcprosCore(NodeCore):
     def _shut_down(self, caller: str, reason: str) -> None:
         detail = f"closed by {caller}: {reason or 'no reason given'}"
         taken, owner = NAME_TAKEN in reason, ""
-        with suppress(Error):
+        with suppress(Error):  # then it stays unknown
             owner = str(self.master.call("lookupNode", self.name.full, timeout=_OWNER_TIMEOUT_S))
         if taken and self._is_out_of_date(reason, owner):
             _log.info("%s: ignored, as it has its name: %s", self.name, detail)
@@ -274,7 +274,7 @@ class BlockingPool:
                 job = self._jobs.popleft()
             try:
                 job()
-            except Exception:
+            except Exception:  # noqa: BLE001 - the next jobs must run
                 _log.exception("%s: a job failed", self._name)
 
 
@@ -360,7 +360,7 @@ class AnnouncedTypes(Types):
         return known
 
     def _known(self, full: str, md5: str) -> MessageType | None:
-        with suppress(Error):
+        with suppress(Error):  # then the publisher's own is used
             found = load(full, ros=1, library=self._library, hash=md5)
             if isinstance(found, MessageType):
                 return found

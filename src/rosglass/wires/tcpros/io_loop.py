@@ -102,7 +102,7 @@ class IoLoop:
         # needs no waking, and closes the socket.
         if not (self._awake or self._closed):
             self._awake = True
-            with suppress(OSError):
+            with suppress(OSError):  # full: the loop wakes anyway
                 self._wake_in.send(b"\0")
 
     def close(self) -> None:
@@ -114,7 +114,7 @@ class IoLoop:
             return
         self._deadline = time.monotonic() + _LINGER_S
         self._closed = True
-        with suppress(OSError):
+        with suppress(OSError):  # full: the loop wakes anyway
             self._wake_in.send(b"\0")
         if self.is_current:
             return
@@ -162,7 +162,7 @@ class IoLoop:
                     continue
                 try:  # as in _run(), without its call: each message on a slow topic is an event
                     handler.ready(events)
-                except BaseException as error:
+                except BaseException as error:  # noqa: BLE001 - the other connections must go on
                     self._on_error(handler, error)
             if self._polling:
                 self._poll()
@@ -213,7 +213,7 @@ class IoLoop:
         self._wake_out.close()
 
     def _on_wake(self) -> None:
-        with suppress(OSError):
+        with suppress(OSError):  # empty
             self._wake_out.recv(4096)
         # In this order: jobs of threads that see the old value run in this round.
         self._awake = False
@@ -221,7 +221,7 @@ class IoLoop:
     def _run(self, handler: Ready, events: int) -> None:
         try:
             handler.ready(events)
-        except BaseException as error:
+        except BaseException as error:  # noqa: BLE001 - the other connections must go on
             self._on_error(handler, error)
 
     def _on_error(self, handler: Ready, error: BaseException) -> None:
@@ -234,7 +234,7 @@ class IoLoop:
     def _run_job(self, job: Callable[[], None]) -> None:
         try:
             job()
-        except BaseException:
+        except BaseException:  # noqa: BLE001 - the other jobs must run
             _log.exception("%s: a job failed", self._thread.name)
 
 
@@ -334,7 +334,7 @@ class Acceptor:
         """Stop accepting connections; safe to call twice."""
         if self._listener.fileno() >= 0:
             self._loop.watch(self._listener, 0, self)
-            with suppress(OSError):
+            with suppress(OSError):  # not on every system
                 # A process that was forked has the socket, too, and would go on listening.
                 self._listener.shutdown(socket.SHUT_RDWR)
             self._listener.close()

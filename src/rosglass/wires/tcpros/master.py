@@ -135,7 +135,7 @@ class _Connection(http.client.HTTPConnection):
     def abort(self) -> None:
         """Abort the call in progress, which raises an error; from any thread."""
         self.aborted = True
-        with suppress(OSError, AttributeError):
+        with suppress(OSError, AttributeError):  # not connected
             self.sock.shutdown(socket.SHUT_RDWR)
 
 

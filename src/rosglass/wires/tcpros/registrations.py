@@ -152,7 +152,7 @@ class Registrations:
                 break
             try:
                 self._poll()
-            except Exception:
+            except Exception:  # noqa: BLE001 - the next poll tries again
                 _log.exception("%s failed", self._thread.name)
             self._wanted.wait(_POLL_S)
         self._leave()

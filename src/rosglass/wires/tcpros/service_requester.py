@@ -279,7 +279,7 @@ class TcprosRequester(ServiceRequester):
             pending.encode(service_type)
         except Error as error:
             return error
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - the caller waits for it
             _log.exception("%s: encoding a request failed", self._name)
             return ServiceError(f"{self._name}: the request could not be sent: {error}")
         return None

@@ -120,7 +120,7 @@ class Slave(socketserver.ThreadingMixIn):
             if crowded:
                 oldest = next(iter(self._connections))
                 del self._connections[oldest]
-                with suppress(OSError):
+                with suppress(OSError):  # its caller was faster
                     oldest.shutdown(socket.SHUT_RDWR)  # its thread ends
             self._connections[sock] = None
         if crowded and self._log_once.is_first("crowded"):
@@ -136,7 +136,7 @@ class Slave(socketserver.ThreadingMixIn):
         """End the connections; safe to call twice."""
         with self._lock:
             for sock in self._connections:
-                with suppress(OSError):
+                with suppress(OSError):  # its caller was faster
                     # An answer in progress may go out; the thread ends at the next call.
                     sock.shutdown(socket.SHUT_RD)
 
@@ -150,7 +150,7 @@ class Slave(socketserver.ThreadingMixIn):
         """Close a connection."""
         with self._lock:
             self._connections.pop(request, None)
-            with suppress(OSError):
+            with suppress(OSError):  # the caller was faster
                 request.shutdown(socket.SHUT_WR)
             request.close()
 
@@ -162,7 +162,7 @@ class Slave(socketserver.ThreadingMixIn):
         try:
             arguments, method = parse_xml(data)
             answer: Any = (dispatch(method or "", arguments),)
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - of garbage; answered to the caller
             answer = xmlrpc.client.Fault(1, f"{type(error).__name__}: {error}")
         return xmlrpc.client.dumps(answer, methodresponse=True, allow_none=True).encode()
 
@@ -181,7 +181,7 @@ class Slave(socketserver.ThreadingMixIn):
             return [1, "", method(*arguments)]
         except (TypeError, ValueError, KeyError) as error:
             return [-1, f"{name}: {error.args[0] if error.args else error}", 0]
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - answered to the caller
             _log.exception("%s failed", name)
             return [0, f"{name} failed: {error}", 0]
 
@@ -299,7 +299,7 @@ def _peer(connection: socket.socket) -> tuple[str, bool]:
 def _addresses(uri: str) -> set[str]:
     """Return the addresses of a URI's host; none where it is unknown."""
     found: list[Any] = []
-    with suppress(OSError, UnicodeError, ValueError):
+    with suppress(OSError, UnicodeError, ValueError):  # unknown, or malformed
         found = socket.getaddrinfo(urlsplit(uri).hostname, None)
     return {_ipv4(str(one[4][0])) for one in found}
 

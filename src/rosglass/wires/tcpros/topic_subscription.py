@@ -737,7 +737,7 @@ class PublisherLink:
                     reader.on_messages(self, part, received)
             if len(frames) >= _BATCH and self._core.loop.is_current:
                 self._apply_backpressure()
-        except Exception:  # of a user's executor
+        except Exception:  # noqa: BLE001 - a user's executor
             _log.exception("%s: handing on messages failed", self.topic)
 
     def _apply_backpressure(self) -> None:

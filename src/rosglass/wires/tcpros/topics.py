@@ -173,7 +173,7 @@ class Topics:
 
         def ask(node: NodeName) -> None:
             header = {}
-            with suppress(Error):
+            with suppress(Error):  # it is listed without its header
                 header = self.header(topic, node, limit)
             answers.put((node, header))
 

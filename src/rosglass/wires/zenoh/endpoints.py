@@ -434,7 +434,7 @@ def receive_directly(callback: Callable[[Any], None]) -> Any:
     def guarded(item: Any) -> None:
         try:
             callback(item)
-        except Exception:  # Zenoh would only print it
+        except Exception:  # noqa: BLE001 - Zenoh would only print it
             _log.exception(_FAILURE)
 
     return zenoh.handlers.Callback(guarded, indirect=False)
@@ -482,7 +482,7 @@ class Pump:
         for item in self._items:
             try:
                 callback(item)
-            except Exception:  # noqa: PERF203 - a failure must not end the thread
+            except Exception:  # noqa: BLE001, PERF203 - a failure must not end the thread
                 _log.exception(_FAILURE)
 
 

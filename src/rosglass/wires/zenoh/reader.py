@@ -343,7 +343,7 @@ class ZenohReader(Declaration, Reader):
             self._count += 1
             try:
                 self._on_sample(data, time.time_ns(), sent, gid, sequence, type_hash)
-            except Exception:
+            except Exception:  # noqa: BLE001 - the sending thread must go on
                 self._log_failure()
 
     def _release(self) -> None:
@@ -458,7 +458,7 @@ class ZenohReader(Declaration, Reader):
             if lifespan and gid and self._latency.add(gid, received, sent) > lifespan:
                 return
             self._on_sample(data, received, sent, gid, sequence, type_hash)
-        except Exception:
+        except Exception:  # noqa: BLE001 - the next samples must be received
             self._log_failure()
 
     def _check_rate(self) -> None:

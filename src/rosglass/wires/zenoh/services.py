@@ -145,7 +145,7 @@ class _ReplyHandler:
     def __call__(self, reply: zenoh.Reply) -> None:
         try:
             self._requester.on_reply(self._number, reply)
-        except Exception:
+        except Exception:  # noqa: BLE001 - Zenoh would only print it
             _log.exception("handling a reply failed")
 
 
@@ -427,7 +427,7 @@ def _open_query(query: Any, note: Attachment, name: str) -> OpenRequest:
         send(reply, len(data), f"{name} reply")
 
     def refuse(reason: str, instead: bytes | bytearray | None) -> None:
-        with suppress(zenoh.ZError):
+        with suppress(zenoh.ZError):  # the client, or the session, is gone
             query.reply_err(reason.encode())
         if instead is None:
             query.drop()
