@@ -61,9 +61,6 @@ def imports(path: Path) -> set[str]:
 
 
 def room_of(parts: Sequence[str]) -> str:
-    # The seam is the client layer's lower edge: wires stand above it, and import it.
-    if tuple(parts[:2]) == ("wires", "base"):
-        return "comm"
     # ROS 1's protocols stand above their wire, which all of them know.
     return "wires/tcpros" if tuple(parts[:2]) == ("wires", "tcpros") else parts[0]
 

@@ -19,6 +19,7 @@ from rosglass.comm import (
     Time,
 )
 from rosglass.comm.types import Types
+from rosglass.comm.wire import Writer
 from rosglass.errors import (
     ConversionError,
     TypeNotFoundError,
@@ -27,7 +28,6 @@ from rosglass.errors import (
 from rosglass.interfaces.names import join_name
 from rosglass.messages import MessageType, OpaqueType
 from rosglass.ros2.node import Ros2Node
-from rosglass.wires.base import Writer
 from rosglass.wires.local import LocalMiddleware, LocalWriter
 
 if TYPE_CHECKING:

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm.graph import EndpointInfo, NodeName
+    from rosglass.comm.wire import Middleware, Writer
     from rosglass.messages import MessageType
-    from rosglass.wires.base import Middleware, Writer
 
 __all__ = [
     "NodeCore",

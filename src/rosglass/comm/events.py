@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rosglass.comm.graph import EndpointInfo
     from rosglass.comm.handle import Executor
     from rosglass.comm.qos import QoS
-    from rosglass.wires.base import Middleware
+    from rosglass.comm.wire import Middleware
 
 __all__ = [
     "DeadlineMissed",

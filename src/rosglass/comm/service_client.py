@@ -14,6 +14,7 @@ from rosglass.comm.handle import Handle, check_may_wait
 from rosglass.comm.promise import Promise, check_timeout
 from rosglass.comm.rclpy_names import hint_at_members
 from rosglass.comm.service_server import decode_checked, served_by_this_thread
+from rosglass.comm.wire import CALL_DROPPED, SERVER_LEFT
 from rosglass.errors import (
     ConnectionLostError,
     ConversionError,
@@ -25,15 +26,14 @@ from rosglass.errors import (
     TimeoutError,  # noqa: A004 - the field's own word
     UnsupportedError,
 )
-from rosglass.wires.base import CALL_DROPPED, SERVER_LEFT
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from rosglass.comm.core import NodeCore
     from rosglass.comm.qos import QoS
+    from rosglass.comm.wire import OnReply
     from rosglass.messages import Message, ServiceType
-    from rosglass.wires.base import OnReply
 
 __all__ = ["Call", "PendingCall", "ServiceClient", "ServiceRequester"]
 

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from rosglass.comm.core import NodeCore
     from rosglass.comm.handle import Executor
     from rosglass.comm.qos import QoS
+    from rosglass.comm.wire import OnRequest, Replier, RequestId
     from rosglass.messages import Message, MessageType, ServiceType
-    from rosglass.wires.base import OnRequest, Replier, RequestId
 
 __all__ = ["Answer", "ServiceServer", "decode_checked", "served_by_this_thread"]
 

@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from rosglass.comm.graph import EndpointInfo, NodeName, Status
     from rosglass.comm.qos import QoS
     from rosglass.comm.statistics import Statistics
+    from rosglass.comm.wire import Reader
     from rosglass.messages import Message, MessageType
-    from rosglass.wires.base import Reader
 
 __all__ = [
     "Problem",

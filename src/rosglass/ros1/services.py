@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from rosglass.comm import Answer, EndpointInfo, Executor
     from rosglass.comm.service_client import PendingCall
+    from rosglass.comm.wire import OnReply, OnRequest
     from rosglass.messages import Message, ServiceType
-    from rosglass.wires.base import OnReply, OnRequest
     from rosglass.wires.tcpros.core import TcprosCore
     from rosglass.wires.tcpros.node import TcprosNode
     from rosglass.wires.tcpros.service_replier import TcprosReplier

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rosglass.comm.graph import Graph
+    from rosglass.comm.wire import Middleware, Writer
     from rosglass.ros2.node import Ros2Node
-    from rosglass.wires.base import Middleware, Writer
 
 __all__ = ["Graph", "Middleware", "Ros2Node", "Writer"]
 
 _HOME_OF = {
     "Graph": "rosglass.comm.graph",
-    "Middleware": "rosglass.wires.base",
+    "Middleware": "rosglass.comm.wire",
     "Ros2Node": "rosglass.ros2.node",
-    "Writer": "rosglass.wires.base",
+    "Writer": "rosglass.comm.wire",
 }
 
 

@@ -64,10 +64,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm import Call
+    from rosglass.comm.wire import OnSample, Reader
     from rosglass.messages import ActionType, Message, MessageType
     from rosglass.ros2.action_types import ActionTypes
     from rosglass.ros2.core import Core
-    from rosglass.wires.base import OnSample, Reader
 
 __all__ = ["Ros2ActionClient", "Ros2ClientGoal"]
 

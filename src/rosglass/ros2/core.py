@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
 
     from rosglass.comm import NodeName
+    from rosglass.comm.wire import Middleware
     from rosglass.interfaces import Library
     from rosglass.ros2.ros_arguments import Arguments
-    from rosglass.wires.base import Middleware
 
 __all__ = ["REQUEST_LIMIT", "Core", "RequestWindow"]
 

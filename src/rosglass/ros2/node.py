@@ -43,11 +43,11 @@ if TYPE_CHECKING:
         ServiceServer,
     )
     from rosglass.comm.action_server import Result
+    from rosglass.comm.wire import Middleware
     from rosglass.interfaces import Library
     from rosglass.messages import ActionType, Message, MessageType, ServiceType
     from rosglass.ros2.parameters import Change
     from rosglass.ros2.ros_arguments import Arguments
-    from rosglass.wires.base import Middleware
 
 __all__ = ["RclServices", "Ros2Node"]
 

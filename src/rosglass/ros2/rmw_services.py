@@ -22,6 +22,7 @@ from rosglass.comm.core import NodeMember
 from rosglass.comm.names import similar
 from rosglass.comm.service_client import Call, PendingCall, ServiceClient, ServiceRequester
 from rosglass.comm.service_server import ServiceServer
+from rosglass.comm.wire import SERVER_LEFT, Replier, RequestId
 from rosglass.errors import Error, NodeClosedError, ServiceError
 from rosglass.ros2.announced import (
     Announced,
@@ -32,16 +33,15 @@ from rosglass.ros2.announced import (
     nodes_of,
 )
 from rosglass.ros2.core import REQUEST_LIMIT, RequestWindow
-from rosglass.wires.base import SERVER_LEFT, Replier, RequestId
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Mapping, Sequence
 
     from rosglass.comm import Answer, Executor
     from rosglass.comm.timers import Timers
+    from rosglass.comm.wire import OnReply, OnRequest, Requester
     from rosglass.messages import Message, ServiceType
     from rosglass.ros2.core import Core
-    from rosglass.wires.base import OnReply, OnRequest, Requester
 
 __all__ = [
     "HOLD_S",

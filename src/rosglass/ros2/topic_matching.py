@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from rosglass.comm import Handle, QoS, Timers
     from rosglass.comm.subscription import SubscriptionFeed
     from rosglass.comm.types import Types
+    from rosglass.comm.wire import OnSample, Reader
     from rosglass.messages import MessageType
     from rosglass.ros2.core import Core
-    from rosglass.wires.base import OnSample, Reader
 
 __all__ = ["DuplicateFilter", "GraphMatching", "TopicTypes"]
 

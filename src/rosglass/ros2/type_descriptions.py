@@ -54,10 +54,10 @@ if TYPE_CHECKING:
 
     from rosglass.comm import EndpointInfo, NodeName, ServiceClient
     from rosglass.comm.types import Types
+    from rosglass.comm.wire import Middleware
     from rosglass.interfaces import Definition, InterfaceDefinition
     from rosglass.messages import ActionType, Message, MessageType
     from rosglass.ros2.core import Core
-    from rosglass.wires.base import Middleware
 
     AnyType: TypeAlias = MessageType | ServiceType | ActionType
     _Users: TypeAlias = Mapping[str, Sequence[EndpointInfo]]

@@ -19,8 +19,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
 from rosglass.comm import ConnectionState, Durability, EndpointKind, Handle, History, Status
-from rosglass.errors import ArgumentError, NodeClosedError
-from rosglass.wires.base import (
+from rosglass.comm.wire import (
     SERVER_LEFT,
     Middleware,
     OnReply,
@@ -32,6 +31,7 @@ from rosglass.wires.base import (
     RequestId,
     Writer,
 )
+from rosglass.errors import ArgumentError, NodeClosedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable

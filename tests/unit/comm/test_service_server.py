@@ -10,8 +10,8 @@ from rosglass.comm import QoS
 from rosglass.comm.executor import IMMEDIATE, LoopExecutor
 from rosglass.comm.handle import Executor
 from rosglass.comm.service_server import ServiceServer
+from rosglass.comm.wire import Replier, RequestId
 from rosglass.messages import load
-from rosglass.wires.base import Replier, RequestId
 
 ADD: Any = load("rospy_tutorials/AddTwoInts", ros=1)
 

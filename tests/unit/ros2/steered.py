@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from rosglass.comm import Handle
     from rosglass.comm.graph import Graph
-    from rosglass.wires.base import OnReply, OnRequest, OnSample, RequestId
+    from rosglass.comm.wire import OnReply, OnRequest, OnSample, RequestId
 
 SERVER, CLIENT = EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT
 

@@ -16,10 +16,10 @@ from rosglass.comm import (
     GoalStatus,
     Time,
 )
+from rosglass.comm.wire import SERVER_LEFT
 from rosglass.interfaces import Library
 from rosglass.ros2 import Ros2Node
 from rosglass.ros2.action_server import _cancelable
-from rosglass.wires.base import SERVER_LEFT
 
 pytestmark = pytest.mark.usefixtures("quick")
 

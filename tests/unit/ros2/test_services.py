@@ -21,11 +21,11 @@ from rosglass.comm import (
     NodeName,
     Promise,
 )
+from rosglass.comm.wire import CALL_DROPPED, SERVER_LEFT, RequestId
 from rosglass.interfaces import Library
 from rosglass.ros2 import Ros2Node
 from rosglass.ros2.core import RequestWindow
 from rosglass.ros2.rmw_services import ActionServiceClient, ReplyPacer
-from rosglass.wires.base import CALL_DROPPED, SERVER_LEFT, RequestId
 
 pytestmark = pytest.mark.usefixtures("quick")
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Durability, History, Reliability
 from rosglass.comm.names import mangle_type
+from rosglass.comm.wire import Reader, Writer
 from rosglass.errors import NodeClosedError, TimeoutError  # noqa: A004 - the field's own word
-from rosglass.wires.base import Reader, Writer
 from rosglass.wires.dds import cyclone
 from rosglass.wires.dds.cyclone import (
     Event,
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm import EndpointInfo, QoS
-    from rosglass.wires.base import OnSample
+    from rosglass.comm.wire import OnSample
     from rosglass.wires.dds.participant import Participant
 
 __all__ = ["DdsReader", "DdsWriter", "SampleReader", "SampleWriter", "Taken", "topic_name"]

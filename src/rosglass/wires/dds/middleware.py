@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rosglass.comm import ConnectionState, EndpointKind, Handle, Status
+from rosglass.comm.wire import Middleware, Reader, Replier, Requester, Writer
 from rosglass.errors import DecodeError, Error, NodeClosedError
-from rosglass.wires.base import Middleware, Reader, Replier, Requester, Writer
 from rosglass.wires.dds import cyclone
 from rosglass.wires.dds.cyclone import BuiltinTopic, Discovered, Event, matched_publication, take
 from rosglass.wires.dds.domain import DdsOptions
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
     from rosglass.comm import EndpointInfo, NodeName
     from rosglass.comm.graph import Graph
+    from rosglass.comm.wire import OnReply, OnRequest, OnSample
     from rosglass.interfaces import Definition
-    from rosglass.wires.base import OnReply, OnRequest, OnSample
 
 __all__ = ["DdsDiscovery", "DdsMiddleware"]
 

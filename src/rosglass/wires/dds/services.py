@@ -18,8 +18,8 @@ from collections import OrderedDict
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from rosglass.comm.wire import SERVER_LEFT, Replier, Requester, RequestId
 from rosglass.errors import NodeClosedError, ServiceError, TimeoutError, UnsupportedError  # noqa: A004
-from rosglass.wires.base import SERVER_LEFT, Replier, Requester, RequestId
 from rosglass.wires.dds import cyclone_identity
 from rosglass.wires.dds.cyclone_identity import UNKNOWN_GUID, Identity, Origin
 from rosglass.wires.dds.cyclone_samples import COPIED
@@ -38,7 +38,7 @@ from rosglass.wires.dds.service_endpoints import (
 if TYPE_CHECKING:
     from rosglass.comm import EndpointInfo
     from rosglass.comm.graph import Graph
-    from rosglass.wires.base import OnReply, OnRequest
+    from rosglass.comm.wire import OnReply, OnRequest
     from rosglass.wires.dds.cyclone import Discovered
     from rosglass.wires.dds.endpoints import Taken
     from rosglass.wires.dds.participant import Participant
@@ -162,7 +162,7 @@ class DdsRequester(Requester):
         return self._scheme is not None and not self._endpoints.closed
 
     def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:
-        """Send a request; see :meth:`rosglass.wires.base.Requester.send`."""
+        """Send a request; see :meth:`rosglass.comm.wire.Requester.send`."""
         if self._endpoints.closed:
             raise NodeClosedError(f"the client of {self._service} is closed")
         with self._lock:

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rosglass.comm import Handle, NodeName
+    from rosglass.comm.wire import OnRequest
     from rosglass.messages import ServiceType
-    from rosglass.wires.base import OnRequest
     from rosglass.wires.tcpros.core import AnnouncedTypes, TcprosOptions
 
 __all__ = ["TcprosNode", "max_connections"]

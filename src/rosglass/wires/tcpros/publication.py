@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import Durability, EndpointInfo, EndpointKind, History, NodeName
 from rosglass.comm.inbox import INBOX_LIMIT
+from rosglass.comm.wire import Writer
 from rosglass.errors import ConversionError, DefinitionConflictError, UnsupportedError
 from rosglass.interfaces import ros1_name
 from rosglass.messages import OpaqueType
-from rosglass.wires.base import Writer
 from rosglass.wires.tcpros.connection import ANY, Frame
 from rosglass.wires.tcpros.graph import split
 from rosglass.wires.tcpros.registrations import Member

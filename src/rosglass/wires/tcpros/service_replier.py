@@ -15,17 +15,17 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm import EndpointKind
 from rosglass.comm.log_limits import LogOnce
+from rosglass.comm.wire import Replier, RequestId
 from rosglass.errors import ServiceError
 from rosglass.interfaces import ros1_name
-from rosglass.wires.base import Replier, RequestId
 from rosglass.wires.tcpros.connection import ANY, MAX_FRAME
 from rosglass.wires.tcpros.registrations import Member
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rosglass.comm.wire import OnRequest
     from rosglass.messages import ServiceType
-    from rosglass.wires.base import OnRequest
     from rosglass.wires.tcpros.connection import Connection
     from rosglass.wires.tcpros.core import TcprosCore
     from rosglass.wires.tcpros.io_loop import IoLoop

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from rosglass.comm.service_client import PendingCall
+    from rosglass.comm.wire import OnReply
     from rosglass.messages import ServiceType
-    from rosglass.wires.base import OnReply
     from rosglass.wires.tcpros.core import TcprosCore
     from rosglass.wires.tcpros.master import Master
 

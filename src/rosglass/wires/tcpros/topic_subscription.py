@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 from rosglass.comm import EndpointInfo, EndpointKind, NodeName, Sample
 from rosglass.comm.subscription import Problem, TopicMatching
+from rosglass.comm.wire import Reader
 from rosglass.errors import (
     ConnectionLostError,
     ConversionError,
@@ -29,7 +30,6 @@ from rosglass.errors import (
 from rosglass.interfaces import join_name, ros1_name
 from rosglass.interfaces.counterparts import RENAMED
 from rosglass.messages import OpaqueType
-from rosglass.wires.base import Reader
 from rosglass.wires.tcpros.arrivals import BacklogMonitor, SilenceMonitor
 from rosglass.wires.tcpros.connection import ANY, Connection
 from rosglass.wires.tcpros.graph import split

@@ -16,8 +16,8 @@ import zenoh
 import zenoh.ext
 
 from rosglass.comm import ConnectionState, Durability, Handle, History, Reliability
+from rosglass.comm.wire import Writer
 from rosglass.errors import ConnectionLostError, NodeClosedError
-from rosglass.wires.base import Writer
 from rosglass.wires.zenoh.command_window import CommandWindow
 from rosglass.wires.zenoh.keys import ATTACHMENT_FULL, HUMBLE_HASH, gid_of, topic_key, without_hash
 

@@ -23,8 +23,7 @@ from rosglass.comm import (
     Status,
 )
 from rosglass.comm.timers import Timers
-from rosglass.errors import ConnectionLostError, Error, NodeClosedError
-from rosglass.wires.base import (
+from rosglass.comm.wire import (
     Middleware,
     OnReply,
     OnRequest,
@@ -34,6 +33,7 @@ from rosglass.wires.base import (
     Requester,
     Writer,
 )
+from rosglass.errors import ConnectionLostError, Error, NodeClosedError
 from rosglass.wires.zenoh.endpoints import (
     CHANNEL,
     Announcement,

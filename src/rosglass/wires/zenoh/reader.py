@@ -23,7 +23,7 @@ import zenoh.ext
 
 from rosglass.comm import Durability, EndpointKind, Reliability
 from rosglass.comm.statistics import LatencyEstimator
-from rosglass.wires.base import OnSample, Reader
+from rosglass.comm.wire import OnSample, Reader
 from rosglass.wires.zenoh.endpoints import Declaration, Owner, Pump
 from rosglass.wires.zenoh.keys import ATTACHMENT, HUMBLE_HASH, NO_ATTACHMENT, topic_key
 

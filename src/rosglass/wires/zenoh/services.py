@@ -23,8 +23,7 @@ from typing import TYPE_CHECKING, Any
 import zenoh
 
 from rosglass.comm import ConnectionState, EndpointKind
-from rosglass.errors import ConnectionLostError, NodeClosedError
-from rosglass.wires.base import (
+from rosglass.comm.wire import (
     CALL_DROPPED,
     SERVER_LEFT,
     OnReply,
@@ -33,6 +32,7 @@ from rosglass.wires.base import (
     Requester,
     RequestId,
 )
+from rosglass.errors import ConnectionLostError, NodeClosedError
 from rosglass.wires.zenoh.endpoints import Declaration, Owner, receive_directly
 from rosglass.wires.zenoh.keys import (
     HUMBLE_HASH,
@@ -207,7 +207,7 @@ class ZenohRequester(Declaration, Requester):
         return bool(self._local_servers()) or bool(self._route()[1])
 
     def send(self, number: int, data: bytes | bytearray, timeout: float | None) -> None:
-        """Send a request; see :meth:`rosglass.wires.base.Requester.send`."""
+        """Send a request; see :meth:`rosglass.comm.wire.Requester.send`."""
         own, (key, others) = self._local_servers(), self._route()
         servers = others | {replier.gid for replier in own}
         call = _Call(zenoh.CancellationToken(), servers)
