@@ -15,7 +15,7 @@ from waiting import eventually
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-__all__ = ["HERE", "ROBOT", "THERE", "Cable"]
+__all__ = ["HERE", "ROBOT", "THERE", "Cable", "do"]
 
 #: The operator's and the robot's address.
 HERE, THERE = "10.77.0.1", "10.77.0.2"
@@ -48,21 +48,25 @@ class Cable:
         its = Path(f"/proc/{self._machine.pid}/ns/net")
         eventually(lambda: its.readlink() != own)
         self._there = ["nsenter", "-t", str(self._machine.pid), "-n"]
-        _do("ip link set lo up")
-        self._do_there("ip link set lo up")
-        _do(f"ip link add cable type veth peer name cable netns {self._machine.pid}")
-        _do(f"ip addr add {HERE}/24 dev cable")
-        self._do_there(f"ip addr add {THERE}/24 dev cable")
-        self._do_there("ip link set cable up")
+        do("ip link set lo up")
+        self.do_there("ip link set lo up")
+        self._lay(self._machine.pid)
+
+    def _lay(self, machine: int) -> None:
+        """Connect this machine and that whose namespace a process holds."""
+        do(f"ip link add cable type veth peer name cable netns {machine}")
+        do(f"ip addr add {HERE}/24 dev cable")
+        self.do_there(f"ip addr add {THERE}/24 dev cable")
+        self.do_there("ip link set cable up")
         self.plug()
 
     def plug(self) -> None:
         """Connect the machines."""
-        _do("ip link set cable up")
+        do("ip link set cable up")
 
     def unplug(self) -> None:
         """Cut the connection."""
-        _do("ip link set cable down")
+        do("ip link set cable down")
 
     def start(
         self, *command: str, env: Mapping[str, str] | None = None, ready: str = ""
@@ -94,9 +98,11 @@ class Cable:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _do_there(self, command: str) -> None:
+    def do_there(self, command: str) -> None:
+        """Run a command on the robot's machine."""
         subprocess.run([*self._there, *command.split()], check=True)
 
 
-def _do(command: str) -> None:
+def do(command: str) -> None:
+    """Run a command on this machine."""
     subprocess.run(command.split(), check=True)
