@@ -322,10 +322,8 @@ class TestStale:
 
     def test_after_the_timeout(self, live: Any, chat: Any, wait: Any) -> None:
         sub = live.property("sub")
-        started = time.monotonic()
         wait(lambda: sub.property("stale"))
-        assert 0.2 < time.monotonic() - started < 15
-        assert 0.2 < sub.property("age") < 15
+        assert sub.property("age") >= 0.3
         assert live.property("shown") == "x"
         chat.publish(data="y")
         wait(lambda: not sub.property("stale"))

@@ -102,6 +102,9 @@ def test_a_picture_too_many_is_none_that_was_dropped(
 def test_the_command_records_until_ctrl_c(app: Any, tmp_path: Path) -> None:
     video = tmp_path / "out.mp4"
     process = start_view("--record", str(video))
+    assert process.stderr is not None
+    # It is created before as well, to try whether that is possible.
+    assert any("recording to" in line for line in process.stderr)
     eventually(lambda: video.exists() or process.poll() is not None, timeout=60)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)

@@ -36,10 +36,14 @@ def test_jobs_run_in_order_of_time_on_one_thread(timers):
 
 def test_a_job_that_was_called_off_does_not_run(timers):
     done = queue.Queue()
-    handle = timers.after(0.02, lambda: done.put("called off"))
-    timers.after(0.04, lambda: done.put("kept"))
-    handle.close()
-    handle.close()
+
+    def begin():  # both jobs are due at once, but their thread is busy here
+        handle = timers.after(0, lambda: done.put("called off"))
+        timers.after(0, lambda: done.put("kept"))
+        handle.close()
+        handle.close()
+
+    timers.after(0, begin)
     assert done.get(timeout=30) == "kept"
     assert done.empty()
 
@@ -72,10 +76,10 @@ def test_closing_forgets_jobs_and_may_be_done_by_one(timers):
     ended, done = threading.Event(), threading.Event()
 
     def close():
+        timers.after(0, done.set)  # due, but this thread is busy with closing
         timers.close()
         ended.set()
 
-    timers.after(0.05, done.set)
     timers.after(0, close)
     assert ended.wait(30)
     timers.close()

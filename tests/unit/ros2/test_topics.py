@@ -196,10 +196,13 @@ def test_messages_in_time_keep_a_deadline(node, middleware, robot, eventually):
     eventually(lambda: len(events) >= 2)
     assert all(isinstance(event, DeadlineMissed) and event.change >= 1 for event in events)
     middleware.readers[0].receive(HELLO)
-    settled = len(events)
+    settled, received, missed = len(events), time.monotonic(), 0
     for _ in at_rate(0.005, 240):
         middleware.readers[0].receive(HELLO)
-    assert len(events) <= settled + 2, "six more would have come without messages"
+        # On a busy machine, some messages are late indeed.
+        before, received = received, time.monotonic()
+        missed += int((received - before) / 0.2)
+    assert len(events) <= settled + missed + 2, "six more would have come without messages"
 
 
 def test_the_middlewares_word_on_liveliness_is_believed(node, middleware, robot, eventually):
