@@ -82,6 +82,8 @@ Rectangle {
             textFormat: Text.PlainText
             width: parent.width
             wrapMode: Text.Wrap
+            maximumLineCount: 8
+            elide: Text.ElideRight
             text: (root.problem ? root.problem
                    : root.shown !== root.asked || !root.step ? "asking for iteration " + root.asked
                    : "stability " + root.step.stability.toFixed(2))

@@ -18,6 +18,8 @@ Column {
     Text {
         width: parent.width
         wrapMode: Text.Wrap
+        maximumLineCount: 8
+        elide: Text.ElideRight
         textFormat: Text.PlainText
         text: state_.stale ? "STATE UNKNOWN" : state_.message.data
         color: state_.stale ? Theme.bad : Theme.text
@@ -59,6 +61,8 @@ Column {
     Text {
         width: parent.width
         wrapMode: Text.Wrap
+        maximumLineCount: 8
+        elide: Text.ElideRight
         textFormat: Text.PlainText
         text: request.note
         color: request.failed ? Theme.bad : Theme.dim

@@ -60,10 +60,12 @@ Column {
     Text {
         width: parent.width
         wrapMode: Text.Wrap
+        maximumLineCount: 8
+        elide: Text.ElideRight
         textFormat: Text.PlainText
         text: request.note
         color: request.failed ? Theme.bad : Theme.dim
         font.pixelSize: 11
     }
-    Text { textFormat: Text.PlainText; id: refused; width: parent.width; wrapMode: Text.Wrap; color: Theme.bad; font.pixelSize: 11 }
+    Text { textFormat: Text.PlainText; id: refused; width: parent.width; wrapMode: Text.Wrap; maximumLineCount: 8; elide: Text.ElideRight; color: Theme.bad; font.pixelSize: 11 }
 }

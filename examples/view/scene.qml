@@ -28,6 +28,8 @@ ApplicationWindow {
         text: view.problem
         textFormat: Text.PlainText
         wrapMode: Text.Wrap
+        maximumLineCount: 8
+        elide: Text.ElideRight
         color: "white"
         background: Rectangle { color: "#c62818" }
     }

@@ -135,3 +135,68 @@ def test_labels_are_plain_whatever_version_is_imported(version: str, bench: Any)
         f"import QtQuick 2.15\nimport QtQuick.Controls.impl {version}",
     )
     assert root.property("label").startswith("IconLabel_")
+
+
+LONG_WORD = "x" * 50_000
+
+
+def test_tool_tips_show_limited_plain_text(bench: Any) -> None:
+    """Tool tips that are attached have no text format to choose."""
+    root: Any = bench.load(
+        """Item {
+            id: root
+            property string late
+            ToolTip { id: initial; text: HOSTILE }
+            ToolTip { id: changed; text: root.late }
+            ToolTip { id: short_; text: "two words" }
+            ToolTip { id: own; text: HOSTILE; contentItem: Text { textFormat: Text.StyledText } }
+            Item { id: attached; ToolTip.text: HOSTILE }
+            function tip(t) {
+                const label = t.contentItem
+                return [label.textFormat === Text.PlainText, label.lineCount, label.truncated]
+            }
+            function tips() {
+                attached.ToolTip.toolTip.text = WORD
+                return JSON.stringify(
+                    [initial, changed, short_, own, attached.ToolTip.toolTip].map(tip))
+            }
+        }""".replace("HOSTILE", json.dumps(HOSTILE)).replace("WORD", json.dumps(LONG_WORD)),
+        "import QtQuick 2.15\nimport QtQuick.Controls 2.15",
+    )
+    root.setProperty("late", HOSTILE)
+    initial, changed, short, own, attached = json.loads(root.tips())
+    assert initial[0]
+    assert changed[0]
+    assert short == [True, 1, False]
+    assert not own[0]
+    assert attached[0]
+    assert attached[1] <= 40
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_a_tool_tip_opens_no_image_and_wraps_no_long_word(
+    style: str, start: Any, tmp_path: Path
+) -> None:
+    file = tmp_path / "Main.qml"
+    file.write_text("""import QtQuick 2.15
+import QtQuick.Controls 2.15
+ApplicationWindow {
+    width: 600; height: 400; visible: true
+    Item { ToolTip { id: image; visible: true; text: "<img src='file:///nothing.png'>" } }
+    Item { ToolTip { id: word; visible: true; text: "x".repeat(50000) } }
+    Item { id: attached }
+    Timer {
+        running: true
+        interval: 1
+        onTriggered: {
+            attached.ToolTip.show("<img src='file:///nothing.png'>")
+            console.log("bounded:", word.contentItem.lineCount <= 40)
+        }
+    }
+}
+""")
+    program = start("run", file, QT_QUICK_CONTROLS_STYLE=style)
+    assert "bounded: true" in program.until("bounded:")
+    program.kill(15)
+    assert program.end() == 143
+    assert "nothing.png" not in program.text

@@ -79,16 +79,26 @@ def elements_of(file: Path) -> Iterator[Element]:
 
 
 def problem(element: Element) -> str:
-    """Return what an element may show as rich text; empty for nothing."""
+    """Return what may show rich text, or take long to wrap a long word; empty for nothing.
+
+    For ``Text.Wrap`` without ``maximumLineCount``, it grows with the square of a word's length.
+    """
     bound = re.search(r"(?:^|[\s;])(?:text|title|displayText)[ \t]*:[ \t]*", element.outline)
     value = element.text[bound.end() :].partition("\n")[0] if bound else ""
     if element.kind in TEXTS:
-        if re.search(r"textFormat\s*:\s*Text\.PlainText\b", element.outline):
-            return ""
         name = re.search(r"\bid\s*:\s*(\w+)", element.outline)
         assigned = name and re.search(rf"\b{name[1]}\.text\s*=[^=]", element.file_text)
         written = re.match(rf"(?:qsTr\()?{LITERAL}\)?[ \t]*(?:[;}}]|$|//)", value)
-        return "" if written and not assigned else f"{element.kind} without textFormat"
+        if written and not assigned:
+            return ""
+        wraps = re.search(
+            r"wrapMode\s*:\s*Text\.Wrap(?:AtWordBoundaryOrAnywhere)?\b", element.outline
+        )
+        if wraps and "maximumLineCount" not in element.outline:
+            return f"{element.kind} wraps without maximumLineCount"
+        if re.search(r"textFormat\s*:\s*Text\.PlainText\b", element.outline):
+            return ""
+        return f"{element.kind} without textFormat"
     if element.kind == "ComboBox":  # its own text is in a text field, which shows plain text
         return "" if "delegate" in element.outline else "ComboBox without a delegate"
     if element.kind in CONTROLS and bound and "contentItem" not in element.outline:
@@ -118,6 +128,9 @@ def test_texts_are_plain() -> None:
         ("Label { text: robot.name; Item { property int textFormat: Text.PlainText } }", True),
         ("Label { id: note }", True),
         ('Item { Label { id: note; text: "a" } function f(x) { note.text = x } }', True),
+        ("Text { text: a.b; textFormat: Text.PlainText; wrapMode: Text.Wrap }", True),
+        ("Text { text: a.b; textFormat: Text.PlainText; wrapMode: Text.WordWrap }", False),
+        ("Text { text: 'a b'; wrapMode: Text.Wrap }", False),
         ("Button { text: sub.message.data }", True),
         ('Button { text: isOn ? "On" : "Off" }', False),
         ("ToolTip { text: status.name }", True),

@@ -167,6 +167,8 @@ Item {
                         : view.reason || camera.problem
                     color: Theme.dim
                     wrapMode: Text.Wrap
+                    maximumLineCount: 8
+                    elide: Text.ElideRight
                     horizontalAlignment: Text.AlignHCenter
                     font.pixelSize: Theme.normal
                 }

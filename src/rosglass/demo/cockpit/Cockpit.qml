@@ -148,6 +148,8 @@ Item {
             textFormat: Text.PlainText
             color: Theme.warn
             wrapMode: Text.Wrap
+            maximumLineCount: 8
+            elide: Text.ElideRight
             horizontalAlignment: Text.AlignHCenter
             font { pixelSize: Theme.normal; weight: Font.DemiBold }
         }

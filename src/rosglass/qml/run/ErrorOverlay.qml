@@ -18,6 +18,8 @@ Rectangle {
         font.family: "monospace"
         font.pixelSize: 15
         wrapMode: Text.Wrap
+        maximumLineCount: 100
+        elide: Text.ElideRight
         textFormat: Text.PlainText
         text: overlay.heading + "\n\n" + overlay.text
     }

@@ -46,6 +46,8 @@ Rectangle {
             font.bold: true
             font.pixelSize: 14
             wrapMode: Text.Wrap
+            maximumLineCount: 100
+            elide: Text.ElideRight
             textFormat: Text.PlainText
             text: panel.heading
         }
@@ -56,6 +58,8 @@ Rectangle {
             font.family: "monospace"
             font.pixelSize: 13
             wrapMode: Text.Wrap
+            maximumLineCount: 100
+            elide: Text.ElideRight
             textFormat: Text.PlainText
             text: panel.text
         }

@@ -10,7 +10,7 @@ import warnings
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error, QmlError
@@ -133,14 +133,52 @@ def is_own_window(file: Path) -> bool:
     return file.parent == _OWN
 
 
-#: Module of Qt's that has the labels of controls, and the versions of ours: all but that which our
-#: file imports.
-_IMPL, _IMPL_VERSIONS = "QtQuick.Controls.impl", [(2, 4), (6, 0)] if QT6 else [(2, 4)]
-#: Qt's plugin with this module, and the module to load it by.
-_IMPL_PLUGIN, _IMPL_LOADER = (
-    ("QtQuick/Controls/impl/*qtquickcontrols2implplugin.*", _IMPL)
+class _Replaced(NamedTuple):
+    """A type of Qt's controls whose place a QML file of ours takes."""
+
+    module: str
+    name: str
+    #: All versions but that which our file imports.
+    versions: list[tuple[int, int]]
+    #: Qt's plugin with the module, and the module to load it by.
+    plugin: str
+    loader: str
+
+
+_REPLACED = (
+    [
+        _Replaced(
+            "QtQuick.Controls.impl",
+            "IconLabel",
+            [(2, 4), (6, 0)],
+            "QtQuick/Controls/impl/*qtquickcontrols2implplugin.*",
+            "QtQuick.Controls.impl",
+        ),
+        _Replaced(
+            "QtQuick.Templates",
+            "ToolTip",
+            [(2, 6), (6, 9)],
+            "QtQuick/Templates/*qtquicktemplates2plugin.*",
+            "QtQuick.Templates",
+        ),
+    ]
     if QT6
-    else ("QtQuick/Controls.2/*qtquickcontrols2plugin.*", "QtQuick.Controls")
+    else [
+        _Replaced(
+            "QtQuick.Controls.impl",
+            "IconLabel",
+            [(2, 4)],
+            "QtQuick/Controls.2/*qtquickcontrols2plugin.*",
+            "QtQuick.Controls",
+        ),
+        _Replaced(
+            "QtQuick.Templates",
+            "ToolTip",
+            [(2, 6)],
+            "QtQuick/Templates.2/*qtquicktemplates2plugin.*",
+            "QtQuick.Templates",
+        ),
+    ]
 )
 #: QQmlPrivate::qmlregister(), mangled by the Itanium C++ ABI, and its argument for a QML file.
 _REGISTER, _COMPOSITE = "_ZN11QQmlPrivate11qmlregisterENS_16RegistrationTypeEPv", 4
@@ -160,24 +198,27 @@ class _CompositeType(ctypes.Structure):
 
 @cache
 def show_plain_labels() -> None:
-    """Let buttons, menu items and delegates show plain text; only the first call has an effect.
+    """Let controls show plain text of limited length; only the first call has an effect.
 
-    Qt's IconLabel makes its text without a context, and crashes at the first image in it: one text
-    of a robot would end the interface. Of two types of one name, Qt takes the one that was
-    registered last, so ours follows Qt's own.
+    These are buttons, menu items, delegates and tool tips. Qt's IconLabel makes its text without a
+    context, and crashes at the first image in it: one text of a robot would end the interface. A
+    tool tip that is attached has no text format to choose, and takes seconds to wrap a long word.
+
+    Of two types of one name, Qt takes the one that was registered last, so ours follow Qt's own.
     """
     folder = Path(_qml_folder())
-    plugin = next((p for p in folder.glob(_IMPL_PLUGIN) if p.suffix in _LIBRARIES), None)
-    if plugin is None:
-        return  # without controls
+    done = True
     handler = QtCore.qInstallMessageHandler(lambda *_: None)  # "it cannot be protected"
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)
-            engine: Any = QtQml.QQmlEngine()
-            engine.importPlugin(str(plugin), _IMPL_LOADER, [])
-        file = Path(IMPORT_PATHS[1], "Rosglass/Controls/IconLabel.qml")
-        done = all(_register_label(file, *version) for version in _IMPL_VERSIONS)
+        for replaced in _REPLACED:
+            plugin = next((p for p in folder.glob(replaced.plugin) if p.suffix in _LIBRARIES), None)
+            if plugin is None:
+                continue  # without controls
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", DeprecationWarning)
+                engine: Any = QtQml.QQmlEngine()
+                engine.importPlugin(str(plugin), replaced.loader, [])
+            done &= all(_register_file(replaced, *version) for version in replaced.versions)
     except (OSError, AttributeError):
         done = False
     finally:
@@ -197,17 +238,19 @@ def _qml_folder() -> str:
     return str(info.location(info.Qml2ImportsPath))
 
 
-def _register_label(file: Path, major: int, minor: int) -> bool:
-    """Register a QML file as the IconLabel of Qt's module; return whether Qt accepts it."""
+def _register_file(replaced: _Replaced, major: int, minor: int) -> bool:
+    """Register our QML file in the place of a type of Qt's; return whether Qt accepts it."""
+    file = Path(IMPORT_PATHS[1], f"Rosglass/Controls/{replaced.name}.qml")
     url = QtCore.QUrl.fromLocalFile(str(file))
     if QT6:
         register: Any = QtQml.qmlRegisterType
-        return int(register(url, _IMPL, major, minor, "IconLabel")) >= 0
+        return int(register(url, replaced.module, major, minor, replaced.name)) >= 0
     # PySide2 registers Python's classes only.
     call = ctypes.CDLL(_LIBRARY)[_REGISTER]
     call.restype, call.argtypes = ctypes.c_int, [ctypes.c_int, ctypes.c_void_p]
     pointer = ctypes.c_void_p.from_address(address(url)).value
-    made = _CompositeType(pointer, _IMPL.encode(), major, minor, b"IconLabel")
+    uri, name = replaced.module.encode(), replaced.name.encode()
+    made = _CompositeType(pointer, uri, major, minor, name)
     return int(call(_COMPOSITE, ctypes.byref(made))) >= 0
 
 

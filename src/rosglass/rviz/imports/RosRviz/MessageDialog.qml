@@ -20,5 +20,7 @@ Dialog {
         width: Math.min(implicitWidth, 400)
         textFormat: Text.PlainText
         wrapMode: Text.Wrap
+        maximumLineCount: 20
+        elide: Text.ElideRight
     }
 }

@@ -280,6 +280,8 @@ Pane {
             text: panel.problem
             textFormat: Text.PlainText
             wrapMode: Text.Wrap
+            maximumLineCount: 20
+            elide: Text.ElideRight
             color: "#c62818"
         }
         RowLayout {
@@ -398,6 +400,8 @@ Pane {
                     visible: choices.count === 0
                     horizontalAlignment: Text.AlignHCenter
                     wrapMode: Text.Wrap
+                    maximumLineCount: 20
+                    elide: Text.ElideRight
                     textFormat: Text.PlainText
                     text: adding.topics.length === 0 && tabs.currentIndex === 0 ? "The robot publishes nothing that a display shows."
                         : others.length === 0 ? "Nothing has these words."

@@ -13,6 +13,8 @@ ToolTip {
         text: tip.plain
         textFormat: Text.PlainText
         wrapMode: Text.Wrap
+        maximumLineCount: 40
+        elide: Text.ElideRight
         color: tip.palette.toolTipText
     }
 }

@@ -82,6 +82,6 @@ Pane {
                 }
             }
         }
-        Label { Layout.fillWidth: true; visible: panel.problem !== ""; text: panel.problem; textFormat: Text.PlainText; wrapMode: Text.Wrap; color: "#c62818" }
+        Label { Layout.fillWidth: true; visible: panel.problem !== ""; text: panel.problem; textFormat: Text.PlainText; wrapMode: Text.Wrap; maximumLineCount: 20; elide: Text.ElideRight; color: "#c62818" }
     }
 }

@@ -227,6 +227,8 @@ Page {
         text: page.scene.problem
         textFormat: Text.PlainText
         wrapMode: Text.Wrap
+        maximumLineCount: 20
+        elide: Text.ElideRight
         padding: 12
         color: "white"
         background: Rectangle { color: "#c0801010"; radius: 6 }
