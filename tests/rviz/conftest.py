@@ -270,9 +270,9 @@ def steered(app: Any, wait: Callable[..., None]) -> Iterator[Any]:
 @pytest.fixture
 def eye(app: Any) -> Callable[[], tuple[float, float, float]]:
     """Return where Ogre's camera is once RViz has drawn."""
-    from rosglass.rviz.camera import Camera
+    from rosglass.rviz.camera import RvizCamera
 
-    made = Camera(app.window)
+    made = RvizCamera(app.window)
 
     def where() -> tuple[float, float, float]:
         made.update()

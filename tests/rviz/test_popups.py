@@ -111,14 +111,14 @@ def test_anchor_is_at_the_place(hand: Any, app: Any, anchor: str, corner: Any) -
 
 
 def test_popup_follows_a_point(hand: Any, app: Any, view: Any) -> None:
-    from rosglass.rviz.camera import Camera
+    from rosglass.rviz.camera import RvizCamera
     from rosglass.rviz.popup import Popup
 
     popup = app.add(Popup(label(), "Point"))
     popup.follow(app.rviz.trackers, (1, 0, 0))
 
     def right() -> bool:
-        seen = Camera(app.window).project((1, 0, 0))
+        seen = RvizCamera(app.window).project((1, 0, 0))
         at = popup.content.geometry().center()
         return bool(abs(at.x() - seen.x) < 3 and abs(at.y() - seen.y) < 3)
 
@@ -127,7 +127,7 @@ def test_popup_follows_a_point(hand: Any, app: Any, view: Any) -> None:
     app.window.manager.getViewManager().getCurrent().subProp("Yaw").setValue(view("Yaw") + 1)
     hand.wait(lambda: popup.content.geometry().center() != before and right())
     # Behind the camera, it is not seen.
-    x, y, z = Camera(app.window).eye
+    x, y, z = RvizCamera(app.window).eye
     popup.follow(app.rviz.trackers, (2 * x, 2 * y, 2 * z))
     assert not popup.content.isVisible()
     # Nor where nobody knows its frame, which is told.
@@ -170,7 +170,7 @@ def test_bad_popups_are_refused(app: Any) -> None:
 
 
 def test_qml_popup_follows_a_point_and_is_moved(hand: Any, app: Any, show: Any) -> None:
-    from rosglass.rviz.camera import Camera
+    from rosglass.rviz.camera import RvizCamera
 
     root = show(
         """import RosRviz 1.0
@@ -185,7 +185,7 @@ def test_qml_popup_follows_a_point_and_is_moved(hand: Any, app: Any, show: Any) 
         return left + wide / 2, top + high / 2
 
     def right() -> bool:
-        seen = Camera(app.window).project((1, 0, 0))
+        seen = RvizCamera(app.window).project((1, 0, 0))
         x, y = centre()
         return abs(x - seen.x) < 2 and abs(y - seen.y) < 2
 
@@ -233,7 +233,7 @@ def test_labels_that_pop_up_later_hide_no_question(hand: Any, show: Any, grab: A
 def test_popup_follows_a_moving_frame(hand: Any, app: Any, master: str, caplog: Any) -> None:
     import rosglass
     from rosglass.comm import Time
-    from rosglass.rviz.camera import Camera
+    from rosglass.rviz.camera import RvizCamera
     from rosglass.rviz.popup import Popup
 
     app.fixed_frame = "map"
@@ -249,7 +249,7 @@ def test_popup_follows_a_moving_frame(hand: Any, app: Any, master: str, caplog: 
                 place = {"translation": {"x": x}, "rotation": {"w": 1.0}}
                 frame = {"header": header, "child_frame_id": "popup_test", "transform": place}
                 publisher.publish(transforms=[frame])
-                seen = Camera(app.window).project((x, 0, 0))
+                seen = RvizCamera(app.window).project((x, 0, 0))
                 at = popup.content.geometry().center()
                 near = abs(at.x() - seen.x) < 3 and abs(at.y() - seen.y) < 3
                 return near and popup.content.isVisible()
@@ -274,11 +274,11 @@ def test_popup_follows_a_moving_frame(hand: Any, app: Any, master: str, caplog: 
 
 
 def test_modal_popup_is_seen_wherever_its_point_is(hand: Any, app: Any) -> None:
-    from rosglass.rviz.camera import Camera
+    from rosglass.rviz.camera import RvizCamera
     from rosglass.rviz.popup import Popup
 
     popup = app.add(Popup(label(), "Question", modal=True))
-    x, y, z = Camera(app.window).eye
+    x, y, z = RvizCamera(app.window).eye
     popup.follow(app.rviz.trackers, (2 * x, 2 * y, 2 * z))
     hand.wait.frames(3)
     assert popup.content.isVisible()
@@ -325,13 +325,13 @@ def test_qml_popup_that_is_not_seen_takes_no_mouse(hand: Any, app: Any, show: An
                 contentItem: Button { implicitWidth: 80; implicitHeight: 60
                     onClicked: top.clicks++ } } }"""
     )
-    from rosglass.rviz.camera import Camera
+    from rosglass.rviz.camera import RvizCamera
 
     hand.wait(lambda: root.property("seen") == 1)
-    seen = Camera(app.window).project((0, 0, 0))
+    seen = RvizCamera(app.window).project((0, 0, 0))
     hand.click(seen.x, seen.y)
     assert root.property("clicks") == 1
-    x, y, z = Camera(app.window).eye
+    x, y, z = RvizCamera(app.window).eye
     root.setProperty("at", [2 * x, 2 * y, 2 * z])
     hand.wait(lambda: root.property("seen") == 0)
     hand.click(seen.x, seen.y)
@@ -366,14 +366,14 @@ def test_qml_popup_is_half_seen_while_its_place_is_old(
                 contentItem: Button { implicitWidth: 80; implicitHeight: 60
                     onClicked: top.clicks++ } } }"""
     )
-    from rosglass.rviz.camera import Camera
+    from rosglass.rviz.camera import RvizCamera
 
     hand.wait(lambda: root.property("seen") == 1)
     hand.wait(lambda: root.property("seen") == 0.5)
     assert root.property("problem") == "the frame 'old_link' was not updated for 3 s"
     assert caplog.text.count("AnchoredPopup: the frame 'old_link' was not") == 1
     # It can be operated all the same.
-    seen = Camera(app.window).project((0, 0, 0))
+    seen = RvizCamera(app.window).project((0, 0, 0))
     hand.click(seen.x, seen.y)
     assert root.property("clicks") == 1
     tell()

@@ -31,7 +31,7 @@ KINDS: list[tuple[str, dict[str, Any], Any, Any]] = [
 
 @pytest.fixture
 def owner(app: Any) -> Any:
-    from rosglass.rviz.registered_properties import RegisteredProperties
+    from rosglass.overlay.registered_properties import RegisteredProperties
 
     return RegisteredProperties()
 
@@ -40,9 +40,9 @@ def owner(app: Any) -> Any:
 def test_each_kind_keeps_its_values_and_refuses_others(
     app: Any, tmp_path: Path, kind: str, options: dict[str, Any], good: Any, bad: Any
 ) -> None:
+    from rosglass.overlay.property_values import plain_config, to_config
+    from rosglass.overlay.registered_properties import RegisteredProperties
     from rosglass.rviz.host import rviz
-    from rosglass.rviz.property_values import plain_config, to_config
-    from rosglass.rviz.registered_properties import RegisteredProperties
 
     first, second = RegisteredProperties(), RegisteredProperties()
     made = first.register(kind, "It", **options)

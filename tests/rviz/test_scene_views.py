@@ -130,7 +130,7 @@ def both(app: Any, wait: Any) -> Iterator[Callable[[str], Both]]:
 def test_the_same_mouse_leads_to_the_same_camera(
     both: Callable[[str], Both], eye: Any, name: str, app: Any
 ) -> None:
-    from rosglass.rviz.camera import Camera
+    from rosglass.rviz.camera import RvizCamera
 
     pair = both(name)
     # Ogre has rays in numbers of 32 bits: on the ground they are a millimetre off.
@@ -141,7 +141,7 @@ def test_the_same_mouse_leads_to_the_same_camera(
     for steps, held in ((1, NONE), (-1, NONE), (1, SHIFT)):
         pair.wheel(steps, held)
         assert eye() == pytest.approx(pair.eye, abs=within), steps
-    camera, ours = Camera(app.window), pair.view.camera(*pair.size)
+    camera, ours = RvizCamera(app.window), pair.view.camera(*pair.size)
     camera.update()
     for point in ((0, 0, 0), (30, -20, 0), (-0.5, 0.2, 0.3)):
         seen = pytest.approx(camera.project(point)[:2], rel=3e-3, abs=1, nan_ok=True)

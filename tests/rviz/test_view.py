@@ -44,12 +44,12 @@ def test_places_and_modes(view: Any, eye: Any, wait: Callable[..., None]) -> Non
 
 
 def test_2d_shows_as_much_as_3d_did(app: Any, view: Any, wait: Callable[..., None]) -> None:
-    from rosglass.rviz.camera import Camera
+    from rosglass.rviz.camera import RvizCamera
 
     steep = 1e-3
     view.move_eye_and_focus((2 - 10 * steep, 1, 10), (2, 1, 0), animate=False)
     wait.frames(6)
-    camera, point = Camera(app.window), (3.0, 2.0, 0.0)
+    camera, point = RvizCamera(app.window), (3.0, 2.0, 0.0)
     camera.update()
     before = camera.project(point)
     view.set_mode(1, animate=False)

@@ -25,7 +25,7 @@ def steps(
     app: Any, steered: Any, hand: Any, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[list[tuple[float, float]]]:
     """What the keys shift the view by, ahead and to the left; a frame takes 0.1 s for them."""
-    from rosglass.rviz import view_controller
+    from rosglass.overlay import view_controller
 
     now, found = [0.0], []
 

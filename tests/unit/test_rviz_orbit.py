@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from rosglass.rviz.orbit import STEEPEST, FramePose, Orbit, Point, ease, shortest_turn
+from rosglass.overlay.orbit import STEEPEST, FramePose, Orbit, Point, ease, shortest_turn
 
 
 def near(a: Point, b: Point, within: float = 1e-9) -> bool:

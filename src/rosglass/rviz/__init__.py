@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 from rosglass.interrupts import InterruptsDeferred
 
 if TYPE_CHECKING:
+    from rosglass.overlay.overlay import Overlay
     from rosglass.rviz.application import Application
-    from rosglass.rviz.overlay import Overlay, register
+    from rosglass.rviz.overlay import register
     from rosglass.rviz.popup import Anchor, Button, Dialog, Popup, message
     from rosglass.rviz.qml_overlay import QmlOverlay
     from rosglass.rviz.widget_overlay import WidgetOverlay

@@ -12,6 +12,8 @@ from rosglass.comm import Handle
 from rosglass.comm.log import warn_on_terminal
 from rosglass.comm.names import validate_node_name
 from rosglass.errors import ConnectionLostError, Error, UnsupportedError
+from rosglass.overlay.rviz_object import ACCESS
+from rosglass.overlay.view_controller import ViewKeys, ViewServices
 from rosglass.qml.engine.log import LocationFormatter
 from rosglass.qml.engine.process import (
     QuitOnSignal,
@@ -39,16 +41,14 @@ from rosglass.rviz.roscpp import (
     shared_arguments,
     wait_for_master,
 )
-from rosglass.rviz.rviz_object import ACCESS
 from rosglass.rviz.stack import Stack
-from rosglass.rviz.view_controller import ViewKeys, ViewServices
 from rosglass.rviz.view_entry import ViewEntry
 from rosglass.rviz.window import Window, config_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rosglass.rviz.overlay import Overlay
+    from rosglass.overlay.overlay import Overlay
 
 __all__ = ["Application"]
 

@@ -4,50 +4,34 @@ from __future__ import annotations
 
 import math
 from importlib import import_module
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rosglass.errors import Error
+from rosglass.overlay.camera import Camera, Picker, ProjectedPoint
 from rosglass.rviz.host import ogre
-from rosglass.rviz.property_values import shown
 from rosglass.rviz.qt5 import QtGui
 from rosglass.rviz.rendering import keep_context, read_depth, read_pixels
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
     from rosglass.rviz.window import Window
 
-__all__ = ["Camera", "Picker", "ProjectedPoint", "RvizPicker"]
+__all__ = ["RvizCamera", "RvizPicker"]
 
 
 #: Ogre's name of RViz's 3D view; number 0 is a hidden window of one pixel.
 _RENDER_TARGET = "OgreWindow(1)"
 
 
-class ProjectedPoint(NamedTuple):
-    """A point projected into the 3D view; all values are NaN behind the camera.
-
-    Attributes:
-        x: Units of the widget with the 3D view, from its left edge.
-        y: Units of the widget, from its upper edge.
-        depth: Metres from the camera.
-    """
-
-    x: float
-    y: float
-    depth: float
-
-
 _BEHIND_CAMERA = ProjectedPoint(math.nan, math.nan, math.nan)
 
 
-class Camera:
+class RvizCamera(Camera):
     """The camera of RViz's 3D view at the last call of :meth:`update`; for the GUI thread only.
 
     RViz moves its camera between ``before_frame`` and drawing, so a handler of that signal reads
@@ -139,75 +123,6 @@ def _point(point: Sequence[float]) -> NDArray[np.float64]:
     return at
 
 
-class Picker:
-    """Picks points and takes pictures of a 3D view; base class of RViz's."""
-
-    def pick(self, x: float, y: float, radius: float = 0.0) -> tuple[float, float, float] | None:
-        """Return the point of the scene at a position in the view.
-
-        Ignores overlays and translucent objects such as the grid.
-
-        Args:
-            x: Units of the widget with the 3D view, from its left edge.
-            y: Units of the widget, from its upper edge.
-            radius: Radius in which to search for the nearest object, in the same units.
-
-        Returns:
-            x, y, z in the fixed frame, in metres; None if nothing is there, or outside the view.
-
-        Raises:
-            Error: An argument is not a finite number, or the 3D view cannot be drawn now.
-        """
-        if not all(math.isfinite(number) for number in (x, y, radius)) or not 0 <= radius <= 100:
-            raise Error(
-                "expected finite x and y, and a radius from 0 to 100, in units of the view, got "
-                f"{shown([x, y, radius])[1:-1]}"
-            )
-        return self._pick(x, y, radius)
-
-    def picture(self) -> Any:
-        """Return a picture of the 3D view with its overlays, a ``QImage``.
-
-        Raises:
-            Error: The view cannot be drawn now.
-        """
-        raise NotImplementedError
-
-    def window_picture(self) -> Any:
-        """Return a picture of the whole window, a ``QImage``."""
-        raise NotImplementedError
-
-    def screenshot(self, file: str | os.PathLike[str], *, window: bool = False) -> Path:
-        """Save a picture of the 3D view with its overlays.
-
-        Args:
-            file: The picture file; its suffix determines the format, e.g. ``.png`` or ``.jpg``.
-            window: Whether to include the rest of its window.
-
-        Returns:
-            The absolute path.
-
-        Raises:
-            Error: The view cannot be drawn now, or the file cannot be written.
-        """
-        path = Path(file).expanduser().absolute()
-        known = sorted(
-            {bytes(kind).decode() for kind in QtGui.QImageWriter.supportedImageFormats()}
-        )
-        if path.suffix.lower().lstrip(".") not in known:
-            raise Error(f"{path}: the name must end in one of .{', .'.join(known)}")
-        if not path.parent.is_dir():
-            raise Error(f"{path}: there is no folder {path.parent}; create it first")
-        image = self.window_picture() if window else self.picture()
-        writer = QtGui.QImageWriter(str(path))
-        if not writer.write(image):
-            raise Error(f"{path}: the picture could not be written: {writer.errorString()}")
-        return path
-
-    def _pick(self, x: float, y: float, radius: float) -> tuple[float, float, float] | None:
-        raise NotImplementedError
-
-
 class RvizPicker(Picker):
     """Picks points and takes pictures by redrawing RViz's view, which takes milliseconds."""
 
@@ -238,7 +153,7 @@ class RvizPicker(Picker):
         seen_x = (int(columns[nearest]) + left + 0.5) / ratio
         seen_y = (height - 0.5 - (int(rows[nearest]) + bottom)) / ratio
         # A new camera: the view was drawn with the current one.
-        return Camera(self._window).unproject(seen_x, seen_y, depth)
+        return RvizCamera(self._window).unproject(seen_x, seen_y, depth)
 
     def picture(self) -> Any:
         """Return a picture of the 3D view with its overlays, a ``QImage``.

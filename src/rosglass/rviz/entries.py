@@ -8,16 +8,13 @@ from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error, QmlError
+from rosglass.overlay.overlay import SCALE_LIMITS
+from rosglass.overlay.property_values import from_config, plain_config, to_config
+from rosglass.overlay.registered_properties import RegisteredProperties
 from rosglass.qml.run.modules import locate
 from rosglass.qt import QtCore, Signal, Slot, is_alive
 from rosglass.rviz.host import AfterEvent, pyqt, rviz
-from rosglass.rviz.overlay import (
-    QML_CLASS,
-    REFERENCE_QML_CLASS,
-    SCALE_LIMITS,
-    class_id_of,
-    factory_of,
-)
+from rosglass.rviz.overlay import QML_CLASS, REFERENCE_QML_CLASS, class_id_of, factory_of
 from rosglass.rviz.properties import (
     Choices,
     PropertyTree,
@@ -25,20 +22,18 @@ from rosglass.rviz.properties import (
     owned_by_rviz,
     remove_from_tree,
 )
-from rosglass.rviz.property_values import from_config, plain_config, to_config
 from rosglass.rviz.qml_overlay import QmlOverlay
 from rosglass.rviz.qt5 import QtWidgets
-from rosglass.rviz.registered_properties import RegisteredProperties
 from rosglass.rviz.rendering import choice
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
+    from rosglass.overlay.overlay import Overlay
+    from rosglass.overlay.trackers import Frames
     from rosglass.qml.engine.session import Session
-    from rosglass.rviz.overlay import Overlay
     from rosglass.rviz.stack import Stack
-    from rosglass.rviz.trackers import Frames
     from rosglass.rviz.window import Window
 
 __all__ = [

@@ -12,7 +12,7 @@ from rosglass.rviz.qt5 import QtCore, QtGui, QtWidgets
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from rosglass.rviz.overlay import Overlay
+    from rosglass.overlay.overlay import Overlay
     from rosglass.rviz.stack import Stack
     from rosglass.rviz.window import Window
 

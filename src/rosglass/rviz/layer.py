@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rosglass.rviz.overlay import Overlay
+    from rosglass.overlay.overlay import Overlay
 
 __all__ = ["HIGHEST_Z", "Drawing", "Layer", "Work"]
 
@@ -98,7 +98,7 @@ class Layer:
         return sum(rect.area for rect in self._shown if rect) / max(whole, 1)
 
     def update(
-        self, pixels: NDArray[np.uint32], within: Iterable[Rect] | None = None
+        self, pixels: NDArray[np.uint32], within: Iterable[tuple[int, int, int, int]] | None = None
     ) -> list[Rect]:
         """Show a picture.
 

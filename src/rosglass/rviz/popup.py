@@ -15,7 +15,7 @@ from rosglass.rviz.widget_overlay import WidgetOverlay, make_widget
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rosglass.rviz.trackers import Tracker, Trackers
+    from rosglass.overlay.trackers import Tracker, Trackers
 
 __all__ = ["Anchor", "Button", "Dialog", "MoveBar", "Popup", "message"]
 

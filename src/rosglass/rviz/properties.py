@@ -12,18 +12,18 @@ import numpy as np
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error
+from rosglass.overlay.property_values import shown
+from rosglass.overlay.registered_properties import RegisteredProperty
+from rosglass.overlay.trackers import FIXED_FRAME
 from rosglass.qt import QtGui, is_alive
 from rosglass.rviz.host import class_of, is_a, pyqt, rviz
-from rosglass.rviz.property_values import shown
-from rosglass.rviz.registered_properties import RegisteredProperty
-from rosglass.rviz.trackers import FIXED_FRAME
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from rosglass.overlay.registered_properties import RegisteredProperties
+    from rosglass.overlay.trackers import Frames
     from rosglass.qml.engine.session import Session
-    from rosglass.rviz.registered_properties import RegisteredProperties
-    from rosglass.rviz.trackers import Frames
 
 __all__ = [
     "Choices",

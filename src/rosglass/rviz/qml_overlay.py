@@ -7,6 +7,7 @@ import time
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rosglass.overlay.live_overlay import LiveOverlay
 from rosglass.qml.run.renderer_choice import need_in_file, need_in_items
 from rosglass.qt import QtCore, Signal, is_alive
 from rosglass.rviz.input import (
@@ -20,7 +21,6 @@ from rosglass.rviz.input import (
     releases,
     scaled,
 )
-from rosglass.rviz.live_overlay import LiveOverlay
 from rosglass.rviz.qt5 import QtCore as Qt5Core
 from rosglass.rviz.qt5 import QtGui, QtQuick, shiboken
 from rosglass.rviz.rendering import choice

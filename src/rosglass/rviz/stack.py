@@ -8,10 +8,11 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
+from rosglass.overlay.overlay import Overlay
 from rosglass.qt import QtCore, Signal, Slot, is_alive, send_deferred_deletes
 from rosglass.rviz.input import Input
 from rosglass.rviz.layer import HIGHEST_Z, Drawing, Work
-from rosglass.rviz.overlay import Overlay, guarded
+from rosglass.rviz.overlay import guarded
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -89,7 +89,9 @@ def update_covered(
 
 
 def changed_tiles(
-    pixels: NDArray[np.uint32], before: NDArray[np.uint32], within: Iterable[Rect] | None = None
+    pixels: NDArray[np.uint32],
+    before: NDArray[np.uint32],
+    within: Iterable[tuple[int, int, int, int]] | None = None,
 ) -> NDArray[np.bool_]:
     """Return for each tile whether two pictures of the same size differ in it.
 
@@ -101,9 +103,9 @@ def changed_tiles(
     height, width = pixels.shape
     tiles = np.zeros((-(-height // TILE), -(-width // TILE)), np.bool_)
     if within is not None:
-        for rect in within:
-            rows = slice(rect.top // TILE, -(-rect.bottom // TILE))
-            columns = slice(rect.left // TILE, -(-rect.right // TILE))
+        for left, top, right, bottom in within:
+            rows = slice(top // TILE, -(-bottom // TILE))
+            columns = slice(left // TILE, -(-right // TILE))
             area = (
                 slice(rows.start * TILE, rows.stop * TILE),
                 slice(columns.start * TILE, columns.stop * TILE),

@@ -7,19 +7,19 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
+from rosglass.overlay.property_values import plain_config
+from rosglass.overlay.registered_properties import RegisteredProperties
+from rosglass.overlay.view import ViewMode
+from rosglass.overlay.view_controller_settings import CONTROLLER_CLASS
 from rosglass.qt import QtCore, Slot
 from rosglass.rviz.entries import camera_icon, display_class, set_status
 from rosglass.rviz.host import pyqt
 from rosglass.rviz.properties import PropertyTree, log_errors, owned_by_rviz, remove_from_tree
-from rosglass.rviz.property_values import plain_config
-from rosglass.rviz.registered_properties import RegisteredProperties
-from rosglass.rviz.view import ViewMode
-from rosglass.rviz.view_controller_settings import CONTROLLER_CLASS
 
 if TYPE_CHECKING:
+    from rosglass.overlay.view import View
+    from rosglass.overlay.view_controller import ViewServices
     from rosglass.rviz.entries import Entries
-    from rosglass.rviz.view import View
-    from rosglass.rviz.view_controller import ViewServices
     from rosglass.rviz.window import Window
 
 __all__ = ["ViewEntry"]

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rosglass.errors import Error
+from rosglass.overlay.overlay import Overlay
 from rosglass.qml.run.modules import locate
 from rosglass.qt import Signal, is_alive
 from rosglass.rviz.input import DRAG, KEYS, MOUSE, PRESS, position, releases
-from rosglass.rviz.overlay import Overlay, guarded
+from rosglass.rviz.overlay import guarded
 from rosglass.rviz.qt5 import QtCore, QtGui, QtWidgets
 from rosglass.rviz.tiles import Rect
 

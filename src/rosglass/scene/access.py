@@ -1,4 +1,4 @@
-"""The seam by which overlays know a scene: :class:`rosglass.rviz.access.Access` over a view.
+"""The seam by which overlays know a scene: :class:`rosglass.overlay.access.Access` over a view.
 
 QML that was written for overlays over RViz runs unchanged over a scene: the object ``rviz`` is the
 same. docs/architecture.md, section 6, has the members. Class ids are those of RViz 1, as these
@@ -15,17 +15,17 @@ from PySide6.QtQuick import QQuickWindow
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error
+from rosglass.overlay import displays, tools
+from rosglass.overlay.access import Access
+from rosglass.overlay.camera import Camera, Picker
+from rosglass.overlay.orbit import Orbit, Point
+from rosglass.overlay.property_values import KINDS
+from rosglass.overlay.trackers import Frames, Trackers
+from rosglass.overlay.view import CurrentView, View, Views
 from rosglass.qml.elements.image_sinks import grab, window_of
 from rosglass.qml.engine.runtime import runtime_of
 from rosglass.qml.run.modules import locate
 from rosglass.qt import QtCore, QtGui, Slot, is_alive
-from rosglass.rviz import displays, tools
-from rosglass.rviz.access import Access
-from rosglass.rviz.camera import Picker
-from rosglass.rviz.orbit import Orbit, Point
-from rosglass.rviz.property_values import KINDS
-from rosglass.rviz.trackers import Frames, Trackers
-from rosglass.rviz.view import CurrentView, View, Views
 from rosglass.scene.configs.rviz_config import RvizConfig
 from rosglass.scene.configs.rviz_formats import DISPLAYS as DISPLAY_IDS
 from rosglass.scene.configs.rviz_formats import TOOLS as TOOL_IDS
@@ -37,8 +37,8 @@ from rosglass.scene.view_controllers.views import VIEWS, TopDownOrthoView
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    from rosglass.overlay.property_values import Kind
     from rosglass.qml.engine.session import Session
-    from rosglass.rviz.property_values import Kind
     from rosglass.scene.displays.display import Display
     from rosglass.scene.displays.scene import Scene
     from rosglass.scene.tools.tool import Tool
@@ -138,8 +138,8 @@ class SceneAccess(Access):
     @cached_property
     def trackers(self) -> Trackers:
         """Trackers of points in the 3D view."""
-        camera: Any = lambda: SceneCamera(self.scene_view)  # noqa: E731 - of another class
-        return Trackers(self.before_frame, camera, lambda: self.frames)
+        view = self.scene_view
+        return Trackers(self.before_frame, lambda: SceneCamera(view), lambda: self.frames)
 
     # Members of its own.
 
@@ -277,7 +277,7 @@ def _close_parts(parts: dict[str, Any]) -> None:
             parts[name].close()
 
 
-class SceneCamera:
+class SceneCamera(Camera):
     """The camera of a view at the last call of :meth:`update`."""
 
     def __init__(self, view: SceneView) -> None:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error
+from rosglass.overlay.property_values import KINDS
 from rosglass.qml.engine.properties import Writable
 from rosglass.qt import QtGui
-from rosglass.rviz.property_values import KINDS
 from rosglass.scene.configs.rviz_formats import read_color, setting_text
 
 if TYPE_CHECKING:

@@ -16,12 +16,12 @@ from rosglass.comm.executor import Dispatcher
 from rosglass.comm.names import similar
 from rosglass.comm.time import Time
 from rosglass.errors import ArgumentError, Error, LookupException, TransformException
+from rosglass.overlay.property_values import shown
 from rosglass.qml.elements.element import Element, single_shot
 from rosglass.qml.elements.tf_buffer import TfLink
 from rosglass.qml.engine.callbacks import weak_callback
 from rosglass.qml.engine.runtime import runtime_of
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
-from rosglass.rviz.property_values import shown
 from rosglass.scene.displays.display import Display
 from rosglass.scene.displays.shapes import poses_matrices
 from rosglass.scene.render.drawing import Group, are_drawable, instance_matrix

@@ -7,10 +7,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
+from rosglass.overlay.property_values import from_plain, to_plain
 from rosglass.qml.elements.element import Element
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
 from rosglass.qt import QtCore, QtQml, Slot, is_alive
-from rosglass.rviz.property_values import from_plain, to_plain
 from rosglass.scene.configs.settings import Setting
 from rosglass.scene.displays.declared import expect_view, find_view
 from rosglass.scene.displays.display import Display

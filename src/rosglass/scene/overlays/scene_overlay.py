@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtQuick import QQuickItem
 
 from rosglass.errors import Error
+from rosglass.overlay.live_overlay import LiveOverlay
 from rosglass.qml.elements.image_sinks import window_of
 from rosglass.qt import QtCore, Slot, is_alive
-from rosglass.rviz.live_overlay import LiveOverlay
 from rosglass.scene.access import access_of
 
 if TYPE_CHECKING:

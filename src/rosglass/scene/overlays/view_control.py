@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rosglass.overlay.view import ViewMode
+from rosglass.overlay.view_controller import ViewKeys, ViewServices
+from rosglass.overlay.view_controller_settings import ControllerSetting, ViewSettings
 from rosglass.qt import QtCore, Slot, is_alive
-from rosglass.rviz.view import ViewMode
-from rosglass.rviz.view_controller import ViewKeys, ViewServices
-from rosglass.rviz.view_controller_settings import ControllerSetting, ViewSettings
 from rosglass.scene.access import access_of
 
 if TYPE_CHECKING:

@@ -7,8 +7,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
+from rosglass.overlay.view_controller_settings import (
+    CONTROLLER_CLASS,
+    ControllerSetting,
+    ViewSettings,
+)
 from rosglass.qt import is_alive
-from rosglass.rviz.view_controller_settings import CONTROLLER_CLASS, ControllerSetting, ViewSettings
 from rosglass.scene.configs.settings import Setting
 from rosglass.scene.displays.display import Display
 

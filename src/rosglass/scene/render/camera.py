@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 
 from rosglass.errors import Error, shown
-from rosglass.rviz.orbit import Point
+from rosglass.overlay.orbit import Point
 from rosglass.tf.transform import rotate, slerp
 
 if TYPE_CHECKING:
@@ -260,7 +260,7 @@ def interpolate(start: Camera, goal: Camera, share: float) -> Camera:
     Args:
         start: Returned for a share of 0 and below.
         goal: Returned for a share of 1 and above; the size is always this one's.
-        share: Progress, 0 to 1; see :func:`rosglass.rviz.orbit.ease`.
+        share: Progress, 0 to 1; see :func:`rosglass.overlay.orbit.ease`.
     """
     if share >= 1:
         return goal

@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
     from rosglass.comm.action_client import CancelAnswer, ClientGoal, GoalStatus
     from rosglass.comm.promise import Promise
+    from rosglass.overlay.orbit import Point
     from rosglass.qml.engine.runtime import Runtime
-    from rosglass.rviz.orbit import Point
 
 __all__ = [
     "Nav2GoalTool",

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
+from rosglass.overlay.orbit import Point
 from rosglass.qml.elements.element import single_shot
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
-from rosglass.rviz.orbit import Point
 from rosglass.scene.configs.settings import Configurable
 from rosglass.scene.render.drawing import Group, Lines, MapImage, Mesh, Points, instance_matrix
 from rosglass.scene.render.picking import Selected, pick, select

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from rosglass.comm.names import similar
 from rosglass.errors import ArgumentError, Error
+from rosglass.overlay.orbit import Point
+from rosglass.overlay.property_values import shown
 from rosglass.qml.elements.element import Element, single_shot
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
 from rosglass.qml.engine.runtime import runtime_of
 from rosglass.qt import Property, QtCore, QtGui, Signal, Slot, is_alive
-from rosglass.rviz.orbit import Point
-from rosglass.rviz.property_values import shown
 from rosglass.scene.configs.rviz_formats import TOOLS, ros_of, tool_type
 from rosglass.scene.configs.settings import Configurable, Setting
 from rosglass.scene.displays.declared import expect_view, find_view

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
+from rosglass.overlay.orbit import Point
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qt import QtCore, QtQml, Signal
-from rosglass.rviz.orbit import Point
 from rosglass.scene.configs.settings import Setting, rgb_of
 from rosglass.scene.render.drawing import Labels, Lines, instance_matrix
 from rosglass.scene.tools.tool import PointerEvent, Tool, camera_cursor, point_text

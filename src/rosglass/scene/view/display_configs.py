@@ -10,8 +10,8 @@ from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error, shown
-from rosglass.rviz.orbit import Orbit, Point
-from rosglass.rviz.view_controller_settings import CONTROLLER_CLASS
+from rosglass.overlay.orbit import Orbit, Point
+from rosglass.overlay.view_controller_settings import CONTROLLER_CLASS
 from rosglass.scene.configs.rviz_config import DisplayConfig
 from rosglass.scene.configs.rviz_formats import (
     DISPLAYS,

@@ -14,8 +14,8 @@ from PySide6.QtQuick import QQuickRhiItem, QQuickWindow, QSGRendererInterface
 from shiboken6 import Shiboken
 
 from rosglass.errors import ArgumentError, Error, shown
+from rosglass.overlay.orbit import ease
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
-from rosglass.rviz.orbit import ease
 from rosglass.scene.configs.rviz_config import RvizConfig, ToolConfig, ViewConfig
 from rosglass.scene.configs.rviz_formats import FIXED_FRAME, ros_of
 from rosglass.scene.displays.display import Display

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 
 from rosglass.errors import ArgumentError
-from rosglass.rviz.orbit import Point
+from rosglass.overlay.orbit import Point
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

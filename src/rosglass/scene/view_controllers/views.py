@@ -17,7 +17,7 @@ import numpy as np
 
 from rosglass.comm.names import similar
 from rosglass.errors import ArgumentError, Error, shown
-from rosglass.rviz.orbit import STEEPEST, Orbit, Point
+from rosglass.overlay.orbit import STEEPEST, Orbit, Point
 from rosglass.scene.configs.rviz_formats import FIXED_FRAME
 from rosglass.scene.render.camera import (
     FOV_RAD,

@@ -6,19 +6,19 @@ import logging
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 
 from rosglass.errors import Error
-from rosglass.rviz.property_values import shown
-from rosglass.rviz.registered_properties import RegisteredProperties
+from rosglass.overlay.property_values import shown
+from rosglass.overlay.registered_properties import RegisteredProperties
 from rosglass.wires.tcpros.graph import expand
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rosglass.rviz.registered_properties import RegisteredProperty
+    from rosglass.overlay.registered_properties import RegisteredProperty
 
 __all__ = ["CONTROLLER_CLASS", "ControllerSetting", "ViewSettings"]
 
 
-_log = logging.getLogger("rosglass.rviz")
+_log = logging.getLogger("rosglass.overlay")
 #: Class id of the view controller's entry in ``.rviz`` files.
 CONTROLLER_CLASS = "rosglass/ViewController"
 _T = TypeVar("_T", bool, float, str)

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 from rosglass.comm.names import similar
 from rosglass.comm.statistics import StampMonitor
 from rosglass.errors import Error, LookupException, TransformException
+from rosglass.overlay.property_values import shown
+from rosglass.overlay.qml_members import VARIANT, errors_to_js, point_of, to_python
 from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS
 from rosglass.qml.elements.tf_buffer import TfLink
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, Signal, is_alive
-from rosglass.rviz.property_values import shown
-from rosglass.rviz.qml_members import VARIANT, errors_to_js, point_of, to_python
 from rosglass.tf import Transform
 
 if TYPE_CHECKING:
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
     from rosglass.comm.node import Node
     from rosglass.comm.time import Time
+    from rosglass.overlay.camera import Camera
     from rosglass.qml.engine.runtime import Runtime
     from rosglass.qml.engine.session import Session
-    from rosglass.rviz.camera import Camera
     from rosglass.tf import TransformBuffer
 
 __all__ = ["FIXED_FRAME", "Frames", "Tracker", "Trackers"]

@@ -1,6 +1,6 @@
 """The object ``rviz`` in QML, one for each overlay, and the objects that it returns.
 
-They use the 3D view only through :class:`rosglass.rviz.access.Access`; docs/architecture.md,
+They use the 3D view only through :class:`rosglass.overlay.access.Access`; docs/architecture.md,
 section 6, says what another 3D view has to implement.
 """
 # ruff: noqa: N802 N815 - the names of slots, properties and signals are QML's
@@ -12,12 +12,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
-from rosglass.qml.engine.callbacks import weak_callback
-from rosglass.qml.engine.log import Caller, log_from_qml, plain_path
-from rosglass.qml.engine.runtime import runtime_of
-from rosglass.qt import Property, QJSValue, QtCore, QtGui, QtQml, Signal, Slot
-from rosglass.rviz.property_values import shown
-from rosglass.rviz.qml_members import (
+from rosglass.overlay.property_values import shown
+from rosglass.overlay.qml_members import (
     LIST,
     VARIANT,
     QmlWrapper,
@@ -34,18 +30,20 @@ from rosglass.rviz.qml_members import (
     text,
     unchecked,
 )
-from rosglass.rviz.qt5 import QtGui as Qt5Gui
-from rosglass.rviz.qt5 import QtQuick
-from rosglass.rviz.registered_properties import RegisteredProperties
+from rosglass.overlay.registered_properties import RegisteredProperties
+from rosglass.qml.engine.callbacks import weak_callback
+from rosglass.qml.engine.log import Caller, log_from_qml, plain_path
+from rosglass.qml.engine.runtime import runtime_of
+from rosglass.qt import Property, QJSValue, QtCore, QtGui, QtQml, QtQuick, Signal, Slot
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from rosglass.overlay.access import Access
+    from rosglass.overlay.orbit import Point
+    from rosglass.overlay.overlay import Overlay
+    from rosglass.overlay.tools import Tool, Tools
     from rosglass.qml.engine.runtime import Runtime
-    from rosglass.rviz.access import Access
-    from rosglass.rviz.orbit import Point
-    from rosglass.rviz.overlay import Overlay
-    from rosglass.rviz.tools import Tool, Tools
 
 __all__ = ["ACCESS", "RvizObject"]
 
@@ -183,7 +181,7 @@ class QmlToolManager(QmlWrapper):
         self.toolChanged.emit(self.current)
 
 
-class ToolIcons(QtQuick.QQuickImageProvider):  # type: ignore[misc]
+class ToolIcons(QtQuick.QQuickImageProvider):
     """Image provider of ``image://rviz_tool_icons/<classId>``, for the GUI thread only.
 
     Scales the largest icon to the requested size, by default 48 pixels; a width or height alone
@@ -194,18 +192,20 @@ class ToolIcons(QtQuick.QQuickImageProvider):  # type: ignore[misc]
     """
 
     def __init__(self, find: Callable[[str], Tool | None]) -> None:
-        super().__init__(QtQuick.QQuickImageProvider.Pixmap)
+        # Both versions of Qt have it, but only the hints of Qt 5.
+        kinds: Any = QtQuick.QQuickImageProvider
+        super().__init__(kinds.Pixmap)
         self._find = find
 
     def requestPixmap(self, name: str, size: Any, requested: Any) -> Any:
         """Return a tool's icon; a transparent one if there is no such tool, or no icon."""
         tool = self._find(name)
-        picture = Qt5Gui.QPixmap() if tool is None else tool.picture()
+        picture = QtGui.QPixmap() if tool is None else tool.picture()
         width, height = (requested.width(), requested.height())
         if picture.isNull():
             side = min(max(width, height, 0) or _ICON_SIZE, _MAX_ICON_SIZE)
-            picture = Qt5Gui.QPixmap(side, side)
-            picture.fill(Qt5Gui.QColor(0, 0, 0, 0))
+            picture = QtGui.QPixmap(side, side)
+            picture.fill(QtGui.QColor(0, 0, 0, 0))
         wide, high = picture.width(), picture.height()
         if width <= 0 and height <= 0:
             factor = _ICON_SIZE / max(wide, high)

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rosglass.comm.qos import QoS
 from rosglass.errors import Error, ServiceError
+from rosglass.overlay.view import ViewMode
 from rosglass.qml.engine.log import RateLimit
 from rosglass.qt import QtCore, Signal, Slot, is_alive
-from rosglass.rviz.qt5 import QtCore as Qt5Core
-from rosglass.rviz.view import ViewMode
 from rosglass.wires.tcpros.graph import expand, split
 
 if TYPE_CHECKING:
@@ -23,17 +22,17 @@ if TYPE_CHECKING:
     from rosglass.comm.node import Node
     from rosglass.comm.publisher import Publisher
     from rosglass.messages import Message
+    from rosglass.overlay.view import View
     from rosglass.qml.engine.session import Session
-    from rosglass.rviz.view import View
 
 __all__ = ["ViewKeys", "ViewServices"]
 
 
-_log = logging.getLogger("rosglass.rviz")
-_E, _Key = Qt5Core.QEvent.Type, Qt5Core.Qt.Key
-_Modifier = Qt5Core.Qt.KeyboardModifier
+_log = logging.getLogger("rosglass.overlay")
+_E, _Key = QtCore.QEvent.Type, QtCore.Qt.Key
+_Modifier = QtCore.Qt.KeyboardModifier
 #: Arrow keys -> direction ahead and to the left.
-_ARROWS = {
+_ARROWS: dict[Any, tuple[int, int]] = {
     _Key.Key_Up: (1, 0),
     _Key.Key_Down: (-1, 0),
     _Key.Key_Left: (0, 1),
@@ -66,7 +65,7 @@ class ViewKeys(QtCore.QObject):
         self._target, self._view = target, view
         self._before_frame, self._focus_is_elsewhere = before_frame, focus_is_elsewhere
         self._settings = view.settings
-        self._pressed: set[int] = set()
+        self._pressed: set[Any] = set()
         self._fast = False
         self._last_step = 0.0
         target.installEventFilter(self)

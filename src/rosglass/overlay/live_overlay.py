@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error, QmlError
+from rosglass.overlay.overlay import Overlay
+from rosglass.overlay.rviz_object import RvizObject
 from rosglass.qml.run.live_file import (
     ERRORS,
     ERRORS_BELOW,
@@ -17,23 +19,20 @@ from rosglass.qml.run.live_file import (
     LiveFile,
 )
 from rosglass.qml.run.modules import interface_file
-from rosglass.qt import QtCore
-from rosglass.rviz.overlay import Overlay
-from rosglass.rviz.qt5 import QtQuick
-from rosglass.rviz.rviz_object import RvizObject
+from rosglass.qt import QtCore, QtQuick
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Sequence
 
+    from rosglass.overlay.access import Access
     from rosglass.qml.engine.session import Session
     from rosglass.qml.run.live_file import Made
     from rosglass.qt import QtQml
-    from rosglass.rviz.access import Access
 
 __all__ = ["LiveOverlay"]
 
-_log = logging.getLogger("rosglass.rviz")
+_log = logging.getLogger("rosglass.overlay")
 _IMPORTS = Path(__file__).with_name("imports")
 
 

@@ -15,17 +15,17 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error
+from rosglass.overlay.property_values import shown
 from rosglass.qml.engine.from_js import plain_from_js
 from rosglass.qml.engine.js_values import object_of
 from rosglass.qml.engine.log import log_from_qml
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, QtQml, Signal, Slot
-from rosglass.rviz.property_values import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from rosglass.overlay.plugins import PluginList
     from rosglass.qml.engine.runtime import Runtime
-    from rosglass.rviz.plugins import PluginList
 
 __all__ = [
     "LIST",

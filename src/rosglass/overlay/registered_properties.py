@@ -7,21 +7,28 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from rosglass.errors import Error
+from rosglass.overlay.property_values import KINDS, merged, shown, to_storable
+from rosglass.overlay.qml_members import (
+    VARIANT,
+    boolean,
+    errors_to_js,
+    spell_checked,
+    text,
+    to_python,
+)
 from rosglass.qml.engine.from_js import plain_from_js
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
-from rosglass.rviz.property_values import KINDS, merged, shown, to_storable
-from rosglass.rviz.qml_members import VARIANT, boolean, errors_to_js, spell_checked, text, to_python
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from rosglass.overlay.property_values import Kind
     from rosglass.qml.engine.runtime import Runtime
-    from rosglass.rviz.property_values import Kind
 
 __all__ = ["RegisteredProperties", "RegisteredProperty"]
 
 
-_log = logging.getLogger("rosglass.rviz")
+_log = logging.getLogger("rosglass.overlay")
 
 
 def _attribute(name: str, from_qml: Callable[[Any], Any], notify: Any) -> Any:
