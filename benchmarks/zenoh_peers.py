@@ -34,8 +34,15 @@ def session(plan: Plan) -> Any:
     from rosglass.wires.zenoh.options import ZenohOptions
     from rosglass.wires.zenoh.session import session_config
 
-    options = ZenohOptions("127.0.0.1", plan["port"], shared_memory=plan["shm"])
+    options = ZenohOptions(
+        "127.0.0.1", plan["port"], mode=plan.get("mode"), shared_memory=plan["shm"]
+    )
     return zenoh.open(session_config(options)[0])
+
+
+def keep(*declared: Any) -> None:
+    """Keep what would end when nothing refers to it."""
+    _kept.extend(declared)
 
 
 def bare_publisher(plan: Plan, data: bytes) -> Callable[[], None]:

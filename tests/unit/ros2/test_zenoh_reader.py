@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import threading
+import weakref
 from types import SimpleNamespace
 
 import pytest
@@ -11,6 +13,7 @@ pytest.importorskip("zenoh")
 
 from rosglass.comm import EndpointInfo, EndpointKind, NodeName
 from rosglass.wires.zenoh.endpoints import LocalRegistry
+from rosglass.wires.zenoh.keys import HUMBLE_HASH
 from rosglass.wires.zenoh.options import ZenohOptions
 from rosglass.wires.zenoh.reader import ZenohReader, _Collected
 
@@ -35,9 +38,17 @@ class Subscriber:
         self.undeclared = True
 
 
+class Key:
+    """A declared key, whose declaration ends with it."""
+
+
 class Session:
     def __init__(self, subscriber):
         self.declare_subscriber = lambda *_, **__: subscriber
+        self.keys = weakref.WeakValueDictionary()
+
+    def declare_keyexpr(self, text):
+        return self.keys.setdefault(text, Key())
 
 
 class Drain:
@@ -100,3 +111,31 @@ def test_a_reader_closed_while_its_samples_change_their_way_ends_each_source_onc
     reader.poll()
     assert first.undeclared
     assert calls == ["begin", "end"]
+
+
+@pytest.mark.parametrize(
+    ("options", "type_hash"),
+    [
+        (ZenohOptions(), "RIHS01_" + "a" * 64),
+        (ZenohOptions(), ""),
+        (ZenohOptions(humble=True), "RIHS01_" + "a" * 64),
+    ],
+)
+def test_a_reader_declares_the_key_of_its_definition(options, type_hash):
+    """Zenoh handles each message on a key that no entity has in twice the time."""
+    session = Session(Subscriber())
+    owner = SimpleNamespace(options=options, forget=lambda _: None, recycle=lambda _: None)
+    endpoint = EndpointInfo(
+        EndpointKind.SUBSCRIPTION,
+        "/topic",
+        "std_msgs/msg/Empty",
+        NodeName("/", "node"),
+        type_hash=type_hash,
+    )
+    reader = ZenohReader(owner, "token", endpoint, print, None, None, LocalRegistry())
+    reader.declare(session)
+    announced = HUMBLE_HASH if options.humble else type_hash or HUMBLE_HASH
+    assert list(session.keys) == [f"0/topic/std_msgs::msg::dds_::Empty_/{announced}"]
+    reader.close()
+    gc.collect()
+    assert not session.keys

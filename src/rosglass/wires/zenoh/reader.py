@@ -268,13 +268,16 @@ class ZenohReader(Declaration, Reader):
     ) -> None:
         super().__init__(owner, token)
         self._place, self._qos = (endpoint.name, endpoint.type), endpoint.qos
-        # All definitions of the type.
+        # All definitions of the type, and the own one.
         self._key = topic_key(owner.options.domain, *self._place, "*")
+        own_hash = HUMBLE_HASH if owner.options.humble else endpoint.type_hash or HUMBLE_HASH
+        self._own_key = topic_key(owner.options.domain, *self._place, own_hash)
         self._on_sample, self._readers = on_sample, readers
         self._drain, self._poller = drain, poller
         # Transient-local ones receive everything over Zenoh, never in the sending thread.
         if self._qos.durability is not Durability.TRANSIENT_LOCAL:
             readers.add(self._place, self)
+        self._known_key: zenoh.KeyExpr | None = None
         self._session: zenoh.Session | None = None
         self._source: _Source | None = None
         self._mode = _Mode.DIRECT
@@ -290,6 +293,9 @@ class ZenohReader(Declaration, Reader):
     def declare(self, session: zenoh.Session) -> list[Any]:
         """Declare the subscriber; a transient-local one queries the publishers' last samples."""
         source: _Source
+        # Zenoh looks for the routes of a key that no entity has for each of its messages, which is
+        # half of its work for a small one. The declaration ends with its object.
+        self._known_key = session.declare_keyexpr(self._own_key)
         if self._qos.durability is Durability.TRANSIENT_LOCAL:
             name = f"{self._key} samples"
             advanced = self._declare_advanced(session)
@@ -353,6 +359,7 @@ class ZenohReader(Declaration, Reader):
             source, self._source = self._source, None
         if source is not None:
             source.end()
+        self._known_key = None
 
     def _declare_advanced(self, session: zenoh.Session) -> Any:
         reliable = self._qos.reliability is Reliability.RELIABLE
