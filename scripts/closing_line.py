@@ -54,7 +54,9 @@ def main() -> int:
         if code != "0" and not found["failed"] + found["errors"]:
             found["errors"] += 1
         total += found
-        result = last if outcomes(last) or seconds == "-" else "passed"
+        result = (
+            last if outcomes(last) or last.startswith(("no tests ran", "not run")) else "passed"
+        )
         if code != "0":
             result = f"FAILED, exit code {code}: {last}"
         print(f"{seconds:>5}  {name}: {result}")

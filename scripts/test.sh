@@ -113,6 +113,14 @@ if [[ "$(version .venv)" != "$(version .venv-system)" ]]; then
   group "$holds_everywhere ($(.venv/bin/python -V))" run .venv 6 -m "not exhaustive" "${units[@]}"
 fi
 gather
+# Beside the tests with windows, which keep the processor busy, while programs wait for each other.
+# After them where they would share a network, and with it ROS domains.
+programs="tests with other programs ($(.venv/bin/python -V))"
+alone=1
+if scripts/private_network.sh sh -c '[ -n "${ROSGLASS_PRIVATE_NETWORK-}" ]' 2>/dev/null; then
+  alone=
+  background group "$programs" run .venv 4 "${once_more[@]}" tests/interop
+fi
 if [[ -n $all ]]; then
   group "$qt5" run .venv-system 6 "${once_more[@]}" tests/gui
 else
@@ -126,15 +134,7 @@ else
 fi
 # Apart from tests/gui: it needs an X server, the others are drawn offscreen.
 group "tests of the 3D view ($(.venv/bin/python -V), PySide6)" run .venv 3 "${once_more[@]}" tests/scene
-# These two beside each other: interfaces keep the processor busy while programs wait for each other.
-# One after the other where they would share a network, and with it ROS domains.
-programs="tests with other programs ($(.venv/bin/python -V))"
-if scripts/private_network.sh sh -c '[ -n "${ROSGLASS_PRIVATE_NETWORK-}" ]' 2>/dev/null; then
-  background group "$programs" run .venv 4 "${once_more[@]}" tests/interop
-  group "$qt6" run .venv 4 "${once_more[@]}" tests/gui
-  gather
-else
-  group "$qt6" run .venv 4 "${once_more[@]}" tests/gui
-  group "$programs" run .venv 6 "${once_more[@]}" tests/interop
-fi
+group "$qt6" run .venv 4 "${once_more[@]}" tests/gui
+gather
+[[ -z $alone ]] || group "$programs" run .venv 6 "${once_more[@]}" tests/interop
 .venv/bin/python scripts/closing_line.py "$SECONDS" <"$results/rows"
