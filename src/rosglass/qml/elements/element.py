@@ -364,8 +364,7 @@ class TopicElement(Element):
         connected = session is not None and session.state == "connected"
         if node is None or not connected or self._count_publishers():
             return
-        # The node may just have been closed.
-        with suppress(Error):
+        with suppress(Error):  # the node may just have been closed
             hint = similar(self._resolved, node.topics())
             level = logging.WARNING if hint else logging.INFO
             self._log(f"{self._topic_in_logs()}: this topic has no publisher{hint}", level)

@@ -242,7 +242,7 @@ class ParameterLink:
                 result = work(client)
             except Error as error:
                 result = error
-            except Exception as error:
+            except Exception as error:  # noqa: BLE001 - the element shows it
                 _log.exception("asking for parameters failed")
                 result = Error(f"internal error: {error}")
             self._session.executor.post(lambda: None if self._closed else done(result))

@@ -327,8 +327,7 @@ class Publisher(Element):
         node, sender = self.node, self._endpoint
         if node is None or sender is None or not self._is_connected():
             return
-        # The node may just have been closed.
-        with suppress(Error):
+        with suppress(Error):  # the node may just have been closed
             if sender.subscription_count() or node.subscriptions(self._resolved):
                 return
             subscribed = [name for name in node.topics() if node.subscriptions(name)]

@@ -190,8 +190,7 @@ def end_process(code: int) -> NoReturn:
     """
     logging.shutdown()
     for stream in (sys.stdout, sys.stderr):
-        # Its reader may be gone, or there may be none.
-        with suppress(OSError, ValueError, AttributeError):
+        with suppress(OSError, ValueError, AttributeError):  # its reader is gone; there is none
             stream.flush()
     os._exit(code)
 
@@ -252,7 +251,7 @@ class QuitOnSignal:
         while received := os.read(self._reader, 1):
             if received[0] not in ending:
                 # Forward to the previous descriptor, e.g. asyncio's, which needs it.
-                with suppress(OSError):
+                with suppress(OSError):  # full, or closed
                     os.write(self._wakeup, received)
             else:
                 self._quit(received[0])

@@ -118,8 +118,7 @@ class GuiExecutor(Executor):
 def _guarded(job: Callable[[], None]) -> None:
     try:
         job()
-    except Exception:
-        # Exceptions must not reach Qt's event loop.
+    except Exception:  # noqa: BLE001 - Qt's event loop calls this
         _log.exception("a callback failed")
 
 
@@ -541,7 +540,7 @@ class Session(QtCore.QObject):
                 result = work()
             except Error as error:
                 result = error
-            except Exception as error:
+            except Exception as error:  # noqa: BLE001 - the job's caller gets it
                 _log.exception("a background job failed")
                 result = Error(f"internal error: {error}")
             if key in self._done:
@@ -767,7 +766,7 @@ def _call_all(handlers: dict[int, tuple[QtCore.QObject, Callable[[], None]]]) ->
         if is_alive(item):
             try:
                 handler()
-            except Exception:
+            except Exception:  # noqa: BLE001 - the other handlers must run
                 _log.exception("internal error in %s", type(item).__name__)
 
 

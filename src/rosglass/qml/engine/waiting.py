@@ -116,7 +116,7 @@ def within(seconds: float, what: str, work: Callable[[], _T]) -> _T:
     def run() -> None:
         try:
             found.append(work())
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - raised in the waiting thread
             failed.append(error)
 
     thread = threading.Thread(target=run, name="rosglass-files", daemon=True)

@@ -98,7 +98,7 @@ def interface_file(place: str | os.PathLike[str]) -> Path:
 
 def near(path: Path) -> str:
     """Return a hint at a file with a similar name; empty if there is none."""
-    with suppress(OSError, ValueError):
+    with suppress(OSError, ValueError):  # a hint only
         return similar(path.name, (n for n in os.listdir(path.parent) if n.endswith(path.suffix)))
     return ""
 

@@ -143,7 +143,7 @@ class _Folder:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        with suppress(OSError):
+        with suppress(OSError):  # Qt reports it
             self._names = set(os.listdir(path))  # noqa: PTH208 - faster, of hundreds of files
         self._listed = dict(_LISTED.findall(_read(path / "qmldir")))
 
