@@ -26,7 +26,7 @@ from rosglass.comm.events import (
 from rosglass.comm.executor import IMMEDIATE, check_plain, load_asyncio
 from rosglass.comm.graph import ConnectionState, EndpointKind
 from rosglass.comm.handle import Executor, Handle, check_flag, check_may_wait
-from rosglass.comm.inbox import ImmediateInbox, Inbox, Sample
+from rosglass.comm.inbox import ImmediateInbox, Inbox, Sample, sample_receiver
 from rosglass.comm.listeners import Listeners
 from rosglass.comm.names import similar
 from rosglass.comm.promise import check_timeout
@@ -37,14 +37,15 @@ from rosglass.errors import ArgumentError, Error, NodeClosedError, TypeNotFoundE
 from rosglass.interfaces.names import join_name
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+    from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
     from collections.abc import Set as AbstractSet
 
     from rosglass.comm.core import NodeCore
     from rosglass.comm.graph import EndpointInfo, NodeName, Status
+    from rosglass.comm.inbox import DuplicateFilter
     from rosglass.comm.qos import QoS
     from rosglass.comm.statistics import Statistics
-    from rosglass.comm.wire import Reader
+    from rosglass.comm.wire import OnSample, Reader
     from rosglass.messages import Message, MessageType
 
 __all__ = [
@@ -288,6 +289,11 @@ class Subscription(TopicEndpoint):
         """
         self._inbox.set_limit(limit)
 
+    @property
+    def last_arrival(self) -> float:
+        """Monotonic time at which the last sample arrived; minus infinity before the first."""
+        return self._inbox.last_time
+
     def statistics(self) -> Statistics:
         """Return the current counts and rates."""
         self._flush()
@@ -305,11 +311,19 @@ class Subscription(TopicEndpoint):
         """
         if not isinstance(sample, Sample):
             raise ArgumentError("sample", sample, "a rosglass.comm.Sample", self.topic)
+        return Duration(self.lateness_ns(sample))
+
+    def lateness_ns(self, sample: Sample) -> int:
+        """Return :meth:`lateness` in nanoseconds, for callers that ask for every sample."""
         feed = self._feed
-        if feed is None:
-            return self._inbox.lateness(sample, by_header=True) or Duration()
-        late = self._inbox.lateness(sample, by_header=not feed.has_simulated_stamps)
-        return Duration(feed.lateness(sample.publisher)) if late is None else late
+        late, by_header = self._inbox.lateness_ns(sample)
+        # Asked only when it decides: it searches the graph for a publisher of simulated time.
+        decides = by_header is not None and (late is None or by_header > late)
+        if by_header is not None and decides and not (feed and feed.has_simulated_stamps):
+            return by_header
+        if late is None:
+            return 0 if feed is None else feed.lateness(sample.publisher)
+        return late
 
     # -- events ----------------------------------------------------------------------------------
 
@@ -554,6 +568,19 @@ class SubscriptionFeed(NodeMember):
     def waiting(self) -> int:
         """The number of samples that wait to be taken, or for their callback."""
         return self._inbox.waiting
+
+    def receiver(
+        self,
+        types: Mapping[str, MessageType],
+        find_type: Callable[[str], MessageType | None],
+        duplicates: DuplicateFilter,
+        wire: str,
+    ) -> OnSample:
+        """Return the function that a reader calls with each sample: it leads to the inbox.
+
+        Arguments as for :func:`rosglass.comm.inbox.sample_receiver`.
+        """
+        return sample_receiver(self.deliver, types, find_type, duplicates, wire, self._ignored)
 
     def on_publisher_left(self, endpoint: EndpointInfo) -> None:
         """Report a matching publisher that left, even if it was never seen in an update.

@@ -33,6 +33,7 @@ from rosglass.comm.action_client import (
 )
 from rosglass.comm.core import NodeMember
 from rosglass.comm.executor import InOrder
+from rosglass.comm.inbox import DuplicateFilter
 from rosglass.comm.log_limits import LogOnce
 from rosglass.errors import (
     ConnectionLostError,
@@ -58,7 +59,6 @@ from rosglass.ros2.action_types import (
     stamp_of,
 )
 from rosglass.ros2.rmw_services import ActionServiceClient
-from rosglass.ros2.topic_matching import DuplicateFilter
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -1,6 +1,7 @@
 """Matches ROS 2 subscriptions with publishers by the types and profiles in the graph.
 
-Also monitors the liveliness of publishers, and detects repeated and lost samples.
+Also monitors the liveliness of publishers. Samples do not pass through here: a reader hands them to
+the subscription's inbox.
 """
 
 from __future__ import annotations
@@ -8,8 +9,9 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from rosglass.comm import Durability, EndpointInfo, EndpointKind, Liveliness, Sample
+from rosglass.comm import Durability, EndpointInfo, EndpointKind, Liveliness
 from rosglass.comm.events import describe_conflicts, qos_conflicts
+from rosglass.comm.inbox import DuplicateFilter
 from rosglass.comm.subscription import Problem, TopicMatching
 from rosglass.errors import Error
 from rosglass.interfaces import join_name
@@ -23,19 +25,13 @@ if TYPE_CHECKING:
     from rosglass.comm import Handle, QoS, Timers
     from rosglass.comm.subscription import SubscriptionFeed
     from rosglass.comm.types import Types
-    from rosglass.comm.wire import OnSample, Reader
+    from rosglass.comm.wire import Reader
     from rosglass.messages import MessageType
     from rosglass.ros2.core import Core
 
-__all__ = ["DuplicateFilter", "GraphMatching", "TopicTypes"]
+__all__ = ["GraphMatching", "TopicTypes"]
 
 _PUBLISHER = EndpointKind.PUBLISHER
-#: Number of publishers to remember; only a robot that restarts for days has more.
-_MAX_PUBLISHERS = 1024
-#: Missing sequence numbers to remember per publisher.
-_MAX_MISSING = 64
-#: Number and time stamp of the last sample of an unknown publisher.
-_NO_SAMPLE = (-3, 0)
 
 
 class GraphMatching(TopicMatching):
@@ -197,7 +193,10 @@ class GraphMatching(TopicMatching):
             self._feed.qos,
             message_type.type_hash,
         )
-        reader = self._core.middleware.create_reader(endpoint, self._receiver())
+        receive = self._feed.receiver(
+            self._types.accepted, self._types.find_type, self._duplicates, self._core.wire
+        )
+        reader = self._core.middleware.create_reader(endpoint, receive)
         old: Reader | None
         old, self.reader = self.reader, reader
         if old is not None:
@@ -208,30 +207,6 @@ class GraphMatching(TopicMatching):
             reader.close()
         else:
             self._feed.update_eagerness()
-
-    def _receiver(self) -> OnSample:
-        """Return the function that takes samples: the hot path, each line runs per sample."""
-        accepted, find_type = self._types.accepted, self._types.find_type
-        ignored = self._ignored
-        is_duplicate, deliver = self._duplicates.is_duplicate, self._feed.deliver
-        wire = self._core.wire
-        # As Sample(...) does, in half the time.
-        make = tuple.__new__
-
-        def receive(
-            data: bytes | memoryview,
-            received: int,
-            sent: int | None,
-            gid: bytes,
-            sequence: int,
-            hash: str,
-        ) -> None:
-            kind = accepted.get(hash) or find_type(hash)
-            if kind is None or is_duplicate(gid, sequence, sent) or gid in ignored:
-                return
-            deliver(make(Sample, (data, wire, kind, received, sent, gid, sequence)))
-
-        return receive
 
 
 class Liveness:
@@ -289,82 +264,6 @@ class Liveness:
         if known is None or known[0] != self._duplicates.latest(gid):
             return now
         return known[1]
-
-
-class DuplicateFilter:
-    """Detects samples that were received before, by publisher, sequence number and time stamp.
-
-    A sample can be received twice: over an old and a new route while links change, from a
-    publisher's history after a reconnection, or under two keys if a publisher serves two
-    distributions. Late samples that were not received before are not repeats. Several threads may
-    use it: the worst effect of a race is that a repeat passes.
-
-    Attributes:
-        lost: The number of skipped sequence numbers so far.
-        guarded: Whether samples without number are compared by their time stamps: only while a
-            reader is replaced, whose last samples may be received again, as a publisher's clock may
-            be set back.
-    """
-
-    def __init__(self) -> None:
-        self.lost = 0
-        self.guarded = False
-        self._last: dict[bytes, tuple[int, int]] = {}
-        self._missing: dict[bytes, set[int]] = {}
-
-    def is_duplicate(self, gid: bytes, sequence: int, sent: int | None) -> bool:
-        """Return whether a sample is a repeat, and record it.
-
-        Samples without identity, number or time stamp are never repeats.
-        """
-        if sent is None or not gid:
-            return False
-        last = self._last.get(gid, _NO_SAMPLE)
-        if sequence == last[0] + 1:
-            self._last[gid] = (sequence, sent)
-            return False
-        return self._is_late_duplicate(gid, sequence, sent, last)
-
-    def latest(self, gid: bytes) -> tuple[int, int]:
-        """Return number and time stamp of a publisher's last sample."""
-        return self._last.get(gid, _NO_SAMPLE)
-
-    def _is_late_duplicate(
-        self, gid: bytes, sequence: int, sent: int, last: tuple[int, int]
-    ) -> bool:
-        """Return whether a sample that does not directly follow the last one is a repeat."""
-        if sequence < 0:
-            repeated = self.guarded and sent <= last[1]
-            if not repeated:
-                self._remember(gid, -1, sent)
-            return repeated
-        if last[0] < 0:
-            self._remember(gid, sequence, sent)
-            return False
-        if sequence > last[0]:
-            self._record_gap(gid, last[0] + 1, sequence)
-        elif sent <= last[1]:
-            missing = self._missing.get(gid, set())
-            if sequence not in missing:
-                return True
-            missing.discard(sequence)
-            self.lost -= 1
-            return False
-        self._last[gid] = (sequence, sent)
-        return False
-
-    def _remember(self, gid: bytes, sequence: int, sent: int) -> None:
-        if gid not in self._last and len(self._last) >= _MAX_PUBLISHERS:
-            self._last.clear()
-            self._missing.clear()
-        self._last[gid] = (sequence, sent)
-
-    def _record_gap(self, gid: bytes, first: int, end: int) -> None:
-        self.lost += end - first
-        missing = self._missing.setdefault(gid, set())
-        missing.update(range(max(first, end - _MAX_MISSING), end))
-        if len(missing) > 2 * _MAX_MISSING:
-            self._missing[gid] = set(sorted(missing)[-_MAX_MISSING:])
 
 
 #: Maximum number of unannounced hashes to remember and report.

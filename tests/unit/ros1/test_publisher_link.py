@@ -55,8 +55,8 @@ def test_reading_makes_way_for_callbacks_that_are_behind(flood, eventually, monk
     sent = iter(range(10_000))
     eventually(lambda: publisher.publish({"data": next(sent)}) or False in pauses)
     (link,) = publisher_links(cockpit, "/flood")
-    (reader,) = link.subscription.readers
-    waiting = reader.feed.waiting
+    (negotiation,) = link.subscription.negotiations
+    waiting = negotiation.feed.waiting
     assert waiting > 10
     publisher.publish({"data": -1})
     while looked.acquire(timeout=0.05):
@@ -64,7 +64,7 @@ def test_reading_makes_way_for_callbacks_that_are_behind(flood, eventually, monk
     for _ in range(3):  # meanwhile, other connections are read from
         other.publish({"data": 1})
         assert looked.acquire(timeout=30)
-    assert reader.feed.waiting == waiting
+    assert negotiation.feed.waiting == waiting
 
 
 def test_what_was_left_in_the_socket_comes_when_callbacks_have_caught_up(flood, eventually):

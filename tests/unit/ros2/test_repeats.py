@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from rosglass.ros2.topic_matching import DuplicateFilter
+from rosglass.comm.inbox import DuplicateFilter
 
 A, B = b"a" * 16, b"b" * 16
 

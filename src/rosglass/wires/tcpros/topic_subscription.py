@@ -13,6 +13,7 @@ import socket
 import time
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
+from functools import partial
 from itertools import repeat
 from typing import TYPE_CHECKING
 
@@ -39,6 +40,7 @@ from rosglass.wires.tcpros.registrations import Member
 
 __all__ = [
     "PublisherLink",
+    "TopicReader",
     "TopicSubscription",
     "TypeNegotiation",
     "UnreachableLog",
@@ -77,8 +79,9 @@ class TopicSubscription(Member):
 
     Attributes:
         unreachable: As given.
-        readers: One for each subscription; replaced, never changed: the loop's thread iterates over
-            them for each message. :meth:`join` and :meth:`leave` are called under the topics' lock.
+        negotiations: One for each subscription; replaced, never changed: the loop's thread iterates
+            over them for each message. :meth:`join` and :meth:`leave` are called under the topics'
+            lock.
         eager: Whether messages are handed on as they are received.
     """
 
@@ -96,7 +99,7 @@ class TopicSubscription(Member):
         self.core, self.topic, self.unreachable = core, topic, unreachable
         self.endpoint = (EndpointKind.SUBSCRIPTION, topic)
         self.type_name = type_name
-        self.readers: tuple[TypeNegotiation, ...] = ()
+        self.negotiations: tuple[TypeNegotiation, ...] = ()
         self.eager = True
         self._current, self._latched = current, latched
         #: By URI; changed in the loop's thread only.
@@ -113,36 +116,36 @@ class TopicSubscription(Member):
 
     # -- subscriptions ---------------------------------------------------------------------------
 
-    def join(self, reader: TypeNegotiation) -> None:
+    def join(self, negotiation: TypeNegotiation) -> None:
         """Add a subscription, which receives latched messages first; from any thread."""
-        self.readers = (*self.readers, reader)
-        self.core.loop.call(lambda: self._join(reader))
+        self.negotiations = (*self.negotiations, negotiation)
+        self.core.loop.call(lambda: self._join(negotiation))
 
-    def _join(self, reader: TypeNegotiation) -> None:
+    def _join(self, negotiation: TypeNegotiation) -> None:
         for link in self.links():
-            # One that connected since the reader joined negotiates with it already.
-            if link.connected and reader not in link.readers:
-                link.readers = (*link.readers, reader)
-                reader.negotiate_type(link, lambda link=link: self._catch_up(reader, link))  # type: ignore[misc]
+            # One that connected since the subscription joined negotiates with it already.
+            if link.connected and negotiation not in link.negotiations:
+                link.negotiations = (*link.negotiations, negotiation)
+                negotiation.negotiate_type(link, partial(self._catch_up, negotiation, link))
         self.update_eager()
 
-    def _catch_up(self, reader: TypeNegotiation, link: PublisherLink) -> None:
+    def _catch_up(self, negotiation: TypeNegotiation, link: PublisherLink) -> None:
         """Hand on the latched messages that a connection of its own would have received."""
         if link.is_local:
             for data in self._latched():
-                reader.on_messages(link, [data], time.time_ns())
+                negotiation.reader.on_messages(link, [data], time.time_ns())
         elif link.latched is not None:
-            reader.on_messages(link, [link.latched], time.time_ns())
-        reader.feed.request_update()
+            negotiation.reader.on_messages(link, [link.latched], time.time_ns())
+        negotiation.feed.request_update()
 
-    def leave(self, reader: TypeNegotiation) -> bool:
+    def leave(self, negotiation: TypeNegotiation) -> bool:
         """Remove a subscription; return whether it was the last one."""
-        self.readers = tuple(one for one in self.readers if one is not reader)
-        return not self.readers
+        self.negotiations = tuple(each for each in self.negotiations if each is not negotiation)
+        return not self.negotiations
 
     def update_eager(self) -> None:
         """Be eager while one of the subscriptions is; from any thread."""
-        eager = any(reader.eager for reader in self.readers)
+        eager = any(each.reader.eager for each in self.negotiations)
         if eager != self.eager:
             self.eager = eager
             self.core.loop.call(self._update_links)
@@ -160,13 +163,13 @@ class TopicSubscription(Member):
 
     def notify_feeds(self) -> None:
         """Notify the subscriptions' feeds of a change; from any thread."""
-        for reader in self.readers:
-            reader.feed.request_update()
+        for each in self.negotiations:
+            each.feed.request_update()
 
     def on_publisher_connected(self, link: PublisherLink) -> None:
         """Negotiate the type with every subscription, then resume reading."""
-        link.readers = readers = self.readers
-        left = len(readers) + 1
+        link.negotiations = negotiations = self.negotiations
+        left = len(negotiations) + 1
 
         def decided() -> None:
             nonlocal left
@@ -176,15 +179,15 @@ class TopicSubscription(Member):
                 link.set_eager(self.eager)
                 self.notify_feeds()
 
-        for reader in readers:
-            reader.negotiate_type(link, decided)
+        for each in negotiations:
+            each.negotiate_type(link, decided)
         decided()
 
     def on_publisher_disconnected(self, link: PublisherLink) -> None:
         """Remove a publisher from the subscriptions; it is dialled again while it is listed."""
         _log.debug("%s: %s", self.topic, link.problem)
-        for reader in self.readers:
-            reader.on_publisher_disconnected(link)
+        for each in self.negotiations:
+            each.on_publisher_disconnected(link)
         if link.epoch != self._epoch:
             # The master does not list it: it was kept for its last messages.
             self._remove(link)
@@ -227,8 +230,8 @@ class TopicSubscription(Member):
     def _remove(self, link: PublisherLink) -> None:
         self._links.pop(link.uri, None)
         link.end()
-        for reader in self.readers:
-            reader.on_publisher_disconnected(link)
+        for each in self.negotiations:
+            each.on_publisher_disconnected(link)
 
     # -- as a member -----------------------------------------------------------------------------
 
@@ -264,8 +267,8 @@ class TopicSubscription(Member):
         """Check for silent publishers, and let the subscriptions' feeds follow the graph."""
         for link in self.links():
             link.check_silence()
-        for reader in self.readers:
-            reader.feed.follow(moved, idle)
+        for each in self.negotiations:
+            each.feed.follow(moved, idle)
         if idle:
             # The rate may have changed.
             self.core.loop.call(self._update_links)
@@ -275,8 +278,8 @@ class TopicSubscription(Member):
         if self._closed:
             return
         self._closed = True
-        for reader in self.readers:
-            reader.feed.close()
+        for each in self.negotiations:
+            each.feed.close()
         self.core.loop.call(self._end)
         self.core.remove(self)
 
@@ -292,8 +295,72 @@ class TopicSubscription(Member):
 _PUBLISHER = EndpointKind.PUBLISHER
 
 
-class TypeNegotiation(TopicMatching, Reader):
-    """Matches a subscription with a topic's publishers by their types, and hands on messages.
+class TopicReader(Reader):
+    """Hands the messages of accepted publishers to a subscription's inbox.
+
+    Args:
+        topic: The node's registration of the topic.
+        feed: The subscription's feed.
+
+    Attributes:
+        accepted: The type and name of each accepted publisher; written by the type negotiation.
+        eager: Whether messages are handed on as they are received.
+    """
+
+    def __init__(self, topic: TopicSubscription, feed: SubscriptionFeed) -> None:
+        self._topic, self._feed, self.eager = topic, feed, True
+        self.accepted: dict[PublisherLink, tuple[MessageType, bytes]] = {}
+
+    def on_messages(
+        self, link: PublisherLink, frames: Sequence[bytes | memoryview], received: int
+    ) -> None:
+        """Hand on messages; in the loop's thread, or one that drains the sockets."""
+        known = self.accepted.get(link)
+        if known is not None:
+            message_type, gid = known
+            # Three times as fast as Sample(...).
+            make = tuple.__new__
+            if len(frames) == 1:
+                sample = make(Sample, (frames[0], "ros1", message_type, received, None, gid, -1))
+                self._feed.deliver(sample)
+                return
+            given = zip(
+                frames,
+                repeat("ros1"),
+                repeat(message_type),
+                repeat(received),
+                repeat(None),
+                repeat(gid),
+                repeat(-1),
+                strict=False,
+            )
+            self._feed.deliver_many(list(map(make, repeat(Sample), given)))
+
+    def set_eager(self, eager: bool) -> None:
+        """Set whether messages are handed on as they are received; from any thread."""
+        self.eager = eager
+        self._topic.update_eager()
+
+    def flush(self) -> None:
+        """Hand on the sockets' data; from any thread."""
+        if not self._topic.eager and not self._topic.core.forked:
+            self._topic.drain()
+
+    def lateness(self, publisher: bytes) -> int:
+        """Return how late a publisher's last message was, by when its messages arrive."""
+        known = self.accepted.copy().items()
+        late = (link.late for link, (_, name) in known if name == publisher)
+        return round(max(late, default=0.0) * 1e9)
+
+    def close(self) -> None:
+        """Hand on no further messages."""
+        self.accepted.clear()
+
+
+class TypeNegotiation(TopicMatching):
+    """Matches a subscription with a topic's publishers by their types.
+
+    Messages do not pass through here, but through its reader.
 
     Args:
         core: The node it belongs to.
@@ -305,12 +372,13 @@ class TypeNegotiation(TopicMatching, Reader):
     Attributes:
         feed: The subscription's feed.
         topic: As given.
-        eager: Whether messages are handed on as they are received.
+        reader: Receives the messages.
     """
 
     #: Connections need no master.
     outlives_discovery = True
     feed: SubscriptionFeed
+    reader: TopicReader
 
     def __init__(
         self,
@@ -320,11 +388,10 @@ class TypeNegotiation(TopicMatching, Reader):
         ignore_local: bool,
         on_close: Callable[[TypeNegotiation], None],
     ) -> None:
-        self.topic, self.eager = topic, True
+        self.topic = topic
         self._core, self._on_close = core, on_close
         self._ignore_local = ignore_local
-        #: The type and name of each accepted publisher, and why others are refused.
-        self._accepted: dict[PublisherLink, tuple[MessageType, bytes]] = {}
+        #: Why publishers are refused.
         self._refused: dict[PublisherLink, str] = {}
         self._remarks: dict[PublisherLink, str] = {}
         self._fixed: MessageType | None = None
@@ -342,7 +409,7 @@ class TypeNegotiation(TopicMatching, Reader):
         md5, full = header.get("md5sum", ""), _full_name(header.get("type", ""))
         wanted = self._fixed
         if wanted is not None and self._agrees(wanted, full, md5) and wanted.md5:
-            self._accepted[link] = (wanted, link.name.encode())
+            self.reader.accepted[link] = (wanted, link.name.encode())
             decided()
             return
         missing = [name for name in ("type", "md5sum") if header.get(name, ANY) == ANY]
@@ -400,7 +467,7 @@ class TypeNegotiation(TopicMatching, Reader):
         if message_type is None:
             self._refused[link] = reason
             return
-        if self._fixed is None and (current is None or not self._accepted):
+        if self._fixed is None and (current is None or not self.reader.accepted):
             self.feed.set_type(message_type)
         elif self._fixed is None and current is not None and message_type.name != current.name:
             self._refused[link] = (
@@ -411,64 +478,15 @@ class TypeNegotiation(TopicMatching, Reader):
             return
         if reason:
             self._remarks[link] = f"{reason}: its messages are received as bytes"
-        self._accepted[link] = (message_type, link.name.encode())
+        self.reader.accepted[link] = (message_type, link.name.encode())
 
     def on_publisher_disconnected(self, link: PublisherLink) -> None:
         """Remove a publisher."""
-        accepted = self._accepted.pop(link, None)
+        accepted = self.reader.accepted.pop(link, None)
         for known in (self._refused, self._remarks):
             known.pop(link, None)
         if accepted is not None:
             self.feed.on_publisher_left(self._endpoint(link, *accepted))
-
-    def on_messages(
-        self, link: PublisherLink, frames: Sequence[bytes | memoryview], received: int
-    ) -> None:
-        """Hand on messages; in the loop's thread, or one that drains the sockets."""
-        known = self._accepted.get(link)
-        if known is not None:
-            message_type, gid = known
-            # Three times as fast as Sample(...).
-            make = tuple.__new__
-            if len(frames) == 1:
-                sample = make(Sample, (frames[0], "ros1", message_type, received, None, gid, -1))
-                self.feed.deliver(sample)
-                return
-            given = zip(
-                frames,
-                repeat("ros1"),
-                repeat(message_type),
-                repeat(received),
-                repeat(None),
-                repeat(gid),
-                repeat(-1),
-                strict=False,
-            )
-            self.feed.deliver_many(list(map(make, repeat(Sample), given)))
-
-    # -- as a reader -----------------------------------------------------------------------------
-
-    def set_eager(self, eager: bool) -> None:
-        """Set whether messages are handed on as they are received; from any thread."""
-        self.eager = eager
-        self.topic.update_eager()
-
-    def flush(self) -> None:
-        """Hand on the sockets' data; from any thread."""
-        if not self.topic.eager and not self._core.forked:
-            self.topic.drain()
-
-    def close(self) -> None:
-        """Stop receiving; safe to call twice."""
-        if not self._closed:
-            self._closed = True
-            self._on_close(self)
-
-    def lateness(self, publisher: bytes) -> int:
-        """Return how late a publisher's last message was, by when its messages arrive."""
-        known = self._accepted.copy().items()
-        late = (link.late for link, (_, name) in known if name == publisher)
-        return round(max(late, default=0.0) * 1e9)
 
     # -- as the matching of the subscription's feed ----------------------------------------------
 
@@ -478,7 +496,7 @@ class TypeNegotiation(TopicMatching, Reader):
         publishers: Sequence[EndpointInfo],  # noqa: ARG002 - ROS 1 has no QoS
     ) -> None:
         """Set the profile, and receive from the connected publishers."""
-        self.feed, self.reader, self._fixed = feed, self, feed.type
+        self.feed, self.reader, self._fixed = feed, TopicReader(self.topic, feed), feed.type
         feed.set_qos(feed.qos.for_subscription([]))
         self.topic.join(self)
 
@@ -492,7 +510,7 @@ class TypeNegotiation(TopicMatching, Reader):
         # Those that cannot be reached are logged once for all that they publish.
         lost = [Problem(link.problem, logging.INFO, link.lost) for link in links if link.problem]
         faults = [*self._refused.copy().values(), *self._remarks.copy().values()]
-        silence = [link.silence for link in links if link.silence and link in self._accepted]
+        silence = [link.silence for link in links if link.silence and link in self.reader.accepted]
         return [
             *lost,
             *(Problem(fault) for fault in faults),
@@ -504,7 +522,17 @@ class TypeNegotiation(TopicMatching, Reader):
         publishers: Sequence[EndpointInfo],  # noqa: ARG002 - the master may not know them yet
     ) -> list[EndpointInfo]:
         """Return the connected publishers whose types are accepted."""
-        return [self._endpoint(link, *accepted) for link, accepted in self._accepted.copy().items()]
+        return [
+            self._endpoint(link, *accepted)
+            for link, accepted in self.reader.accepted.copy().items()
+        ]
+
+    def close(self) -> None:
+        """Stop receiving; safe to call twice."""
+        if not self._closed:
+            self._closed = True
+            self.reader.close()
+            self._on_close(self)
 
     def _endpoint(self, link: PublisherLink, message_type: MessageType, gid: bytes) -> EndpointInfo:
         return EndpointInfo(
@@ -583,7 +611,7 @@ class PublisherLink:
         latched: The last message of a publisher that latches.
         epoch: The number of the master that listed it last; counted up by restarts.
         ended: Whether it is removed.
-        readers: The readers with which the type is negotiated on this connection.
+        negotiations: The negotiations of the type on this connection.
     """
 
     def __init__(self, subscription: TopicSubscription, uri: str, epoch: int) -> None:
@@ -593,7 +621,7 @@ class PublisherLink:
         self.problem, self.lost = "", False
         self.latched: Received | None = None
         self.ended = False
-        self.readers: tuple[TypeNegotiation, ...] = ()
+        self.negotiations: tuple[TypeNegotiation, ...] = ()
         self._core = subscription.core
         self._connection: Connection | None = None
         self._addresses: list[tuple[str, int]] = []
@@ -733,8 +761,8 @@ class PublisherLink:
         try:
             for start in range(0, len(frames), _BATCH):
                 part = frames[start : start + _BATCH]
-                for reader in self.subscription.readers:
-                    reader.on_messages(self, part, received)
+                for each in self.subscription.negotiations:
+                    each.reader.on_messages(self, part, received)
             if len(frames) >= _BATCH and self._core.loop.is_current:
                 self._apply_backpressure()
         except Exception:  # noqa: BLE001 - a user's executor
@@ -742,7 +770,7 @@ class PublisherLink:
 
     def _apply_backpressure(self) -> None:
         """Pause reading for a moment if callbacks are behind: reading takes time from them."""
-        behind = max((reader.feed.waiting for reader in self.subscription.readers), default=0)
+        behind = max((each.feed.waiting for each in self.subscription.negotiations), default=0)
         connection = self._connection
         if behind > _MAX_BEHIND and connection is not None:
             connection.pause(reading=False)

@@ -228,10 +228,10 @@ class Topics:
         if last:
             publication.close()
 
-    def _end_subscription(self, reader: TypeNegotiation) -> None:
-        shared = reader.topic
+    def _end_subscription(self, negotiation: TypeNegotiation) -> None:
+        shared = negotiation.topic
         with self._lock:
-            last = shared.leave(reader)
+            last = shared.leave(negotiation)
             if last and self._subscribed.get(shared.topic) is shared:
                 del self._subscribed[shared.topic]
         if last:
