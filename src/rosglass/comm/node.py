@@ -304,12 +304,9 @@ class Node(Handle):
         """Return the time of the node's clock."""
         return self._core.clock.now()
 
-    def steady(self) -> float:
-        """Return a monotonic time in seconds, which measures the ages of messages.
-
-        It stands still while a recording that replaces a robot is paused.
-        """
-        return time.monotonic()
+    #: Returns a monotonic time in seconds, which measures the ages of messages. It stands still
+    #: while a recording that replaces a robot is paused.
+    steady: Callable[[], float] = staticmethod(time.monotonic)
 
     def create_timer(
         self,

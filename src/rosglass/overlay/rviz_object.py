@@ -31,9 +31,9 @@ from rosglass.overlay.qml_members import (
     unchecked,
 )
 from rosglass.overlay.registered_properties import RegisteredProperties
-from rosglass.qml.engine.callbacks import weak_callback
 from rosglass.qml.engine.log import Caller, log_from_qml, plain_path
 from rosglass.qml.engine.runtime import runtime_of
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import Property, QJSValue, QtCore, QtGui, QtQml, QtQuick, Signal, Slot
 
 if TYPE_CHECKING:

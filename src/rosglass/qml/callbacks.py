@@ -1,5 +1,5 @@
 """Callbacks of own elements for QML."""
 
-from rosglass.qml.engine.callbacks import weak_callback
+from rosglass.qml.engine.session import weak_callback
 
 __all__ = ["weak_callback"]

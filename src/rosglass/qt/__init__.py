@@ -31,6 +31,7 @@ __all__ = [
     "choose_binding",
     "import_plainly",
     "is_alive",
+    "is_valid",
     "optional",
     "run_event_loop",
     "send_deferred_deletes",
@@ -144,6 +145,11 @@ def import_plainly() -> None:
     which would fail from now on, needs this.
     """
     builtins.__import__ = getattr(builtins, "__orig_import__", builtins.__import__)
+
+
+#: Returns what :func:`is_alive` does for a QObject that is not None: a function of Qt's bindings,
+#: for code that runs for every message.
+is_valid = _shiboken.isValid
 
 
 def is_alive(item: QtCore.QObject | None) -> bool:

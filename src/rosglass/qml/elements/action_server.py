@@ -13,10 +13,11 @@ from rosglass.errors import Error
 from rosglass.qml.elements.element import Element
 from rosglass.qml.elements.goal_handle import ServerGoalHandle
 from rosglass.qml.elements.singleton import full_type
-from rosglass.qml.engine.callbacks import Answers, call_back, weak_callback
+from rosglass.qml.engine.callbacks import Answers, call_back
 from rosglass.qml.engine.dialect import Dialect
 from rosglass.qml.engine.js_values import properties_of
 from rosglass.qml.engine.properties import ReadOnly, Writable, function, report
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import QJSValue, QtCore, Signal, is_alive
 
 if TYPE_CHECKING:

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosglass.comm.names import similar
 from rosglass.errors import Error, TypeNotFoundError
-from rosglass.qml.engine.callbacks import weak_callback
 from rosglass.qml.engine.dialect import Dialect, resolve_namespace, within_namespace
 from rosglass.qml.engine.from_js import fields_from_js
 from rosglass.qml.engine.log import Caller, RateLimit, declared_at, log_from_qml
 from rosglass.qml.engine.properties import ReadOnly, report
 from rosglass.qml.engine.runtime import UNPREPARED, runtime_of
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ from rosglass.comm.action_client import GoalStatus
 from rosglass.comm.time import Time
 from rosglass.errors import ConversionError, Error
 from rosglass.qml.elements.element import given_fields, named
-from rosglass.qml.engine.callbacks import weak_callback
 from rosglass.qml.engine.log import log_from_qml
 from rosglass.qml.engine.properties import ReadOnly
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:

@@ -17,12 +17,11 @@ from rosglass.comm.qos import Durability, History, QoS
 from rosglass.errors import ConversionError, Error, UnsupportedError
 from rosglass.qml.elements.element import NO_PEER_MS, Element, single_shot
 from rosglass.qml.elements.singleton import full_type
-from rosglass.qml.engine.callbacks import weak_callback
 from rosglass.qml.engine.dialect import Dialect
 from rosglass.qml.engine.from_js import fields_from_js
 from rosglass.qml.engine.log import log_from_qml
 from rosglass.qml.engine.properties import ReadOnly
-from rosglass.qml.engine.session import NOT_INITIALIZED
+from rosglass.qml.engine.session import NOT_INITIALIZED, weak_callback
 from rosglass.qt import Property, QJSValue, Signal, Slot, is_alive
 
 if TYPE_CHECKING:

@@ -19,14 +19,14 @@ from rosglass.qml.elements.element import (
     named,
 )
 from rosglass.qml.elements.singleton import full_type
-from rosglass.qml.engine.callbacks import Answers, Deferred, call_back, pass_on, weak_callback
+from rosglass.qml.engine.callbacks import Answers, Deferred, call_back, pass_on
 from rosglass.qml.engine.dialect import Dialect
 from rosglass.qml.engine.from_js import fields_from_js
 from rosglass.qml.engine.js_values import qos_from_js, shown
 from rosglass.qml.engine.log import log_from_qml
 from rosglass.qml.engine.properties import ReadOnly, Writable, at_least, function, report
 from rosglass.qml.engine.runtime import own_runtime
-from rosglass.qml.engine.session import NOT_INITIALIZED
+from rosglass.qml.engine.session import NOT_INITIALIZED, weak_callback
 from rosglass.qml.engine.waiting import MOST_WAITING, wait_for
 from rosglass.qt import Property, QJSValue, QtCore, Signal, Slot, is_alive
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import logging
 import math
+import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -12,11 +13,12 @@ from rosglass.comm.qos import Durability, History, QoS, Reliability
 from rosglass.comm.statistics import Pace
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
 from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS, TopicElement, single_shot
-from rosglass.qml.engine.callbacks import Deferred, call_back, weak_callback
+from rosglass.qml.engine.callbacks import Deferred, call_back
 from rosglass.qml.engine.dialect import Dialect
 from rosglass.qml.engine.js_values import qos_from_js
 from rosglass.qml.engine.properties import ReadOnly, Writable, at_least, report
-from rosglass.qt import QJSValue, QtCore, Signal, Slot, is_alive
+from rosglass.qml.engine.session import weak_callback
+from rosglass.qt import QJSValue, QtCore, Signal, Slot, is_alive, is_valid
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -247,7 +249,7 @@ class Subscription(TopicElement):
     # Receiving.
 
     def _on_arrival(self, endpoint: TopicSubscription) -> None:
-        if not is_alive(self) or endpoint is not self._endpoint:
+        if not is_valid(self) or endpoint is not self._endpoint:
             return
         wait = self._wait_ms()
         if wait > 0:
@@ -276,12 +278,11 @@ class Subscription(TopicElement):
         elif not endpoint.add_waiter(self._wake) and not endpoint.closed:
             self._wake()
         # They may have waited for their turn, or for a screen that stood still.
-        age = endpoint.statistics().age if samples else None
-        held = 0.0 if age is None else age.seconds
+        held = time.monotonic() - endpoint.last_arrival if samples else 0.0
         for sample in samples if self.throttleRate == 0 else samples[-1:]:
             self._show(sample, held)
             # A handler may have changed the topic or destroyed this object.
-            if not is_alive(self) or endpoint is not self._endpoint:
+            if not is_valid(self) or endpoint is not self._endpoint:
                 return
 
     def _show(self, sample: Sample, held: float) -> None:
@@ -309,7 +310,7 @@ class Subscription(TopicElement):
         if new_type:
             self.messageTypeChanged.emit()
         self.messageChanged.emit()
-        if not is_alive(self) or self._sample is not sample:
+        if not is_valid(self) or self._sample is not sample:
             return
         if self._problem:
             self._set_problem("")
@@ -318,7 +319,7 @@ class Subscription(TopicElement):
             self.staleChanged.emit()
         if not self._subscribed:
             report(self, subscribed=True)
-        if is_alive(self) and self._has_listeners():
+        if is_valid(self) and self._has_listeners():
             self.newMessage.emit(self._get_message())
 
     def _lateness(self, sample: Sample) -> float:
@@ -326,7 +327,7 @@ class Subscription(TopicElement):
         endpoint = self._endpoint
         if endpoint is None:
             return 0.0
-        return endpoint.lateness(sample).seconds
+        return endpoint.lateness_ns(sample) / 1e9
 
     def _has_listeners(self) -> bool:
         """Return whether newMessage is connected, so that its value is needed."""

@@ -15,10 +15,10 @@ from rosglass.comm.statistics import note_time, rate_of
 from rosglass.errors import ConversionError, DecodeError, Error, TypeNotFoundError
 from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS, Element
 from rosglass.qml.elements.subscription import DEFAULT_QOS, ROS1_QOS, Subscription
-from rosglass.qml.engine.callbacks import weak_callback
 from rosglass.qml.engine.dialect import Dialect
 from rosglass.qml.engine.js_values import qos_from_js, shown
 from rosglass.qml.engine.properties import ReadOnly, Writable, at_least, report, within
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:

@@ -13,10 +13,10 @@ from rosglass.comm.names import expand
 from rosglass.comm.time import Time
 from rosglass.errors import ConversionError, Error, TransformException
 from rosglass.qml.elements.element import Element
-from rosglass.qml.engine.callbacks import weak_callback
 from rosglass.qml.engine.dialect import Dialect
 from rosglass.qml.engine.js_values import time_from_js
 from rosglass.qml.engine.properties import Writable
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qml.engine.waiting import wait_for
 from rosglass.qt import QJSValue, Signal, Slot, is_alive
 

@@ -13,10 +13,10 @@ from rosglass.comm.time import Time
 from rosglass.errors import Error, TransformException
 from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS, Element, single_shot
 from rosglass.qml.elements.tf_buffer import TfBuffer, TfLink, shown_transform
-from rosglass.qml.engine.callbacks import weak_callback
 from rosglass.qml.engine.dialect import Dialect
 from rosglass.qml.engine.from_js import fields_from_js
 from rosglass.qml.engine.properties import ReadOnly, Writable, at_least, report, within
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import QJSValue, QtCore, Signal, Slot, is_alive
 
 if TYPE_CHECKING:

@@ -1,82 +1,25 @@
-"""Calls of JavaScript functions, promises for JavaScript, and answers from JavaScript."""
+"""Callbacks of JavaScript, promises for JavaScript, and answers from JavaScript."""
 
 from __future__ import annotations
 
 import logging
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any
-from weakref import WeakMethod
 
 from rosglass.errors import Error
 from rosglass.qml.engine.log import Caller, log_from_qml, plain_path
-from rosglass.qt import QJSValue, QtCore, Signal, Slot
+from rosglass.qt import QJSValue, QtCore, Slot
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from rosglass.qml.engine.runtime import Runtime
-    from rosglass.qt import QtQml
 
 
-__all__ = ["Answers", "Deferred", "JsCalls", "call_back", "pass_on", "weak_callback"]
+__all__ = ["Answers", "Deferred", "call_back", "pass_on"]
 
-_SCRIPT = """(function (calls, jobs) {
-    function thrown(value) {
-        return Object.assign(new Error(String(value)), { fileName: undefined })
-    }
-    calls.asked.connect(function (number) {
-        const job = jobs[number]
-        try {
-            job.result = job.callee.apply(undefined, job.passed)
-        } catch (error) {
-            job.result = error instanceof Error ? error : thrown(error)
-        }
-        job.done = true
-    })
-})"""
 #: Maximum number of open answers of one function; more requests are refused.
 _MAX_OPEN = 1000
-_ENDED = "new Error('the function was ended because it blocked the interface')"
-
-
-class JsCalls(QtCore.QObject):
-    """Calls JavaScript functions in the thread of their engine, without holding the GIL.
-
-    QJSValue.call holds the GIL until the function returns, so that the watchdog could not end an
-    endless function. Sending a signal releases the GIL.
-
-    Args:
-        engine: The engine.
-    """
-
-    asked = Signal(int)
-
-    def __init__(self, engine: QtQml.QQmlEngine) -> None:
-        super().__init__(engine)
-        self._engine = engine
-        self._jobs, self._number = engine.newObject(), 0
-        script: Any = engine.evaluate(_SCRIPT)
-        script.call([engine.newQObject(self), self._jobs])
-
-    def call(self, function: QJSValue, arguments: Sequence[QJSValue]) -> QJSValue:
-        """Return the function's result; a JavaScript error if it threw or was ended."""
-        self._number = (self._number + 1) % 2**31
-        name = str(self._number)
-        job, passed = self._engine.newObject(), self._engine.newArray(len(arguments))
-        for index, argument in enumerate(arguments):
-            passed.setProperty(index, argument)
-        job.setProperty("callee", function)
-        job.setProperty("passed", passed)
-        self._jobs.setProperty(name, job)
-        try:
-            self.asked.emit(self._number)
-        finally:
-            self._jobs.deleteProperty(name)
-        result: Any = job.property("result")
-        if not job.property("done").toBool():
-            result = self._engine.evaluate(_ENDED)
-        value: QJSValue = result
-        return value
 
 
 def call_back(runtime: Runtime, callback: QJSValue, *arguments: QJSValue) -> QJSValue:
@@ -100,29 +43,6 @@ def call_back(runtime: Runtime, callback: QJSValue, *arguments: QJSValue) -> QJS
     line = 0 if named.isUndefined() else result.property("lineNumber").toInt()
     log_from_qml("", logging.ERROR, result.toString(), Caller(file, max(line, 0), ""))
     return QJSValue()
-
-
-def weak_callback(method: Callable[..., Any], otherwise: Any = None) -> Callable[..., Any]:
-    """Return a callback for other threads that does not keep its QML object alive.
-
-    PySide crashes if a thread drops the last reference to an object while the GUI thread deletes
-    it.
-
-    Args:
-        method: A method of the object, called on the GUI thread.
-        otherwise: Return value, or the error to raise, if the object no longer exists.
-    """
-    reference = WeakMethod(method)
-
-    def call(*arguments: Any) -> Any:
-        found = reference()
-        if found is not None:
-            return found(*arguments)
-        if isinstance(otherwise, Error):
-            raise otherwise
-        return otherwise
-
-    return call
 
 
 class Deferred:

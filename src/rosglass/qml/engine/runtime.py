@@ -9,73 +9,29 @@ from typing import TYPE_CHECKING, Any
 
 from rosglass.comm.names import similar
 from rosglass.errors import ConversionError, Error
-from rosglass.qml.engine.callbacks import JsCalls
 from rosglass.qml.engine.dialect import Dialect
 from rosglass.qml.engine.from_js import elements_from_js, numpy
 from rosglass.qml.engine.js_values import fraction, number_from_text, qos_parts
 from rosglass.qml.engine.log import Caller, explain, log_from_qml, plain_path
 from rosglass.qml.engine.session import Session
-from rosglass.qml.engine.to_js import describe, exact, is_duration, milliseconds, reader, to_json
-from rosglass.qt import QT6, QJSValue, QtCore, QtQml, Slot, is_alive
+from rosglass.qml.engine.to_js import MessageConverter
+from rosglass.qt import QT6, QJSValue, QtCore, QtQml, Signal, Slot, is_alive
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rosglass.comm.qos import QoS
     from rosglass.comm.time import Duration, Time
-    from rosglass.messages import Message
     from rosglass.messages.schema import Schema
-    from rosglass.qml.engine.to_js import LongArray, MessageReader
 
 
-__all__ = ["UNPREPARED", "Host", "LongArrays", "Runtime", "own_runtime", "runtime_of"]
+__all__ = ["UNPREPARED", "Host", "JsCalls", "Runtime", "own_runtime", "runtime_of"]
 
 _NS = 1_000_000_000
 #: The file of a caller that is not QML.
 _NO_FILE = "<python>"
 #: Largest number of whole seconds that a double holds exactly, in nanoseconds.
 _LONGEST = 2**53 * _NS
-
-
-class LongArrays(QtCore.QObject):
-    """The long arrays of one message; exists while JavaScript refers to one of them."""
-
-    def __init__(self, runtime: Runtime, arrays: list[LongArray], dialect: Dialect) -> None:
-        super().__init__()
-        self._runtime, self.arrays, self._dialect = runtime, arrays, dialect
-
-    @Slot(int, int, result=QJSValue)
-    def at(self, index: int, place: int) -> QJSValue:
-        """Return one element of an array."""
-        if not 0 <= index < len(self.arrays) or not 0 <= place < len(self.arrays[index][1]):
-            return QJSValue()
-        member, values = self.arrays[index]
-        try:
-            value = values[place]
-            if member.struct is not None:
-                if self._dialect is Dialect.ROS1 and is_duration(member.struct):
-                    return self._runtime.value(milliseconds(value))
-                return self._runtime.message(value, self._dialect)
-        except Error as error:
-            self._runtime.throw(str(error))
-            return QJSValue()
-        if member.number is None:
-            return QJSValue(str(value))
-        if member.number.code == "?":
-            return self._runtime.value(bool(value))
-        whole = exact(int(value)) if member.number.low is not None else float(value)
-        return self._runtime.value(whole)
-
-    @Slot(int, result="QVariant")
-    def buffer(self, index: int) -> QtCore.QByteArray | None:
-        """Return a numeric array's bytes in native byte order; None for other arrays."""
-        if not 0 <= index < len(self.arrays):
-            return None
-        member, values = self.arrays[index]
-        if member.number is None:
-            return None
-        native = values.astype(values.dtype.newbyteorder("="), copy=False)
-        return QtCore.QByteArray(native.tobytes())
 
 
 class Host(QtCore.QObject):
@@ -167,9 +123,6 @@ _NAME = "rosglass.runtime"
 _OWN_SCRIPTS = tuple(str(_FOLDER / name) for name in ("times.js", "arrays.js", "helpers.js"))
 #: Error for an object in an engine without a runtime.
 UNPREPARED = "call rosglass.qml.install(engine) before the QML engine loads anything"
-#: Bytes of long arrays passed to JavaScript after which its garbage collector is called: it does
-#: not see how much memory its small objects hold in Python.
-_GARBAGE = 64 << 20
 #: Names of the functions that helpers.js returns.
 _HELPERS = (
     "build",
@@ -182,6 +135,21 @@ _HELPERS = (
     "makeQos",
     "makeOptions",
 )
+_CALL_SCRIPT = """(function (calls, jobs) {
+    function thrown(value) {
+        return Object.assign(new Error(String(value)), { fileName: undefined })
+    }
+    calls.asked.connect(function (number) {
+        const job = jobs[number]
+        try {
+            job.result = job.callee.apply(undefined, job.passed)
+        } catch (error) {
+            job.result = error instanceof Error ? error : thrown(error)
+        }
+        job.done = true
+    })
+})"""
+_ENDED = "new Error('the function was ended because it blocked the interface')"
 _PROMISE = """(function () {
     let made = {}
     made.promise = new Promise(function (resolve, reject) {
@@ -190,6 +158,46 @@ _PROMISE = """(function () {
     })
     return made
 })"""
+
+
+class JsCalls(QtCore.QObject):
+    """Calls JavaScript functions in the thread of their engine, without holding the GIL.
+
+    QJSValue.call holds the GIL until the function returns, so that the watchdog could not end an
+    endless function. Sending a signal releases the GIL.
+
+    Args:
+        engine: The engine.
+    """
+
+    asked = Signal(int)
+
+    def __init__(self, engine: QtQml.QQmlEngine) -> None:
+        super().__init__(engine)
+        self._engine = engine
+        self._jobs, self._number = engine.newObject(), 0
+        script: Any = engine.evaluate(_CALL_SCRIPT)
+        script.call([engine.newQObject(self), self._jobs])
+
+    def call(self, function: QJSValue, arguments: Sequence[QJSValue]) -> QJSValue:
+        """Return the function's result; a JavaScript error if it threw or was ended."""
+        self._number = (self._number + 1) % 2**31
+        name = str(self._number)
+        job, passed = self._engine.newObject(), self._engine.newArray(len(arguments))
+        for index, argument in enumerate(arguments):
+            passed.setProperty(index, argument)
+        job.setProperty("callee", function)
+        job.setProperty("passed", passed)
+        self._jobs.setProperty(name, job)
+        try:
+            self.asked.emit(self._number)
+        finally:
+            self._jobs.deleteProperty(name)
+        result: Any = job.property("result")
+        if not job.property("done").toBool():
+            result = self._engine.evaluate(_ENDED)
+        value: QJSValue = result
+        return value
 
 
 class Runtime(QtCore.QObject):
@@ -206,16 +214,16 @@ class Runtime(QtCore.QObject):
         engine.rootContext().setContextProperty(_NAME, self)
         self.session = session
         self._engine = engine
-        self._formats: dict[tuple[Schema, Dialect], tuple[MessageReader, QJSValue]] = {}
         self._kept: set[QtCore.QObject] = set()
-        self._debt = 0
-        self._host = Host(self)
+        self.host = Host(self)
+        #: Returns a message as a JavaScript value; see :meth:`MessageConverter.convert`.
+        self.message = MessageConverter(self, engine).convert
 
     @cached_property
-    def _helper(self) -> dict[str, QJSValue]:
+    def helpers(self) -> dict[str, QJSValue]:
         """Functions of our scripts; loaded for the first value, after the first frame."""
         parts = [self._script(name) for name in ("times.js", "arrays.js")]
-        host = self._engine.newQObject(self._host)
+        host = self._engine.newQObject(self.host)
         made = self._script("helpers.js").call([*parts, host, QJSValue(not QT6)])
         found = {name: made.property(name) for name in _HELPERS}
         for name, helper in found.items():
@@ -316,29 +324,9 @@ class Runtime(QtCore.QObject):
             made.setProperty(index, self.value(inner))
         return made
 
-    def message(self, message: Message, dialect: Dialect = Dialect.ROS2) -> QJSValue:
-        """Return a message as a JavaScript value, in the style of a module.
-
-        Raises:
-            DecodeError: The received bytes are malformed.
-        """
-        engine = self.engine
-        if engine is None:
-            return QJSValue()
-        schema = message._schema__
-        arrays: list[LongArray] = []
-        read, shape = self._format(schema, dialect)
-        text, marked = to_json(read(message, arrays))
-        source = QJSValue()
-        if arrays:
-            source = engine.newQObject(self.keep(LongArrays(self, arrays, dialect)))
-            self._charge(arrays)
-        build = "buildWithNan" if marked else "build"
-        return self._call(build, [QJSValue(text), shape, source])
-
     def promise(self) -> tuple[QJSValue, QJSValue, QJSValue]:
         """Return a JavaScript promise, and the functions that resolve and reject it."""
-        made = self._call("makePromise", [])
+        made = self.call_helper("makePromise", [])
         return made.property("promise"), made.property("resolve"), made.property("reject")
 
     def time(self, time: Time, dialect: Dialect = Dialect.ROS2) -> QJSValue:
@@ -350,7 +338,9 @@ class Runtime(QtCore.QObject):
         return self._make_time(dialect, "duration", *divmod(duration.nanoseconds, 10**9))
 
     def _make_time(self, dialect: Dialect, kind: str, sec: int, nanosec: int) -> QJSValue:
-        return self._call("makeTime", [self.value(v) for v in (dialect.ros, kind, sec, nanosec)])
+        return self.call_helper(
+            "makeTime", [self.value(v) for v in (dialect.ros, kind, sec, nanosec)]
+        )
 
     def create_time(
         self, dialect: Dialect, kind: str, first: QJSValue, second: QJSValue
@@ -361,38 +351,20 @@ class Runtime(QtCore.QObject):
             The value; a JavaScript error if the arguments are invalid.
         """
         arguments = [self.value(dialect.ros), self.value(kind), first, second]
-        result: QJSValue = self._helper["createTime"].call(arguments)
+        result: QJSValue = self.helpers["createTime"].call(arguments)
         return result
 
     def clock(self, number: int) -> QJSValue:
         """Return the JavaScript object of a clock type, by rcl's number."""
-        return self._call("clock", [self.value(number)])
+        return self.call_helper("clock", [self.value(number)])
 
     def options(self) -> QJSValue:
         """Return an empty set of init options."""
-        return self._call("makeOptions", [])
+        return self.call_helper("makeOptions", [])
 
     def qos(self, qos: QoS) -> QJSValue:
         """Return a profile that QML can change and pass to publishers and subscriptions."""
-        return self._call("makeQos", [self.value(part) for part in qos_parts(qos)])
-
-    def _format(self, schema: Schema, dialect: Dialect) -> tuple[MessageReader, QJSValue]:
-        """Return a type's reader, and its shape for JavaScript."""
-        made = self._formats.get((schema, dialect))
-        if made is None:
-            assert self.engine is not None
-            found = describe(schema, dialect)
-            fields = self.engine.newArray(len(found.fields))
-            for index, (name, kind, inner) in enumerate(found.fields):
-                field = self.value([name, kind, 0])
-                if inner is not None:
-                    field.setProperty(2, self._format(inner, dialect)[1])
-                fields.setProperty(index, field)
-            number = self._host.know(schema, dialect)
-            head = [QJSValue(found.name), QJSValue(found.time), fields]
-            shape = self._call("shape", [*head, self.value(found.constants), self.value(number)])
-            made = self._formats[schema, dialect] = reader(schema, dialect), shape
-        return made
+        return self.call_helper("makeQos", [self.value(part) for part in qos_parts(qos)])
 
     def _script(self, name: str) -> QJSValue:
         file = _FOLDER / name
@@ -401,21 +373,14 @@ class Runtime(QtCore.QObject):
             raise Error(f"{file}:{result.property('lineNumber').toString()}: {result.toString()}")
         return result
 
-    def _charge(self, arrays: list[LongArray]) -> None:
-        self._debt += sum(getattr(values, "nbytes", 0) for _, values in arrays)
-        if self._debt > _GARBAGE:
-            self._debt = 0
-            self.session.executor.post(self._collect)
-
-    def _collect(self) -> None:
-        engine = self.engine
-        if engine is not None:
-            engine.collectGarbage()
-
-    def _call(self, name: str, arguments: list[QJSValue]) -> QJSValue:
+    def call_helper(self, name: str, arguments: list[QJSValue]) -> QJSValue:
+        """Call a function of helpers.js; return undefined, and log the error, if it throws."""
         if self.engine is None:
             return QJSValue()
-        result: QJSValue = self._helper[name].call(arguments)
+        return self.checked(name, self.helpers[name].call(arguments))
+
+    def checked(self, name: str, result: QJSValue) -> QJSValue:
+        """Return the result of a helper; undefined, with the error logged, if it threw."""
         if result.isError():
             _log.error("internal error: %s: %s", name, result.toString())
             return QJSValue()

@@ -16,6 +16,7 @@ from collections import deque
 from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, overload
+from weakref import WeakMethod
 
 from rosglass.comm.executor import Dispatcher
 from rosglass.comm.graph import ConnectionState, Status
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from rosglass.ros2.ros_arguments import Arguments
 
 
-__all__ = ["NOT_INITIALIZED", "GuiExecutor", "ScriptLimit", "Session"]
+__all__ = ["NOT_INITIALIZED", "GuiExecutor", "ScriptLimit", "Session", "weak_callback"]
 
 _log = logging.getLogger("rosglass.qml")
 
@@ -120,6 +121,29 @@ def _guarded(job: Callable[[], None]) -> None:
         job()
     except Exception:  # noqa: BLE001 - Qt's event loop calls this
         _log.exception("a callback failed")
+
+
+def weak_callback(method: Callable[..., Any], otherwise: Any = None) -> Callable[..., Any]:
+    """Return a callback for other threads that does not keep its QML object alive.
+
+    PySide crashes if a thread drops the last reference to an object while the GUI thread deletes
+    it.
+
+    Args:
+        method: A method of the object, called on the GUI thread.
+        otherwise: Return value, or the error to raise, if the object no longer exists.
+    """
+    reference = WeakMethod(method)
+
+    def call(*arguments: Any) -> Any:
+        found = reference()
+        if found is not None:
+            return found(*arguments)
+        if isinstance(otherwise, Error):
+            raise otherwise
+        return otherwise
+
+    return call
 
 
 class ScriptLimit:

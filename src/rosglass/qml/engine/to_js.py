@@ -10,7 +10,9 @@ import math
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rosglass.errors import Error
 from rosglass.qml.engine.dialect import Dialect
+from rosglass.qt import QJSValue, QtCore, QtQml, Slot, is_valid
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,10 +20,13 @@ if TYPE_CHECKING:
     from rosglass.interfaces import Definition
     from rosglass.messages import Message
     from rosglass.messages.schema import Member, Schema
+    from rosglass.qml.engine.runtime import Runtime
 
 __all__ = [
     "INLINE",
     "LongArray",
+    "LongArrays",
+    "MessageConverter",
     "Shape",
     "constants_of",
     "describe",
@@ -35,6 +40,9 @@ __all__ = [
 #: Longer arrays of numbers, texts or messages are fetched on access.
 INLINE = {"number": 64, "text": 32, "message": 16}
 _EXACT = 1 << 53
+#: Bytes of long arrays passed to JavaScript after which its garbage collector is called: it does
+#: not see how much memory its small objects hold in Python.
+_GARBAGE = 64 << 20
 _HEADER = "std_msgs/msg/Header"
 
 #: A long array: its member and its values.
@@ -205,3 +213,107 @@ def _mark(value: Any) -> Any:
     if isinstance(value, list):
         return [_mark(inner) for inner in value]
     return value
+
+
+class MessageConverter:
+    """Converts messages for the QML of one engine.
+
+    Args:
+        runtime: The engine's runtime.
+        engine: The engine.
+    """
+
+    def __init__(self, runtime: Runtime, engine: QtQml.QQmlEngine) -> None:
+        self._runtime, self._engine = runtime, engine
+        self._formats: dict[tuple[Schema, Dialect], tuple[MessageReader, QJSValue]] = {}
+        self._debt = 0
+
+    def convert(self, message: Message, dialect: Dialect = Dialect.ROS2) -> QJSValue:
+        """Return a message as a JavaScript value, in the style of a module.
+
+        Undefined if the engine no longer exists.
+
+        Raises:
+            DecodeError: The received bytes are malformed.
+        """
+        runtime, engine, schema = self._runtime, self._engine, message._schema__
+        if not is_valid(engine):
+            return QJSValue()
+        arrays: list[LongArray] = []
+        read, shape = self._formats.get((schema, dialect)) or self._format(schema, dialect)
+        text, marked = to_json(read(message, arrays))
+        source = QJSValue()
+        if arrays:
+            source = engine.newQObject(runtime.keep(LongArrays(runtime, arrays, dialect)))
+            self._charge(arrays)
+        build = "buildWithNan" if marked else "build"
+        result: QJSValue = runtime.helpers[build].call([QJSValue(text), shape, source])
+        return runtime.checked(build, result) if result.isError() else result
+
+    def _format(self, schema: Schema, dialect: Dialect) -> tuple[MessageReader, QJSValue]:
+        """Return a type's reader, and its shape for JavaScript."""
+        made = self._formats.get((schema, dialect))
+        if made is None:
+            runtime, found = self._runtime, describe(schema, dialect)
+            fields = self._engine.newArray(len(found.fields))
+            for index, (name, kind, inner) in enumerate(found.fields):
+                field = runtime.value([name, kind, 0])
+                if inner is not None:
+                    field.setProperty(2, self._format(inner, dialect)[1])
+                fields.setProperty(index, field)
+            number = runtime.value(runtime.host.know(schema, dialect))
+            head = [QJSValue(found.name), QJSValue(found.time), fields]
+            shape = runtime.call_helper("shape", [*head, runtime.value(found.constants), number])
+            made = self._formats[schema, dialect] = reader(schema, dialect), shape
+        return made
+
+    def _charge(self, arrays: list[LongArray]) -> None:
+        self._debt += sum(getattr(values, "nbytes", 0) for _, values in arrays)
+        if self._debt > _GARBAGE:
+            self._debt = 0
+            self._runtime.session.executor.post(self._collect)
+
+    def _collect(self) -> None:
+        if is_valid(self._engine):
+            self._engine.collectGarbage()
+
+
+class LongArrays(QtCore.QObject):
+    """The long arrays of one message; exists while JavaScript refers to one of them."""
+
+    def __init__(self, runtime: Runtime, arrays: list[LongArray], dialect: Dialect) -> None:
+        super().__init__()
+        self._runtime, self.arrays, self._dialect = runtime, arrays, dialect
+
+    @Slot(int, int, result=QJSValue)
+    def at(self, index: int, place: int) -> QJSValue:
+        """Return one element of an array."""
+        if not 0 <= index < len(self.arrays) or not 0 <= place < len(self.arrays[index][1]):
+            return QJSValue()
+        member, values = self.arrays[index]
+        try:
+            value = values[place]
+            if member.struct is not None:
+                if self._dialect is Dialect.ROS1 and is_duration(member.struct):
+                    return self._runtime.value(milliseconds(value))
+                return self._runtime.message(value, self._dialect)
+        except Error as error:
+            self._runtime.throw(str(error))
+            return QJSValue()
+        if member.number is None:
+            return QJSValue(str(value))
+        if member.number.code == "?":
+            return self._runtime.value(bool(value))
+        whole = exact(int(value)) if member.number.low is not None else float(value)
+        return self._runtime.value(whole)
+
+    @Slot(int, result="QVariant")
+    def buffer(self, index: int) -> QtCore.QByteArray | None:
+        """Return a numeric array's bytes in native byte order; None for other arrays."""
+        if not 0 <= index < len(self.arrays):
+            return None
+        member, values = self.arrays[index]
+        if member.number is None:
+            return None
+        native = values.astype(values.dtype.newbyteorder("="), copy=False)
+        return QtCore.QByteArray(native.tobytes())

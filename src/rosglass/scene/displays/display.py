@@ -23,9 +23,9 @@ from rosglass.comm.qos import Durability, QoS, Reliability
 from rosglass.errors import ArgumentError, Error, TransformException
 from rosglass.interfaces.names import ros1_name
 from rosglass.qml.elements.element import TopicElement, single_shot
-from rosglass.qml.engine.callbacks import weak_callback
 from rosglass.qml.engine.log import log_from_qml
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import QtQml, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import FIXED_FRAME, TopicSetting, read_topic, write_topic
 from rosglass.scene.configs.settings import Configurable, Setting

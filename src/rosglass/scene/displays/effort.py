@@ -12,8 +12,8 @@ import numpy as np
 
 from rosglass.errors import Error, ExtrapolationException, TransformException
 from rosglass.qml.elements.element import single_shot
-from rosglass.qml.engine.callbacks import weak_callback
 from rosglass.qml.engine.properties import ReadOnly, report
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import Signal, Slot, is_alive
 from rosglass.scene.configs.settings import Setting
 from rosglass.scene.data.urdf import parse_urdf

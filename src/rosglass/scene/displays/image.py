@@ -25,9 +25,9 @@ from rosglass.images.transports import camera_info_topic
 from rosglass.interfaces.names import ros1_name
 from rosglass.qml.elements.element import DEFAULT_TIMEOUT_MS
 from rosglass.qml.elements.image_sinks import ImageItem, Sink
-from rosglass.qml.engine.callbacks import weak_callback
 from rosglass.qml.engine.log import declared_at, log_from_qml
 from rosglass.qml.engine.properties import ReadOnly, Writable, report
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import Property, QtCore, QtGui, QtQml, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import read_number
 from rosglass.scene.configs.settings import Setting

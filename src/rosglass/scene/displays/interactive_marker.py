@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 from rosglass.errors import Error
 from rosglass.qml.elements.element import single_shot
-from rosglass.qml.engine.callbacks import weak_callback
 from rosglass.qml.engine.properties import ReadOnly, report
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import QtCore, QtQml, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import read_marker_namespace, write_marker_namespace
 from rosglass.scene.configs.settings import Setting

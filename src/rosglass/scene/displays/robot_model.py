@@ -15,8 +15,8 @@ from rosglass.comm.qos import QoS
 from rosglass.errors import Error, UnsupportedError
 from rosglass.images.encodings import MAX_PIXELS
 from rosglass.qml.elements.element import single_shot
-from rosglass.qml.engine.callbacks import weak_callback
 from rosglass.qml.engine.properties import ReadOnly, report
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import QtGui, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import (
     DescriptionSetting,

@@ -19,8 +19,8 @@ from rosglass.errors import ArgumentError, Error, LookupException, TransformExce
 from rosglass.overlay.property_values import shown
 from rosglass.qml.elements.element import Element, single_shot
 from rosglass.qml.elements.tf_buffer import TfLink
-from rosglass.qml.engine.callbacks import weak_callback
 from rosglass.qml.engine.runtime import runtime_of
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import Property, QtCore, Signal, Slot, is_alive
 from rosglass.scene.displays.display import Display
 from rosglass.scene.displays.shapes import poses_matrices

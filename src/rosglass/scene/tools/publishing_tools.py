@@ -14,8 +14,8 @@ import numpy as np
 from rosglass.comm.names import similar
 from rosglass.comm.qos import QoS
 from rosglass.errors import Error
-from rosglass.qml.engine.callbacks import weak_callback
 from rosglass.qml.engine.properties import ReadOnly, report
+from rosglass.qml.engine.session import weak_callback
 from rosglass.qt import QtCore, Signal, Slot, is_alive
 from rosglass.scene.configs.rviz_formats import (
     TopicSetting,
