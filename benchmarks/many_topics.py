@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import statistics
 import subprocess
 import sys
@@ -84,7 +85,7 @@ def names(plan: dict[str, Any]) -> list[str]:
 
 
 def publisher(plan: dict[str, Any]) -> None:
-    """Publish with a session for each robot until killed."""
+    """Publish with a session for each robot, until killed or left behind."""
     import struct
 
     import rosglass
@@ -100,10 +101,10 @@ def publisher(plan: dict[str, Any]) -> None:
             made.append((session.declare_publisher(key(name)), gid_of(token)))
             peers.keep(session, session.liveliness().declare_token(token))
     print("ready", flush=True)
-    sequence, due, pause = 0, time.monotonic(), 1 / plan["hz"]
+    sequence, due, pause, parent = 0, time.monotonic(), 1 / plan["hz"], os.getppid()
     # Spread over the period, as robots are, in steps that a sleep can keep.
     steps = max(1, min(len(made), round(pause / 0.001)))
-    while True:
+    while os.getppid() == parent:
         sequence += 1
         for step in range(steps):
             for sender, gid in made[step::steps]:
