@@ -208,6 +208,14 @@ def attempt(action: Callable[[Any], Any], argument: Any) -> tuple[bool, Any]:
         return False, error
 
 
+def peak_of(action: Callable[[Any], Any], argument: Any) -> int:
+    """Return the largest number of bytes that Python allocated during an attempt."""
+    tracemalloc.reset_peak()
+    before = tracemalloc.get_traced_memory()[0]
+    attempt(action, argument)
+    return tracemalloc.get_traced_memory()[1] - before
+
+
 @pytest.mark.parametrize(("name", "ros"), CASES)
 def test_mutants_are_decoded_alike_or_refused(name: str, ros: int) -> None:
     kind, wire = load(name, ros), WIRE[ros]
@@ -330,12 +338,10 @@ def test_hostile_counts_allocate_nothing(name: str, ros: int) -> None:
             if index % 7:
                 continue
             for action in actions:
-                tracemalloc.reset_peak()
-                before = tracemalloc.get_traced_memory()[0]
-                attempt(action, data)
-                peak = tracemalloc.get_traced_memory()[1] - before
                 # Python objects for a few hundred bytes, an error with its traceback.
-                assert peak < 60_000 + 100 * len(data), f"{peak} bytes for {data.hex()}"
+                limit = 60_000 + 100 * len(data)
+                # Threads that other tests have left add to a peak, but not to each of three.
+                assert any(peak_of(action, data) < limit for _ in range(3)), data.hex()
     finally:
         tracemalloc.stop()
 
