@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 import rosglass
-from rosglass.cli import doctor, main
+from rosglass.cli import main
 from rosglass.cli.arguments import COMMANDS
 from rosglass.cli.messages import split_type
 from rosglass.cli.network import interfaces, is_loopback, router_problem
@@ -356,11 +356,23 @@ def test_where_the_simulated_robot_is(
     ("size", "seconds", "level"),
     [(4 * 2**20, 30, "note"), (4 * 2**20, 3, "ok"), (128 * 2**20, 30, "ok")],
 )
-def test_doctor_looks_at_the_memory_for_ip_fragments(tmp_path, size, seconds, level):
+def test_doctor_looks_at_the_memory_for_ip_fragments(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    size: int,
+    seconds: int,
+    level: str,
+) -> None:
     """Lost packets fill it, and large messages over DDS stay away until it is empty."""
-    (tmp_path / "ipfrag_high_thresh").write_text(f"{size}\n")
-    (tmp_path / "ipfrag_time").write_text(f"{seconds}\n")
-    (finding,) = doctor._fragments(tmp_path)
-    assert finding.level == level
-    assert ("sysctl" in finding.fix) == (level == "note")
-    assert not list(doctor._fragments(tmp_path / "none"))
+    kernel = {"ipfrag_high_thresh": size, "ipfrag_time": seconds}
+    read = Path.read_text
+
+    def read_text(path: Path, *args: Any, **options: Any) -> str:
+        return f"{kernel[path.name]}\n" if path.name in kernel else read(path, *args, **options)
+
+    monkeypatch.setattr(Path, "read_text", read_text)
+    main(["doctor", "--json", "--url", "local://doctor"])
+    found = json.loads(capsys.readouterr().out)
+    (finding,) = [one for one in found if "IP fragments" in one["text"]]
+    assert finding["level"] == level
+    assert ("sysctl" in finding["fix"]) == (level == "note")

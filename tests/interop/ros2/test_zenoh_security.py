@@ -44,6 +44,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, names, days in (
         ("router", "DNS:localhost,IP:127.0.0.1", "30"),
         ("elsewhere", "DNS:robot.example", "30"),
+        ("expired", "DNS:localhost,IP:127.0.0.1", "-1"),
         ("operator", "DNS:operator", "30"),
     ):
         (place / "names").write_text(f"subjectAltName={names}\n")
@@ -152,6 +153,10 @@ def test_tls_encrypts_and_says_why_it_fails(
     elsewhere = run("tls", f"link: {{ tls: {{ {tls_settings(folder, 'elsewhere')} }} }}")
     url = elsewhere.url.replace("?tls=true", f"?ca={folder}/authority.pem")
     assert "a certificate for another host" in refused(connect, url)
+    expired = run("tls", f"link: {{ tls: {{ {tls_settings(folder, 'expired')} }} }}")
+    old = refused(connect, expired.url.replace("?tls=true", f"?ca={folder}/authority.pem"))
+    assert "a certificate that is not valid now (certificate has expired)" in old
+    assert "renew it, or correct a clock" in old
     assert "does not speak TLS: leave out tls" in refused(
         connect, f"{run('tcp', '').url}?ca={folder}/authority.pem"
     )
