@@ -1,4 +1,4 @@
-"""Counts what parts 7 and 8 want to reach, and prints it as a table.
+"""Counts the milestones of part 11, and prints them as a table.
 
     .venv/bin/python scripts/milestones.py [--checkout DIR] [--trace]
 
@@ -14,7 +14,6 @@ import argparse
 import ast
 import contextlib
 import os
-import re
 import shutil
 import socket
 import subprocess
@@ -22,25 +21,13 @@ import sys
 import tempfile
 import threading
 import time
-from collections import Counter, defaultdict
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-#: Where the clients of ROS 1 and ROS 2 and their wires live: today's folders and part 7's.
-_CLIENT_LAYER = ("comm", "ros1", "ros2", "node", "wires")
-_LOCKS = {"Lock", "RLock", "Event", "Condition", "Semaphore", "BoundedSemaphore", "Barrier"}
-#: What a class that stands for a whole ROS graph derives from, and the real ones among them.
-_WORLDS = {"Node", "GraphNode", "Middleware", "Wire"}
-_REAL_WORLDS = {"GraphNode", "Ros1Node", "Ros2Node", "DdsMiddleware", "ZenohMiddleware", "Bare"}
-#: Names of the glossary's left column (house.md, section 3) that stand for nothing else.
-_GLOSSARY = re.compile(
-    r"\b(told|nobody|somebody|whoever|farewells?|furniture|errands?|see_off|let_up|meanwhile)\b"
-    r"|_(?:PATIENCE|LEISURE|HURRY)\b|\bput_off\b",
-    re.IGNORECASE,
-)
 #: What a NamedTuple has for everybody.
 _OF_TUPLES = {"_replace", "_asdict", "_fields", "_make"}
 #: What rospy's generated classes have for everybody: genpy documents them, without other names.
@@ -77,16 +64,6 @@ class Source:
         """How many lines it has."""
         return len(self.text.splitlines())
 
-    def calls(self) -> Iterator[tuple[str, str, ast.Call]]:
-        """Yield each call with the name of what is called, and of what that is taken from."""
-        for node in ast.walk(self.tree):
-            if isinstance(node, ast.Call):
-                called = node.func
-                if isinstance(called, ast.Attribute):
-                    yield called.attr, getattr(called.value, "id", ""), node
-                elif isinstance(called, ast.Name):
-                    yield called.id, "", node
-
 
 def read(folder: Path) -> list[Source]:
     return [Source(path) for path in sorted(folder.rglob("*.py"))]
@@ -94,47 +71,6 @@ def read(folder: Path) -> list[Source]:
 
 def total_lines(sources: list[Source]) -> int:
     return sum(source.lines for source in sources)
-
-
-def twins(package: Path) -> int:
-    """Count module names that both ROS worlds have."""
-    worlds = [{path.stem for path in (package / ros).glob("*.py")} for ros in ("ros1", "ros2")]
-    return len((worlds[0] & worlds[1]) - {"__init__"})
-
-
-def locks(sources: list[Source]) -> int:
-    return sum(
-        name in _LOCKS and owner in {"", "threading"}
-        for source in sources
-        for name, owner, _ in source.calls()
-    )
-
-
-def worlds(sources: list[Source]) -> int:
-    """Count classes that stand for a ROS graph in memory."""
-    found = set()
-    for source in sources:
-        for node in ast.walk(source.tree):
-            if isinstance(node, ast.ClassDef) and node.name not in _REAL_WORLDS:
-                bases = {getattr(base, "id", getattr(base, "attr", "")) for base in node.bases}
-                if bases & _WORLDS:
-                    found.add(node.name)
-    return len(found)
-
-
-def sleeps(sources: list[Source]) -> tuple[int, int, int]:
-    """Count calls of ``time.sleep`` in tests, of ``nothing_happens``, and sleeps of their peers.
-
-    Peers are programs of their own, which send at a rate.
-    """
-    fixed = quiet = peers = 0
-    for source in sources:
-        for name, owner, _ in source.calls():
-            is_sleep = name == "sleep" and owner == "time"
-            peers += is_sleep and "peers" in source.path.parts
-            fixed += is_sleep and "peers" not in source.path.parts
-            quiet += name == "nothing_happens"
-    return fixed, quiet, peers
 
 
 def private_reaches(sources: list[Source]) -> int:
@@ -147,16 +83,6 @@ def private_reaches(sources: list[Source]) -> int:
         for source in sources
         for node in ast.walk(source.tree)
         if isinstance(node, ast.Attribute)
-    )
-
-
-def late_imports(sources: list[Source]) -> int:
-    return sum(
-        isinstance(inner, ast.Import | ast.ImportFrom)
-        for source in sources
-        for node in ast.walk(source.tree)
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
-        for inner in ast.walk(node)
     )
 
 
@@ -177,19 +103,6 @@ def import_graph(package: Path, sources: list[Source]) -> dict[str, set[str]]:
                 wanted |= (inner & names.keys()) or ({node.module} & names.keys())
         wanted.discard(name)
     return graph
-
-
-def lone_modules(graph: dict[str, set[str]]) -> int:
-    """Count modules that one module of the same folder imports, and none besides."""
-    importers = defaultdict(set)
-    packages = {name.rpartition(".")[0] for name in graph}
-    for name, wanted in graph.items():
-        for other in wanted if name not in packages else ():  # what __init__ shows to users apart
-            importers[other].add(name)
-    return sum(
-        len(by) == 1 and next(iter(by)).rpartition(".")[0] == name.rpartition(".")[0]
-        for name, by in importers.items()
-    )
 
 
 def cycles(graph: dict[str, set[str]]) -> tuple[int, int]:
@@ -224,12 +137,44 @@ def cycles(graph: dict[str, set[str]]) -> tuple[int, int]:
     return len(large), sum(map(len, large))
 
 
-def glossary_words(folders: list[Path]) -> int:
-    """Count words of the glossary's left column in the code and in what is written about it."""
-    texts = [
-        path for folder in folders for path in folder.rglob("*") if path.suffix in {".py", ".md"}
-    ]
-    return sum(len(_GLOSSARY.findall(path.read_text(encoding="utf-8"))) for path in texts)
+def circles(graph: dict[str, set[str]]) -> int:
+    """Count pairs of modules that import each other."""
+    return sum(name in graph[other] for name in graph for other in graph[name]) // 2
+
+
+def back_arrows(graph: dict[str, set[str]]) -> int:
+    """Count pairs of packages of which each imports the other."""
+    arrows = {
+        (name.split(".")[1], other.split(".")[1])
+        for name, wanted in graph.items()
+        for other in wanted
+        if name.count(".") and other.count(".")
+    }
+    return sum(one < other and (other, one) in arrows for one, other in arrows)
+
+
+def loaded(root: Path, module: str, package: str) -> int:
+    """Count modules of a package that importing a module loads, in a process of its own."""
+    code = (
+        f"import sys, {module}\n"
+        f"print(sum(name.split('.')[:2] == {package.split('.')!r} for name in sys.modules))"
+    )
+    env = {**os.environ, "PYTHONPATH": str(root / "src")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True
+    )
+    return int(done.stdout)
+
+
+def patterns(root: Path) -> int:
+    """Count what scripts/words.py finds with ``--patterns``."""
+    done = subprocess.run(
+        [sys.executable, root / "scripts" / "words.py", "--patterns"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return int(done.stdout.split()[-1])
 
 
 # -- the way of a message ------------------------------------------------------------------
@@ -405,32 +350,32 @@ def main() -> None:
     if not package.is_dir():
         parser.error(f"{root} is no checkout of rosglass: {package} is missing")
     source, tests = read(package), read(root / "tests")
-    clients = [one for one in source if one.path.relative_to(package).parts[0] in _CLIENT_LAYER]
     graph = import_graph(package, source)
-
-    def of(folder: str) -> int:
-        return total_lines(
-            [one for one in source if folder in one.path.relative_to(package).parts[:1]]
-        )
-
-    fixed, quiet, peers = sleeps(tests)
     groups, inside = cycles(graph)
+
+    def inside_of(folder: str) -> list[Source]:
+        return [one for one in source if one.path.relative_to(package).parts[0] == folder]
+
+    def flat(folder: str) -> int:
+        return sum(one.path.parent == package / folder for one in source)
+
+    largest = max(inside_of("scene"), key=lambda one: one.lines)
+    without_rviz = total_lines(source) - total_lines(inside_of("rviz"))
     rows = [
-        ("module names in both ROS worlds", twins(package), "0"),
-        ("client layer + wires, lines", total_lines(clients), "26,000"),
-        ("locks, events, conditions in them", locks(clients), "25"),
-        ("in-memory worlds (product and tests)", worlds(source + tests), "1"),
-        ("tests, lines", total_lines(tests), "50,000; then 45,000"),
-        ("tests: sleeps, nothing_happens(), in peers", f"{fixed}, {quiet}, {peers}", "20"),
-        ("tests: reaches into privates", private_reaches(tests), "60"),
-        ("files in src", len(source), "320"),
-        ("modules imported by one sibling only", lone_modules(graph), "60"),
-        ("all of src, lines", total_lines(source), "72,000"),
-        ("qml, lines", of("qml"), "12,500"),
-        ("rviz, lines", of("rviz"), "11,000"),
+        (
+            "modules of rosglass.rviz loaded by rosglass.scene.access",
+            loaded(root, "rosglass.scene.access", "rosglass.rviz"),
+            "0",
+        ),
+        ("files directly in scene/, qml/", f"{flat('scene')}, {flat('qml')}", "4, 4"),
+        (f"largest file of scene/ ({largest.path.name}), lines", largest.lines, "900"),
+        ("packages that import each other, pairs", back_arrows(graph), "0"),
+        ("modules that import each other, pairs", circles(graph), "2"),
         ("import cycles of more than two modules", f"{groups} ({inside} modules)", "0"),
-        ("late imports", late_imports(source), "150"),
-        ("words of the glossary's left column", glossary_words([package, root / "docs"]), "0"),
+        ("patterns of scripts/words.py", patterns(root), "0"),
+        ("tests: reaches into privates", private_reaches(tests), "60"),
+        ("src without rviz/, lines", without_rviz, "105,000"),
+        ("tests, lines", total_lines(tests), "78,000"),
     ]
     if options.trace:
         for wire, end, files in traces():
