@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rosglass.errors import Error, QmlError
+from rosglass.errors import QmlError
 from rosglass.overlay.overlay import Overlay
 from rosglass.overlay.rviz_object import RvizObject
 from rosglass.qml.run.live_file import (
@@ -93,8 +93,6 @@ class LiveOverlay(Overlay):
         Raises:
             Error: The job cannot be called.
         """
-        if not callable(job):
-            raise Error(f"prepare: expected a function of the engine, got {job!r:.80}")
         self._live.prepare(job)
 
     def _prepare(self, engine: QtQml.QQmlEngine) -> None:
@@ -213,15 +211,15 @@ class LiveOverlay(Overlay):
         self.renewed.emit(self)
         self._root = root
         self._place(root)
-        self.tell_problem("")
+        self.show_problem("")
 
-    def tell_problem(self, problem: str) -> None:
+    def show_problem(self, problem: str) -> None:
         """Set the problem; if empty, errors of the file remain."""
-        super().tell_problem(problem or self._error or self._standing_problem())
+        super().show_problem(problem or self._error or self._standing_problem())
 
     def _show_error(self, error: str) -> None:
         self._error = error
-        self.tell_problem(error)
+        self.show_problem(error)
         if self._closed:
             return
         if error:
@@ -234,7 +232,7 @@ class LiveOverlay(Overlay):
     def _on_script_ended(self, text: str) -> None:
         if self._closed or self._error:
             return
-        self.tell_problem(text)
+        self.show_problem(text)
         self._errors.show(text, self._windows(), SCRIPT_ENDED)
         self._fit_errors()
         self.changed.emit()

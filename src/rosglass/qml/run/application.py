@@ -147,8 +147,6 @@ class Application(Handle):
         Raises:
             Error: The job cannot be called.
         """
-        if not callable(job):
-            raise Error(f"prepare: expected a function of the engine, got {job!r:.80}")
         self._runner.prepare(job)
 
     def _set_context(self, engine: QtQml.QQmlEngine) -> None:

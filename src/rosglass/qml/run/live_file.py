@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rosglass.errors import QmlError
+from rosglass.errors import Error, QmlError
 from rosglass.extras import install_command
 from rosglass.qml.engine.log import forget_repeats, log_engine_warnings, plain_path
 from rosglass.qml.engine.watchdog import Watchdog
@@ -368,7 +368,13 @@ class LiveFile(QtCore.QObject):
         self.watch = watch
 
     def prepare(self, job: Callable[[QtQml.QQmlEngine], None]) -> None:
-        """Call a function with the engine, and with each later one before it loads the file."""
+        """Call a function with the engine, and with each later one before it loads the file.
+
+        Raises:
+            Error: The job cannot be called.
+        """
+        if not callable(job):
+            raise Error(f"prepare: expected a function of the engine, got {job!r:.80}")
         self._preparations.append(job)
         job(self.engine)
 
