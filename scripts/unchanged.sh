@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Tells whether files are the same as in the commit that this one is compared with:
+# Checks whether files are the same as in the commit that this one is compared with:
 # scripts/unchanged.sh PATH...
 # Succeeds and prints why they count as unchanged, or fails: they changed, or there is no commit to
 # compare with. That commit is $BASE, or else where this branch left origin/main. On origin/main itself it

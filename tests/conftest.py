@@ -31,7 +31,7 @@ DOMAINS, DOMAIN_SHARES = 100, 8
 #: Whether a test has failed.
 FAILED = pytest.StashKey[bool]()
 
-#: Of each exhaustive test, one case in this many runs without ``--exhaustive``.
+#: One case in this many of each exhaustive test runs without ``--exhaustive``.
 EXHAUSTIVE_SHARE = 10
 
 # Whoever starts the tests in the background has Ctrl-C ignored, in everything they start as well.

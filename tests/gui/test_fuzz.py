@@ -22,7 +22,7 @@ PROGRAM = Path(__file__).with_name("fuzz_app.py")
 LIMIT = 600
 pytestmark = pytest.mark.timeout(LIMIT + 30)
 CHUNKS = ["singletons", "given", "types", "lifecycle"]
-#: What is tried in both versions of Qt: values that are given, and objects that go away.
+#: The cases that run in both versions of Qt: values that are given, and objects that go away.
 IN_BOTH = {("given", "Ros2"), ("lifecycle", "Ros2")}
 
 

@@ -280,7 +280,7 @@ def test_problems_are_told(live: Bench, robot: Robot, wait: Any, setting: str, t
     wait(lambda: told in root.problem())
 
 
-def test_what_its_subscribers_do_not_receive_is_a_problem(running: Bench, wait: Any) -> None:
+def test_images_that_subscribers_do_not_receive_are_a_problem(running: Bench, wait: Any) -> None:
     root: Any = running.load(window("always: true; rate: 30"), IMPORTS)
     with running.robot.create_subscription("/panel/image", COMPRESSED, print):
         wait(lambda: "subscribes to sensor_msgs/msg/CompressedImage here" in root.problem())

@@ -1,4 +1,4 @@
-"""What Qt's stack of JavaScript is read for: a stop pressed while the screen is frozen is sent."""
+"""Reading Qt's stack of JavaScript: a stop pressed while the screen is frozen is sent."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ def test_the_last_line_is_pytests_closing_line_for_all_groups() -> None:
         ("1", "Found 3 errors.", "3 passed, 1 error in 9.00s"),
         ("139", "", "3 passed, 1 error in 9.00s"),
         ("5", "no tests ran in 0.10s", "3 passed, 1 error in 9.00s"),
-        # pytest's own errors follow a line that tells of no failure.
+        # pytest's own errors follow a line that reports no failure.
         ("3", "7 passed in 1.00s", "10 passed, 1 error in 9.00s"),
     ],
 )  # fmt: skip

@@ -310,7 +310,7 @@ def _save(app: Application, target: Path) -> None:
         )
     if not image.save(str(target)):
         raise UnsupportedError(
-            f"the picture could not be written to {target}; "
+            f"the image could not be written to {target}; "
             "its folder must exist and its name end in .png or .jpg"
         )
 

@@ -48,7 +48,7 @@ class Camera:
 
 
 class Picker:
-    """Picks points and takes pictures of a 3D view; base class of each view's."""
+    """Picks points and takes screenshots of a 3D view; base class of each view's."""
 
     def pick(self, x: float, y: float, radius: float = 0.0) -> tuple[float, float, float] | None:
         """Return the point of the scene at a position in the view.
@@ -74,7 +74,7 @@ class Picker:
         return self._pick(x, y, radius)
 
     def picture(self) -> Any:
-        """Return a picture of the 3D view with its overlays, a ``QImage``.
+        """Return a screenshot of the 3D view with its overlays, a ``QImage``.
 
         Raises:
             Error: The view cannot be drawn now.
@@ -82,14 +82,14 @@ class Picker:
         raise NotImplementedError
 
     def window_picture(self) -> Any:
-        """Return a picture of the whole window, a ``QImage``."""
+        """Return a screenshot of the whole window, a ``QImage``."""
         raise NotImplementedError
 
     def screenshot(self, file: str | os.PathLike[str], *, window: bool = False) -> Path:
-        """Save a picture of the 3D view with its overlays.
+        """Save a screenshot of the 3D view with its overlays.
 
         Args:
-            file: The picture file; its suffix determines the format, e.g. ``.png`` or ``.jpg``.
+            file: The image file; its suffix determines the format, e.g. ``.png`` or ``.jpg``.
             window: Whether to include the rest of its window.
 
         Returns:
@@ -109,7 +109,7 @@ class Picker:
         image = self.window_picture() if window else self.picture()
         writer = QtGui.QImageWriter(str(path))
         if not writer.write(image):
-            raise Error(f"{path}: the picture could not be written: {writer.errorString()}")
+            raise Error(f"{path}: the image could not be written: {writer.errorString()}")
         return path
 
     def _pick(self, x: float, y: float, radius: float) -> tuple[float, float, float] | None:

@@ -109,7 +109,7 @@ class Overlay(QtCore.QObject):
 
     @property
     def visible(self) -> bool:
-        """Whether it is shown; a hidden overlay gets no input."""
+        """True if it is shown; a hidden overlay gets no input."""
         return self._visible
 
     @visible.setter
@@ -123,7 +123,7 @@ class Overlay(QtCore.QObject):
         """Error text of the overlay; empty if it works."""
         return self._problem
 
-    def tell_problem(self, problem: str) -> None:
+    def show_problem(self, problem: str) -> None:
         """Set :attr:`problem`; an empty text clears it."""
         if problem != self._problem:
             self._problem = problem

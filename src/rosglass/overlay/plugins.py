@@ -1,4 +1,4 @@
-"""What the lists of tools and displays of a 3D view have in common."""
+"""The base of the lists of tools and displays of a 3D view."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class Tool(Plugin):
 
     @property
     def selected(self) -> bool:
-        """Whether it is the selected tool."""
+        """True if it is the selected tool."""
         return self.exists and self._owner.current is self
 
     def select(self) -> None:

@@ -331,7 +331,7 @@ class Entry(QtCore.QObject):
             try:
                 overlay.load()
             except Error as error:
-                overlay.tell_problem(str(error))
+                overlay.show_problem(str(error))
 
     def detach(self) -> Overlay | None:
         """Disconnect and return the overlay, and keep the values it would save."""

@@ -359,7 +359,7 @@ class Drawing:
                 layer.update(pixels, None if self._failed else overlay.painted)
             done = True
         if done and self._failed:
-            overlay.tell_problem("")
+            overlay.show_problem("")
         self._failed = not done
         if pixels is None or not done:
             return Work(1e3 * (time.perf_counter() - started))

@@ -166,7 +166,7 @@ def _log_problem(overlay: Overlay, text: str, raised: Any) -> None:
     # Frames and timers repeat the same error.
     level = logging.DEBUG if text == overlay.problem else logging.ERROR
     _log.log(level, "overlay %s: %s", overlay.name, text, exc_info=raised)
-    overlay.tell_problem(text)
+    overlay.show_problem(text)
 
 
 def _describe(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> str:

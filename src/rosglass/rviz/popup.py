@@ -159,7 +159,7 @@ class Popup(WidgetOverlay):
             str(self._tracker.problem) if self._tracker else "",
         )
         if self.problem in ("", before):
-            self.tell_problem(self._tracker_problem)
+            self.show_problem(self._tracker_problem)
 
     def _on_stale_changed(self) -> None:
         if self._tracker is not None and self._tracker.stale:

@@ -458,7 +458,7 @@ class QmlOverlay(QmlInput, LiveOverlay):
         if need:
             self._undrawable = choice.tell_missing(need)
             _log.warning("overlay %s: %s", self.name, self._undrawable)
-            self.tell_problem(self.problem)
+            self.show_problem(self.problem)
 
     def _fit_errors(self) -> None:
         for item in self._errors.items:

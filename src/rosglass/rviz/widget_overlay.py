@@ -336,7 +336,7 @@ class WidgetOverlay(Overlay):
         self._proxy.setFlag(QtWidgets.QGraphicsItem.ItemUsesExtendedStyleOption)
         # Widgets of an inactive window neither show nor handle the keyboard focus.
         QtCore.QCoreApplication.sendEvent(self._scene, QtCore.QEvent(_E.WindowActivate))
-        self._style = StyleSheet(self.name, self._use_style, self.tell_problem)
+        self._style = StyleSheet(self.name, self._use_style, self.show_problem)
         if widget is None:
             self.setup(made)
             _show_children(made)
@@ -362,7 +362,7 @@ class WidgetOverlay(Overlay):
     def _use_style(self, text: str) -> None:
         if is_alive(self.root):
             self.root.setStyleSheet(text)
-            self.tell_problem("")
+            self.show_problem("")
 
     # Drawing
 

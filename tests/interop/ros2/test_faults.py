@@ -83,7 +83,7 @@ def test_a_cable_that_is_unplugged_for_ten_seconds_over_dds(on_two_machines):
 
 
 def test_cameras_are_back_soon_after_a_link_has_lost_packets_over_dds(on_two_machines):
-    """What is left of larger datagrams fills the kernel's memory for fragments for 30 s."""
+    """The rest of larger datagrams fills the kernel's memory for fragments for 30 s."""
     pytest.importorskip("cyclonedds", reason='needs pip install "rosglass[dds]"')
     seen = on_two_machines(PEERS / "bad_link_dds.py", "5", env={"CYCLONEDDS_URI": ""})
     if seen["missing"]:

@@ -223,7 +223,7 @@ def test_rclpy_answers_while_images_displace_each_other(start_rclpy_peer, node):
     peer.end()
 
 
-def test_who_loses_large_images_says_what_to_do(on_two_machines, rclpy_python):
+def test_publisher_of_lost_large_images_names_the_setting(on_two_machines, rclpy_python):
     """Fast DDS takes 40 MB/s in datagrams of one packet, the default if there is a network."""
     script = Path(__file__).parent / "peers/one_machine_fastdds.py"
     env = {"ROS_DOMAIN_ID": "0", "CYCLONEDDS_URI": ""}

@@ -207,7 +207,7 @@ def test_the_documentations_larger_datagrams_are_those_of_this_machine():
     assert user_config(config(CYCLONEDDS_URI=own)) == own
 
 
-def test_who_sends_single_packets_is_advised_to_send_the_documentations_datagrams(monkeypatch):
+def test_publisher_of_single_packets_is_advised_to_send_documented_datagrams(monkeypatch):
     monkeypatch.setattr(dds_domain, "_datagram_size", lambda _: 1472)
 
     def advice(url="dds://", **env):

@@ -14,7 +14,7 @@ from rosglass.qml.elements.goal_handle import (
     GoalCallbacks,
     GoalHandle,
     RosGoalHandle,
-    tell_cancelling,
+    report_cancelling,
 )
 from rosglass.qml.engine.callbacks import Deferred, call_back
 from rosglass.qml.engine.dialect import Dialect
@@ -87,7 +87,7 @@ class GoalSender(ClientElement):
 
         def answered(answer: Promise[CancelAnswer]) -> None:
             if is_alive(self):
-                reason = tell_cancelling(answer, what, caller, logging.INFO)
+                reason = report_cancelling(answer, what, caller, logging.INFO)
                 if reason:
                     self.cancelFailed.emit(reason)
 

@@ -40,8 +40,8 @@ __all__ = [
     "ServerGoalHandle",
     "comm_state_of",
     "let_go",
+    "report_cancelling",
     "status_code",
-    "tell_cancelling",
     "terminal_state_of",
 ]
 
@@ -269,7 +269,7 @@ class GoalHandle(QtCore.QObject):
 
         def answered(answer: Promise[CancelAnswer]) -> None:
             if is_alive(self) and (not self._over or self._status is GoalStatus.LOST):
-                reason = tell_cancelling(answer, self._label, caller, logging.WARNING)
+                reason = report_cancelling(answer, self._label, caller, logging.WARNING)
                 if reason:
                     self.cancelFailed.emit(reason)
 
@@ -420,7 +420,9 @@ def let_go(state: dict[str, object], names: Iterable[str]) -> None:
         state.pop(name, None)
 
 
-def tell_cancelling(answer: Promise[CancelAnswer], what: str, caller: Caller, refused: int) -> str:
+def report_cancelling(
+    answer: Promise[CancelAnswer], what: str, caller: Caller, refused: int
+) -> str:
     """Log that a request to cancel failed, or was refused.
 
     Args:

@@ -1,1 +1,1 @@
-"""What every interface runs on: its session, the runtime of an engine, values and callbacks."""
+"""The base of every interface: its session, the runtime of an engine, values and callbacks."""

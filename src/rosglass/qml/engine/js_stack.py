@@ -1,7 +1,7 @@
 """The JavaScript stack of an engine, which Qt does not show while JavaScript runs.
 
-The public ``QJSEngine.setInterrupted`` ends JavaScript, but Qt does not tell whether any runs, nor
-whether it has ended. Interrupted from one heartbeat of the GUI thread to the next, an engine ends
+The public ``QJSEngine.setInterrupted`` ends JavaScript, but Qt does not report if any runs, nor if
+it has ended. Interrupted from one heartbeat of the GUI thread to the next, an engine ends
 every handler that comes in between as well, without a warning: that of a stop button which was
 pressed while a function looped, or while Qt, RViz or a plugin was at work and no JavaScript ran
 (``tests/gui/test_js_stack.py``). So the watchdog reads from Qt's memory what runs, and where.
@@ -226,7 +226,7 @@ class JsStack:
             if at >= 0:
                 return page + at
             page, end = page - _PAGE, page + len(_MAGIC)
-        raise OSError("this is no function")
+        raise OSError("this is not a function")
 
     def _string(self, unit: int, number: int, layout: _Layout) -> str:
         memory = self._memory

@@ -20,7 +20,7 @@ from rosglass.comm import IMMEDIATE
 
 IMAGE = "sensor_msgs/msg/CompressedImage"
 CAMERAS = [f"/camera{number}" for number in range(4)]
-#: Of a camera over Wi-Fi.
+#: The link of a camera over bad Wi-Fi.
 LOSS, DELAY_S = 0.2, 0.2
 ROBOT = f"""
 import time, rosglass
