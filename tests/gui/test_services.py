@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from rosglass.comm.graph import ConnectionState
 from rosglass.errors import Error
 
 if TYPE_CHECKING:
@@ -61,6 +62,21 @@ def test_requests_wait_for_a_server(live: Bench, wait: Any) -> None:
         "/late", "std_srvs/srv/Trigger", lambda request: {"message": "here"}
     )
     wait(lambda: root.property("answer") == "here")
+
+
+def test_missing_server_is_reported_only_after_connecting(
+    running: Bench, wait: Any, caplog: Any, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr("rosglass.qml.elements.element._SEARCH_MS", 100)
+    running.session.node.set_status(ConnectionState.CONNECTING, "no router yet")
+    wait(lambda: running.session.state == "connecting")
+    running.load("""QtObject {
+        property var client: Ros2.createServiceClient("/humanoid/stand", "std_srvs/srv/SetBool")
+    }""")
+    wait.nothing_happens(0.3)
+    assert "no server offers" not in caplog.text
+    running.session.node.set_status(ConnectionState.CONNECTED, "")
+    wait(lambda: "no server offers /humanoid/stand" in caplog.text)
 
 
 def test_no_server(live: Bench, wait: Any, caplog: Any) -> None:

@@ -551,8 +551,13 @@ class ClientElement(Element):
 
     def _warn(self, client: Any) -> None:
         """Log why there is no server, unless one has been found in the meantime."""
-        if is_alive(self) and self._endpoint is client:
-            self._log(self._problem, logging.WARNING)
+        if not is_alive(self) or self._endpoint is not client:
+            return
+        if self._session is None or self._session.state != "connected":
+            # Servers are found after that.
+            QtCore.QTimer.singleShot(_SEARCH_MS, lambda: self._warn(client))
+            return
+        self._log(self._problem, logging.WARNING)
 
     def _on_ready(self, ready: bool) -> None:
         if not is_alive(self) or self._endpoint is None:
