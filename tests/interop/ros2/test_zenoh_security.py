@@ -109,7 +109,7 @@ def test_a_router_with_users_lets_in_who_has_a_password(
     folder: Path, run: Callable[[str, str], Router], connect: Callable[..., Node]
 ) -> None:
     router = run("tcp", f"auth: {{ usrpwd: {{ dictionary_file: '{folder}/users.txt' }} }}")
-    assert (router.is_restricted, router.is_encrypted) == (True, False)
+    assert (router.is_restricted, router.is_encrypted) == (True, True), "on this machine only"
     own = with_user(router.url, f"operator:{IN_URL}")
     robot, cockpit = connect("robot", url=own), connect("cockpit", url=own)
     exchange(robot, cockpit)
@@ -206,6 +206,22 @@ def example(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Router]:
     monkeypatch.chdir(folder)
     with Router(config_file="example.json5") as router:
         yield router
+
+
+def test_example_open_to_the_network_starts_without_a_warning(folder: Path) -> None:
+    text = EXAMPLE.read_text()
+    for port in ("7447", "7448"):
+        text = text.replace(f":{port}", f":{free_port()}")
+    (folder / "open.json5").write_text(text)
+    command = [sys.executable, "-m", "rosglass", "router", "--config", "open.json5"]
+    with subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as router:
+        assert router.stdout is not None
+        assert "tls/[::]:" in router.stdout.readline()
+        router.terminate()
+        _, errors = router.communicate(timeout=30)
+    assert errors == "", "plain TCP is open to this machine only"
 
 
 def test_the_example_lets_viewers_look_only(example: Router, connect: Callable[..., Node]) -> None:

@@ -58,8 +58,9 @@ class Router(Handle):
         listen: The addresses, with the actual port.
         url: URL for :func:`rosglass.connect`, without user; empty if there is none for the address.
         is_local: Whether only programs on this machine can connect.
-        is_restricted: Whether programs need a password or a certificate to connect.
-        is_encrypted: Whether all connections are encrypted.
+        is_restricted: Whether programs on other machines need a password or a certificate to
+            connect.
+        is_encrypted: Whether all connections with other machines are encrypted.
 
     Raises:
         ArgumentError: `listen` is not an address, or `config_file` cannot be read.
@@ -75,7 +76,9 @@ class Router(Handle):
         addresses = endpoints(config, "listen")
         self.listen, self.url = ", ".join(addresses), _url(addresses)
         self.is_local = all(_is_loopback(address) for address in addresses)
-        self.is_encrypted = all(address.startswith(_ENCRYPTED) for address in addresses)
+        self.is_encrypted = all(
+            address.startswith(_ENCRYPTED) or _is_loopback(address) for address in addresses
+        )
         has_users = json.loads(config.get_json("transport/auth/usrpwd/dictionary_file"))
         has_certificates = json.loads(config.get_json("transport/link/tls/enable_mtls"))
         self.is_restricted = bool(has_users or (has_certificates and self.is_encrypted))
