@@ -227,7 +227,7 @@ def test_malformed_messages_are_named(running: Any, camera: Any, wait: Any) -> N
     [
         ('topic: "/a b"', "/a b"),
         ('topic: "/cam"; defaultTransport: "teleport"', "'teleport' is unknown"),
-        ('topic: "/chat"', "not pictures"),
+        ('topic: "/chat"', "not images"),
     ],
 )
 def test_what_cannot_be_shown_is_said(

@@ -167,7 +167,7 @@ def test_a_region_outside_the_picture_concerns_only_its_viewer(
     wrong.setProperty("regionOfInterest", _rect(10, 10, 100, 100))
     wait(lambda: wrong.property("subscribed") and camera.subscription_count())
     show(running, camera, wait, root, quarters())
-    wait(lambda: "not within the picture of 16x16" in wrong.property("problem"))
+    wait(lambda: "not within the image of 16x16" in wrong.property("problem"))
     assert seen(root, 1) is None
     assert wrong.property("stale")
     assert root.property("sub0").property("problem") == ""

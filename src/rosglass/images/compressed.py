@@ -84,10 +84,10 @@ def read_header(data: Any) -> PictureHeader:
     if bytes(view[:4]) in _TIFF:
         return _tiff_header(view)
     if not view:
-        raise DecodeError(_TYPE, "the picture is empty", "data", 0)
+        raise DecodeError(_TYPE, "the image is empty", "data", 0)
     start = bytes(view[:4]).hex(" ")
     raise UnsupportedError(
-        f"compressed pictures must be JPEG, PNG or TIFF; this one starts with the bytes {start}"
+        f"compressed images must be JPEG, PNG or TIFF; this one starts with the bytes {start}"
     )
 
 
@@ -149,10 +149,10 @@ def _check(header: PictureHeader, view: memoryview) -> None:
     pixels = header.width * header.height
     size = f"{header.width}x{header.height}"
     if not pixels:
-        raise DecodeError(_TYPE, f"the picture is {size} pixels", "data")
+        raise DecodeError(_TYPE, f"the image is {size} pixels", "data")
     if pixels > min(MAX_PIXELS, _MAX_RATIO * len(view)):
         raise DecodeError(
-            _TYPE, f"{len(view)} bytes cannot be a picture of {size} pixels", "data", 0
+            _TYPE, f"{len(view)} bytes cannot be an image of {size} pixels", "data", 0
         )
     # libjpeg fills a truncated image with grey and reports success.
     if header.kind == "jpeg" and not _has_end(view):
@@ -277,11 +277,11 @@ def compress(
         known = ", ".join(COMPRESSIBLE)
         raise UnsupportedError(f"{encoding!r} cannot be compressed here; these can: {known}")
     if kind not in {"jpeg", "png"}:
-        raise UnsupportedError(f"pictures are compressed as 'jpeg' or 'png', not {kind!r}")
+        raise UnsupportedError(f"images are compressed as 'jpeg' or 'png', not {kind!r}")
     if kind == "jpeg" and encoding == "rgba8":
         raise UnsupportedError("JPEG has no transparency: use png for rgba8, or rgb8 for JPEG")
     if not 1 <= quality <= 100:
-        raise UnsupportedError(f"the quality of a JPEG picture is 1 to 100, not {quality}")
+        raise UnsupportedError(f"the quality of a JPEG image is 1 to 100, not {quality}")
     cv2 = opencv()
     code = COMPRESSIBLE[encoding]
     if code:
@@ -290,9 +290,9 @@ def compress(
     try:
         good, data = cv2.imencode(".jpg" if kind == "jpeg" else ".png", pixels, settings)
     except cv2.error as error:
-        raise UnsupportedError(f"the picture cannot be encoded as {kind}: {error}") from None
+        raise UnsupportedError(f"the image cannot be encoded as {kind}: {error}") from None
     if not good:
-        raise UnsupportedError(f"the picture cannot be encoded as {kind}")
+        raise UnsupportedError(f"the image cannot be encoded as {kind}")
     return data.tobytes(), f"{encoding}; {kind} compressed {_CODED[encoding]}"
 
 
@@ -389,7 +389,7 @@ def decompress_depth(
         )
     view = memoryview(data).cast("B")
     if len(view) <= _HEADER.size:
-        raise DecodeError(_TYPE, f"the depth picture is cut off: {len(view)} bytes", "data")
+        raise DecodeError(_TYPE, f"the depth image is cut off: {len(view)} bytes", "data")
     _, a, b = _HEADER.unpack_from(view)
     body = view[_HEADER.size :]
     depths = _png(body) if kind == "png" else _rvl(body)
@@ -422,12 +422,12 @@ def _png(body: memoryview) -> NDArray[np.uint16]:
 
 def _rvl(body: memoryview) -> NDArray[np.uint16]:
     if len(body) < _RVL_SIZE.size:
-        raise DecodeError(_TYPE, "the RVL data are cut off before the picture's size", "data")
+        raise DecodeError(_TYPE, "the RVL data are cut off before the image's size", "data")
     width, height = _RVL_SIZE.unpack_from(body)
     count = width * height
     if not 0 < count <= min(MAX_PIXELS, max(_MIN_RVL_LIMIT, _MAX_RVL_RATIO * len(body))):
         raise DecodeError(
-            _TYPE, f"{len(body)} bytes cannot be a picture of {width}x{height} pixels", "data"
+            _TYPE, f"{len(body)} bytes cannot be an image of {width}x{height} pixels", "data"
         )
     return decode_rvl(body[_RVL_SIZE.size :], count).reshape(height, width)
 

@@ -69,7 +69,9 @@ class DepthColors:
             )
         for name, value in (("near", near), ("far", far)):
             if value is not None and not 0 <= value < float("inf"):
-                raise UnsupportedError(f"the depth {name} = {value} is no distance in metres")
+                raise UnsupportedError(
+                    f"the depth {name} must be a finite distance in metres from 0, not {value}"
+                )
         if near is not None and far is not None and not near < far:
             raise UnsupportedError(
                 f"depths cannot be coloured from {near} m to {far} m: far must be beyond near"

@@ -120,12 +120,12 @@ class Frame:
 
     @property
     def has_alpha(self) -> bool:
-        """Whether pixels can be transparent."""
+        """True if pixels have an alpha channel."""
         return self.format in {PixelFormat.RGBA, PixelFormat.BGRA}
 
     @property
     def is_color(self) -> bool:
-        """Whether it has colors."""
+        """True if pixels have colors, not only a brightness."""
         return self.format not in {PixelFormat.GRAY8, PixelFormat.GRAY16}
 
 
@@ -244,7 +244,7 @@ def opencv() -> Any:
         return import_module("cv2")
     except ImportError:
         raise UnsupportedError(
-            "this picture needs OpenCV, which is not installed; "
+            "this image needs OpenCV, which is not installed; "
             f"install it with: {install_command('camera')}"
         ) from None
 
@@ -256,7 +256,9 @@ def _to_rgba(pixels: Array, code: str, out: Array | None = None) -> Array:
     try:
         rgba: Array = cv2.cvtColor(pixels, getattr(cv2, f"COLOR_{code}"), dst=out)
     except cv2.error as error:
-        raise DecodeError(_IMAGE, f"cannot convert a picture of {pixels.shape}: {error}") from None
+        raise DecodeError(
+            _IMAGE, f"cannot convert pixels of shape {pixels.shape}: {error}"
+        ) from None
     return rgba
 
 
@@ -270,7 +272,7 @@ def pixels_of(image: RawImage, encoding: Encoding) -> Array:
     row_bytes = image.width * encoding.channels * encoding.size
     size = memoryview(image.data).nbytes
     if image.width < 1 or image.height < 1:
-        raise DecodeError(_IMAGE, f"the picture is {image.width}x{image.height} pixels", "width")
+        raise DecodeError(_IMAGE, f"the image is {image.width}x{image.height} pixels", "width")
     if image.width * image.height > MAX_PIXELS:
         raise DecodeError(
             _IMAGE,
@@ -280,7 +282,7 @@ def pixels_of(image: RawImage, encoding: Encoding) -> Array:
     if remainder or (encoding.direct in _EVEN_WIDTH and image.width % 2):
         raise DecodeError(
             _IMAGE,
-            f"{image.encoding} needs even sizes, the picture is {image.width}x{image.height}",
+            f"{image.encoding} needs an even width and height, not {image.width}x{image.height}",
             "width",
         )
     if image.step < row_bytes:
@@ -344,7 +346,7 @@ def to_rgbx(frame: Frame) -> Frame:
     elif layout is PixelFormat.GRAY8:
         out = _to_rgba(frame.planes[0], "GRAY2RGBA")
     else:
-        raise UnsupportedError(f"a picture of {layout.value} cannot be made RGBX")
+        raise UnsupportedError(f"an image of {layout.value} cannot be converted to RGBX")
     return replace(frame, format=PixelFormat.RGBX, planes=(_rows_of_bytes(out),))
 
 

@@ -126,12 +126,12 @@ class ImageStream(Handle):
 
     @property
     def subscribed(self) -> bool:
-        """Whether it is subscribed, or would be without :meth:`rest`."""
+        """True while subscribed, or while only :meth:`rest` prevents it."""
         return self._subscription is not None or self._resting
 
     @property
     def video(self) -> bool:
-        """Whether the transport in use is a video, which must be received without gaps."""
+        """True if the transport in use is a video, which must be received without gaps."""
         return self._choice is not None and self._choice.transport.video
 
     @property
@@ -245,7 +245,7 @@ class ImageStream(Handle):
 
     @property
     def _has_work(self) -> bool:
-        """Whether the thread has something to do besides decoding."""
+        """True if the thread has something to do besides decoding."""
         idle = self._subscription is None
         return self._closing or (not idle if self._resting else self._look)
 
@@ -288,7 +288,7 @@ class ImageStream(Handle):
         self._notify()
 
     def _profile(self, choice: Choice) -> QoS:
-        """Return the profile to request: a picture that was latched is asked for, too."""
+        """Return the QoS to request, which includes an image that a publisher has latched."""
         qos = _VIDEO if choice.transport.video else _STILLS
         publishers = self._node.publishers(choice.topic)
         if any(p.qos.durability is not Durability.TRANSIENT_LOCAL for p in publishers):
@@ -335,7 +335,7 @@ class ImageStream(Handle):
                 self._invalid += 1
             self._set_problem(str(error))
         except Exception as error:  # noqa: BLE001 - no image may end the stream
-            _log.exception("%s: a picture could not be converted", self.topic)
+            _log.exception("%s: an image could not be converted", self.topic)
             self._set_problem(f"internal error: {error}")
         return None
 

@@ -240,11 +240,11 @@ def choose(topic: str, preferred: str, published: Mapping[str, list[str]]) -> Ch
     if others:
         raise UnsupportedError(
             f"{topic} is only sent as {', '.join(others)}; "
-            f"pictures can be received as: {', '.join(TRANSPORTS)}"
+            f"images can be received as: {', '.join(TRANSPORTS)}"
         )
     if topic in published:
         raise UnsupportedError(
-            f"{topic} carries {', '.join(published[topic])}, not pictures "
+            f"{topic} carries {', '.join(published[topic])}, not images "
             f"({', '.join(dict.fromkeys(t.type for t in TRANSPORTS.values()))})"
         )
     return None

@@ -162,7 +162,7 @@ class VideoDecoder:
             if not frames:
                 return None
             if frames[-1].is_corrupt:
-                raise DecodeError(self._type, "the picture is damaged", "data")
+                raise DecodeError(self._type, "the frame is damaged", "data")
             return self._picture(frames[-1])
         except (av.error.FFmpegError, ValueError, MemoryError) as error:
             raise DecodeError(self._type, f"the packet is corrupt: {error}", "data") from None

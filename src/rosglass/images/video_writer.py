@@ -1,4 +1,4 @@
-"""Writes pictures as a video file, with PyAV, in a thread of its own."""
+"""Writes frames to a video file, with PyAV, in a thread of its own."""
 
 from __future__ import annotations
 
@@ -33,23 +33,23 @@ _ENCODERS: dict[str, tuple[tuple[str, dict[str, str]], ...]] = {
     ".mkv": (("libx264", _H264), ("libopenh264", {"b": "8M"}), ("mpeg4", {"q": "3"})),
     ".webm": (("libvpx-vp9", _VPX), ("libvpx", _VPX)),
 }
-#: Pictures that wait for the encoder.
+#: Frames that may wait for the encoder.
 _MAX_WAITING = 4
 #: Times are in milliseconds.
 _TIME_BASE = Fraction(1, 1000)
-#: Seconds that closing waits for the encoder, before and after its last picture.
+#: Seconds that closing waits for the encoder, before and after its last frame.
 _CLOSE_TIMEOUT_S = 1.5
-#: Of BT.709, which players assume for pictures of this size (ITU-T H.273).
+#: The number of BT.709 in ITU-T H.273: the colors that players assume for frames of this size.
 _BT709 = 1
 
 
 class VideoStatus(NamedTuple):
-    """What was recorded.
+    """The state of a recorded video.
 
     Attributes:
-        frames: Pictures in the file.
-        dropped: Pictures that came while the encoder was busy.
-        duration: Seconds from the first picture to the last, or to the end.
+        frames: Frames in the file.
+        dropped: Frames that were dropped because the encoder was busy.
+        duration: Seconds from the first frame to the last, or to the end.
         problem: Why the file ends early; empty if it does not.
     """
 
@@ -59,16 +59,16 @@ class VideoStatus(NamedTuple):
     problem: str
 
 
-class _Picture(NamedTuple):
+class _Frame(NamedTuple):
     time: float
     pixels: NDArray[np.uint8]
     format: str
 
 
 class VideoWriter:
-    """A video file whose pictures have times of their own; writes in a thread.
+    """Writes a video file with a variable frame rate, in a thread of its own.
 
-    Pictures of another size than the first one are fitted into it.
+    The first frame sets the size; frames of other sizes are scaled to fit into it.
 
     Args:
         path: The file, ``.mp4`` or ``.mkv`` (H.264) or ``.webm`` (VP9); it must not exist.
@@ -86,7 +86,7 @@ class VideoWriter:
             raise Error(f"{self.path}: the name of a video ends in one of {known}")
         self._encoder, self._options = _find_encoder(suffix)
         try:
-            # Only to try: without a picture, no file is left.
+            # Only a test: a video without frames leaves no file.
             with self.path.open("xb"):
                 pass
             self.path.unlink()
@@ -94,21 +94,21 @@ class VideoWriter:
             raise Error(f"{self.path} exists already; choose another name, or delete it") from None
         except OSError as error:
             raise Error(f"{self.path} cannot be written: {error.strerror}") from None
-        self._queue: queue.Queue[_Picture | float] = queue.Queue(_MAX_WAITING)
+        self._queue: queue.Queue[_Frame | float] = queue.Queue(_MAX_WAITING)
         self._lock = threading.Lock()
         self._frames = self._dropped = 0
         self._first = self._last = 0.0
         self._problem = ""
         self._container: Any = None
         self._stream: Any = None
-        self._picture: Any = None
+        self._frame: Any = None
         self._closed = False
         self._thread = threading.Thread(target=self._work, name="video", daemon=True)
         self._thread.start()
 
     @property
     def is_full(self) -> bool:
-        """Whether the encoder is busy, so that the next picture would be dropped."""
+        """True if the encoder is busy, so that the next frame would be dropped."""
         return self._queue.full()
 
     def status(self) -> VideoStatus:
@@ -118,20 +118,20 @@ class VideoWriter:
             return VideoStatus(self._frames, self._dropped, duration, self._problem)
 
     def add(self, pixels: NDArray[np.uint8], time: float, format: str = "rgba") -> bool:
-        """Add a picture; it is dropped and counted while the encoder is busy.
+        """Add a frame; it is dropped and counted while the encoder is busy.
 
         Args:
-            pixels: (height, width, 4), which nothing changes any more.
-            time: Seconds, by any clock; later than that of the picture before.
+            pixels: Array of shape (height, width, 4) that is not changed afterwards.
+            time: Seconds, by any clock; later than the previous frame's.
             format: ``rgba`` or ``bgra``.
 
         Returns:
-            Whether it was added.
+            True if it was added, False if it was dropped.
         """
         if self._closed or self._problem:
             return False
         try:
-            self._queue.put_nowait(_Picture(time, pixels, format))
+            self._queue.put_nowait(_Frame(time, pixels, format))
         except queue.Full:
             with self._lock:
                 self._dropped += 1
@@ -139,7 +139,7 @@ class VideoWriter:
         return True
 
     def count_dropped(self) -> None:
-        """Count a picture that was not even taken, as :attr:`is_full`."""
+        """Count a frame that was not even read back, because of :attr:`is_full`."""
         with self._lock:
             self._dropped += 1
 
@@ -147,10 +147,10 @@ class VideoWriter:
         """Write what is left, and close the file; safe to call twice.
 
         Args:
-            time: Seconds until which the last picture is shown; None for its own time.
+            time: Time in seconds at which the last frame ends; None for the frame's own time.
 
         Returns:
-            What was recorded.
+            The final status.
         """
         if not self._closed:
             self._closed = True
@@ -166,7 +166,7 @@ class VideoWriter:
 
     def _work(self) -> None:
         try:
-            while isinstance(item := self._queue.get(), _Picture):
+            while isinstance(item := self._queue.get(), _Frame):
                 self._encode(item)
             self._finish(item)
         except Exception as error:  # noqa: BLE001 - of the disk, PyAV or a codec; shown as the problem
@@ -176,14 +176,14 @@ class VideoWriter:
             with suppress(Exception):  # it fails as writing did
                 self._close_file()
 
-    def _encode(self, item: _Picture) -> None:
+    def _encode(self, item: _Frame) -> None:
         if self._container is None:
             self._open(item)
         frame = pyav().VideoFrame.from_ndarray(np.ascontiguousarray(item.pixels), item.format)
-        self._picture = self._fit(frame)
-        self._put(self._picture, item.time)
+        self._frame = self._fit(frame)
+        self._put(self._frame, item.time)
 
-    def _open(self, item: _Picture) -> None:
+    def _open(self, item: _Frame) -> None:
         height, width, _ = item.pixels.shape
         container = self._container = pyav().open(str(self.path), "w")
         stream = self._stream = container.add_stream(self._encoder, options=dict(self._options))
@@ -196,7 +196,7 @@ class VideoWriter:
         self._first = item.time
 
     def _fit(self, frame: Any) -> Any:
-        """Return a picture in the size and the colors of the file."""
+        """Return a frame in the size and the colors of the file."""
         width, height = self._stream.width, self._stream.height
         if abs(frame.width - width) > 1 or abs(frame.height - height) > 1:
             share = min(width / frame.width, height / frame.height)
@@ -226,7 +226,7 @@ class VideoWriter:
             return
         if end > self._last + float(_TIME_BASE):
             # Otherwise the video would end with the last change.
-            self._put(self._picture, end)
+            self._put(self._frame, end)
         for packet in self._stream.encode():
             self._container.mux(packet)
         self._close_file()

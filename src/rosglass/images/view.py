@@ -41,7 +41,7 @@ class View:
             display does that.
 
     Raises:
-        UnsupportedError: The rotation is no multiple of 90, the region is empty, or the zoom is
+        UnsupportedError: The rotation is not a multiple of 90, the region is empty, or the zoom is
             below 1.
     """
 
@@ -54,18 +54,18 @@ class View:
     def __post_init__(self) -> None:
         if self.rotation % 90:
             raise UnsupportedError(
-                f"a picture cannot be turned by {self.rotation} degrees; give a multiple of 90"
+                f"the image cannot be rotated by {self.rotation} degrees; give a multiple of 90"
             )
         if self.region is not None:
             x, y, width, height = self.region
             if x < 0 or y < 0 or width < 1 or height < 1:
                 raise UnsupportedError(
-                    f"the region x={x} y={y} {width}x{height} is no part of a picture; give "
+                    f"the region x={x} y={y} {width}x{height} is not part of an image; give "
                     "x and y from 0, width and height from 1"
                 )
         if not 1 <= self.zoom < float("inf"):
             raise UnsupportedError(
-                f"a picture cannot be enlarged {self.zoom} times; give 1 or more"
+                f"the image cannot be enlarged {self.zoom} times; give 1 or more"
             )
 
     def apply(self, frame: Frame) -> Frame:
@@ -110,7 +110,7 @@ def _center_region(width: int, height: int, zoom: float) -> tuple[int, int, int,
 def _crop(frame: Frame, x: int, y: int, width: int, height: int) -> Frame:
     if x + width > frame.width or y + height > frame.height:
         raise UnsupportedError(
-            f"the region x={x} y={y} {width}x{height} is not within the picture of "
+            f"the region x={x} y={y} {width}x{height} is not within the image of "
             f"{frame.width}x{frame.height} pixels"
         )
     if frame.format in {PixelFormat.NV12, PixelFormat.NV21}:
@@ -156,7 +156,7 @@ def save(frame: Frame, path: str | Path) -> Path:
     kind = file.suffix.lower()
     if kind not in FILE_TYPES:
         raise UnsupportedError(
-            f"{file}: a picture cannot be saved as {kind or 'a file without an ending'!r}; "
+            f"{file}: an image cannot be saved as {kind or 'a file without an ending'!r}; "
             f"these work: {', '.join(FILE_TYPES)}"
         )
     if frame.format is PixelFormat.GRAY16 and kind not in _DEEP:
@@ -168,9 +168,9 @@ def save(frame: Frame, path: str | Path) -> Path:
     try:
         good, data = cv2.imencode(kind, _pixels(frame, kind in _DEEP), settings)
     except cv2.error as error:
-        raise UnsupportedError(f"{file}: the picture cannot be saved: {error}") from None
+        raise UnsupportedError(f"{file}: the image cannot be saved: {error}") from None
     if not good:
-        raise UnsupportedError(f"{file}: the picture cannot be saved as {kind}")
+        raise UnsupportedError(f"{file}: the image cannot be saved as {kind}")
     part = file.with_name(f".{file.name}.{os.getpid()}.part")
     try:
         part.write_bytes(data)

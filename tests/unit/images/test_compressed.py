@@ -165,8 +165,8 @@ def tiff(order: str, fields: dict[int, tuple[int, int, int]], size: int = 100) -
         ({256: (4, 1, 60_000), 257: (4, 1, 60_000)}, "declares 60000x60000 pixels"),
         ({256: (3, 1, 9), 257: (3, 1, 9), 322: (4, 1, 1 << 20), 323: (4, 1, 1 << 20)}, "in tiles"),
         ({256: (3, 1, 8000), 257: (3, 1, 8000), 258: (3, 1, 64), 277: (3, 1, 4)}, "of 4 times 64"),
-        ({256: (3, 1, 9), 257: (3, 1, 0)}, "the picture is 9x0 pixels"),
-        ({256: (3, 1, 2000), 257: (3, 1, 2000)}, "cannot be a picture of 2000x2000"),
+        ({256: (3, 1, 9), 257: (3, 1, 0)}, "the image is 9x0 pixels"),
+        ({256: (3, 1, 2000), 257: (3, 1, 2000)}, "cannot be an image of 2000x2000"),
         ({256: (3, 1, 9), 257: (3, 1, 9), 258: (3, 4, 1 << 15)}, "the TIFF file is cut off"),
         ({256: (3, 1, 9), 257: (3, 1, 9)}, "the tiff file is corrupt"),
     ],
@@ -194,7 +194,7 @@ def test_cut_off_files_are_refused_at_every_length(suffix: str) -> None:
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (b"", "the picture is empty"),
+        (b"", "the image is empty"),
         (b"GIF89a..", "starts with the bytes 47 49 46 38"),
         (b"\x89PNG\r\n\x1a\n" + bytes(40), "no complete header"),
         (b"\xff\xd8\xff\xe0" + bytes(40), "no marker"),
@@ -229,7 +229,7 @@ def test_jpeg_claiming_a_huge_size_is_refused() -> None:
     at = data.index(b"\xff\xc0") + 5
     data[at : at + 4] = struct.pack(">HH", 65535, 65535)
     assert read_header(bytes(data)).width == 65535
-    with pytest.raises(DecodeError, match="cannot be a picture of 65535x65535"):
+    with pytest.raises(DecodeError, match="cannot be an image of 65535x65535"):
         decompress(bytes(data))
 
 

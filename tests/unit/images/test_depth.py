@@ -107,9 +107,9 @@ def test_colours_land_in_the_display_s_memory() -> None:
     [
         (("rainbow",), "'rainbow' is unknown; known are: turbo"),
         (("jet", 2.0, 2.0), "far must be beyond near"),
-        (("jet", -1.0), "no distance"),
-        (("jet", float("nan")), "no distance"),
-        (("jet", 0.0, float("inf")), "no distance"),
+        (("jet", -1.0), "must be a finite distance"),
+        (("jet", float("nan")), "must be a finite distance"),
+        (("jet", 0.0, float("inf")), "must be a finite distance"),
     ],
 )
 def test_bad_settings_are_named(arguments: tuple, reason: str) -> None:

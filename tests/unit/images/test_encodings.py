@@ -209,8 +209,8 @@ def test_colours_are_converted_into_the_display_s_memory() -> None:
         ({"height": 4_000_000_000}, "more than"),
         ({"width": 60_000, "height": 60_000, "step": 180_000}, "more than"),
         ({"width": 8000, "height": 8000, "step": 24_000}, "needs 192000000 bytes, data has 96"),
-        ({"encoding": "yuv422", "width": 7}, "needs even sizes"),
-        ({"encoding": "nv12", "height": 3}, "needs even sizes"),
+        ({"encoding": "yuv422", "width": 7}, "needs an even width and height"),
+        ({"encoding": "nv12", "height": 3}, "needs an even width and height"),
     ],
 )
 def test_contradictions_are_named_without_allocating(fields: dict, reason: str) -> None:

@@ -43,7 +43,7 @@ def test_nothing_published_yet_is_no_error() -> None:
     [
         ("teleport", BOTH, "'teleport' is unknown; known are: raw, compressed"),
         ("raw", {"/cam/zstd": ["zstd_image_transport/msg/Packet"]}, "only sent as zstd"),
-        ("raw", {"/cam": ["std_msgs/msg/String"]}, "carries std_msgs/msg/String, not pictures"),
+        ("raw", {"/cam": ["std_msgs/msg/String"]}, "carries std_msgs/msg/String, not images"),
     ],
 )
 def test_what_cannot_be_shown_is_named(preferred: str, published: dict, reason: str) -> None:

@@ -88,10 +88,10 @@ def test_nothing_is_copied_where_nothing_moves(encoding: str) -> None:
     ("fields", "reason"),
     [
         ({"rotation": 45}, "45 degrees; give a multiple of 90"),
-        ({"region": (-1, 0, 2, 2)}, "x=-1 y=0 2x2 is no part"),
-        ({"region": (0, 0, 0, 2)}, "0x2 is no part"),
-        ({"region": (8, 0, 5, 2)}, "not within the picture of 12x6"),
-        ({"region": (0, 5, 2, 2)}, "not within the picture of 12x6"),
+        ({"region": (-1, 0, 2, 2)}, "x=-1 y=0 2x2 is not part of an image"),
+        ({"region": (0, 0, 0, 2)}, "0x2 is not part of an image"),
+        ({"region": (8, 0, 5, 2)}, "not within the image of 12x6"),
+        ({"region": (0, 5, 2, 2)}, "not within the image of 12x6"),
     ],
 )
 def test_impossible_views_are_named(fields: dict, reason: str) -> None:
