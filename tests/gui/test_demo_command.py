@@ -125,7 +125,7 @@ def test_its_children_end_with_it(
     process.send_signal(number)
     output, _ = process.communicate(timeout=60)
     assert process.returncode == code
-    assert "picture of the cockpit" not in output
+    assert "screenshot of the cockpit" not in output
     assert ("demo.png was not written: the cockpit was ended before" in output) == (code > 0)
     wait_gone(pids, 30)
 

@@ -170,7 +170,7 @@ def test_a_screenshot_that_cannot_be_written(start: Any, file: Path, tmp_path: P
     file.write_text(GOOD)
     for target, error in (
         (tmp_path / "no" / "x.png", "x.png': there is no folder '"),
-        (tmp_path / "x.xyz", "x.xyz': the name of a picture ends in .png or .jpg"),
+        (tmp_path / "x.xyz", "x.xyz': the name of a screenshot ends in .png or .jpg"),
     ):
         program = start("run", file, "--screenshot", target)
         assert program.end() == 2

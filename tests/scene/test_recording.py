@@ -110,7 +110,7 @@ def test_the_command_records_until_ctrl_c(app: Any, tmp_path: Path) -> None:
     _, said = process.communicate(timeout=60)
     assert process.returncode == 130, said
     assert "out.mp4: " in said
-    assert " pictures, " in said
+    assert " frames, " in said
     assert "Traceback" not in said
     frames = decode(video)
     assert frames[0][1].shape == (800, 1280, 3)

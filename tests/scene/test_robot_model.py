@@ -554,7 +554,7 @@ def test_links_share_the_mesh_that_they_name(
 def test_screenshots_wait_for_meshes_that_are_being_read(
     bench: SceneBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rosglass.cli.run import Picture
+    from rosglass.cli.run import Screenshot
     from rosglass.qml.elements.image_sinks import is_loading
     from rosglass.scene.displays import robot_model
 
@@ -581,7 +581,9 @@ def test_screenshots_wait_for_meshes_that_are_being_read(
     def save(_: Path) -> None:
         saved.append(len(list(robot.root.drawables())))
 
-    Picture(tmp_path / "robot.png", 0.0).take(ended.append, save, lambda: is_loading(bench.window))
+    Screenshot(tmp_path / "robot.png", 0.0).take(
+        ended.append, save, lambda: is_loading(bench.window)
+    )
     bench.wait.settled(bench.session)
     assert not saved
     may_read.set()

@@ -19,8 +19,8 @@ from rosglass.cli.parser import (
     complete,
     number,
     pair,
-    picture_file,
     positive_int,
+    screenshot_file,
     seconds,
 )
 
@@ -39,7 +39,7 @@ _WINDOW = 10_000
 #: The router of ``rosglass demo`` and ``rosglass robot``, unless the environment names another.
 _DEMO_URL = "zenoh://127.0.0.1:7447"
 
-#: What an argument names -> its help.
+#: Help of arguments by the kind of their name.
 _HELP = {
     "topics": "name of the topic, e.g. /odom",
     "services": "name of the service, e.g. /reset",
@@ -150,8 +150,8 @@ def _add_interface_options(
     )
     parser.add_argument(
         "--screenshot",
-        metavar="PICTURE",
-        type=picture_file,
+        metavar="FILE",
+        type=screenshot_file,
         help=f"save a screenshot of {window} (PNG, JPEG) and exit",
     )
     parser.add_argument(
@@ -335,7 +335,7 @@ def _demo(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--screenshot",
         metavar="FILE.png",
-        type=picture_file,
+        type=screenshot_file,
         help="save a screenshot before the end (without display: demo.png)",
     )
     parser.add_argument(

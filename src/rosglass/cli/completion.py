@@ -23,7 +23,7 @@ __all__ = ["complete_names", "offer", "run"]
 
 #: Seconds that completion may take to discover the graph.
 _DISCOVERY_TIMEOUT_S = 1.5
-#: What is completed from the library -> the kind of its types; None for all.
+#: Kind of the library's types that complete an argument, by its kind; None for all.
 _TYPES = {"messages": "msg", "service_types": "srv", "action_types": "action", "interfaces": None}
 
 

@@ -94,7 +94,7 @@ def _show(
         shoot()
     print(f"\n{cockpit.report()}", flush=True)
     for path in taken:
-        print(f"picture of the cockpit: {path}")
+        print(f"screenshot of the cockpit: {path}")
     if screenshot is not None and not taken and not failures:
         failures.append(Error(f"{screenshot} was not written: the cockpit was ended before"))
     if robot is not None and robot.poll() is not None:
@@ -104,7 +104,7 @@ def _show(
     missing = [
         what
         for what, came in (
-            ("camera picture", cockpit.camera.frames > 0),
+            ("camera image", cockpit.camera.frames > 0),
             ("odometry", cockpit.received("/odom")),
         )
         if not came

@@ -55,8 +55,8 @@ _PACKAGES = {
     "cyclonedds": ("ROS 2 over DDS", "dds"),
     "eclipse-zenoh": ("ROS 2 over Zenoh", "zenoh"),
     "PySide6-Essentials": ("interfaces in QML", "qml"),
-    "PySide6-Addons": ("camera pictures in QML", "camera"),
-    "opencv-python-headless": ("compressed pictures", "images"),
+    "PySide6-Addons": ("camera images in QML", "camera"),
+    "opencv-python-headless": ("compressed images", "images"),
     "av": ("H.264, HEVC, AV1 and Theora videos", "video"),
     "mcap": ("recordings", "bags"),
     "rosbags": ("ROS 1 bags and SQLite bags", "bags"),
@@ -78,7 +78,7 @@ _VARIABLES = (
     "ROS_HOSTNAME",
     "ROS_PACKAGE_PATH",
 )
-#: Receive buffer in bytes that a camera picture needs.
+#: Receive buffer in bytes that a camera image needs.
 _BUFFER_BYTES = 4 * 2**20
 #: Memory for IP fragments, in bytes, and seconds that they may stay, as ROS 2's guide recommends.
 _FRAGMENTS_BYTES, _FRAGMENTS_S = 128 * 2**20, 3
@@ -193,7 +193,7 @@ def _kernel() -> Iterator[_Finding]:
         yield _Finding(
             "warning",
             "network",
-            f"receive buffers are limited to {size} bytes: big pictures get lost over DDS",
+            f"receive buffers are limited to {size} bytes: large images get lost over DDS",
             f"sudo sysctl -w net.core.rmem_max={_BUFFER_BYTES} (and into /etc/sysctl.d to keep it)",
         )
     else:
@@ -461,8 +461,8 @@ def _master(uri: str, timeout: float) -> _Finding | None:
             pass
         call_node(uri, "getPid", _CALLER, timeout=timeout)
     except (ConnectionLostError, MasterError) as error:
-        text = f"something listens at {host}:{port}, but it is no ROS 1 master: {error}"
-        return _Finding("error", uri, text, f"look what it is (sudo ss -ltnp), and {start}")
+        text = f"something listens at {host}:{port}, but it is not a ROS 1 master: {error}"
+        return _Finding("error", uri, text, f"find out what it is (sudo ss -ltnp), and {start}")
     except ConnectionRefusedError:
         text = f"no master runs: {host} is there, but nothing listens on its port {port}"
         return _Finding("error", uri, text, start)

@@ -34,7 +34,7 @@ __all__ = [
 
 #: Number of elements of an array that are shown, unless all are requested.
 SHOWN = 36
-#: The same for programs, which accept more, but no pictures.
+#: The same for programs, which accept more, but not whole images.
 SHOWN_JSON = 10_000
 
 
@@ -116,7 +116,7 @@ def parse_fields(text: str, type_name: str, template: str = "") -> dict[str, Any
         template: An example for errors.
 
     Raises:
-        ConversionError: It is no YAML, or no mapping.
+        ConversionError: The text is not YAML, or not a mapping.
     """
     hint = f"YAML such as '{template}'" if template else "YAML such as '{x: 1, name: arm}'"
     try:
@@ -136,7 +136,7 @@ def split_type(rest: Sequence[str]) -> tuple[str | None, str]:
     """Split ``[TYPE] [VALUES]``, both of which may be left out.
 
     Raises:
-        Error: There are more than two, or the first of two is no type's name.
+        Error: There are more than two, or the first of two is not the name of a type.
     """
     if len(rest) > 1 and (rest[0].endswith(":") or rest[0].startswith("{")):
         raise Error(f"put the values into one pair of quotes: '{' '.join(rest)}'")
@@ -147,7 +147,7 @@ def split_type(rest: Sequence[str]) -> tuple[str | None, str]:
         )
     looks_like_type = [part.count("/") in (1, 2) and not set(part) & set("{}:[ ") for part in rest]
     if len(rest) == 2 and not looks_like_type[0]:
-        raise Error(f"{rest[0]!r} is no type; write e.g. geometry_msgs/msg/Twist")
+        raise Error(f"{rest[0]!r} is not a type; write e.g. geometry_msgs/msg/Twist")
     if len(rest) == 1 and not looks_like_type[0]:
         return None, rest[0]
     return (rest[0] if rest else None), (rest[1] if len(rest) == 2 else "")

@@ -151,7 +151,7 @@ def _fitting(
 
 def _double(value: int) -> float:
     if int(float(value)) != value:
-        raise Error(f"{value} is no double: the nearest one is {float(value)!r}")
+        raise Error(f"{value} is not a double: the nearest one is {float(value)!r}")
     return float(value)
 
 

@@ -26,8 +26,8 @@ __all__ = [
     "is_completing",
     "number",
     "pair",
-    "picture_file",
     "positive_int",
+    "screenshot_file",
     "seconds",
 ]
 
@@ -279,11 +279,11 @@ def positive_int(text: str) -> int:
     return int(text)
 
 
-def picture_file(text: str) -> str:
-    """Parse the file of a picture that is written later; a type of options."""
+def screenshot_file(text: str) -> str:
+    """Parse the file name of a screenshot; a type of options."""
     folder = os.path.dirname(text) or "."  # noqa: PTH120 - pathlib would take time here
     if not text.lower().endswith((".png", ".jpg", ".jpeg")):
-        raise argparse.ArgumentTypeError(f"{text!r}: the name of a picture ends in .png or .jpg")
+        raise argparse.ArgumentTypeError(f"{text!r}: the name of a screenshot ends in .png or .jpg")
     if not os.path.isdir(folder):  # noqa: PTH112
         raise argparse.ArgumentTypeError(f"{text!r}: there is no folder {folder!r}")
     return text

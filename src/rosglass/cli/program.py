@@ -138,7 +138,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     if rest and not hasattr(args, "arguments"):
         parser.error(f"{args.command} takes no arguments after --")
     if ros and not hasattr(args, "ros_arguments"):
-        parser.error(f"{args.command} takes no --ros-args: it is no node of its own")
+        parser.error(f"{args.command} takes no --ros-args: it is not a node of its own")
     args.arguments, args.ros_arguments = rest, ros
     return args
 

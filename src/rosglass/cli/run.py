@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rosglass.scene.app.window_recorder import WindowRecorder
 
 __all__ = [
-    "Picture",
+    "Screenshot",
     "format_log",
     "load_qt",
     "make_recorder",
@@ -127,7 +127,7 @@ def show(
 
     Args:
         file: The file.
-        screenshot: Where to save a picture of the window, after which the program ends.
+        screenshot: File for a screenshot of the window, after which the program ends.
         after: Seconds until the screenshot.
         verbose: Show what is logged for developers, too.
         end_process: End the process with the interface, whatever still runs in it.
@@ -195,17 +195,15 @@ def _show(
             app.quit(1)
 
     app.session.connection_changed.connect(on_connection)
-    picture = None if screenshot is None else Picture(screenshot, after)
+    shot = None if screenshot is None else Screenshot(screenshot, after)
 
     def shown() -> None:
         if recorder is not None and app.window is not None:
             recorder.start(app.window)
             # What the window shows is in the video: a kiosk has no mark of it.
             note(f"recording to {recorder.path}")
-        if picture is not None:
-            picture.take(
-                app.quit, lambda target: _save_connected(app, target), lambda: app.is_loading
-            )
+        if shot is not None:
+            shot.take(app.quit, lambda target: _save_connected(app, target), lambda: app.is_loading)
 
     _call_later(0.0, shown)
     _call_later(_FIRST_COLLECTION_S, gc.enable)
@@ -215,7 +213,7 @@ def _show(
     code = app.run(end_process=end_process)
     if recorder is not None:
         code = _check_recording(recorder, code)
-    return code if picture is None else picture.check(code)
+    return code if shot is None else shot.check(code)
 
 
 def _check_recording(recorder: WindowRecorder, code: int) -> int:
@@ -226,15 +224,15 @@ def _check_recording(recorder: WindowRecorder, code: int) -> int:
         return code or 1
     size = recorder.path.stat().st_size / 1e6
     lost = f", {status.dropped} DROPPED: the encoder is too slow" if status.dropped else ""
-    note(f"{recorder.path}: {status.frames} pictures, {status.duration:.1f} s, {size:.1f} MB{lost}")
+    note(f"{recorder.path}: {status.frames} frames, {status.duration:.1f} s, {size:.1f} MB{lost}")
     if status.problem:
         note(status.problem)
         return code or 1
     return code
 
 
-class Picture:
-    """The picture of ``--screenshot``, and whether it was taken.
+class Screenshot:
+    """The screenshot of ``--screenshot``, and whether it was taken.
 
     Args:
         target: The file.
@@ -278,7 +276,7 @@ class Picture:
         _call_later(self._after, take)
 
     def check(self, code: int) -> int:
-        """Return the program's exit code, which is an error if no picture was taken."""
+        """Return the program's exit code, which is an error if no screenshot was taken."""
         if code == 0 and not self._taken:
             note(
                 f"{self._target} was not written: the program was ended before {self._after:g} s "
@@ -289,7 +287,7 @@ class Picture:
 
 
 def _save_connected(app: Application, target: Path) -> None:
-    """Save a picture; raise Error as well if there will be no connection, as with a wrong --url."""
+    """Save a screenshot; raise Error, too, if a connection is impossible, as with a wrong --url."""
     _save(app, target)
     state = app.session.state
     text = f"{target} shows no robot: {app.session.detail or state}"
@@ -301,11 +299,11 @@ def _save_connected(app: Application, target: Path) -> None:
 
 def _save(app: Application, target: Path) -> None:
     if app.window is None:
-        raise UnsupportedError("the interface has no window to take a picture of")
+        raise UnsupportedError("the interface has no window to take a screenshot of")
     image = app.grab()
     if image.isNull():
         raise UnsupportedError(
-            "Qt gave no picture of the window, as Qt 5 does offscreen; use a virtual screen: "
+            "Qt returned no image of the window, as Qt 5 does offscreen; use a virtual screen: "
             "xvfb-run -s '-screen 0 1280x800x24' rosglass run ..."
         )
     if not image.save(str(target)):

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rosglass.cli.run import Picture, format_log
+from rosglass.cli.run import Screenshot, format_log
 from rosglass.errors import Error, QmlError
 from rosglass.rviz.requirements import require_bindings
 
@@ -94,10 +94,10 @@ def _show(args: argparse.Namespace, config: str, remappings: list[str], received
             if path not in shown:
                 app.add_qml(file, watch=args.watch)
         target = args.screenshot
-        picture = None if target is None else Picture(Path(target), args.after)
-        if picture is not None:
-            picture.take(app.quit, app.screenshot)
+        shot = None if target is None else Screenshot(Path(target), args.after)
+        if shot is not None:
+            shot.take(app.quit, app.screenshot)
         if received:
             return 128 + received[0]
         code = app.run(end_process=True)
-        return code if picture is None else picture.check(code)
+        return code if shot is None else shot.check(code)

@@ -20,7 +20,7 @@ def run(args: argparse.Namespace) -> int:
     """Show the view until it is closed; returns the exit code.
 
     Raises:
-        Error: The config is missing, or is no config of RViz.
+        Error: The config is missing, or is not a config of RViz.
         UnsupportedError: There is no Qt 6, or it would draw without a graphics interface.
     """
     # Threads for products of large matrices, which a view does not have, would delay its window.

@@ -71,7 +71,7 @@ def test_values_are_set_as_the_parameter_is_declared(
 @pytest.mark.parametrize(
     ("name", "text", "told"),
     [
-        ("gain", "9007199254740993", "is no double: the nearest one is 9007199254740992.0"),
+        ("gain", "9007199254740993", "is not a double: the nearest one is 9007199254740992.0"),
         ("gain", "fast", "refuses to set gain"),
         ("count", "5.5", "refuses to set count"),
     ],
