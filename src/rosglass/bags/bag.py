@@ -390,7 +390,7 @@ class ScannedBag(Bag):
                 yield BagMessage(wanted[number], time, data)
 
     def _merge_channels(self) -> None:
-        """Make one channel of those that differ only in their publisher."""
+        """Merge channels that differ only in their publisher."""
         groups: dict[Channel, list[int]] = {}
         for number, channel in self._known.items():
             groups.setdefault(replace(channel, count=0), []).append(number)

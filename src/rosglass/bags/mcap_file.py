@@ -163,7 +163,7 @@ class McapBag(ScannedBag):
             except Exception as error:  # damaged data may raise anything
                 if not self._known and not self._foreign:
                     raise BagError(
-                        f"{self.path} is no MCAP file, or damaged at its beginning: {error}"
+                        f"{self.path} is not an MCAP file, or damaged at its beginning: {error}"
                     ) from error
 
     def _record_headers(

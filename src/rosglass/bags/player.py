@@ -184,12 +184,12 @@ class Player(Handle):
 
     @property
     def is_paused(self) -> bool:
-        """Whether it is paused."""
+        """True while the player is paused."""
         return self._paused
 
     @property
     def loop(self) -> bool:
-        """Whether it starts again at the end."""
+        """True if the player starts again at the end."""
         return self._loop
 
     def status(self) -> PlayerStatus:
@@ -274,7 +274,7 @@ class Player(Handle):
         try:
             excluded = re.compile(exclude) if exclude else None
         except re.error as error:
-            raise BagError(f"exclude {exclude!r} is no regular expression: {error}") from error
+            raise BagError(f"exclude {exclude!r} is not a regular expression: {error}") from error
         names = {channel.topic for channel in self._bag.channels}
         for missing in sorted(wanted - names):
             raise BagError(
@@ -590,13 +590,13 @@ class Playback(Handle):
 
     @property
     def is_playing(self) -> bool:
-        """Whether it plays."""
+        """True while messages are played."""
         running = self._player.status().state in {PlayerState.STARTING, PlayerState.PLAYING}
         return running and not self._player.is_paused
 
     @property
     def is_at_end(self) -> bool:
-        """Whether it has paused at the end."""
+        """True once it has paused at the end."""
         return not self.is_playing and self.position >= self.duration
 
     @property
@@ -606,7 +606,7 @@ class Playback(Handle):
 
     @property
     def loop(self) -> bool:
-        """Whether it starts again at the end."""
+        """True if the player starts again at the end."""
         return self._player.loop
 
     @property

@@ -415,4 +415,4 @@ def _expression(text: str, what: str) -> re.Pattern[str] | None:
     try:
         return re.compile(text) if text else None
     except re.error as error:
-        raise BagError(f"{what} {text!r} is no regular expression: {error}") from error
+        raise BagError(f"{what} {text!r} is not a regular expression: {error}") from error

@@ -179,7 +179,7 @@ class ReplayNode(Ros2Node):
             if callback is None:
                 known = self._recorded_types.find_opaque(known) or known
         profile = qos if isinstance(qos, QoS) else QoS(depth=qos)
-        # ROS 1 sends latched messages to every subscriber; an unrecorded QoS is no conflict.
+        # ROS 1 sends latched messages to every subscriber; an unrecorded QoS is not a conflict.
         if self.wire == "ros1" or self.resolve(topic) in self._unprofiled:
             profile = replace(profile, durability=Durability.BEST_AVAILABLE, send_timeout=None)
         qos = profile.for_subscription([info.qos for info in recorded])

@@ -60,7 +60,7 @@ class Ros1CutBag(ScannedBag):
         path: The file.
 
     Raises:
-        BagError: It is no ROS 1 bag, or nothing in it can be read.
+        BagError: The file is not a ROS 1 bag, or nothing in it can be read.
     """
 
     def __init__(self, path: Path) -> None:

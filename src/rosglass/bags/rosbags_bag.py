@@ -149,7 +149,7 @@ def _check_metadata(path: Path) -> None:
 def _check_databases(path: Path) -> None:
     """Raise YAMLError if QoS profiles in a bag's SQLite files expand beyond the limits."""
     for file in path.iterdir() if path.is_dir() else [path]:
-        # The rosbags package handles files that are no database or lack this column.
+        # The rosbags package reports files that are not databases or lack this column.
         with suppress(sqlite3.Error):
             uri = f"{file.resolve().as_uri()}?immutable=1"
             with closing(sqlite3.connect(uri, uri=True)) as database:

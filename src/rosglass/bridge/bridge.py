@@ -115,7 +115,7 @@ class Rule:
 
     @property
     def is_pattern(self) -> bool:
-        """Whether it can match several names."""
+        """True if it can match several names."""
         return _is_pattern(self.name)
 
     def applies(self, side: int) -> bool:
@@ -132,7 +132,7 @@ class Rules:
 
     Raises:
         InvalidNameError: A text is invalid.
-        ArgumentError: `exclude` is no regular expression.
+        ArgumentError: `exclude` is not a regular expression.
     """
 
     def __init__(self, rules: Iterable[str | Rule], exclude: str = "") -> None:
@@ -182,14 +182,16 @@ def _is_pattern(name: str) -> bool:
     try:
         re.compile(translate(name))
     except re.error:
-        raise InvalidNameError(f"{name!r} is no pattern; * stands for any characters") from None
+        raise InvalidNameError(
+            f"{name!r} is not a valid pattern; * stands for any characters"
+        ) from None
     return True
 
 
 def _absolute_name(name: str) -> str:
     if not re.fullmatch(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*", name):
         raise InvalidNameError(
-            f"{name!r} is no name of a topic or service; write /name or /namespace/name"
+            f"{name!r} is not the name of a topic or service; write /name or /namespace/name"
         )
     return name if name.startswith("/") else f"/{name}"
 
@@ -298,7 +300,7 @@ class Bridge(Handle):
         #: By kind, number of the graph and name.
         self._callable: dict[tuple[str, int, str], ServiceRelay | ActionRelay] = {}
         self._missed: dict[tuple[str, int, str], float] = {}
-        #: What cannot be relayed, by kind, number of the graph and name.
+        #: Problems of names that cannot be relayed, by kind, number of the graph and name.
         self._refused: dict[tuple[str, int, str], RelayStatus] = {}
         self._missing: set[tuple[str, int, str]] = set()
         self._statistics: list[Publisher] = []

@@ -283,7 +283,7 @@ class TopicRelay:
 
     @property
     def alive(self) -> bool:
-        """Whether it is connected to publishers, regardless of the graph."""
+        """True while it is connected to publishers, regardless of the graph."""
         subscription = self._subscription
         if subscription is None or subscription.closed:
             return False
@@ -291,7 +291,7 @@ class TopicRelay:
 
     @property
     def subscribed(self) -> bool:
-        """Whether it is subscribed."""
+        """True while it is subscribed."""
         return self._subscription is not None
 
     def follow(self, own: int) -> None:

@@ -37,9 +37,10 @@ _DISCOVERY_TIME_S = 1.5
 class Side:
     """One of a bridge's two graphs.
 
-    Parallel bridges, between the same two graphs, are no sources: they publish what this bridge
-    relays itself. Their nodes have the same base name in both graphs. A bridge to a third graph is
-    a source, unless what it relays has been in the other graph before (see :class:`Routes`).
+    Parallel bridges, between the same two graphs, do not count as sources: they publish what this
+    bridge relays itself. Their nodes have the same base name in both graphs. A bridge to a third
+    graph is a source, unless what it relays has been in the other graph before (see
+    :class:`Routes`).
 
     Args:
         node: The bridge's node in this graph.
@@ -65,12 +66,12 @@ class Side:
 
     @property
     def connected(self) -> bool:
-        """Whether the node is connected, so that its graph is up to date."""
+        """True while the node is connected, so that its graph is up to date."""
         return self.node.status().state is ConnectionState.CONNECTED
 
     @property
     def known(self) -> bool:
-        """Whether discovery has had time to complete."""
+        """True once discovery has had time to complete."""
         return time.monotonic() - self._since > _DISCOVERY_TIME_S
 
     def update(self) -> None:

@@ -69,7 +69,7 @@ class FieldType:
 
     @property
     def is_compound(self) -> bool:
-        """Whether the element type is a message type."""
+        """True if the element type is a message type."""
         return "/" in self.name
 
     def __str__(self) -> str:

@@ -329,7 +329,7 @@ class Library:
 
         Raises:
             DefinitionConflictError: As for :meth:`add_text`.
-            UnsupportedError: It is no definition.
+            UnsupportedError: `definition` is not an InterfaceDefinition.
         """
         check_definition(definition)
         with self._lock:
@@ -341,7 +341,7 @@ class Library:
     def add_version(self, definition: InterfaceDefinition) -> str:
         """Add a ROS 2 definition that a peer sent, to be found under its hash.
 
-        Unlike with :meth:`add`, other definitions of the type are no conflict: this one is used if
+        Unlike with :meth:`add`, other definitions of the type do not conflict: this one is used if
         its hash is requested and, if no provider has the type, for its name alone (the version
         added last, if there are several).
 

@@ -42,12 +42,12 @@ _ESCAPES = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"}
 
 
 def full_text(definition: InterfaceDefinition) -> str:
-    """Return the definition followed by those that it uses, as in ROS 1 connection headers.
+    """Return the definition followed by the ones it uses, as in ROS 1 connection headers.
 
     IDL is translated to ``.msg``.
 
     Raises:
-        UnsupportedError: `definition` is no definition.
+        UnsupportedError: `definition` is not a definition.
         DefinitionError: `definition` is not resolved.
     """
     check_definition(definition)
@@ -64,7 +64,7 @@ def schema_text(definition: Definition) -> tuple[str, str]:
     or names with other letters.
 
     Raises:
-        UnsupportedError: `definition` is no definition.
+        UnsupportedError: `definition` is not a definition.
         DefinitionError: `definition` is not resolved.
     """
     check_definition(definition)

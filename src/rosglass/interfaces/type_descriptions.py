@@ -71,13 +71,13 @@ _CONTROLS = {b"t": b"\t", b"n": b"\n", b"r": b"\r"}
 
 
 def type_sources(definition: InterfaceDefinition) -> list[dict[str, str]]:
-    """Return the texts of a definition and of those that it uses, as dicts of ``TypeSource``.
+    """Return the texts of a definition and of the ones it uses, as dicts of ``TypeSource``.
 
     Args:
         definition: A resolved ROS 2 definition.
 
     Raises:
-        UnsupportedError: `definition` is a ROS 1 one, or no definition.
+        UnsupportedError: `definition` belongs to ROS 1, or is not a definition.
     """
     described = type_description(definition)
     names = [part["type_name"] for part in described["referenced_type_descriptions"]]
@@ -541,7 +541,7 @@ class TypeCache:
             return _read(text, name, type_hash)
         except _RUBBISH as error:
             # It is useless, whatever wrote it.
-            _log.warning("%s is no definition of %s and is removed: %s", path, name, error)
+            _log.warning("%s is not a definition of %s and is removed: %s", path, name, error)
             with suppress(OSError):  # another process was faster
                 os.unlink(path)
             return None

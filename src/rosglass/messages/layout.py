@@ -40,7 +40,7 @@ class Wire:
 
     @property
     def aligned(self) -> bool:
-        """Whether primitives are aligned to their size."""
+        """True if primitives are aligned to their size."""
         return self.name == "cdr"
 
     @property
@@ -226,17 +226,17 @@ def _all_numbers(schema: Schema) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Knowledge:
-    """What is known of a position when code is generated: it is `residue` modulo `modulus`."""
+    """A position as far as it is known when code is generated: `residue` modulo `modulus`."""
 
     modulus: int = 1
     residue: int = 0
 
     def after(self, size: int) -> Knowledge:
-        """Return what is known `size` bytes later."""
+        """Return the position `size` bytes later."""
         return Knowledge(self.modulus, (self.residue + size) % self.modulus)
 
     def to(self, align: int) -> Knowledge:
-        """Return what is known after padding to a multiple of `align`."""
+        """Return the position after padding to a multiple of `align`."""
         if self.modulus >= align:
             return self.after(-self.residue % align)
         return Knowledge(align, 0)

@@ -88,7 +88,7 @@ class Message:
     __hash__ = None  # type: ignore[assignment]
     #: The bytes of a shell; unset in plain objects. A view keeps its object alive.
     _buffer__: bytes | memoryview
-    #: Where in the bytes the shell of a nested message starts.
+    #: Offset at which the shell of a nested message starts in the bytes.
     _offset__: int
     _schema__: ClassVar[Schema]
     #: Decodes a shell; None for plain classes.
@@ -145,7 +145,7 @@ class Message:
         The first call copies the array out of the received bytes; later calls return that copy.
 
         Raises:
-            FieldPathError: There is no such field, or it is no numeric array.
+            FieldPathError: The field does not exist, or is not a numeric array.
         """
         return writable(self, path)
 
@@ -276,7 +276,7 @@ class Stamp:
 
     @property
     def is_duration(self) -> bool:
-        """Whether it is a span of time, not a point in time."""
+        """True for a duration, False for a point in time."""
         return self._schema__.name.lower().endswith("duration")
 
     @property

@@ -130,7 +130,7 @@ class Member:
 
     @property
     def is_array(self) -> bool:
-        """Whether the member is an array."""
+        """True if the member is an array."""
         return self.array is not ArrayKind.NONE
 
     @property
@@ -220,7 +220,7 @@ def _resolve(
             raise DefinitionError(f"field {field.name!r} appears twice in {definition.name}", file)
         # Names are used in generated code; no parser has checked definitions made by hand.
         if not (field.name.isascii() and field.name.isidentifier()):
-            raise DefinitionError(f"{definition.name}: {field.name!r} is no field name", file)
+            raise DefinitionError(f"{definition.name}: {field.name!r} is not a field name", file)
         attr = _attribute(field.name, taken)
         taken.add(attr)
         ftype = field.type

@@ -72,7 +72,7 @@ class Source:
 
     @property
     def is_full(self) -> bool:
-        """Whether further code should go into functions of its own."""
+        """True if further code should go into functions of its own."""
         return len(self.lines) > _MANY_LINES or self._depth > _DEEP
 
     def line(self, text: str) -> None:

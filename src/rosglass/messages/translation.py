@@ -65,7 +65,7 @@ class Translation:
         added: Paths of fields that only the target has; they get their defaults.
 
     Raises:
-        UnsupportedError: There can be no such type; the message gives the reason.
+        UnsupportedError: The other ROS cannot have such a type; the message gives the reason.
     """
 
     def __init__(
@@ -154,7 +154,7 @@ class ServiceTranslation:
         response: Translates responses of the server for the clients.
 
     Raises:
-        UnsupportedError: There can be no such type; the message gives the reason.
+        UnsupportedError: The other ROS cannot have such a type; the message gives the reason.
     """
 
     def __init__(
@@ -188,7 +188,7 @@ class ActionTranslation:
         feedback: The same for feedback.
 
     Raises:
-        UnsupportedError: There can be no such type; the message gives the reason.
+        UnsupportedError: The other ROS cannot have such a type; the message gives the reason.
     """
 
     def __init__(self, source: ActionType, library: Library | None = None) -> None:

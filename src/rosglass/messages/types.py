@@ -138,7 +138,7 @@ class MessageType:
         else:
             parsed = interfaces.parse_message(text, name, ros=ros)
         if not isinstance(parsed, Definition):
-            raise InvalidNameError(f"{name!r} is no message type; write pkg/msg/Type")
+            raise InvalidNameError(f"{name!r} is not a message type; write pkg/msg/Type")
 
         def find(wanted: str, owner: Definition, field: Field) -> Definition:
             if wanted not in parsed.nested:
@@ -185,7 +185,7 @@ class MessageType:
 
     @cached_property
     def has_header(self) -> bool:
-        """Whether messages begin with a ``std_msgs/Header`` named ``header``."""
+        """True if messages begin with a ``std_msgs/Header`` named ``header``."""
         first = self.definition.fields[:1]
         return [(field.name, str(field.type)) for field in first] == [("header", _HEADER)]
 
@@ -247,7 +247,7 @@ class MessageType:
             wstring_width: Bytes for each UTF-16 unit of wstrings, 2 or 4; None to detect it.
 
         Raises:
-            DecodeError: The buffer is no bytes, or its header announces another representation.
+            DecodeError: The buffer is not bytes, or its header announces another encoding.
                 Other damage is reported when fields are read; :meth:`validate` finds it at once.
         """
         if wire is None:
@@ -347,10 +347,10 @@ class MessageType:
     ) -> Message:
         """Return the message in `buffer` with every field decoded; arguments as :meth:`decode`.
 
-        Bytes left over are no error, as other versions of a type may have more fields.
+        Bytes left over are accepted, as other versions of a type may have more fields.
 
         Raises:
-            DecodeError: The buffer is no such message.
+            DecodeError: The buffer is not such a message.
         """
         data = self._bytes(buffer)
         return self._codec_for(data, wire, wstring_width).decode_all(data)
@@ -363,8 +363,8 @@ class MessageType:
         :meth:`decode_all` accepts the same buffers, and those with bytes left over.
 
         Raises:
-            DecodeError: A length does not fit the buffer, a unit of a wstring is no character, or
-                bytes are left over (up to three bytes of padding are normal in CDR).
+            DecodeError: A length does not fit the buffer, a unit of a wstring is not a character,
+                or bytes are left over (up to three bytes of padding are normal in CDR).
         """
         data = self._bytes(buffer)
         codec = self._codec_for(data, wire, wstring_width)
@@ -608,8 +608,9 @@ class OpaqueType(MessageType):
         text: As given.
 
     Raises:
-        InvalidNameError: `name` is no message type's name, or `type_hash` no hash.
-        UnsupportedError: There is no such ROS.
+        InvalidNameError: `name` is not the name of a message type, or `type_hash` is
+            not a hash.
+        UnsupportedError: `ros` is neither 1 nor 2.
     """
 
     def __init__(
@@ -624,10 +625,10 @@ class OpaqueType(MessageType):
         if ros not in _HASHES:
             raise UnsupportedError(f"{name}: there is ROS 1 and ROS 2, not {ros!r}")
         if split_name(name)[1] not in ("", "msg", "action"):
-            raise InvalidNameError(f"{name!r} is no message type; write pkg/msg/Type")
+            raise InvalidNameError(f"{name!r} is not a message type; write pkg/msg/Type")
         if not isinstance(type_hash, str) or (type_hash and not _HASHES[ros].fullmatch(type_hash)):
             raise InvalidNameError(
-                f"{type_hash!r:.90} is no type hash of {name}; write {_WRITE[ros]}, or nothing"
+                f"{type_hash!r:.90} is not a type hash of {name}; write {_WRITE[ros]}, or nothing"
             )
         self.name, self.ros, self.wire = join_name(name), ros, "cdr" if ros == 2 else "ros1"
         self.reason, self.text = reason, text
@@ -803,7 +804,7 @@ def load(
         TypeNotFoundError: No provider has a definition.
         DefinitionConflictError: No provider has the version with this hash.
         DefinitionError: The definition has errors, or is cyclic.
-        UnsupportedError: `library` is no library, or `ros` neither 1 nor 2.
+        UnsupportedError: `library` is not a library, or `ros` is neither 1 nor 2.
     """
     if library is not None and not isinstance(library, interfaces.Library):
         raise UnsupportedError(f"a library is a rosglass.Library, not {library!r:.80}")
@@ -826,7 +827,7 @@ def load(
 
 
 def mend(name: str, text: str, md5: str, library: Library | None = None) -> MessageType | None:
-    """Create a ROS 1 type from a text with lines that are no definition, or without nested types.
+    """Create a ROS 1 type from a text with invalid lines, or without its nested types.
 
     Args:
         name: ``pkg/msg/Type``.

@@ -52,7 +52,7 @@ __all__ = ["TransformBuffer", "Transformable"]
 
 
 def check_name(name: object, what: str) -> None:
-    """Raise InvalidArgumentException if `name` is no valid name of a frame."""
+    """Raise InvalidArgumentException if `name` is not a valid frame name."""
     if not isinstance(name, str) or not name:
         raise InvalidArgumentException(f"{what}: expected the name of a frame, got {name!r}")
     if name[0] == "/":
@@ -183,7 +183,7 @@ class PendingLookups:
             timeout: Seconds; None for no limit.
 
         Raises:
-            ConversionError: The timeout is no number of seconds.
+            ConversionError: The timeout is not a number of seconds.
             InvalidArgumentException: The arguments are invalid.
             NodeClosedError: The buffer is closed.
         """
@@ -288,10 +288,10 @@ _MAX_HINTS = 1000
 
 @dataclass(frozen=True, slots=True)
 class Transformable:
-    """Whether a transform is available; true if it is.
+    """The answer to :meth:`TransformBuffer.can_transform`; true if the transform is available.
 
     Attributes:
-        error: Why it is not; None if it is.
+        error: Why the transform is not available; None if it is.
     """
 
     error: TransformException | None = None

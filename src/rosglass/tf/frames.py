@@ -386,7 +386,7 @@ _REASON = {
     "self": "the two are the same",
     "no name": "both frames need a name",
     "not finite": "a number in it is not finite",
-    "not normalised": "its rotation is no quaternion of length 1; an empty one has w = 1",
+    "not normalised": "its rotation is not a quaternion of length 1; the identity has w = 1",
     "loop": "the parent is itself placed in the child; find out which of the two is wrong",
     "too deep": f"the parent is below more than {_MAX_DEPTH} other frames; find out who names them",
     "long name": f"names of frames have at most {_MAX_NAME_LENGTH} letters",

@@ -245,8 +245,7 @@ class TransformBroadcaster(Handle):
         """Publish a transform, or several in one message.
 
         Raises:
-            InvalidArgumentException: An argument is no transform, or a frame has no name; nothing
-                is sent.
+            InvalidArgumentException: Not a transform, or a frame has no name; nothing is sent.
             ConversionError: A stamp does not fit into the message.
             NodeClosedError: The broadcaster is closed.
         """

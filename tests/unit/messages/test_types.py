@@ -149,8 +149,8 @@ def test_cycles_are_errors() -> None:
     [
         (compound("t/msg/A", ("b", "t/msg/B")), "no definition of 't/msg/B'"),
         (compound("t/msg/A", ("x", "int8"), ("x", "int8")), "appears twice"),
-        (compound("t/msg/A", ("x y", "int8")), "is no field name"),
-        (compound("t/msg/A", ('x"]; import os', "int8")), "is no field name"),
+        (compound("t/msg/A", ("x y", "int8")), "is not a field name"),
+        (compound("t/msg/A", ('x"]; import os', "int8")), "is not a field name"),
         (compound("t/msg/A", ("x", "complex128")), "no definition of 'complex128'"),
     ],
 )
