@@ -72,7 +72,7 @@ class GoalStatus(Enum):
 
     @property
     def is_active(self) -> bool:
-        """Whether the goal has not ended."""
+        """True until the goal has ended."""
         return self in _ACTIVE
 
 
@@ -379,7 +379,7 @@ class ActionClient(Client):
 
     @property
     def closed(self) -> bool:
-        """Whether :meth:`close` was called, of the client or of its node."""
+        """True once the client or its node was closed."""
         return self._closed or self._core.closed
 
     @property

@@ -159,7 +159,7 @@ class ServerGoal(Handle):
 
     @property
     def is_cancel_requested(self) -> bool:
-        """Whether it should end soon: with :meth:`canceled`, or because the server closes.
+        """True if the goal should end soon: cancel it with :meth:`canceled`, or the server closes.
 
         Also when a newer goal preempts it (in ROS 1, with ``simple=True``).
         """
@@ -236,7 +236,7 @@ class ServerGoal(Handle):
 
     @property
     def _cancelable(self) -> bool:
-        """Whether it has neither ended nor is being cancelled (``rcl_action``'s state machine)."""
+        """True if it has not ended and is not being cancelled (``rcl_action``'s state machine)."""
         return self._status in (GoalStatus.ACCEPTED, GoalStatus.EXECUTING)
 
     def _request_cancel(self) -> bool:
@@ -371,7 +371,7 @@ class ActionServer(Handle):
 
     @property
     def closed(self) -> bool:
-        """Whether :meth:`close` was called."""
+        """True once the server was closed."""
         return self._protocol.closed
 
     @property

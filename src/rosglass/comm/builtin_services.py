@@ -176,7 +176,7 @@ class SimTime(Handle):
 
     @property
     def following(self) -> bool:
-        """Whether the clock follows ``/clock``."""
+        """True while the clock follows ``/clock``."""
         return self._subscription is not None
 
     def follow(self, wanted: bool) -> None:

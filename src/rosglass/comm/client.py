@@ -45,7 +45,7 @@ class Client(Handle):
 
     @property
     def ready(self) -> bool:
-        """Whether a compatible server is available."""
+        """True while a compatible server is available."""
         return self._readiness.read()
 
     @abstractmethod

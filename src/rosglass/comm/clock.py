@@ -85,7 +85,7 @@ class Clock(Unique):
 
     @property
     def is_simulated(self) -> bool:
-        """Whether the time comes from a simulation (``/clock``) instead of the system."""
+        """True if the time comes from a simulation (``/clock``) instead of the system."""
         return self._simulated
 
     def now(self) -> Time:

@@ -128,12 +128,12 @@ class NodeCore(ABC):
 
     @property
     def closed(self) -> bool:
-        """Whether the node is closed."""
+        """True once the node is closed."""
         return self._closed
 
     @property
     def forked(self) -> bool:
-        """Whether this process is a fork of the one that created the node."""
+        """True if this process is a fork of the one that created the node."""
         return self._process != _process[0]
 
     def check_open(self) -> None:

@@ -108,7 +108,7 @@ class Dispatcher(Executor):
 
     @property
     def is_current(self) -> bool:
-        """Whether this is the dispatcher's own thread."""
+        """True in the dispatcher's own thread."""
         return self._thread is threading.current_thread()
 
     def close(self) -> None:
@@ -270,7 +270,7 @@ class LoopExecutor(Executor):
 
     @property
     def is_current(self) -> bool:
-        """Whether the calling thread is running the loop."""
+        """True if the calling thread runs the loop."""
         try:
             return load_asyncio().get_running_loop() is self._loop
         except RuntimeError:

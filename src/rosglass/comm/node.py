@@ -522,7 +522,7 @@ class RemoteNodeClient(Handle):
 
     @property
     def ready(self) -> bool:
-        """Whether the node is available and has the services."""
+        """True while the node is available and has the services."""
         return not self._closed and self._client(self._first).ready
 
     def wait_for_server(self, timeout: float | None = None) -> bool:

@@ -91,11 +91,11 @@ class ParameterDescriptor:
 
 
 class SetResult(NamedTuple):
-    """Whether a parameter was set.
+    """The result of setting a parameter.
 
     Attributes:
-        successful: Whether it was set.
-        reason: Why not, as the node reports it.
+        successful: True if the parameter was set.
+        reason: Why it was not set, as the node reports it.
     """
 
     successful: bool
@@ -218,7 +218,7 @@ class RemoteParameters(Handle):
     @property
     @abstractmethod
     def ready(self) -> bool:
-        """Whether the parameters are available."""
+        """True while the parameters are available."""
 
     @abstractmethod
     def wait_for_server(self, timeout: float | None = None) -> bool:
@@ -289,7 +289,7 @@ class ParameterClient(Handle):
 
     @property
     def ready(self) -> bool:
-        """Whether the node (in ROS 1, the master) is available and serves parameters."""
+        """True while the node (in ROS 1, the master) is available and serves parameters."""
         return not self._closed and self._remote.ready
 
     def wait_for_server(self, timeout: float | None = None) -> bool:

@@ -75,7 +75,7 @@ class Publisher(TopicEndpoint):
         #: The subscriptions in the graph at the last update; None requests another one.
         self._known: list[EndpointInfo] | None = None
         self._left: deque[EndpointInfo] = deque(maxlen=_MAX_LEFT)
-        #: What is wrong with subscriptions in the graph; None before the first update.
+        #: The problem with subscriptions in the graph; None before the first update.
         self._graph_problem: str | None = None
         self._big = False
         self._liveliness_listeners: Listeners[LivelinessLost] = Listeners(where=topic)

@@ -28,7 +28,7 @@ BEST_AVAILABLE = Duration(2**63 - 2)
 
 
 class Reliability(Enum):
-    """Whether lost samples are retransmitted."""
+    """The retransmission of lost samples."""
 
     RELIABLE = "reliable"
     BEST_EFFORT = "best_effort"
@@ -39,7 +39,7 @@ class Reliability(Enum):
 
 
 class Durability(Enum):
-    """Whether late subscriptions receive earlier samples."""
+    """The delivery of earlier samples to late subscriptions."""
 
     VOLATILE = "volatile"
     TRANSIENT_LOCAL = "transient_local"
@@ -236,7 +236,7 @@ class QoS:
 
     @property
     def is_decided(self) -> bool:
-        """Whether no policy is a middleware default or best available."""
+        """True if no policy is a middleware default or best available."""
         return (
             self.reliability in (Reliability.RELIABLE, Reliability.BEST_EFFORT)
             and self.durability in (Durability.VOLATILE, Durability.TRANSIENT_LOCAL)

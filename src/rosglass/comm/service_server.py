@@ -230,7 +230,7 @@ class ServiceServer(Handle):
     @property
     def _failure_effect(self) -> str:
         """The effect of a failure on the client, for log lines."""
-        if self._replier.tells_failures:
+        if self._replier.reports_failures:
             return "it receives the error instead"
         if self._instead is not None:
             return "it gets a response with all defaults, as ROS 2 has no errors"

@@ -148,7 +148,7 @@ class Subscription(TopicEndpoint):
 
     @property
     def closed(self) -> bool:
-        """Whether :meth:`close` was called."""
+        """True once :meth:`close` was called."""
         return self._inbox.closed
 
     def publisher_count(self) -> int:
@@ -246,7 +246,7 @@ class Subscription(TopicEndpoint):
 
     @property
     def batching(self) -> bool:
-        """Whether callbacks may be delayed to receive in batches; see :meth:`set_batching`."""
+        """True if callbacks may be delayed to receive in batches; see :meth:`set_batching`."""
         return self._batching
 
     def set_batching(self, batching: bool) -> None:
@@ -365,7 +365,7 @@ class Subscription(TopicEndpoint):
 
     @property
     def _awaited(self) -> bool:
-        """Whether samples are awaited: by a callback, a current wait or one in the last second."""
+        """True while a callback, or a wait within the last second, needs samples at once."""
         recent = time.monotonic() - self._last_wait < _AWAITED_S
         return (self._calls and not self._batching) or bool(self._waits) or recent
 
@@ -642,7 +642,7 @@ class SubscriptionFeed(NodeMember):
 
     @property
     def has_simulated_stamps(self) -> bool:
-        """Whether headers may be stamped by a simulation's time."""
+        """True if headers may be stamped with simulated time."""
         return self._core.has_simulated_stamps
 
     def lateness(self, publisher: bytes) -> int:

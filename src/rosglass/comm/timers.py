@@ -142,7 +142,7 @@ class Worker:
 
     @property
     def is_current(self) -> bool:
-        """Whether this is the worker's own thread."""
+        """True in the worker's own thread."""
         return self._thread is threading.current_thread()
 
     def close(self) -> None:

@@ -117,7 +117,7 @@ class Writer(Handle):
 class Reader(Handle):
     """Receives the samples of one subscription."""
 
-    #: What is wrong with what arrives, in words, and already logged; empty if all is well.
+    #: The problem with the received data, in words, and already logged; empty if there is none.
     problem: str = ""
 
     def set_eager(self, eager: bool) -> None:
@@ -239,7 +239,7 @@ class Replier(Handle):
     #: middle of receiving. Set by the server.
     quick: bool = False
     #: Whether :meth:`fail` reaches the client.
-    tells_failures: bool = False
+    reports_failures: bool = False
     #: Largest response in bytes; None for no limit.
     max_reply: int | None = None
     #: Whether a ServiceError raised by the callback is an answer, as in rospy, not a failure.
@@ -360,7 +360,7 @@ class Middleware(ABC):
 
         Raises:
             TimeoutError: It does not answer within `timeout` seconds.
-            DefinitionError: The announced type is no ROS 2 message.
+            DefinitionError: The announced type is not a ROS 2 message.
         """
         return None
 

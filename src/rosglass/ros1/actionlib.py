@@ -197,7 +197,7 @@ class ServerState(IntEnum):
 
     @property
     def is_terminal(self) -> bool:
-        """Whether the goal has ended."""
+        """True once the goal has ended."""
         return self in _TERMINAL
 
 

@@ -253,7 +253,7 @@ class ActionlibClientGoal(ClientGoal):
 
     @property
     def _is_unsent(self) -> bool:
-        """Whether it waits for a server."""
+        """True while the goal waits for a server."""
         return self._sent is None and not self._done.done()
 
     def _send(self, server: str, epoch: int) -> None:

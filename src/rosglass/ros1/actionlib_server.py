@@ -57,7 +57,7 @@ _CANCELABLE = (ServerState.PENDING, ServerState.ACTIVE)
 _REPLACED = "It was preempted by a newer goal"
 _RECALLED = "It was cancelled before it was executed"
 
-#: The states of accepted goals: of those that became active, and of those that wait.
+#: The states of accepted goals that became active, and of accepted goals that wait.
 _ACTIVE_STATES = {
     GoalStatus.ACCEPTED: ServerState.ACTIVE,
     GoalStatus.EXECUTING: ServerState.ACTIVE,

@@ -312,7 +312,7 @@ class RemoteNamespace(RemoteParameters):
 
     @property
     def ready(self) -> bool:
-        """Whether the master, which has the parameters, is connected."""
+        """True while the master, which has the parameters, is connected."""
         return self._core.status().state is ConnectionState.CONNECTED
 
     def wait_for_server(self, timeout: float | None = None) -> bool:

@@ -522,12 +522,12 @@ class ParameterSubscription(Handle):
 
     @property
     def known(self) -> bool:
-        """Whether the master has answered."""
+        """True once the master has answered."""
         return self._known.is_set()
 
     @property
     def is_set(self) -> bool:
-        """Whether it is known and set."""
+        """True if the value is known and set."""
         return self.known and self._value is not None
 
     @property

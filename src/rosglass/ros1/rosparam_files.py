@@ -128,7 +128,7 @@ class _Constructors:
         try:
             return float(text) * math.pi / 180.0
         except ValueError:
-            raise _problem(node, f"{text!r} is no number of degrees; e.g. deg(90)") from None
+            raise _problem(node, f"{text!r} is not a number of degrees; e.g. deg(90)") from None
 
     def radians(self, node: Any) -> float:
         text = _inside(str(self.construct_scalar(node)), "rad")
@@ -136,7 +136,7 @@ class _Constructors:
             return _calculate(ast.parse(text, mode="eval").body)
         except (SyntaxError, ValueError, ZeroDivisionError, OverflowError, RecursionError):
             raise _problem(
-                node, f"{text!r} is no number of radians; e.g. rad(pi/2): numbers, pi, + - * /"
+                node, f"{text!r} is not a number of radians; e.g. rad(pi/2): numbers, pi, + - * /"
             ) from None
 
 

@@ -221,7 +221,7 @@ class ActionVersion:
 
     @property
     def pending(self) -> bool:
-        """Whether a definition is being fetched."""
+        """True while a definition is being fetched."""
         types = self.types
         return self._fetching or (
             types is not None and any(version.pending for version, _ in self._parts())

@@ -236,7 +236,9 @@ class _Reader:
                 validate_node_name(part)
             except InvalidNameError as error:
                 hint = "; a wildcard stands for whole parts: '*' or '**'" if "*" in part else ""
-                raise self._error(key, f"{full!r} is no name of a node: {error}{hint}") from None
+                raise self._error(
+                    key, f"{full!r} is not the name of a node: {error}{hint}"
+                ) from None
         return re.sub("/{2,}", "/", full)
 
     def _parameters(
@@ -270,10 +272,10 @@ class _Reader:
         items: list[Any] = []
         while not isinstance(event := self._next(), self._yaml.SequenceEndEvent):
             if isinstance(event, self._yaml.MappingStartEvent):
-                problem = self._error(event, "a mapping in a list is no parameter's value")
+                problem = self._error(event, "a mapping in a list is not a parameter value")
                 raise _MapInListError(str(problem))
             if not isinstance(event, self._yaml.ScalarEvent):
-                raise self._error(event, "a list in a list is no parameter's value")
+                raise self._error(event, "a list in a list is not a parameter value")
             item = self._scalar(event)
             if item is None:
                 raise self._error(event, "a list cannot hold null")

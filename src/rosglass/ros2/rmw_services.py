@@ -554,9 +554,9 @@ class Ros2Replier(Replier, NodeMember):
         return "; ".join(problems)
 
     @property
-    def tells_failures(self) -> bool:  # type: ignore[override]
-        """Whether the middleware can carry :meth:`fail`."""
-        return self._replier.tells_failures
+    def reports_failures(self) -> bool:  # type: ignore[override]
+        """True if the middleware can carry :meth:`fail`."""
+        return self._replier.reports_failures
 
     def follow(self, moved: bool, idle: bool) -> None:  # noqa: ARG002 - the graph alone matters
         """Log a new problem after a change of the graph."""

@@ -326,7 +326,7 @@ class _Parser:
                 f"{where} has a wildcard; ROS 2's rules name one topic or service each"
             )
         if name == "~" or "{" in name or "}" in name:
-            raise self._error(f"{where} is no name; write '~/name' for a private one")
+            raise self._error(f"{where} is not a name; write '~/name' for a private one")
         try:
             # With the shortest names possible: the rule's effect on a node is checked later.
             expand(name, "n", "/")
@@ -338,7 +338,7 @@ class _Parser:
         bad = re.search(r"[\s:*]|\.\.|^\.|\.$", name)
         if bad:
             raise self._error(
-                f"{text!r}: {name!r} is no parameter's name ({bad[0]!r} at position {bad.start()})"
+                f"{text!r}: {name!r} is not a parameter name ({bad[0]!r} at position {bad.start()})"
             )
         if not value.strip():
             raise self._error(
@@ -361,7 +361,7 @@ class _Parser:
         number = LOG_LEVELS.get(level.upper())
         if number is None:
             levels = ", ".join(LOG_LEVELS).lower()
-            raise self._error(f"--log-level {text!r}: {level!r} is no level; known are {levels}")
+            raise self._error(f"--log-level {text!r}: {level!r} is not a level; known are {levels}")
         if not separator:
             self._level = number
         elif logger:

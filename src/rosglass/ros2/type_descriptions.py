@@ -163,7 +163,7 @@ def describe(types: Types, name: str, type_hash: str, *, sources: bool) -> dict[
         Error: The type does not exist.
     """
     if type_hash and not is_hash(type_hash):
-        raise DefinitionError(f"{type_hash!r:.90} is no RIHS01 hash", "the request")
+        raise DefinitionError(f"{type_hash!r:.90} is not a RIHS01 hash", "the request")
     definition = _find(types, name, type_hash)
     texts: list[dict[str, str]] = []
     if sources:
@@ -347,7 +347,8 @@ class TypeFetcher(NodeMember):
         timeout = check_timeout(timeout, f"fetching {name}")
         if hash and not is_hash(hash):
             raise InvalidNameError(
-                f"{hash!r:.90} is no type hash of {name}; write RIHS01_ and 64 hexadecimal digits"
+                f"{hash!r:.90} is not a type hash of {name}; "
+                "write RIHS01_ and 64 hexadecimal digits"
             )
         promise: Promise[AnyType] = Promise(
             f"{name} has not been received", self._core.dispatcher, cancellable=True

@@ -1,1 +1,1 @@
-"""What nodes talk over: each wire announces endpoints and moves bytes."""
+"""The wires under a node: each announces endpoints and transfers bytes."""

@@ -395,7 +395,7 @@ class LocalRequester(_Endpoint["LocalReplier"], Requester):
 class LocalReplier(_Endpoint[LocalRequester], Replier):
     """Delivers the requests of all clients to a service server."""
 
-    tells_failures = True
+    reports_failures = True
 
     def __init__(self, owner: LocalMiddleware, info: EndpointInfo, on_request: OnRequest) -> None:
         super().__init__(owner, info)

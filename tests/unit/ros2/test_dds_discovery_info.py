@@ -95,7 +95,7 @@ def test_cut_samples_are_refused(info):
         ),
         (
             ParticipantEntities(gid(1), (NodeEntities(NodeName("/", "é")),)).encode(),
-            "is no name",
+            "is not an ASCII name",
         ),
     ],
 )

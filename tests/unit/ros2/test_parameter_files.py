@@ -234,7 +234,7 @@ def test_every_name_comes_back_as_it_was(values: dict[str, Any]) -> None:
         ("n: {ros__parameters: {a: 1e999}}", r"beyond the range of a double"),
         ("n: {ros__parameters: {a: 1e-999}}", r"beyond the range of a double"),
         (f"n: {{ros__parameters: {{a: {'9' * 5000}}}}}", r"beyond the 64 bits"),
-        ("n-x: {ros__parameters: {a: 1}}", r"1:7: '/n-x' is no name of a node"),
+        ("n-x: {ros__parameters: {a: 1}}", r"1:7: '/n-x' is not the name of a node"),
         ("/a*: {ros__parameters: {a: 1}}", r"a wildcard stands for whole parts"),
         ("n: {ros__parameters: " + "{a: " * 100 + "1" + "}" * 102, r"too deeply nested"),
         ("{a: " * 100 + "1" + "}" * 100, r"too deeply nested"),
@@ -264,11 +264,11 @@ def test_a_list_of_mappings_costs_its_parameter_only(
     assert found.for_node("/n") == {"a": 1, "b.d": 2}
     assert found.for_node("/m") == {"e": 3}
     (record,) = caplog.records
-    assert "a mapping in a list is no parameter's value; the parameter 'b.c' is left out" in (
+    assert "a mapping in a list is not a parameter value; the parameter 'b.c' is left out" in (
         record.getMessage()
     )
     assert record.getMessage().startswith("f.yaml:4:")
-    with pytest.raises(ParameterError, match="a mapping in a list is no parameter's value"):
+    with pytest.raises(ParameterError, match="a mapping in a list is not a parameter value"):
         parse_value(value, "p")
 
 

@@ -104,8 +104,8 @@ def test_nodes_are_renamed(rules: list[str], name: str, namespace: str) -> None:
         ("foo:=", r"'foo:=' has no new name after ':=' \(position 5\)"),
         ("/foo/*:=bar", r"the old name '/foo/\*' has a wildcard"),
         (r"foo:=\1", r"the new name .* has a wildcard"),
-        ("~:=bar", "the old name '~' is no name; write '~/name'"),
-        ("{node}:=bar", "is no name"),
+        ("~:=bar", "the old name '~' is not a name; write '~/name'"),
+        ("{node}:=bar", "is not a name"),
         ("fo o:=bar", r"contains ' ' at position 2"),
         ("foo:=b//ar", "'//' at position"),
         ("foo:=1bar", "starts with the digit"),
@@ -180,9 +180,9 @@ def test_parameters_of_one_node_win(tmp_path: Path) -> None:
             r"'x:=' has no value after ':=' \(position 3\); an empty text is written -p \"x:=''\"",
         ),
         (":=1", "has no name before"),
-        ("a b:=1", "'a b' is no parameter's name"),
-        ("a..b:=1", "is no parameter's name"),
-        ("a:b:c:=1", "is no parameter's name"),
+        ("a b:=1", "'a b' is not a parameter name"),
+        ("a..b:=1", "is not a parameter name"),
+        ("a:b:c:=1", "is not a parameter name"),
         ("x:={a: 1}", "a parameter's value is a scalar or a list, not a mapping"),
         ("x:=[1, 2.0]", "the items of a list must be of one type"),
         ("x:=[", "this is not YAML"),
@@ -212,8 +212,8 @@ def test_log_levels() -> None:
     assert arguments.log_level == 30
     assert arguments.logger_levels == {"rcl": 40, "a.b": 50}
     for bad, message in (
-        ("loud", "'loud' is no level; known are unset, debug, info, warn, error, fatal"),
-        ("x:=loud", "'loud' is no level"),
+        ("loud", "'loud' is not a level; known are unset, debug, info, warn, error, fatal"),
+        ("x:=loud", "'loud' is not a level"),
         (":=debug", "no logger's name"),
     ):
         with pytest.raises(RosArgumentError, match=message):

@@ -139,7 +139,7 @@ def test_types_of_actions_that_come_and_go_are_kept_once(library: Library, types
     [
         ("my_msgs/msg/Other", "", "/robot: no definition of my_msgs/msg/Other"),
         ("my_msgs/msg/Part", "RIHS01_" + "0" * 64, "/robot: no definition .* has the hash"),
-        ("my_msgs/msg/Part", "md5:abc", "/robot: .* is no RIHS01 hash"),
+        ("my_msgs/msg/Part", "md5:abc", "/robot: .* is not a RIHS01 hash"),
         ("../../etc/passwd", "", "/robot: .* is not a type name"),
         ("", "RIHS01_" + "0" * 64, "/robot: no type with the hash .* is in use"),
         ("", "", "/robot: neither a type's name nor its hash"),

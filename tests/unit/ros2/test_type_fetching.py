@@ -273,8 +273,8 @@ def test_nobody_uses_it(join: Callable[..., Ros2Node]) -> None:
     [
         ({"name": "state"}, "not a type name"),
         ({"name": 3}, "not a type name"),
-        ({"name": STATE, "hash": "abc"}, "no type hash"),
-        ({"name": STATE, "hash": 3}, "no type hash"),
+        ({"name": STATE, "hash": "abc"}, "not a type hash"),
+        ({"name": STATE, "hash": 3}, "not a type hash"),
         ({"name": STATE, "timeout": -1}, "timeout"),
         ({"name": STATE, "timeout": "5"}, "timeout"),
         ({"name": STATE, "node": "a b"}, "a b"),

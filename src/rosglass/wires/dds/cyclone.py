@@ -301,7 +301,7 @@ def create_writer(participant: int, topic: int, qos: Qos | None, place: str) -> 
 
 
 def delete(entity: int) -> None:
-    """Delete an entity and its children; deleting it twice is no error.
+    """Delete an entity and its children; deleting it twice is allowed.
 
     Waits for its callbacks to return: do not call it from one of them, or while holding a lock that
     they need.

@@ -237,10 +237,10 @@ _NO_INTERFACE = re.compile(r"(\S+): does not match an available interface")
 _NO_INDEX, _CROWD = "free participant index", "120 programs of this machine"
 
 #: Maximum size of a datagram in bytes. Large samples use few datagrams and a large socket buffer:
-#: with 65 kB, a picture of 6 MB took 2.5 ms instead of 43, and none was lost. The kernel caps the
+#: with 65 kB, an image of 6 MB took 2.5 ms instead of 43, and none was lost. The kernel caps the
 #: buffer at net.core.rmem_max. With its overhead, a datagram stays below 32 kB: ROS 2 on Fast DDS
 #: receives into the default 208 kB, which the kernel counts in powers of two. Those of 65 kB took
-#: 128 kB each, and most pictures never arrived.
+#: 128 kB each, and most images never arrived.
 _MAX_DATAGRAM = 31_000
 #: On a network, a datagram is one packet at most. Of larger ones that lost a packet, the kernel
 #: keeps the others for 30 s, in 4 MB for all programs (ipfrag_time, ipfrag_high_thresh): some
@@ -256,7 +256,7 @@ _IP_UDP_HEADERS, _RTPS_HEADERS = 28, 128
 _GET_FLAGS, _GET_ADDRESS, _GET_MTU = 0x8913, 0x8915, 0x8921
 _UP, _LOOPBACK = 0x1, 0x8
 _BUFFER = '<SocketReceiveBufferSize min="default" max="10MB"/>'
-#: What a reader asks for is repeated at once, as it asks 5 ms later at the earliest: in bursts of
+#: Samples that a reader requests again are sent at once: it asks every 5 ms at most. In bursts of
 #: 256 kB, Fast DDS got 35 MB/s, and images of 93 MB/s fell behind for good. Bursts of 8 MB take an
 #: overloaded machine the time to receive them.
 _REPEATS = (

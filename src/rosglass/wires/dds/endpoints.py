@@ -96,7 +96,7 @@ class SampleWriter:
         #: Held by a write: the topic must not be deleted before the write ends.
         self._lock = threading.Lock()
         self._closed = False
-        #: Of a topic's writer that readers may fall behind of.
+        #: Flow control of a topic's writer, for readers that fall behind; None without it.
         self._flow: FlowControl | None = None
         with participant.in_use():
             self._topic = make_topic(participant.entity, topic, dds_type)

@@ -95,7 +95,7 @@ class FlowControl:
 
     @property
     def idle(self) -> bool:
-        """Whether no sample waits."""
+        """True while no sample waits."""
         return not self._waiting
 
     def hold(self, serdata: int, size: int) -> bool:

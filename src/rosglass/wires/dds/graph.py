@@ -183,7 +183,9 @@ class _Reader:
         try:
             return text.decode("ascii")
         except UnicodeDecodeError:
-            raise DecodeError(_NAME, f"{text!r} is no name", offset=self._at - size) from None
+            raise DecodeError(
+                _NAME, f"{text!r} is not an ASCII name", offset=self._at - size
+            ) from None
 
     def _take(self, size: int) -> bytes:
         start, self._at = self._at, self._at + size
@@ -320,7 +322,7 @@ class DdsGraph:
 
     @property
     def humble(self) -> bool:
-        """Whether all other ROS 2 participants use Humble's wide identities."""
+        """True if all other ROS 2 participants use Humble's wide identities."""
         widths = [
             participant.info.humble
             for participant in self._participants.values()

@@ -237,7 +237,7 @@ class Pump:
 
     @property
     def current(self) -> bool:
-        """Whether the calling thread is the pump's."""
+        """True in the pump's own thread."""
         return threading.current_thread() is self._thread
 
     def close(self) -> None:

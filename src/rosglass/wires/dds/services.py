@@ -444,7 +444,7 @@ class DdsReplier(Replier):
         return f"{names_of(foreign_peers)} cannot be answered: {reason}; {REMEDY}"
 
     def reply(self, request: RequestId, data: bytes | bytearray) -> None:
-        """Send a reply once the client's reader is matched; a client that left is no error."""
+        """Send a reply once the client's reader is matched; a client that left is ignored."""
         answer = request.handle
         if not isinstance(answer, _ReplyTarget):
             return

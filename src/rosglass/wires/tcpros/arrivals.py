@@ -1,7 +1,7 @@
-"""What the times tell at which a publisher's messages arrive: it is silent, or they were held back.
+"""Detects from arrival times that a publisher is silent, or that its messages were delayed.
 
-ROS 1 sends no time stamps with its messages, and TCP keeps back everything that follows a lost
-packet: after an outage, the messages of that time arrive at once, the oldest first.
+ROS 1 sends no time stamps with its messages, and TCP holds back everything that follows a lost
+packet: after an outage, its messages arrive at once, the oldest first.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ class BacklogMonitor:
             return
         missing = gap - count * period
         if gap > max(_GAP_PERIODS * period, _MIN_GAP_S):
-            # Reading in batches is no gap: as many messages come as it is long.
+            # Not after reading in batches, which brings as many messages as fit into the gap.
             self.late = max(0.0, self.late + missing) if missing > period else 0.0
             self._steady = 0
         elif gap * 2 < count * period:

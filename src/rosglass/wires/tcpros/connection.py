@@ -281,7 +281,7 @@ class Outgoing:
 
     @property
     def is_command(self) -> bool:
-        """Whether the next frame expires."""
+        """True if the next frame expires."""
         return bool(self._frames) and self._frames[0][0].expiry > 0
 
     def send(self, write: Callable[[Sequence[memoryview]], int]) -> None:
@@ -632,7 +632,7 @@ class Connection:
 
     @property
     def closed(self) -> bool:
-        """Whether it has ended."""
+        """True once it has ended."""
         return self._closed
 
     @property
@@ -740,7 +740,7 @@ class Connection:
 
     @property
     def stalled(self) -> bool:
-        """Whether the peer has not acknowledged sent bytes for half a second; from any thread."""
+        """True if the peer has not acknowledged sent bytes for half a second; from any thread."""
         with self._lock:
             return not self._closed and self._connected and self._unacked.stalled()
 

@@ -73,7 +73,7 @@ class TcprosOptions:
 
 
 class TcprosCore(NodeCore):
-    """What the members of a ROS 1 node share: its master, addresses, graph and threads.
+    """The shared state of a ROS 1 node's members: master, addresses, graph and threads.
 
     Args:
         name: The node's name.
@@ -112,7 +112,7 @@ class TcprosCore(NodeCore):
         self.lookups = BlockingPool(f"{name.name} lookups")
         self.address, self.uri = ("", 0), ""
         self._status = Status(ConnectionState.CONNECTING, f"looking for {options.master}")
-        #: Where connections are accepted, and the node's API is served.
+        #: The listening sockets: for connections, and for the node's API.
         self._sockets: list[socket.socket] = []
         self._ports, self._interface = [options.tcpros_port, options.slave_port], ""
         self.uris: set[str] = set()

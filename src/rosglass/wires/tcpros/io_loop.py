@@ -85,12 +85,12 @@ class IoLoop:
 
     @property
     def is_current(self) -> bool:
-        """Whether this is the loop's own thread."""
+        """True in the loop's own thread."""
         return self._thread is threading.current_thread()
 
     @property
     def closed(self) -> bool:
-        """Whether it was closed; it runs on for up to a second while data is left to send."""
+        """True once it was closed; it runs on for up to a second while data is left to send."""
         return self._closed
 
     # -- from any thread -------------------------------------------------------------------------

@@ -105,7 +105,7 @@ class Registrations:
 
     @property
     def is_current(self) -> bool:
-        """Whether this is its own thread."""
+        """True in its own thread."""
         return self._thread is threading.current_thread()
 
     def start(self) -> None:

@@ -60,7 +60,7 @@ class TcprosReplier(Replier, Member):
     """
 
     lists_node = True
-    tells_failures = has_refusals = True
+    reports_failures = has_refusals = True
     max_reply = MAX_FRAME
 
     def __init__(
@@ -266,7 +266,7 @@ class _Session:
 
     @property
     def gone(self) -> bool:
-        """Whether the connection has ended."""
+        """True once the connection has ended."""
         return self._link.closed
 
     def on_frame(self, data: bytes | memoryview) -> None:

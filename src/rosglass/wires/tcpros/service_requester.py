@@ -385,12 +385,12 @@ class TcprosRequester(ServiceRequester):
 
     @property
     def is_awaited(self) -> bool:
-        """Whether calls or threads wait for the server."""
+        """True while calls or threads wait for the server."""
         return bool(self._queue) or (bool(self.waiters) and not self.ready())
 
     @property
     def has_connections(self) -> bool:
-        """Whether there are connections with the server, which make a probe needless."""
+        """True while there are connections with the server, which make a probe needless."""
         return bool(self._links)
 
     def on_server_found(self, moved: bool) -> None:
@@ -574,7 +574,7 @@ class ServiceFinder:
 
     @property
     def ready(self) -> bool:
-        """Whether there is a server of the right type."""
+        """True while there is a server of the right type."""
         return self.peer is not None and self.type is not None and not self.mismatch()
 
     @property
@@ -796,7 +796,7 @@ class ServiceLocation:
 
 @dataclass(frozen=True)
 class ServerInfo:
-    """What a service's server announces in its header.
+    """The fields that a service's server announces in its header.
 
     Attributes:
         node: Its node's full name; its URI if the header has none.

@@ -38,7 +38,7 @@ _MAX_CALL_BYTES = 64 * 2**20
 #: Connections at a time; the master and each tool have one.
 _MAX_CONNECTIONS = 100
 _PROTOCOL = "TCPROS"
-#: What rospy, too, returns for figures that are not counted.
+#: Stands for figures that are not counted, as in rospy.
 _NOT_COUNTED = -1
 #: XML-RPC has 32 bits for a number.
 _MAX_INT = 2**31 - 1

@@ -633,12 +633,12 @@ class PublisherLink:
 
     @property
     def connected(self) -> bool:
-        """Whether its header was received."""
+        """True once its header was received."""
         return bool(self.header)
 
     @property
     def is_local(self) -> bool:
-        """Whether the publisher is the node itself, at its address or one that it had before."""
+        """True if the publisher is the node itself, at its current address or an earlier one."""
         return self.uri in self._core.uris
 
     @property
@@ -755,7 +755,7 @@ class PublisherLink:
         self._count += len(frames)
         self._backlog.add(len(frames), time.monotonic())
         if self._silence.problem:
-            self.subscription.notify_feeds()  # it is none any more
+            self.subscription.notify_feeds()  # it has ended
         if self._latches:
             self.latched = frames[-1]
         try:

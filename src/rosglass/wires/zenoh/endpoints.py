@@ -1,4 +1,4 @@
-"""What a node declares on a Zenoh session: liveliness tokens, and publishers with shared memory."""
+"""A node's declarations in a Zenoh session: liveliness tokens, publishers with shared memory."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ __all__ = [
     "without_hash",
 ]
 
-#: What Humble, which has no type hashes, writes instead.
+#: Stands for the type hash in Humble, which has no type hashes.
 HUMBLE_HASH = "TypeHashNotSupported"
 
 _SPACE = "@ros2_lv"

@@ -143,7 +143,7 @@ class ZenohMiddleware(Middleware):
         self._changed: Callable[[], None] = lambda: None
         self._graph: Graph | None = None
         #: Topic or service of each announced publisher and client by its GID, the oldest first.
-        #: Also of those that left: what they have sent may still arrive.
+        #: Kept after they leave: what they have sent may still arrive.
         self._names: dict[bytes, str] = {}
         self._logged_tokens: set[str] = set()
 

@@ -482,7 +482,7 @@ class ZenohReader(Declaration, Reader):
 
         Returns:
             The publisher's type hash, and its lifespan in nanoseconds, 0 for none. None if there
-            is no sample, or if its publisher is that of another topic.
+            is not a sample, or if its publisher is that of another topic.
         """
         if len(data) < 4 and sample.kind == zenoh.SampleKind.DELETE:
             return None
@@ -504,8 +504,9 @@ class ZenohReader(Declaration, Reader):
     def _on_misrouted(self, topic: str) -> None:
         """Count a sample that Zenoh delivered on the wrong topic.
 
-        Its type may be that of this topic, so that nothing else would tell. A publisher that is not
-        announced is accepted: its token may be late, or its identity not be that of its token.
+        Its type may be that of this topic, so that nothing else would reveal it. A publisher that
+        is not announced is accepted: its token may be late, or its identity not be that of its
+        token.
         """
         self._misrouted += 1
         self._misrouted_at, self._other_topic = time.monotonic(), topic

@@ -448,7 +448,7 @@ class ZenohReplier(Declaration, Replier):
         own_servers: The servers of the node, which its own clients call directly.
     """
 
-    tells_failures = True
+    reports_failures = True
 
     def __init__(
         self,

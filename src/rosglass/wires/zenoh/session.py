@@ -5,7 +5,7 @@ only, and discovers other peers by gossip, never by multicast. To a router on an
 a client.
 
 Zenoh drops a dead link after its lease: 10 s, and 60 s with the routers of ROS 2. Until then, an
-operator would see the last picture as if it were live. If the connection survives, it delivers old
+operator would see the last image as if it were live. If the connection survives, it delivers old
 commands when the network returns. While Zenoh closes a link on which data waits, it accepts a new
 one to the same peer and numbers its keys as on the old one: messages arrive on other topics
 (docs/upstream/zenoh_misrouting.md). So the system closes connections that acknowledge nothing.
@@ -48,7 +48,7 @@ __all__ = [
 ]
 
 
-#: Where a router listens, unless it is given another address.
+#: The address at which a router listens by default.
 DEFAULT_LISTEN = f"tcp/127.0.0.1:{DEFAULT_PORT}"
 
 _log = logging.getLogger("rosglass.ros2")
@@ -65,7 +65,7 @@ OPEN_TIMEOUT_S = 12.0
 #: wait for each other: a 6 MB image takes a fifth longer, and is dropped on a busy machine. On
 #: other links, a longer queue would add latency.
 _LOCAL_QUEUE_SIZE = 8
-#: Of two peers, only one opens the link, so that their attempts do not cross (as in rmw_zenoh).
+#: Only one of two peers opens the link, so that their attempts do not cross (as in rmw_zenoh).
 _STRATEGY = {"peer": {"to_router": "always", "to_peer": "greater-zid"}}
 
 
