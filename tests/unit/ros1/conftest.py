@@ -34,13 +34,13 @@ class FakeParameters:
     Attributes:
         tree: All parameters, as nested dicts.
         followers: The API's URI of each node that follows a name, by name and node.
-        tells: Whether followers are told of changes.
+        notifies: Whether subscribers are notified of changes.
     """
 
     def __init__(self) -> None:
         self.tree: dict[str, Any] = {}
         self.followers: dict[str, dict[str, str]] = {}
-        self.tells = True
+        self.notifies = True
 
     def getParam(self, _: str, name: str) -> Any:  # noqa: N802 - the API's name
         try:
@@ -62,7 +62,7 @@ class FakeParameters:
                 place[space] = {}
             place = place[space]
         place[last] = value
-        self._tell_followers(name, value, node)
+        self._notify_followers(name, value, node)
         return [1, "", 0]
 
     def deleteParam(self, _: str, name: str) -> Any:  # noqa: N802
@@ -71,7 +71,7 @@ class FakeParameters:
             del self._at(space)[last]
         except KeyError:
             return [-1, f"Parameter [{name}] is not set", 0]
-        self._tell_followers(name, {}, "")
+        self._notify_followers(name, {}, "")
         return [1, "", 0]
 
     def searchParam(self, node: str, name: str) -> Any:  # noqa: N802
@@ -93,13 +93,13 @@ class FakeParameters:
         self.followers.get(name, {}).pop(node, None)
         return [1, "", 1]
 
-    def _tell_followers(self, name: str, value: Any, node: str) -> None:
+    def _notify_followers(self, name: str, value: Any, node: str) -> None:
         # Like rosmaster, by the name that has changed, with a slash at its end.
         for followed, apis in self.followers.items():
-            if self.tells and f"{name}/".startswith(f"{followed}/"):
+            if self.notifies and f"{name}/".startswith(f"{followed}/"):
                 for api in [apis[other] for other in apis if other != node]:
                     arguments = (api, f"{name}/", value)
-                    threading.Thread(target=_tell_parameter, args=arguments, daemon=True).start()
+                    threading.Thread(target=_update_parameter, args=arguments, daemon=True).start()
 
     def _at(self, name: str) -> Any:
         found: Any = self.tree
@@ -139,7 +139,7 @@ class FakeMaster(FakeParameters):
         self.start()
 
     def start(self, tree: dict[str, Any] | None = None) -> None:
-        """Start with nobody registered, and no parameters but those of a `tree`."""
+        """Start without registered nodes, and without parameters but those of `tree`."""
         FakeParameters.__init__(self)
         self.tree = tree or {}
         self.publishers: dict[str, dict[str, str]] = {}
@@ -155,7 +155,7 @@ class FakeMaster(FakeParameters):
         self._thread.start()
 
     def stop(self) -> None:
-        """Answer nobody any more."""
+        """Stop answering."""
         self._server.shutdown()
         self._server.server_close()
         self._thread.join(5)
@@ -250,7 +250,7 @@ def _update(api: str, topic: str, publishers: list[str]) -> None:
         proxy.publisherUpdate("/master", topic, publishers)
 
 
-def _tell_parameter(api: str, name: str, value: Any) -> None:
+def _update_parameter(api: str, name: str, value: Any) -> None:
     with suppress(OSError, xmlrpc.client.Error), xmlrpc.client.ServerProxy(api) as proxy:
         proxy.paramUpdate("/master", name, value)
 

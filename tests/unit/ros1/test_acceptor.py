@@ -27,7 +27,7 @@ class Scarce(socket.socket):
         return super().accept()
 
 
-def test_who_waits_is_accepted_once_there_are_descriptors_again(caplog):
+def test_connections_are_accepted_once_descriptors_are_free_again(caplog):
     loop = IoLoop("test acceptor")
     came = threading.Event()
     listener = Scarce()
@@ -51,5 +51,5 @@ def test_who_waits_is_accepted_once_there_are_descriptors_again(caplog):
     loop.call(acceptor.end)
     loop.close()
     assert lasted > 0.2, "again and again, but it leaves time for others"
-    told = [record.getMessage() for record in caplog.records]
-    assert told == [f"cannot accept connections: {os.strerror(errno.EMFILE)}"]
+    messages = [record.getMessage() for record in caplog.records]
+    assert messages == [f"cannot accept connections: {os.strerror(errno.EMFILE)}"]

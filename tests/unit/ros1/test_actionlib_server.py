@@ -1,4 +1,4 @@
-"""What an action server keeps of its goals, and which ones a request to cancel means."""
+"""Goals that an action server keeps, and the goals that a cancel request selects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What clients of actionlib make of a goal's status, whatever a server says and whenever."""
+"""States of an actionlib client for any server status, at any time."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def test_cancelling_waits_for_the_server_where_it_makes_a_difference(state):
     waits = state in (CommState.WAITING_FOR_GOAL_ACK, CommState.PENDING, CommState.ACTIVE)
     steps = [CommState.WAITING_FOR_CANCEL_ACK] if waits else []
     assert [step.state for step in made.cancel()] == steps
-    assert made.status is before  # until the server tells that it knows
+    assert made.status is before  # until the server acknowledges it
 
 
 @pytest.mark.parametrize(
@@ -149,11 +149,11 @@ def test_cancelling_waits_for_the_server_where_it_makes_a_difference(state):
         (CommState.DONE, GoalStatus.SUCCEEDED),
     ],
 )
-def test_what_states_are_in_all_worlds(state, status):
+def test_comm_states_map_to_goal_status(state, status):
     assert machine(state).status is status
 
 
-def test_the_states_on_the_way_are_told_with_what_they_are():
+def test_skipped_states_are_reported_in_order():
     made = CommStateMachine()
     assert made.on_status(ServerState.PREEMPTED) == [
         (CommState.ACTIVE, GoalStatus.EXECUTING),

@@ -86,7 +86,7 @@ def client(puppet, connect):
 
 @pytest.fixture
 def sent(client, puppet, eventually):
-    """A goal that the server has, and tells to execute."""
+    """A goal that the server has accepted and executes."""
     goal = client.send_goal({"goal": 5})
     eventually(lambda: puppet.goals)
     puppet.say(g0="ACTIVE")
@@ -97,7 +97,7 @@ def sent(client, puppet, eventually):
 # -- the client ------------------------------------------------------------------------------------
 
 
-def test_what_goes_over_the_wire(sent, puppet):
+def test_goal_message_has_stamp_and_id(sent, puppet):
     message = puppet.goals[0]
     assert message.goal.goal == 5
     assert message.goal_id.id == sent.id_text == sent.id.decode()
@@ -240,7 +240,7 @@ def test_a_server_that_was_cut_off_may_have_missed_a_goal(client, puppet, eventu
     eventually(lambda: puppet.cancels == [(goal.id_text, 0)])
 
 
-def test_a_request_to_cancel_that_nobody_heeds_times_out(sent):
+def test_unacknowledged_cancel_request_times_out(sent):
     with pytest.raises(
         TimeoutError, match=r"did not acknowledge within 0.2 s that it cancels goal"
     ):
@@ -317,19 +317,19 @@ def test_a_goal_may_be_pending_for_longer_than_the_timeout(client, puppet, event
     assert goal.acceptance.result(0) is True
 
 
-def test_a_server_that_contradicts_itself_is_told_of_once(sent, puppet, caplog, eventually):
+def test_contradicting_status_is_logged_once(sent, puppet, caplog, eventually):
     for _ in range(5):
         puppet.say(g0="PENDING")
     puppet.say(g0="PREEMPTING")
     eventually(lambda: sent.status is GoalStatus.CANCELING)
-    told = [
+    messages = [
         record.getMessage() for record in caplog.records if "contradicts" in record.getMessage()
     ]
-    assert len(told) == 1
-    assert "PENDING does not follow ACTIVE" in told[0]
+    assert len(messages) == 1
+    assert "PENDING does not follow ACTIVE" in messages[0]
 
 
-def test_a_status_that_does_not_exist_is_told_of_once(sent, puppet, caplog, eventually):
+def test_unknown_status_is_logged_once(sent, puppet, caplog, eventually):
     for _ in range(5):
         puppet.say(g0=77)
     puppet.say(g0="PREEMPTING")
@@ -362,7 +362,7 @@ def test_a_result_may_come_before_any_status(client, puppet, eventually):
     assert states == [CommState.PENDING, CommState.WAITING_FOR_RESULT, CommState.DONE]
 
 
-def test_goals_of_others_are_none_of_ours(sent, puppet, connect, eventually):
+def test_goals_of_other_clients_are_ignored(sent, puppet, connect, eventually):
     other = connect("other").create_action_client(NAME, TYPE)
     assert other.wait_for_server(30)
     theirs = other.send_goal({"goal": 6})
@@ -462,7 +462,7 @@ class Hand:
 
 @pytest.fixture
 def offer(connect, eventually):
-    """Offer the action; returns the server and somebody to lead its client."""
+    """Offer the action; returns the server and a `Hand`, which leads its client."""
 
     def offer(execute, **more):
         server = connect("robot").create_action_server(NAME, TYPE, execute, **more)
@@ -563,13 +563,13 @@ def test_goals_that_the_executor_does_not_take_end_at_once(offer, eventually):
         (lambda _: 1 / 0, "ZeroDivisionError: division by zero"),
     ],
 )
-def test_what_fails_is_aborted_with_its_reason(execute, text, offer, eventually):
+def test_failing_callback_aborts_the_goal_with_the_reason(execute, text, offer, eventually):
     _, hand = offer(execute)
     hand.send("a")
     eventually(lambda: hand.results)
-    state, told, result = hand.results["a"][0]
+    state, status_text, result = hand.results["a"][0]
     assert (state, result) == ("ABORTED", 0)
-    assert told.startswith(text)
+    assert status_text.startswith(text)
 
 
 def test_an_executor_takes_goals_one_by_one(offer, eventually):

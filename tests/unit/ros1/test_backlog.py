@@ -1,4 +1,4 @@
-"""What a bad link has held back of a publisher whose messages have no stamp."""
+"""Messages without stamps that a bad link has held back."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def lateness(monitor: BacklogMonitor, *arrivals: tuple[float, int]) -> list[floa
     return found
 
 
-def test_what_arrives_in_time_is_not_late(monitor: BacklogMonitor) -> None:
+def test_messages_in_time_are_not_late(monitor: BacklogMonitor) -> None:
     times = [100 + PERIOD * n + (0.04 if n % 2 else 0) for n in range(1, 100)]
     assert not any(lateness(monitor, *((at, 1) for at in times)))
     # Read in batches, as sockets are that are not urgent.

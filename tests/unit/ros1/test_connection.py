@@ -36,7 +36,7 @@ class End:
             self.peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         self.peer.settimeout(10)
         self.headers, self.frames, self.ended = [], [], []
-        #: What a test may replace.
+        #: Callbacks that a test may replace.
         self.on_header, self.on_frame = self.headers.append, self._keep
         self.link = Connection(
             loop,
@@ -44,7 +44,7 @@ class End:
             self._take_header,
             self._take_frame,
             self.ended.append,
-            peer="somebody",
+            peer="a peer",
         )
         loop.call(self.link.accept)
 
@@ -81,7 +81,7 @@ def test_frames_come_byte_by_byte(end):
 
 
 @pytest.mark.parametrize(
-    ("data", "told"),
+    ("data", "reason"),
     [
         (b"\xff\xff\xff\xff", "connection header claims to have 4294967295"),
         (b"GET / HTTP/1.1\r\n\r\n", "connection header claims"),
@@ -92,14 +92,14 @@ def test_frames_come_byte_by_byte(end):
         (encode_header({"callerid": "/peer", "error": "go away"}), "/peer refuses: go away"),
     ],
 )
-def test_garbage_ends_the_connection_and_says_why(end, data, told):
+def test_garbage_ends_the_connection_with_the_reason(end, data, reason):
     end.peer.sendall(data)
-    assert told in eventually(lambda: end.ended)[0]
+    assert reason in eventually(lambda: end.ended)[0]
     assert end.peer.recv(10) == b""
     assert end.frames == []
 
 
-def test_whoever_sends_no_header_is_not_waited_for(loop, monkeypatch):
+def test_peer_without_header_times_out(loop, monkeypatch):
     monkeypatch.setattr(module, "_HEADER_TIMEOUT_S", 0.1)
     end = End(loop)
     assert "no connection header was received" in eventually(lambda: end.ended)[0]
@@ -116,7 +116,7 @@ def test_a_header_in_time_lasts(loop, monkeypatch):
     assert eventually(lambda: end.frames) == [b"still there"]
 
 
-def test_nobody_listens(loop):
+def test_refused_connection_ends_with_the_reason(loop):
     address = ("127.0.0.1", free_port())
     ended = []
     loop.call(
@@ -154,8 +154,8 @@ def test_the_caller_may_reuse_its_buffer(loop):
     end.peer.close()
 
 
-def test_what_was_sent_arrives_although_the_loop_is_closed_at_once():
-    loop = IoLoop("farewell")
+def test_sent_data_arrives_although_the_loop_is_closed_at_once():
+    loop = IoLoop("finishing")
     end = End(loop, small=True)
     end.link.send([frame(b"stop" * 6_000)])
     loop.call(lambda: end.link.finish(1.0))
@@ -180,7 +180,7 @@ def test_closing_the_loop_ends_every_connection():
     assert all(end.peer.recv(1) == b"" for end in ends)
 
 
-def test_what_nobody_waits_for_is_left_for_a_moment_and_can_be_had_at_once(loop, end):
+def test_non_urgent_frames_are_deferred_until_drained(loop, end):
     end.peer.sendall(HEADER + frame(b"first"))
     eventually(lambda: end.frames)
     loop.call(lambda: end.link.set_urgent(urgent=False))
@@ -191,7 +191,7 @@ def test_what_nobody_waits_for_is_left_for_a_moment_and_can_be_had_at_once(loop,
     assert eventually(lambda: end.frames[-1] == b"by itself")
 
 
-def test_much_that_nobody_waits_for_holds_up_nobody(loop, end):
+def test_many_non_urgent_frames_do_not_block_the_loop(loop, end):
     end.peer.sendall(HEADER)
     eventually(lambda: end.headers)
     loop.call(lambda: end.link.set_urgent(urgent=False))

@@ -13,7 +13,7 @@ from tcpros import node_uri, publisher_address
 from rosglass.wires.tcpros import node as tcpros_node
 
 FLOOD = 1000
-HEADER = b"\x14\0\0\0\x10\0\0\0callerid=/nobody"
+HEADER = b"\x14\0\0\0\x10\0\0\0callerid=/caller"
 
 
 def flood(port, payload=b""):

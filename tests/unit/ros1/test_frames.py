@@ -25,7 +25,7 @@ def frame(content: bytes) -> bytes:
 
 
 class Taken:
-    """What an Incoming handed on."""
+    """Keeps everything that an Incoming hands on."""
 
     def __init__(self, lead: int = 0) -> None:
         self.header: dict[str, str] = {}
@@ -134,7 +134,7 @@ def test_big_frames_are_views_that_stay_as_they_are():
     assert all(type(one) is memoryview and one.readonly for one in taken.frames)
 
 
-def test_buffers_that_nobody_looks_at_are_used_again():
+def test_unreferenced_buffers_are_reused():
     taken = Taken()
     taken.give(encode_header(HEADER))
     buffers = set()
@@ -144,7 +144,7 @@ def test_buffers_that_nobody_looks_at_are_used_again():
     assert len(buffers) <= 2
 
 
-def test_what_stopped_goes_on_later():
+def test_stopped_reader_resumes_later():
     taken = Taken()
     taken.give(encode_header(HEADER))
     taken.incoming.stopped = True
@@ -180,7 +180,7 @@ def test_the_oldest_makes_room_and_is_counted():
     assert outgoing.held == 0
 
 
-def test_what_was_begun_is_finished():
+def test_partly_sent_frame_is_finished():
     outgoing = Outgoing()
     outgoing.add(Frame([b"begun"]), 2, 1, 0)
     for number in range(5):
@@ -210,7 +210,7 @@ def test_keeping_all_is_bounded_by_bytes():
     assert outgoing.lost == 90
 
 
-def test_what_waits_is_copied_once_for_all():
+def test_waiting_data_is_copied_once():
     theirs = bytearray(b"0123456789")
     one = Frame([b"ab", theirs])
     rests = [one.rest(5), one.rest(0), one.rest(7)]

@@ -171,7 +171,7 @@ def test_the_own_address(url: str, env: dict[str, str], expected: tuple[str, str
 def test_the_address_towards_the_master_is_announced() -> None:
     assert address.own_address("192.168.7.5") == "192.168.7.5"
     assert address.own_address("::ffff:192.168.7.5") == "192.168.7.5"
-    # A master on this machine does not tell how others reach it.
+    # A master on this machine does not show how other machines reach it.
     assert address.own_address("127.0.0.1") == address.own_address("::1") == address.own_address()
 
 
@@ -193,11 +193,11 @@ def test_a_node_listens_only_where_it_is_announced(host: str, interface: str) ->
 
 
 def test_addresses_that_others_cannot_reach_are_doubted() -> None:
-    # 192.0.2.0/24 is nobody's (RFC 5737).
-    told = address.explain_unreachable("192.0.2.7", "ROS_IP", "robot")
-    assert told.startswith("ROS_IP=192.0.2.7 is not an address of this machine: other nodes may")
-    told = address.explain_unreachable("127.0.0.1", "ROS_IP", "192.0.2.8")
-    assert told.startswith("ROS_IP=127.0.0.1 reaches this machine only")
+    # 192.0.2.0/24 is reserved for documentation (RFC 5737).
+    message = address.explain_unreachable("192.0.2.7", "ROS_IP", "robot")
+    assert message.startswith("ROS_IP=192.0.2.7 is not an address of this machine: other nodes may")
+    message = address.explain_unreachable("127.0.0.1", "ROS_IP", "192.0.2.8")
+    assert message.startswith("ROS_IP=127.0.0.1 reaches this machine only")
     assert address.explain_unreachable("127.0.0.1", "", "192.0.2.8").startswith(
         "the own address 127.0.0.1 "
     )

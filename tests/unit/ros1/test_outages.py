@@ -35,7 +35,7 @@ def clock(monkeypatch):
     return made
 
 
-def test_who_confirms_nothing_for_half_a_second_has_stalled(clock, monkeypatch):
+def test_connection_without_acknowledgement_for_half_a_second_has_stalled(clock, monkeypatch):
     watched, waiting = UnackedBytes(None), [0]
     monkeypatch.setattr(watched, "unacked", lambda: waiting[0])
 
@@ -56,7 +56,9 @@ def test_who_confirms_nothing_for_half_a_second_has_stalled(clock, monkeypatch):
     assert not later(0.1, 40, 0)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not tell what is confirmed")
+@pytest.mark.skipif(
+    sys.platform != "linux", reason="other systems do not report unacknowledged bytes"
+)
 def test_a_silent_subscriber_gets_only_the_newest_afterwards(monkeypatch):
     silent = [False]
     real = UnackedBytes.unacked
@@ -87,7 +89,9 @@ def test_a_silent_subscriber_gets_only_the_newest_afterwards(monkeypatch):
         ours.close()
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not tell what is confirmed")
+@pytest.mark.skipif(
+    sys.platform != "linux", reason="other systems do not report unacknowledged bytes"
+)
 def test_commands_to_a_silent_subscriber_expire_here(monkeypatch):
     silent = [False]
     real = UnackedBytes.unacked

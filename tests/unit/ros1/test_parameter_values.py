@@ -1,4 +1,4 @@
-"""What a ROS 1 parameter can be."""
+"""Values of ROS 1 parameters."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ RECURSIVE.append(RECURSIVE)
 
 
 @pytest.mark.parametrize(
-    ("value", "told"),
+    ("value", "message"),
     [
         (2**31, r"/a: 2147483648 is beyond the 32 bits.*set it as a float \(2147483648.0\)"),
         (-(2**31) - 1, "/a: -2147483649 is beyond the 32 bits"),
@@ -94,12 +94,12 @@ RECURSIVE.append(RECURSIVE)
         (RECURSIVE, "nested more than 50 levels"),
     ],
 )
-def test_what_the_server_cannot_hold_is_refused_with_the_fix(value, told):
-    with pytest.raises(ParameterError, match=told):
+def test_unsupported_value_is_refused_with_the_fix(value, message):
+    with pytest.raises(ParameterError, match=message):
         to_wire("/a", value)
 
 
-def test_dates_that_are_none_stay_texts():
+def test_invalid_dates_stay_strings():
     assert from_wire(xmlrpc.client.DateTime("yesterday")) == "yesterday"
 
 

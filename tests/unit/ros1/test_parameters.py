@@ -61,7 +61,7 @@ def test_search_goes_upwards(server):
     assert server.search("~gain") is None
 
 
-def test_what_is_not_set_is_told_with_similar_names(server):
+def test_unset_parameter_is_reported_with_similar_names(server):
     server.set("/robot_arm/speed_limit", 1)
     assert server.get("/robot_arm/sped_limit", 5) == 5
     assert server.get("/robot_arm/sped_limit", None) is None
@@ -113,7 +113,7 @@ def test_names_against_the_rules_that_are_there_can_be_read_and_deleted(server, 
     assert master.tree == {"base-link": {}}
 
 
-def test_refusals_by_the_master_are_told(server, master):
+def test_refusals_by_the_master_are_reported(server, master):
     master.answers["setParam"] = lambda *_: [-1, "read-only today", 0]
     with pytest.raises(ParameterError, match=r"parameter /a: .*read-only today"):
         server.set("/a", 1)
@@ -123,7 +123,7 @@ def test_refusals_by_the_master_are_told(server, master):
         server.get("/a", 5)
 
 
-def test_a_master_that_is_gone_or_silent_is_told_in_time(server, master):
+def test_missing_or_silent_master_is_reported_in_time(server, master):
     hold = threading.Event()
     master.answers["getParam"] = lambda *_: [1, "", int(hold.wait(30))]
     began = time.monotonic()
@@ -167,11 +167,11 @@ def test_promises_do_not_wait(server, node, master):
         return await server.get_async("/x", 8)
 
     assert asyncio.run(ask()) == 8
-    told: list[object] = []
+    results: list[object] = []
     done = threading.Event()
-    server.get_async("/x", 9).on_done(lambda p: (told.append(p.result()), done.set()))
+    server.get_async("/x", 9).on_done(lambda p: (results.append(p.result()), done.set()))
     assert done.wait(30)
-    assert told == [9]
+    assert results == [9]
     master.answers["getParam"] = lambda *_: [1, "", int(hold.wait(30))]
     hold.clear()
     waiting = server.get_async("/x")
@@ -236,21 +236,21 @@ def test_waiting_in_a_thread_that_receives_is_refused(node, server, eventually):
 # -- following -----------------------------------------------------------------------------------
 
 
-def test_a_subscription_is_told_the_value_and_each_change(server, master, eventually):
-    told: list[object] = []
-    subscription = server.subscribe("/a", told.append)
+def test_subscription_is_notified_of_the_value_and_each_change(server, master, eventually):
+    notified: list[object] = []
+    subscription = server.subscribe("/a", notified.append)
     assert subscription.wait(30)
-    eventually(lambda: told == [None])
+    eventually(lambda: notified == [None])
     assert not subscription.is_set
     master.setParam("/other", "/a/b", 1)
-    eventually(lambda: told[-1] == {"b": 1})
+    eventually(lambda: notified[-1] == {"b": 1})
     assert subscription.value == {"b": 1}
     master.setParam("/other", "/a/b", 1)  # no change
-    server.set("/a/c", 2)  # the master does not tell us what we did ourselves
+    server.set("/a/c", 2)  # the master does not notify us of our own changes
     eventually(lambda: subscription.value == {"b": 1, "c": 2})
     master.deleteParam("/other", "/a")
-    eventually(lambda: told[-1] is None)
-    assert told == [None, {"b": 1}, {"b": 1, "c": 2}, None]
+    eventually(lambda: notified[-1] is None)
+    assert notified == [None, {"b": 1}, {"b": 1, "c": 2}, None]
     assert "not set" in repr(subscription)
 
 
@@ -259,14 +259,14 @@ def test_subscriptions_of_one_name_share_a_registration(server, master, eventual
     one, two = server.subscribe("/a"), server.subscribe("/a")
     assert one.wait(30)
     assert two.wait(30)
-    told: list[object] = []
-    three = server.subscribe("/a", told.append)
-    eventually(lambda: told == [1])
+    notified: list[object] = []
+    three = server.subscribe("/a", notified.append)
+    eventually(lambda: notified == [1])
     one.close()
     two.close()
     two.close()
     master.setParam("/other", "/a", 2)
-    eventually(lambda: told == [1, 2])
+    eventually(lambda: notified == [1, 2])
     assert one.value == 1
     three.close()
     eventually(lambda: not master.followers["/a"])
@@ -288,23 +288,23 @@ def test_closing_and_following_anew_at_once_stays_registered(server, master, eve
 
 
 def test_a_master_that_was_restarted_is_asked_again(server, master, node, eventually):
-    told: list[object] = []
+    notified: list[object] = []
     server.set("/a", 1)
-    subscription = server.subscribe("/a", told.append)
-    eventually(lambda: told == [1])
+    subscription = server.subscribe("/a", notified.append)
+    eventually(lambda: notified == [1])
     master.stop()
     assert subscription.value == 1
     master.start()
-    eventually(lambda: told == [1, None])
+    eventually(lambda: notified == [1, None])
     master.setParam("/other", "/a", 3)
-    eventually(lambda: told == [1, None, 3])
+    eventually(lambda: notified == [1, None, 3])
 
 
-def test_a_change_that_was_not_told_is_found(server, master, eventually, monkeypatch):
+def test_change_without_notification_is_found(server, master, eventually, monkeypatch):
     monkeypatch.setattr("rosglass.ros1.parameter_server._REREAD_S", 0.5)
     subscription = server.subscribe("/a")
     assert subscription.wait(30)
-    master.tells = False
+    master.notifies = False
     master.setParam("/other", "/a", 3)
     eventually(lambda: subscription.value == 3)
 
@@ -369,7 +369,7 @@ def test_setting_checks_all_before_anything_is_set(node, master):
         own.set("a")
 
 
-def test_what_ros_1_cannot_do_is_said(node):
+def test_options_without_ros_1_counterpart_are_refused(node):
     own = node.parameters
     with pytest.raises(UnsupportedError, match="has no range"):
         own.declare("a", 1, ParameterDescriptor(range=Range(0, 5)))
@@ -441,7 +441,7 @@ def test_parameters_of_the_start_win_once(master, eventually):
         node.close()
 
 
-def test_what_can_be_no_parameter_is_refused_on_the_command_line(connect):
+def test_invalid_parameter_value_is_refused_on_the_command_line(connect):
     for argument in ("_speed:=99999999999", "_day:=2026-01-02", "_none:=null"):
         with pytest.raises(RosArgumentError, match=f"argument 1: '{argument}'"):
             connect("arm", arguments=[argument])
@@ -466,10 +466,10 @@ def test_a_client_reads_and_sets_a_namespace(node, master):
             "b": {"c": [1, 2], "d": {"e": "x"}},
         }
         assert client.get("b/d/e") == {"b/d/e": "x"}
-        told = client.describe()
-        assert told["b/c"].type is ParameterType.INTEGER_ARRAY
-        assert told["m"].type is ParameterType.NOT_SET
-        assert told["m"].description == "A list."
+        descriptions = client.describe()
+        assert descriptions["b/c"].type is ParameterType.INTEGER_ARRAY
+        assert descriptions["m"].type is ParameterType.NOT_SET
+        assert descriptions["m"].description == "A list."
         assert client.describe(["x"])["x"].type is ParameterType.NOT_SET
         assert client.set({"a": None, "n": 5})["n"].successful
         gone = client.set({"a": None})["a"]
@@ -505,14 +505,14 @@ def test_files_are_loaded_whole_or_not_at_all(node, server, master, tmp_path):
     server.save(saved, "/g")
     assert saved.read_text() == "z: 1\n"
     before = list(server.names())
-    for text, told in (
+    for text, message in (
         ("ok: 1\na: 99999999999", "robot.yaml: parameter /left/a: 99999999999 is beyond"),
         ("1: 2", "the name of a parameter in /left is 1; put it between quotes"),
         ("a:", "robot.yaml: parameter /left/a: .*got None"),
         ("day: 2026-01-02", "datetime.date"),
     ):
         path.write_text(text)
-        with pytest.raises(ParameterError, match=told):
+        with pytest.raises(ParameterError, match=message):
             server.load(path)
     path.write_text("5")
     with pytest.raises(ParameterError, match="names of parameters are missing"):
@@ -524,16 +524,16 @@ def test_files_are_loaded_whole_or_not_at_all(node, server, master, tmp_path):
     assert server.names() == before
 
 
-def test_who_follows_a_namespace_is_told_of_a_file_as_a_whole(server, tmp_path, eventually):
+def test_subscriber_of_a_namespace_is_notified_of_a_file_as_a_whole(server, tmp_path, eventually):
     path = tmp_path / "many.yaml"
     path.write_text("".join(f"p{number}: {number}\n" for number in range(50)))
-    told = []
+    notified = []
     server.set("/many/old", True)
-    with server.subscribe("/many", told.append):
-        eventually(lambda: told)
+    with server.subscribe("/many", notified.append):
+        eventually(lambda: notified)
         assert len(server.load(path, "/many")) == 50
-        eventually(lambda: len(told[-1]) == 51)
-    assert [len(value) for value in told] == [1, 51]
+        eventually(lambda: len(notified[-1]) == 51)
+    assert [len(value) for value in notified] == [1, 51]
 
 
 def test_a_refusal_is_a_master_error_elsewhere(node, master):
@@ -542,7 +542,7 @@ def test_a_refusal_is_a_master_error_elsewhere(node, master):
         node.parameter_server.names()
 
 
-def test_what_comes_of_a_call_may_wait_for_the_master_again(server, master):
+def test_callback_of_a_call_may_call_the_master_again(server, master):
     server.set("/speed", 1.5)
     got = []
     done = threading.Event()

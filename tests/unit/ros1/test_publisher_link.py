@@ -61,13 +61,13 @@ def test_reading_makes_way_for_callbacks_that_are_behind(flood, eventually, monk
     publisher.publish({"data": -1})
     while looked.acquire(timeout=0.05):
         pass
-    for _ in range(3):  # meanwhile, other connections are read from
+    for _ in range(3):  # other connections are still read from
         other.publish({"data": 1})
         assert looked.acquire(timeout=30)
     assert negotiation.feed.waiting == waiting
 
 
-def test_what_was_left_in_the_socket_comes_when_callbacks_have_caught_up(flood, eventually):
+def test_data_left_in_the_socket_is_received_once_callbacks_caught_up(flood, eventually):
     _, _, publisher, gate, got, pauses = flood
     for number in range(500):
         publisher.publish({"data": number})
@@ -77,8 +77,8 @@ def test_what_was_left_in_the_socket_comes_when_callbacks_have_caught_up(flood, 
     assert got == list(range(500))
 
 
-def tell_publishers(node, topic, uris):
-    """Tell a node a topic's publishers, as a master does, and wait until it has taken that in."""
+def update_publishers(node, topic, uris):
+    """Send a node a topic's publishers, as a master does, and wait until it has handled them."""
     with xmlrpc.client.ServerProxy(node_uri(node)) as api:
         assert api.publisherUpdate("/master", topic, uris)[0] == 1
     taken = threading.Event()
@@ -99,9 +99,9 @@ def stop(connect, eventually):
 def test_a_publisher_that_the_master_names_again_at_once_stays_connected(stop):
     robot, cockpit, publisher, subscription = stop
     links = publisher_links(cockpit, "/stop")
-    tell_publishers(cockpit, "/stop", [])
+    update_publishers(cockpit, "/stop", [])
     publisher.publish({"data": 1})
-    tell_publishers(cockpit, "/stop", [node_uri(robot)])
+    update_publishers(cockpit, "/stop", [node_uri(robot)])
     assert subscription.wait(30).message().data == 1
     assert publisher_links(cockpit, "/stop") == links
 
@@ -109,7 +109,7 @@ def test_a_publisher_that_the_master_names_again_at_once_stays_connected(stop):
 def test_the_last_message_of_a_publisher_that_leaves_is_received(stop, eventually, monkeypatch):
     monkeypatch.setattr(topic_subscription, "_LAST_MESSAGES_S", 3600.0)
     _, cockpit, publisher, subscription = stop
-    tell_publishers(cockpit, "/stop", [])
+    update_publishers(cockpit, "/stop", [])
     publisher.publish({"data": 1})
     publisher.close()
     assert subscription.wait(30).message().data == 1
@@ -119,7 +119,7 @@ def test_the_last_message_of_a_publisher_that_leaves_is_received(stop, eventuall
 def test_a_connection_ends_whose_publisher_the_master_names_no_more(stop, eventually, monkeypatch):
     monkeypatch.setattr(topic_subscription, "_LAST_MESSAGES_S", 0.01)
     _, cockpit, publisher, subscription = stop
-    tell_publishers(cockpit, "/stop", [])
+    update_publishers(cockpit, "/stop", [])
     eventually(lambda: not subscription.publisher_count() and not publisher.subscription_count())
     assert not publisher_links(cockpit, "/stop")
 

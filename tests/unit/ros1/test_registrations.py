@@ -1,4 +1,4 @@
-"""What the master is told of a node, also by masters and after faults that are hard to have."""
+"""Registration of a node at the master, also by odd masters and after rare faults."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def node(master: FakeMaster) -> Iterator[Any]:
 
 
 def shut_down(node: Any, caller: str, reason: str) -> None:
-    """Tell a node to end, as its master does, or a tool."""
+    """Ask a node to shut down, as its master or a tool does."""
     with xmlrpc.client.ServerProxy(node_uri(node)) as api:
         api.shutdown(caller, reason)
 
@@ -103,7 +103,7 @@ def test_closing_from_other_threads_at_the_same_time(
 
 
 @pytest.mark.parametrize("create", ["create_publisher", "create_subscription"])
-def test_one_that_is_closed_while_the_master_is_told_of_the_one_before(
+def test_endpoint_that_closes_while_its_predecessor_is_registered_is_unregistered(
     master: FakeMaster, node: Ros1Node, create: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     member = Publication if create == "create_publisher" else TopicSubscription
@@ -120,7 +120,7 @@ def test_one_that_is_closed_while_the_master_is_told_of_the_one_before(
         return found
 
     def hold(*_: Any) -> Any:
-        # The node's thread is about to tell the master of both.
+        # The node's thread is about to register both.
         first.close()
         second.append(getattr(node, create)("/a", "std_msgs/Empty"))
         del master.answers["lookupNode"]
@@ -149,13 +149,13 @@ def test_one_that_is_closed_while_the_master_is_told_of_the_one_before(
         [-1, "no such luck", 0],
     ],
 )
-def test_masters_that_talk_nonsense_are_told_apart(master: FakeMaster, answer: Any) -> None:
+def test_invalid_answers_of_a_master_are_reported(master: FakeMaster, answer: Any) -> None:
     master.answers["getSystemState"] = lambda _: answer
     with rosglass.connect(master.url, "panel", own_services=False) as node:
         eventually(lambda: "trying again" in node.status().detail, node.status)
         assert node.status().state is ConnectionState.CONNECTING
-        told = node.status().detail
-        assert "not as " in told or "refuses getSystemState" in told
+        detail = node.status().detail
+        assert "not as " in detail or "refuses getSystemState" in detail
         del master.answers["getSystemState"]
         eventually(lambda: node.status().state is ConnectionState.CONNECTED)
 
@@ -199,8 +199,8 @@ def test_a_wrong_own_address_is_shown(master: FakeMaster, monkeypatch: pytest.Mo
     url = master.url.partition("?")[0]
     with rosglass.connect(url, "panel", own_services=False) as node:
         eventually(lambda: node.status().state is ConnectionState.CONNECTED)
-        told = "ROS_IP=192.0.2.7 is not an address of this machine"
-        eventually(lambda: node.status().detail.startswith(told))
+        expected = "ROS_IP=192.0.2.7 is not an address of this machine"
+        eventually(lambda: node.status().detail.startswith(expected))
         node.create_publisher("/a", "std_msgs/Empty")
         eventually(lambda: "/panel" in master.publishers.get("/a", {}))
         assert master.publishers["/a"]["/panel"].startswith("http://192.0.2.7:")
@@ -216,7 +216,7 @@ def test_a_new_network_address_is_announced_and_the_node_lives_on(
         eventually(lambda: "127.0.0.1" in master.publishers.get("/a", {}).get("/panel", ""))
         monkeypatch.setattr(address, "_route_elsewhere", lambda: "127.0.0.2")
         eventually(lambda: "127.0.0.2" in master.publishers["/a"]["/panel"])
-        # The master takes it for another node, and tells the old one to end.
+        # The master takes it for another node, and asks the old one to shut down.
         shut_down(node, "/master", "[/panel] Reason: new node registered with same name")
         eventually(lambda: "shutdown" not in [t.name for t in threading.enumerate()])
         assert node.status().state is ConnectionState.CONNECTED
@@ -396,9 +396,7 @@ def test_own_messages_are_ignored_also_after_the_address_has_changed(
         assert others[0].data == 2
 
 
-def test_a_node_that_somebody_else_closes_looks_nothing_up_any_more(
-    master: FakeMaster, node: Any
-) -> None:
+def test_node_that_is_shut_down_remotely_stops_lookups(master: FakeMaster, node: Any) -> None:
     master.offer("/add", 1)
     eventually(lambda: "/add" in node.services())
     core = core_of(node)
@@ -411,7 +409,7 @@ def test_a_node_that_somebody_else_closes_looks_nothing_up_any_more(
     assert not ran.wait(0.3)
 
 
-def test_the_graph_is_told_and_changes_are(master: FakeMaster, node: Ros1Node) -> None:
+def test_graph_and_its_changes_are_reported(master: FakeMaster, node: Ros1Node) -> None:
     changes: list[float] = []
     node.on_graph_change(lambda: changes.append(time.monotonic()))
     master.publishers["/scan"] = {"/robot/laser": "http://127.0.0.1:1/"}
@@ -429,7 +427,7 @@ def test_the_graph_is_told_and_changes_are(master: FakeMaster, node: Ros1Node) -
         "sensor_msgs/msg/LaserScan",
     )
     assert [one.name for one in node.endpoints("/robot/base")] == ["/cmd"]
-    assert node.endpoints("/nobody") == []
+    assert node.endpoints("/unknown") == []
     eventually(lambda: changes)
     # A type that becomes known later counts as a change.
     count = len(changes)
@@ -461,7 +459,7 @@ def test_a_node_asks_little_of_its_master(master: FakeMaster, node: Ros1Node) ->
     assert set(master.calls) == {"getPid", "lookupNode", "getSystemState"}
 
 
-def test_who_closes_while_the_master_hangs_is_forgotten_once_it_answers(
+def test_node_that_closes_while_the_master_hangs_is_unregistered_later(
     master: FakeMaster, node: Ros1Node
 ) -> None:
     hung = connected(master, "hung")
@@ -515,7 +513,7 @@ def test_a_node_on_the_ports_of_one_that_is_seen_off_stays_registered(
     second.close()
 
 
-def test_who_leaves_in_good_order_is_no_warning_and_who_dies_is(
+def test_orderly_exit_is_not_a_warning_but_a_crash_is(
     master: FakeMaster, node: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     node.create_action_server("/go", "actionlib/Test", lambda goal: None)
@@ -534,7 +532,7 @@ def test_who_leaves_in_good_order_is_no_warning_and_who_dies_is(
             lambda: caplog.text,
         )  # type: ignore[misc]
     assert [r.getMessage() for r in caplog.records if r.levelno >= logging.WARNING] == []
-    # Nobody unregisters for those who are killed.
+    # A node that is killed never unregisters.
     other = connected(master, "other")
     publisher = other.create_publisher("/word", "std_msgs/String")
     eventually(lambda: "/other" in master.publishers.get("/word", {}))
@@ -550,7 +548,7 @@ def test_who_leaves_in_good_order_is_no_warning_and_who_dies_is(
     )
 
 
-def test_a_publisher_out_of_reach_is_told_once_for_all_its_topics_and_when_it_is_back(
+def test_unreachable_publisher_is_logged_once_for_all_topics_and_on_return(
     master: FakeMaster, node: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     topics = ["/a", "/b", "/c"]
@@ -565,12 +563,12 @@ def test_a_publisher_out_of_reach_is_told_once_for_all_its_topics_and_when_it_is
         )
     )
 
-    def told(what: str) -> list[str]:
+    def logged(what: str) -> list[str]:
         return [r.getMessage() for r in caplog.records if what in r.getMessage()]
 
     master.answers["unregisterPublisher"] = lambda *_: [1, "", 0]
     robot.close()
-    eventually(lambda: told("cannot be received"), lambda: caplog.text)
+    eventually(lambda: logged("cannot be received"), lambda: caplog.text)
     eventually(lambda: all("refused; trying again" in one.problem.lower() for one in heard))
     del master.answers["unregisterPublisher"]
     for topic in topics:
@@ -578,10 +576,10 @@ def test_a_publisher_out_of_reach_is_told_once_for_all_its_topics_and_when_it_is
     robot = connected(master, "robot")
     for topic in topics:
         robot.create_publisher(topic, "std_msgs/String")
-    eventually(lambda: told("is back"), lambda: caplog.text)
-    (lost,) = told("cannot be received")
+    eventually(lambda: logged("is back"), lambda: caplog.text)
+    (lost,) = logged("cannot be received")
     assert lost.startswith("/a, /b, /c: /robot cannot be received from: http://")
-    assert told("is back") == ["/a, /b, /c: /robot is back"]
+    assert logged("is back") == ["/a, /b, /c: /robot is back"]
     assert {r.levelno for r in caplog.records if "/robot" in r.getMessage()} == {logging.WARNING}
     eventually(lambda: not any(one.problem for one in heard), lambda: [h.problem for h in heard])
     robot.close()

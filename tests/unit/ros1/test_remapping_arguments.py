@@ -32,8 +32,8 @@ def parse(*arguments: str) -> Arguments:
     ],
 )
 def test_names_are_replaced(rule: str, old: str, new: str) -> None:
-    told = parse(rule.strip()) if rule.startswith(" ") else parse(rule)
-    assert told.remappings("node", "/ns") == {old: new}
+    parsed = parse(rule.strip()) if rule.startswith(" ") else parse(rule)
+    assert parsed.remappings("node", "/ns") == {old: new}
 
 
 def test_the_last_rule_for_a_name_counts_as_in_rospy() -> None:
@@ -41,12 +41,12 @@ def test_the_last_rule_for_a_name_counts_as_in_rospy() -> None:
 
 
 def test_special_names() -> None:
-    told = parse(
+    parsed = parse(
         *("__name:=left", "__ns:=arm/", "__ip:=10.0.0.2", "__master:=http://robot:11312"),
         *("__log:=/tmp/x.log", "__tcpros_server_port:=5000"),
     )
-    assert (told.name, told.namespace, told.address) == ("left", "/arm", "10.0.0.2")
-    assert (told.master, told.tcpros_port) == ("http://robot:11312", 5000)
+    assert (parsed.name, parsed.namespace, parsed.address) == ("left", "/arm", "10.0.0.2")
+    assert (parsed.master, parsed.tcpros_port) == ("http://robot:11312", 5000)
     assert parse("__ip:=10.0.0.2", "__hostname:=robot").address == "robot"
     assert parse("__ns:=/").namespace == "/"
 
@@ -65,24 +65,24 @@ def test_special_names() -> None:
     ],
 )
 def test_private_parameters_have_yaml_values(text: str, value: Any) -> None:
-    for told in (parse(f"_a/b:={text}"), parse("--ros-args", "-p", f"a/b:={text}", "--")):
-        assert told.parameters == {"a/b": value}
-        assert type(told.parameters["a/b"]) is type(value)
+    for parsed in (parse(f"_a/b:={text}"), parse("--ros-args", "-p", f"a/b:={text}", "--")):
+        assert parsed.parameters == {"a/b": value}
+        assert type(parsed.parameters["a/b"]) is type(value)
 
 
-def test_what_is_not_for_ros_is_left_alone() -> None:
+def test_other_arguments_are_kept() -> None:
     others = ["program", "--file", "x.qml", "-v", "--name:=x", "=", ":=x", "10:=20", "", "a:b=c"]
     assert Arguments.parse([*others, "a:=b"]).others == tuple(others)
 
 
 def test_one_command_line_for_both_worlds() -> None:
-    told = parse(
+    parsed = parse(
         *("--ros-args", "-r", "chatter:=talk", "--remap", "__ns:=/arm", "--param", "speed:=2"),
         *("-r", "__node:=left", "--", "rest"),
     )
-    assert told.remappings("left", "/arm") == {"/arm/chatter": "/arm/talk"}
-    assert (told.name, told.namespace, told.parameters) == ("left", "/arm", {"speed": 2})
-    assert told.others == ("program", "rest")
+    assert parsed.remappings("left", "/arm") == {"/arm/chatter": "/arm/talk"}
+    assert (parsed.name, parsed.namespace, parsed.parameters) == ("left", "/arm", {"speed": 2})
+    assert parsed.others == ("program", "rest")
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_arguments_are_a_list_of_texts(arguments: Any) -> None:
         rosglass.connect("ros1://127.0.0.1:1", arguments=arguments)
 
 
-def test_a_node_does_as_it_is_told(master: FakeMaster, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_node_obeys_its_arguments(master: FakeMaster, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_NAMESPACE", "ignored")
     arguments = ["prog", "__name:=left", "__ns:=/arm", "in:=/out", "_speed:=1.5"]
     with rosglass.connect(master.url, "right", "/leg", arguments=arguments) as node:
@@ -154,7 +154,7 @@ def test_a_bad_ros_namespace_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         rosglass.connect("ros1://127.0.0.1:1")
 
 
-def test_names_that_nobody_else_has() -> None:
+def test_anonymous_names_are_unique() -> None:
     url = "ros1://127.0.0.1:1"
     with (
         rosglass.connect(url) as one,

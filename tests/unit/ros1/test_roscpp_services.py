@@ -1,4 +1,4 @@
-"""What every ROS 1 node has besides: log, log levels, simulated time."""
+"""The built-in parts of a ROS 1 node: log, log levels, simulated time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rosglass.errors import ConversionError, ServiceError
 
 @pytest.fixture
 def log(connect):
-    """What another node hears on /rosout."""
+    """The messages that another node receives on /rosout."""
     heard: list = []
     listener = connect("listener", own_services=False)
     listener.create_subscription("/rosout", "rosgraph_msgs/Log", heard.append, 10_000)
@@ -56,7 +56,7 @@ def test_own_services_are_offered_or_not(connect, master, eventually):
         connect("odd", own_services="no")
 
 
-def test_log_levels_are_told_and_set(connect, eventually):
+def test_log_levels_are_listed_and_set(connect, eventually):
     node, other = connect("arm"), connect("other", own_services=False)
     node.logger.getChild("gripper.left")
     ask = other.create_service_client("/arm/get_loggers", "roscpp/GetLoggers")
@@ -66,9 +66,9 @@ def test_log_levels_are_told_and_set(connect, eventually):
     def levels():
         return {entry.name: entry.level for entry in ask.call(timeout=30).loggers}
 
-    told = levels()
-    assert told["ros.arm"] == told["ros.arm.gripper.left"] == "info"
-    assert "rosglass.ros1" in told
+    found = levels()
+    assert found["ros.arm"] == found["ros.arm.gripper.left"] == "info"
+    assert "rosglass.ros1" in found
     change.call({"logger": "ros.arm.gripper", "level": "Debug"}, timeout=30)
     assert levels()["ros.arm.gripper.left"] == "debug"
     assert node.logger.getChild("gripper.left").isEnabledFor(logging.DEBUG)

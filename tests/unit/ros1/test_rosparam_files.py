@@ -37,7 +37,7 @@ list: [1, 2.5, yes, null]
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("a: 1\na: 2", "f.yaml:2:1: .*'a' is there twice"),
         ("a: [", "f.yaml:1:"),
@@ -53,12 +53,12 @@ list: [1, 2.5, yes, null]
         ("[" * 5000, "f.yaml"),
     ],
 )
-def test_what_is_no_parameter_file_is_told_with_its_place(text, told):
-    with pytest.raises(ParameterError, match=told):
+def test_malformed_file_is_rejected_with_the_position(text, message):
+    with pytest.raises(ParameterError, match=message):
         parse(text, "f.yaml")
 
 
-def test_what_is_dumped_can_be_read(tmp_path):
+def test_dumped_file_can_be_read(tmp_path):
     tree = {"a": {"b": [1, 2.5, "x"], "c": b"\0\1"}, "s": "yes", "f": math.inf, "u": "ü"}
     path = tmp_path / "robot.yaml"
     write(path, tree)
@@ -68,7 +68,7 @@ def test_what_is_dumped_can_be_read(tmp_path):
 
 
 @pytest.mark.parametrize("missing", ["nowhere/robot.yaml", "nowhere"])
-def test_files_that_cannot_be_opened_are_told(tmp_path, missing):
+def test_files_that_cannot_be_opened_are_named(tmp_path, missing):
     with pytest.raises(ParameterError, match="nowhere"):
         read(tmp_path / missing)
     with pytest.raises(ParameterError, match="nowhere"):
@@ -76,7 +76,7 @@ def test_files_that_cannot_be_opened_are_told(tmp_path, missing):
 
 
 @pytest.mark.parametrize("path", [None, 3, b"x", "", "a\0b", "\ud800", [], object()])
-def test_what_is_no_path_is_refused(path):
+def test_invalid_path_is_rejected(path):
     for ask in (read, lambda path: write(path, {})):
         with pytest.raises(ParameterError, match="path"):
             ask(path)

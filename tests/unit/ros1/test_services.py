@@ -54,11 +54,11 @@ class Robot:
 
     Attributes:
         headers: What clients sent, probes left out.
-        tells: Its own connection header.
+        reply: Its own connection header.
     """
 
-    def __init__(self, serve, tells=TELLS):
-        self.serve, self.tells, self.headers = serve, tells, []
+    def __init__(self, serve, reply=TELLS):
+        self.serve, self.reply, self.headers = serve, reply, []
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port = self._listener.getsockname()[1]
         self._open = [self._listener]
@@ -79,7 +79,7 @@ class Robot:
             is_probe = header.get("probe") == "1"
             if not is_probe:
                 self.headers.append(header)
-            sock.sendall(encode_header(self.tells))
+            sock.sendall(encode_header(self.reply))
             if not is_probe:
                 self.serve(sock, header)
         except OSError:
@@ -98,12 +98,12 @@ class Robot:
 def start_robot(master):
     robots = []
 
-    def start_robot(serve=None, tells=TELLS):
+    def start_robot(serve=None, reply=TELLS):
         def answer(sock, _):
             receive_request(sock)
             sock.sendall(response())
 
-        robots.append(Robot(serve or answer, tells))
+        robots.append(Robot(serve or answer, reply))
         master.offer("/add", robots[-1].port)
         return robots[-1]
 
@@ -144,11 +144,11 @@ def dial(master, eventually):
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "message"),
     [({"qos": 10}, "/x: qos: expected"), ({"persistent": "no"}, "/x: persistent: expected")],
 )
-def test_options_of_another_kind_are_refused(node, options, told):
-    with pytest.raises(rosglass.ConversionError, match=told):
+def test_options_of_another_kind_are_refused(node, options, message):
+    with pytest.raises(rosglass.ConversionError, match=message):
         node.create_service_client("/x", ADD, **options)
 
 
@@ -199,8 +199,8 @@ def test_a_server_that_keeps_no_connections_serves_persistent_clients_too(
 # -- types ---------------------------------------------------------------------------------------
 
 
-def test_a_type_that_nobody_knows_here_is_named_with_what_to_do(node, start_robot, eventually):
-    start_robot(tells=TELLS | {"type": "acme_srvs/Dance"})
+def test_type_unknown_here_is_reported_with_the_fix(node, start_robot, eventually):
+    start_robot(reply=TELLS | {"type": "acme_srvs/Dance"})
     client = node.create_service_client("/add")
     eventually(lambda: "acme_srvs" in client.problem)
     assert "/robot offers it as acme_srvs/srv/Dance" in client.problem
@@ -216,7 +216,7 @@ def test_a_definition_that_is_added_later_is_taken(master, connect, start_robot,
     (tmp_path / "acme_srvs" / "package.xml").write_text("<package><name>acme_srvs</name></package>")
     library = Library()
     definition.write_text("int64 a\nint64 b\n---\nint64 sum\n")
-    start_robot(tells=TELLS | {"type": "acme_srvs/Dance"})
+    start_robot(reply=TELLS | {"type": "acme_srvs/Dance"})
     client = connect("late", library=library).create_service_client("/add")
     call = client.call_async({"a": 1})
     assert not client.wait_for_server(0.3)
@@ -247,8 +247,8 @@ def test_another_md5_is_refused_naming_both(connect, node, persistent, eventuall
     trigger = rosglass.load(TRIGGER, ros=1)
     with pytest.raises(rosglass.ServiceError) as caught:
         client.call(timeout=30)
-    for told in (ADD.replace("/", "/srv/"), MD5, "std_srvs/srv/Trigger", trigger.md5, "int64 a"):
-        assert told in str(caught.value)
+    for text in (ADD.replace("/", "/srv/"), MD5, "std_srvs/srv/Trigger", trigger.md5, "int64 a"):
+        assert text in str(caught.value)
     assert not isinstance(caught.value, rosglass.ServiceUnavailableError)
     assert not client.ready
     assert trigger.md5 in client.problem
@@ -262,14 +262,14 @@ def test_another_md5_is_refused_naming_both(connect, node, persistent, eventuall
 
 
 def test_a_server_of_any_type_is_called(node, start_robot):
-    start_robot(tells=TELLS | {"md5sum": "*", "type": "*"})
+    start_robot(reply=TELLS | {"md5sum": "*", "type": "*"})
     assert node.create_service_client("/add", ADD).call().sum == 3
     unknown = node.create_service_client("/add")
     assert not unknown.wait_for_server(0.5)
     assert "does not announce its type" in unknown.problem
 
 
-def test_types_of_services_are_told_once_their_servers_have(node, start_robot, connect, eventually):
+def test_types_of_services_are_listed_once_probed(node, start_robot, connect, eventually):
     start_robot()
     connect("other").create_service_server("/go", TRIGGER, dict)
     # The nodes' own services, for their loggers, may be there by now.
@@ -284,13 +284,13 @@ def test_types_of_services_are_told_once_their_servers_have(node, start_robot, c
 
 def test_the_graph_changes_when_types_become_known(node, start_robot, eventually):
     start_robot()
-    told = []
-    node.on_graph_change(lambda: told.append(node.services().get("/add")))
+    seen = []
+    node.on_graph_change(lambda: seen.append(node.services().get("/add")))
     node.services()
-    eventually(lambda: ["rospy_tutorials/srv/AddTwoInts"] in told)
+    eventually(lambda: ["rospy_tutorials/srv/AddTwoInts"] in seen)
 
 
-def test_types_of_a_hundred_services_are_told(node, connect, eventually):
+def test_types_of_a_hundred_services_are_listed(node, connect, eventually):
     robot = connect("robot")
     for number in range(100):
         robot.create_service_server(f"/s{number}", (ADD, BOOL)[number % 2], dict)
@@ -301,7 +301,7 @@ def test_types_of_a_hundred_services_are_told(node, connect, eventually):
     assert found["/s9"] == ["std_srvs/srv/SetBool"]
 
 
-def test_nobody_is_asked_for_types_that_nobody_wants(node, master, start_robot, eventually):
+def test_servers_are_not_probed_without_interest_in_types(node, master, start_robot, eventually):
     start_robot()
     # The first of these looks may have begun before the service was there.
     looks = master.calls.count("getSystemState")
@@ -442,7 +442,7 @@ def garbage(data):
     return serve
 
 
-def test_a_server_that_never_answers_is_told_apart_from_none(client, start_robot):
+def test_silent_server_times_out_and_may_still_execute(client, start_robot):
     seen = []
 
     def answer(sock, _):
@@ -470,7 +470,7 @@ def test_a_server_that_goes_in_mid_call_ends_it_at_once(client, start_robot):
 
 
 @pytest.mark.parametrize(
-    ("data", "error", "told"),
+    ("data", "error", "message"),
     [
         (b"\1\xff\xff\xff\xff", rosglass.ConnectionLostError, "4294967295"),
         (b"\1\3\0\0\0abc", rosglass.ServiceError, "not a rospy_tutorials"),
@@ -481,15 +481,15 @@ def test_a_server_that_goes_in_mid_call_ends_it_at_once(client, start_robot):
     ],
     ids=["endless", "short", "long", "failure", "silent failure", "no UTF-8"],
 )
-def test_responses_that_make_no_sense_or_tell_failures(client, start_robot, data, error, told):
+def test_invalid_and_failing_responses_are_reported(client, start_robot, data, error, message):
     start_robot(garbage(data))
-    with pytest.raises(error, match=told) as caught:
+    with pytest.raises(error, match=message) as caught:
         client.call(timeout=30)
     assert type(caught.value) is error
     assert client.pending == 0
 
 
-def test_a_response_that_nobody_asked_for_ends_a_kept_connection(node, start_robot):
+def test_unrequested_response_ends_a_persistent_connection(node, start_robot):
     def twice(sock, _):
         while True:
             receive_request(sock)
@@ -501,19 +501,21 @@ def test_a_response_that_nobody_asked_for_ends_a_kept_connection(node, start_rob
 
 
 @pytest.mark.parametrize(
-    "tells", [{"callerid": "/robot"}, {"type": ADD}], ids=["no md5sum", "type only"]
+    "reply", [{"callerid": "/robot"}, {"type": ADD}], ids=["no md5sum", "type only"]
 )
-def test_a_header_without_what_is_needed_is_named(client, start_robot, tells):
-    start_robot(tells=tells)
+def test_incomplete_header_is_reported(client, start_robot, reply):
+    start_robot(reply=reply)
     with pytest.raises(rosglass.ServiceUnavailableError, match="no md5sum"):
         client.call(timeout=0.6)
 
 
 def test_a_server_that_refuses_is_quoted(client, start_robot):
-    start_robot(tells={"error": "not today"})
-    with pytest.raises(rosglass.ServiceError, match=r"refuses the call of /add.*not today") as told:
+    start_robot(reply={"error": "not today"})
+    with pytest.raises(
+        rosglass.ServiceError, match=r"refuses the call of /add.*not today"
+    ) as caught:
         client.call(timeout=30)
-    assert not isinstance(told.value, rosglass.ServiceUnavailableError)
+    assert not isinstance(caught.value, rosglass.ServiceUnavailableError)
 
 
 def test_a_server_that_closes_before_its_header_was_sent_nothing(client, master):
@@ -590,7 +592,7 @@ def test_hundreds_of_clients_and_servers_leave_no_files_and_threads(connect, eve
 # -- serving -------------------------------------------------------------------------------------
 
 
-def test_a_probe_is_told_type_and_parts(connect, dial):
+def test_probe_receives_the_type_and_its_parts(connect, dial):
     robot = connect("robot")
     robot.create_service_server("/add", ADD, add)
     sock, header = dial(callerid="/me", service="/add", md5sum="*", probe="1")
@@ -602,11 +604,11 @@ def test_a_probe_is_told_type_and_parts(connect, dial):
         "service": "/add",
         "type": ADD,
     }
-    assert sock.recv(1) == b"", "a probe is no call: the connection is closed"
+    assert sock.recv(1) == b"", "a probe is not a call: the connection is closed"
 
 
 @pytest.mark.parametrize(
-    ("header", "told"),
+    ("header", "reason"),
     [
         ({"service": "/add", "callerid": "/me"}, "md5sum is missing"),
         ({"service": "/sub", "callerid": "/me", "md5sum": MD5}, "/robot does not offer /sub"),
@@ -618,12 +620,12 @@ def test_a_probe_is_told_type_and_parts(connect, dial):
     ],
     ids=["md5", "name", "service", "another md5"],
 )
-def test_connections_that_cannot_be_served_are_told_why(connect, dial, header, told):
+def test_refused_connection_receives_the_reason(connect, dial, header, reason):
     robot = connect("robot")
     robot.create_service_server("/add", ADD, add)
     sock, answer = dial(**header)
     assert set(answer) == {"error"}
-    assert told in answer["error"]
+    assert reason in answer["error"]
     assert sock.recv(1) == b""
 
 
@@ -669,7 +671,7 @@ def test_requests_that_are_not_read_yet_wait_outside(connect, dial):
     promise.set_result(None)
 
 
-def test_who_does_not_read_responses_gets_no_more_of_them(connect, dial, eventually):
+def test_client_that_does_not_read_responses_is_paused(connect, dial, eventually):
     robot = connect("robot")
     seen = []
 
@@ -698,19 +700,19 @@ def test_who_does_not_read_responses_gets_no_more_of_them(connect, dial, eventua
 
 
 @pytest.mark.parametrize(
-    ("fails", "told"),
+    ("fails", "message"),
     [
         (ValueError("no arm"), "error processing request: no arm"),
         (KeyError(), "error processing request: KeyError"),
         (rosglass.ServiceError("not homed"), "service cannot process request: not homed"),
     ],
 )
-def test_an_exception_is_told_to_the_caller(connect, client, fails, told, caplog):
+def test_exception_is_reported_to_the_caller(connect, client, fails, message, caplog):
     def callback(_):
         raise fails
 
     connect("robot").create_service_server("/add", ADD, callback)
-    with pytest.raises(rosglass.ServiceError, match=f"the call of /add failed: {told}$"):
+    with pytest.raises(rosglass.ServiceError, match=f"the call of /add failed: {message}$"):
         client.call()
     logged = [record for record in caplog.records if record.levelname == "ERROR"]
     assert bool(logged) != isinstance(fails, rosglass.ServiceError)
@@ -737,7 +739,7 @@ def test_a_service_has_one_server_in_a_node(node):
 
 
 def test_a_server_that_is_made_again_at_once_stays_registered(node, master, eventually):
-    """The farewell of the old one, sent meanwhile, must not remove the new one."""
+    """The background unregistration of the old one must not remove the new one."""
     for _ in range(20):
         server = node.create_service_server("/add", ADD, add)
         eventually(lambda: "/add" in master.services)
@@ -773,7 +775,7 @@ def test_a_service_is_registered_again_after_the_master_was_restarted(
     assert client.call({"a": 2}).sum == 2
 
 
-def test_what_a_client_that_has_gone_asked_for_is_not_begun(connect, dial):
+def test_request_of_a_client_that_left_is_not_executed(connect, dial):
     robot = connect("robot")
     seen, begun, go = [], threading.Event(), threading.Event()
 

@@ -13,7 +13,7 @@ LATCHED = QoS(depth=1, durability=Durability.TRANSIENT_LOCAL)
 
 
 def count_looks(monkeypatch):
-    """Return a list to which each look whether somebody has fallen silent is added."""
+    """Return a list that grows with each check for silent publishers."""
     looks, follow = [], arrivals.SilenceMonitor.update
 
     def count(self, *given):
@@ -31,9 +31,9 @@ def test_a_publisher_that_falls_silent_is_a_problem_until_its_next_message(
     looks = count_looks(monkeypatch)
     robot, cockpit = connect("robot"), connect("cockpit")
     publisher = robot.create_publisher("/odom", "std_msgs/Int32")
-    told = []
+    problems = []
     subscription = cockpit.create_subscription("/odom", "std_msgs/Int32", lambda _: None)
-    subscription.on_problem_change(told.append)
+    subscription.on_problem_change(problems.append)
 
     def fall_silent():
         """Send regularly, which a loaded machine may not manage, and then no more."""
@@ -58,7 +58,7 @@ def test_a_publisher_that_falls_silent_is_a_problem_until_its_next_message(
     assert subscription.publisher_count() == 1
     publisher.publish({"data": 2})
     eventually(lambda: not subscription.problem)
-    eventually(lambda: told[-2:] == [problem, ""])
+    eventually(lambda: problems[-2:] == [problem, ""])
 
 
 def test_a_latched_message_is_not_missed(connect, eventually, monkeypatch):

@@ -1,4 +1,4 @@
-"""What a node answers on its API: tools, masters, and those who send garbage."""
+"""Answers of a node's slave API to tools, masters and garbage."""
 
 from __future__ import annotations
 
@@ -50,25 +50,25 @@ def place(node: Ros1Node) -> tuple[str, int]:
     return str(parts.hostname), int(parts.port or 0)
 
 
-def test_what_tools_ask(api: Any, node: Ros1Node, master: FakeMaster) -> None:
+def test_tools_get_their_answers(api: Any, node: Ros1Node, master: FakeMaster) -> None:
     assert api.getPid("/t") == [1, "", os.getpid()]
     assert api.getMasterUri("/t") == [1, "", f"http://127.0.0.1:{master.port}"]
     assert api.getPublications("/t") == [1, "", [["/speed", "std_msgs/Float64"]]]
     subscriptions = api.getSubscriptions("/t")[2]
     assert ["/words", "std_msgs/String"] in subscriptions
     assert ["/any", "*"] in subscriptions
-    code, _, told = api.requestTopic("/t", "/speed", [["UDPROS", 1], ["TCPROS"]])
-    assert (code, told[:2]) == (1, ["TCPROS", "127.0.0.1"])
-    socket.create_connection(tuple(told[1:]), 10).close()
+    code, _, protocol = api.requestTopic("/t", "/speed", [["UDPROS", 1], ["TCPROS"]])
+    assert (code, protocol[:2]) == (1, ["TCPROS", "127.0.0.1"])
+    socket.create_connection(tuple(protocol[1:]), 10).close()
 
 
-def test_connections_are_told_as_rospy_tells_them(api: Any, node: Ros1Node) -> None:
+def test_connections_are_listed_as_in_rospy(api: Any, node: Ros1Node) -> None:
     reader = node.create_subscription("/speed")
     eventually(reader.publisher_count)
     _, port = publisher_address(node, "/speed")
-    told = api.getBusInfo("/t")[2]
-    inbound = next(row for row in told if row[2] == "i" and row[5])
-    outbound = next(row for row in told if row[2] == "o")
+    rows = api.getBusInfo("/t")[2]
+    inbound = next(row for row in rows if row[2] == "i" and row[5])
+    outbound = next(row for row in rows if row[2] == "o")
     assert inbound[1:6] == [node_uri(node), "i", "TCPROS", "/speed", True]
     assert outbound[1:6] == ["/panel", "o", "TCPROS", "/speed", True]
     # rosnode's pattern for the last column.
@@ -85,7 +85,7 @@ def test_connections_are_told_as_rospy_tells_them(api: Any, node: Ros1Node) -> N
 
 
 @pytest.mark.parametrize(
-    ("method", "arguments", "told"),
+    ("method", "arguments", "expected"),
     [
         ("getPid", (), "getPid: "),
         ("getBusInfo", (1, 2), "getBusInfo: "),
@@ -104,11 +104,11 @@ def test_connections_are_told_as_rospy_tells_them(api: Any, node: Ros1Node) -> N
     ],
 )
 def test_calls_that_make_no_sense_are_refused(
-    api: Any, node: Ros1Node, method: str, arguments: tuple[Any, ...], told: str
+    api: Any, node: Ros1Node, method: str, arguments: tuple[Any, ...], expected: str
 ) -> None:
     code, message, _ = getattr(api, method)(*arguments)
     assert code == -1
-    assert told in message
+    assert expected in message
     assert node.status().state is not ConnectionState.CLOSED
 
 
@@ -192,7 +192,7 @@ def test_a_flood_of_connections_costs_no_more_than_a_hundred_threads(
         socks[0].settimeout(10)
         assert socks[0].recv(1) == b""
         assert api.getPid("/t")[0] == 1
-        # One that has just served somebody may take a moment to end.
+        # A thread that has just served a client may take a moment to end.
         eventually(lambda: sum("process_request" in t.name for t in threading.enumerate()) <= 100)
     finally:
         for sock in socks:
@@ -211,13 +211,16 @@ def test_closing_ends_the_connections_of_the_api(node: Ros1Node) -> None:
         socket.create_connection(address, 10).close()
 
 
-def test_who_is_told_to_shut_down_says_who_said_so(api: Any, node: Ros1Node) -> None:
-    told: list[Any] = []
+def test_shutdown_request_names_the_caller(api: Any, node: Ros1Node) -> None:
+    statuses: list[Any] = []
     done = threading.Event()
     node.on_status_change(
-        lambda status: (told.append(status), status.state is ConnectionState.CLOSED and done.set())
+        lambda status: (
+            statuses.append(status),
+            status.state is ConnectionState.CLOSED and done.set(),
+        )
     )
     assert api.shutdown("/rosnode", "user request")[0] == 1
     assert done.wait(30)
-    assert told[-1].detail == "closed by /rosnode: user request"
-    assert node.status() == told[-1]
+    assert statuses[-1].detail == "closed by /rosnode: user request"
+    assert node.status() == statuses[-1]

@@ -115,7 +115,7 @@ def test_broken_action_file_is_reported(
     eventually(lambda: "Go.action:1:1: expected a type and a name" in client.problem)
 
 
-def test_what_comes_later_is_waited_for(join: Callable[..., Any]) -> None:
+def test_type_that_is_announced_later_is_awaited(join: Callable[..., Any]) -> None:
     user = join("cockpit")
     promise = user.fetch_type_async(STATE, timeout=30)
 
@@ -127,7 +127,7 @@ def test_what_comes_later_is_waited_for(join: Callable[..., Any]) -> None:
     assert asyncio.run(fetch()).md5 == md5_of(STATE)
 
 
-def test_local_types_serve_where_nobody_tells_another(join: Callable[..., Any]) -> None:
+def test_local_types_serve_unless_a_node_announces_another(join: Callable[..., Any]) -> None:
     library = Library()
     user = join("cockpit", library)
     assert user.fetch_type("std_msgs/Bool", timeout=30) is rosglass.load(
@@ -157,7 +157,7 @@ def test_several_versions_must_be_chosen(
         user.fetch_type(STATE, hash="0" * 32, timeout=3)
 
 
-def test_nobody_uses_it(
+def test_unused_type_is_not_found(
     join: Callable[..., Any], master: FakeMaster, eventually: Callable[..., Any]
 ) -> None:
     user = join("cockpit")
@@ -215,7 +215,7 @@ class Answering:
 
 
 @pytest.mark.parametrize(
-    ("reply", "told"),
+    ("reply", "message"),
     [
         (encode_header({"error": "not on Sundays"}), "refuses: not on Sundays"),
         (encode_header({"callerid": "/odd", "type": "my_msgs/State"}), "has no md5sum"),
@@ -235,11 +235,11 @@ class Answering:
     ],
 )
 def test_publishers_that_answer_nonsense_are_named(
-    reply: bytes, told: str, join: Callable[..., Any], master: FakeMaster
+    reply: bytes, message: str, join: Callable[..., Any], master: FakeMaster
 ) -> None:
     odd = Answering(master, "/odd", reply)
     try:
-        with pytest.raises(TypeNotFoundError, match=told):
+        with pytest.raises(TypeNotFoundError, match=message):
             join("cockpit").fetch_type(STATE, timeout=30)
     finally:
         odd.close()
