@@ -81,7 +81,7 @@ class SteeredRequester(LocalRequester):
         self.timeouts: list[float | None] = []
         self.forgotten: list[int] = []
         self._numbers: list[int] = []
-        #: Requests whose servers left, whoever is there now.
+        #: Requests whose server left, even if another one serves now.
         self.abandoned: set[int] = set()
         super().__init__(owner, info, on_reply)
 

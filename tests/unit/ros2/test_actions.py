@@ -107,7 +107,7 @@ class Peer:
         message = {"goal_id": {"uuid": goal.id}, "feedback": {"sequence": list(sequence)}}
         self.feedback.receive(self.types["FeedbackMessage"].encode(message), **options)
 
-    def tell(self, goal, status, sec=5):
+    def send_status(self, goal, status, sec=5):
         info = {"goal_id": {"uuid": goal.id}, "stamp": {"sec": sec}}
         array = {"status_list": [{"goal_info": info, "status": status}]}
         self.status.receive(rosglass.load("action_msgs/msg/GoalStatusArray").encode(array))
@@ -174,25 +174,25 @@ def test_the_server_announces_itself_as_an_action(robot, server):
 
 
 def test_feedback_and_status_never_come_before_the_acceptance(client, peer, eventually):
-    told = []
+    seen = []
     goal = client.send_goal(
-        on_feedback=lambda m: told.append(list(m.sequence)), on_status_change=told.append
+        on_feedback=lambda m: seen.append(list(m.sequence)), on_status_change=seen.append
     )
     peer.feed(goal, 1)
-    peer.tell(goal, 2)
+    peer.send_status(goal, 2)
     peer.feed(goal, 2)
     nothing_happens(0.02)
-    assert told == []
+    assert seen == []
     assert goal.feedback is None
     peer.answer()
-    eventually(lambda: told == [ACCEPTED, EXECUTING, [1], [2]])
+    eventually(lambda: seen == [ACCEPTED, EXECUTING, [1], [2]])
     assert goal.accepted == Time.from_parts(5, 0)
 
 
-def test_feedback_of_others_and_after_the_end_is_not_told(client, peer, eventually):
-    told = []
-    one = client.send_goal(on_feedback=lambda m: told.append(("one", list(m.sequence))))
-    two = client.send_goal(on_feedback=lambda m: told.append(("two", list(m.sequence))))
+def test_feedback_of_other_goals_and_after_the_end_is_ignored(client, peer, eventually):
+    seen = []
+    one = client.send_goal(on_feedback=lambda m: seen.append(("one", list(m.sequence))))
+    two = client.send_goal(on_feedback=lambda m: seen.append(("two", list(m.sequence))))
     peer.answer(1)
     peer.answer(2)
     peer.feed(two, 2)
@@ -203,25 +203,25 @@ def test_feedback_of_others_and_after_the_end_is_not_told(client, peer, eventual
     peer.result(one, 4)
     assert one.result(30).status is SUCCEEDED
     peer.feed(one, 3)
-    eventually(lambda: told == [("two", [2]), ("one", [1])])
+    eventually(lambda: seen == [("two", [2]), ("one", [1])])
 
 
 def test_feedback_that_waits_is_taken_before_the_end(client, peer, eventually):
-    told = []
+    seen = []
     goal = client.send_goal(
-        on_feedback=lambda m: told.append(list(m.sequence)), on_done=told.append
+        on_feedback=lambda m: seen.append(list(m.sequence)), on_done=seen.append
     )
     peer.answer()
     eventually(lambda: peer.asked)
     message = {"goal_id": {"uuid": goal.id}, "feedback": {"sequence": [1]}}
     peer.feedback.waiting.append(peer.types["FeedbackMessage"].encode(message))
     peer.result(goal, 4)
-    eventually(lambda: told == [[1], goal])
+    eventually(lambda: seen == [[1], goal])
 
 
-def test_a_sample_that_comes_twice_is_told_once(client, peer, eventually):
-    told = []
-    goal = client.send_goal(on_feedback=lambda m: told.append(list(m.sequence)))
+def test_duplicate_feedback_is_reported_once(client, peer, eventually):
+    seen = []
+    goal = client.send_goal(on_feedback=lambda m: seen.append(list(m.sequence)))
     peer.answer()
     peer.feed(goal, 1)
     peer.feedback.count -= 1
@@ -232,18 +232,18 @@ def test_a_sample_that_comes_twice_is_told_once(client, peer, eventually):
     finally:
         time.time_ns = stamp
     peer.feed(goal, 2)
-    eventually(lambda: [2] in told)
-    assert told == [[1], [2]]
+    eventually(lambda: [2] in seen)
+    assert seen == [[1], [2]]
 
 
 @pytest.mark.parametrize("code", [4, 5, 6])
-def test_the_status_topic_tells_of_every_goal_that_has_not_ended(client, peer, code, eventually):
+def test_status_topic_lists_every_goal_that_has_not_ended(client, peer, code, eventually):
     goals = [client.send_goal() for _ in range(3)]
     for number in (1, 2, 3):
         peer.answer(number)
-    told = []
+    seen = []
     for goal in goals:
-        goal.on_status_change(lambda status, g=goal: told.append((g, status)))
+        goal.on_status_change(lambda status, g=goal: seen.append((g, status)))
     infos = [
         {"goal_info": {"goal_id": {"uuid": goal.id}}, "status": status}
         for goal, status in zip(goals, (code, 1, 3), strict=True)
@@ -251,7 +251,7 @@ def test_the_status_topic_tells_of_every_goal_that_has_not_ended(client, peer, c
     array = rosglass.load("action_msgs/msg/GoalStatusArray")
     peer.status.receive(array.encode(status_list=[{"status": 2}, *infos]))
     ended = {4: SUCCEEDED, 5: CANCELED, 6: ABORTED}[code]
-    eventually(lambda: told == [(goals[0], ended), (goals[2], CANCELING)])
+    eventually(lambda: seen == [(goals[0], ended), (goals[2], CANCELING)])
     assert [goal.status for goal in goals] == [ended, ACCEPTED, CANCELING]
     peer.status.receive(array.encode(status_list=[infos[1], {**infos[2], "status": 2}]))
     assert goals[2].status is CANCELING  # it never goes back
@@ -264,14 +264,14 @@ def test_the_status_topic_tells_of_every_goal_that_has_not_ended(client, peer, c
 def test_a_status_that_is_not_known_is_ignored(client, peer):
     goal = client.send_goal()
     peer.answer()
-    peer.tell(goal, 0)
-    peer.tell(goal, 77)
+    peer.send_status(goal, 0)
+    peer.send_status(goal, 77)
     assert goal.status is ACCEPTED
 
 
 def test_an_acceptance_that_gets_lost_shows_by_the_status(client, peer):
     goal = client.send_goal(timeout=1.0)
-    peer.tell(goal, 2, sec=9)
+    peer.send_status(goal, 2, sec=9)
     assert goal.acceptance.result(30) is True
     assert goal.status is EXECUTING
     assert goal.accepted == Time.from_parts(9, 0)
@@ -287,14 +287,14 @@ def test_a_goal_whose_server_went_is_cancelled_should_it_run(client, peer, event
     assert bytes(asked.goal_info.goal_id.uuid) == goal.id
 
 
-def test_a_goal_that_nobody_answers_is_given_up_and_cancelled(client, peer, eventually):
+def test_unanswered_goal_times_out_and_is_cancelled(client, peer, eventually):
     goal = client.send_goal(timeout=0.05)
-    told = (
+    message = (
         f"neither accepted nor rejected goal {goal.id_text} within 0.05 s; it was asked to cancel"
     )
-    with pytest.raises(rosglass.TimeoutError, match=told):
+    with pytest.raises(rosglass.TimeoutError, match=message):
         goal.result(5)
-    with pytest.raises(rosglass.TimeoutError, match=told):
+    with pytest.raises(rosglass.TimeoutError, match=message):
         goal.acceptance.result(0)
     assert goal.status is LOST
     eventually(lambda: peer.cancel_goal.sent)
@@ -324,7 +324,7 @@ def test_a_goal_cancelled_before_it_was_accepted_is_cancelled_then(client, peer,
 
 
 @pytest.mark.parametrize(
-    ("code", "told"),
+    ("code", "reason"),
     [
         (0, "there was no goal to cancel"),
         (1, "the server refuses to cancel"),
@@ -333,12 +333,12 @@ def test_a_goal_cancelled_before_it_was_accepted_is_cancelled_then(client, peer,
         (9, "the server answers with the unknown code 9"),
     ],
 )
-def test_refusals_to_cancel_are_explained(client, peer, code, told):
+def test_refusals_to_cancel_are_explained(client, peer, code, reason):
     goal = client.send_goal()
     peer.answer()
     answer = goal.cancel()
     peer.canceled(1, code)
-    assert answer.result(30) == CancelAnswer((), told)
+    assert answer.result(30) == CancelAnswer((), reason)
     assert goal.status is ACCEPTED
 
 
@@ -392,7 +392,7 @@ def test_a_result_is_asked_for_again_when_the_end_was_announced(
     goal = client.send_goal()
     peer.answer()
     eventually(lambda: peer.asked)
-    peer.tell(goal, 6)
+    peer.send_status(goal, 6)
     eventually(lambda: len(peer.asked) > 2)
     assert peer.get_result.forgotten[:1] == [1]
     peer.result(goal, 6)
@@ -417,18 +417,20 @@ def test_a_result_is_asked_for_again_when_the_server_is_back(client, peer, event
 
 @pytest.mark.parametrize("connected", [True, False])
 def test_a_goal_is_lost_with_its_server(client, peer, middleware, impatient, connected, eventually):
-    middleware.become(ConnectionState.CONNECTED if connected else ConnectionState.LOST, "told why")
-    told = []
-    goal = client.send_goal(on_status_change=told.append, on_done=told.append)
+    middleware.become(
+        ConnectionState.CONNECTED if connected else ConnectionState.LOST, "cable pulled"
+    )
+    seen = []
+    goal = client.send_goal(on_status_change=seen.append, on_done=seen.append)
     peer.answer()
     assert goal.acceptance.result(30)
     peer.vanish()
     with pytest.raises(
         rosglass.ConnectionLostError,
-        match=f"went away before goal {goal.id_text} ended; its outcome is unknown .* told why",
+        match=f"went away before goal {goal.id_text} ended; its outcome is unknown .* cable pulled",
     ):
         goal.result(30)
-    eventually(lambda: told == [ACCEPTED, LOST, goal])
+    eventually(lambda: seen == [ACCEPTED, LOST, goal])
     assert list(client.goals) == []
 
 
@@ -436,7 +438,7 @@ def test_a_goal_whose_end_is_known_keeps_it_without_the_result(client, peer, imp
     goal = client.send_goal()
     peer.answer()
     eventually(lambda: peer.asked)
-    peer.tell(goal, 4)
+    peer.send_status(goal, 4)
     peer.vanish()
     with pytest.raises(rosglass.ConnectionLostError, match="which has ended as succeeded"):
         goal.result(30)
@@ -464,7 +466,7 @@ def test_a_restarted_server_that_does_not_answer(client, peer, monkeypatch, even
     peer.vanish()
     peer.appear(gid=b"t" * 16)
     eventually(lambda: len(peer.asked) == 4)
-    peer.tell(known, 2)  # somebody has it: the server only looks new
+    peer.send_status(known, 2)  # a server knows this one: it only looks new
     eventually(lambda: known.status is EXECUTING)
     monkeypatch.setattr("rosglass.ros2.action_client.GRACE_S", 0.05)
     with pytest.raises(rosglass.ConnectionLostError, match="went away before"):
@@ -491,10 +493,12 @@ def test_types_that_do_not_fit_are_named(node, middleware, caplog, eventually):
     for end in middleware.requesters:
         end.linked = True
     middleware.appear(SERVER, "/fib/_action/send_goal", "a_msgs/action/Else_SendGoal")
-    told = f"/robot offers a_msgs/action/Else_SendGoal here, not {FIB}_SendGoal: it gets no goals"
-    assert told in client.problem
+    problem = (
+        f"/robot offers a_msgs/action/Else_SendGoal here, not {FIB}_SendGoal: it gets no goals"
+    )
+    assert problem in client.problem
     assert not client.ready
-    eventually(lambda: caplog.text.count(told) == 1)
+    eventually(lambda: caplog.text.count(problem) == 1)
     unknown = node.create_action_client("/fib")
     eventually(lambda: "no definition of a_msgs/action/Else" in unknown.problem)
     middleware.appear(SERVER, "/fib/_action/send_goal", f"{FIB}_SendGoal", node="two")
@@ -510,11 +514,11 @@ def test_a_part_with_an_unknown_definition_is_named(node, middleware, part, even
         "FeedbackMessage": (PUBLISHER, "feedback"),
     }[part]
     middleware.appear(kind, f"/fib/_action/{name}", f"{FIB}_{part}", OTHER_HASH)
-    told = f"/robot has {FIB}_{part}, which cannot be used"
-    eventually(lambda: told in client.problem and OTHER_HASH in client.problem)
+    problem = f"/robot has {FIB}_{part}, which cannot be used"
+    eventually(lambda: problem in client.problem and OTHER_HASH in client.problem)
     fixed = node.create_action_client("/fib", rosglass.load(FIB))
-    told = f"/robot has another definition of {FIB}_{part} ({OTHER_HASH}, ours is RIHS01_"
-    assert told in fixed.problem
+    problem = f"/robot has another definition of {FIB}_{part} ({OTHER_HASH}, ours is RIHS01_"
+    assert problem in fixed.problem
 
 
 @pytest.fixture
@@ -646,7 +650,7 @@ def test_a_server_that_is_asked_by_hand(node, robot, server, middleware, eventua
     ],
     ids=str,
 )
-def test_what_a_request_to_cancel_means(goal_id, stamp, chosen, code):
+def test_cancel_request_selects_goals(goal_id, stamp, chosen, code):
     """As rcl_action_process_cancel_request."""
 
     class Goal:
@@ -681,8 +685,10 @@ def test_results_are_kept_for_a_while(client, server, node, monkeypatch, eventua
 def test_an_incomplete_server_is_named(client, middleware, eventually):
     end = middleware.requesters[0]
     middleware.appear(SERVER, end.info.name, end.info.type, end.info.type_hash)
-    told = "/fib/_action/send_goal, /fib/_action/cancel_goal, /fib/_action/get_result does not answ"
-    eventually(lambda: told in client.problem)
+    problem = (
+        "/fib/_action/send_goal, /fib/_action/cancel_goal, /fib/_action/get_result does not answ"
+    )
+    eventually(lambda: problem in client.problem)
 
 
 def test_a_goal_whose_client_closes_while_it_asks_for_the_result_says_so(node, client, server):
@@ -696,7 +702,7 @@ def test_a_goal_whose_client_closes_while_it_asks_for_the_result_says_so(node, c
 
 
 @pytest.mark.parametrize("close", ["server", "node"])
-def test_a_goal_accepted_just_before_closing_is_told_its_end(robot, node, close, eventually):
+def test_goal_accepted_just_before_closing_gets_its_result(robot, node, close, eventually):
     server = robot.create_action_server("/fib", FIB, fibonacci)
     ask = {
         part: node.create_service_client(f"/fib/_action/{part}")

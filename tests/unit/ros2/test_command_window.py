@@ -55,7 +55,7 @@ def test_commands_flow_while_the_router_answers(rig):
     assert (rig.window.lost, rig.window.problem) == (0, "")
 
 
-def test_what_a_stalled_router_does_not_confirm_is_followed_by_the_newest_only(rig):
+def test_stalled_router_gets_only_the_newest_command_afterwards(rig):
     rig.answered = False
     for name in "abcdef":
         rig.send(name)
@@ -68,7 +68,7 @@ def test_what_a_stalled_router_does_not_confirm_is_followed_by_the_newest_only(r
     assert rig.sent == ["a", "b", "c", "f"], "as soon as it answers"
 
 
-def test_what_waits_for_too_long_is_dropped(rig):
+def test_command_that_waits_too_long_is_dropped(rig):
     rig.answered = False
     rig.send("a")
     rig.send("b", after=0.2)
@@ -98,7 +98,7 @@ def test_a_slow_link_that_answers_is_not_a_stalled_one(rig):
     assert rig.sent[-1] == "stop"
 
 
-def test_a_pause_is_no_round_trip(rig):
+def test_pause_does_not_count_as_round_trip(rig):
     for number in range(5):
         rig.send(str(number), after=0.9)
     rig.answered = False
@@ -107,7 +107,7 @@ def test_a_pause_is_no_round_trip(rig):
     assert rig.sent[-1] == "b", "0.1 s"
 
 
-def test_an_outage_is_no_round_trip(rig):
+def test_outage_does_not_count_as_round_trip(rig):
     rig.answered = False
     rig.send("a")
     rig.pass_time(8.0)

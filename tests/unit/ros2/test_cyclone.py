@@ -1,4 +1,4 @@
-"""What of Cyclone DDS's binding needs no network: the library, its errors, its profiles."""
+"""The parts of Cyclone DDS's binding that need no network: the library, errors, profiles."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def test_failed_calls_are_named_with_what_they_were_for(code, kind):
         cyclone.check(code, "dds_create_reader", "topic /scan")
 
 
-def test_what_did_not_fail_is_returned():
+def test_result_of_a_successful_call_is_returned():
     assert cyclone.check(17, "dds_take", "topic /scan") == 17
     assert cyclone.check_alive(0, "dds_take", "topic /scan") == 0
 
@@ -117,7 +117,7 @@ def test_calls_for_entities_that_are_gone():
     cyclone.delete(12345)
 
 
-def test_a_missing_package_is_told_with_the_remedy(fresh, monkeypatch):
+def test_missing_package_is_reported_with_the_install_command(fresh, monkeypatch):
     def missing(name):
         raise importlib.metadata.PackageNotFoundError(name)
 

@@ -108,7 +108,7 @@ def test_this_machine_as_a_peer_is_whatever_address_it_uses(peer):
     assert (around.get("AddLocalhost"), len(around)) == ("true", 0)
 
 
-def test_a_peer_that_nobody_knows_is_named():
+def test_unresolvable_peer_is_named():
     with pytest.raises(rosglass.ConnectionLostError, match=r"address of peer 'robot\.invalid'"):
         config("dds://robot.invalid")
 
@@ -131,7 +131,7 @@ def test_a_name_server_that_does_not_answer_does_not_hang_us(monkeypatch):
     ("url", "interval"),
     [("dds://", "1s"), ("dds://10.0.0.9", "2s"), ("dds://localhost", "1s")],
 )
-def test_who_comes_later_is_found_within_seconds(url, interval):
+def test_participants_announce_themselves_every_few_seconds(url, interval):
     assert ours(url).findtext("Discovery/SPDPInterval") == interval
 
 
@@ -177,7 +177,7 @@ def test_the_users_own_configuration_comes_last_and_so_wins():
         ),
     ],
 )
-def test_what_the_url_and_the_users_configuration_both_say_is_refused(tmp_path, url, own, element):
+def test_option_in_both_url_and_user_configuration_is_refused(tmp_path, url, own, element):
     file = tmp_path / "cyclone.xml"
     file.write_text("<General><AllowMulticast>spdp,asm</AllowMulticast></General>")
     with pytest.raises(rosglass.ConversionError) as error:
@@ -197,7 +197,7 @@ def test_what_the_url_and_the_users_configuration_both_say_is_refused(tmp_path, 
         ("dds://?range=localhost", "/no/such/file.xml"),
     ],
 )
-def test_what_only_one_of_them_says_is_taken(url, own):
+def test_user_configuration_without_conflict_is_kept(url, own):
     assert user_config(config(url, CYCLONEDDS_URI=own)) == own
 
 

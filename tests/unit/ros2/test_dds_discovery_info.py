@@ -36,7 +36,7 @@ def widths(info: ParticipantEntities) -> list[ParticipantEntities]:
 
 @pytest.mark.parametrize("info", widths(INFO) + widths(EMPTY))
 @pytest.mark.parametrize("padding", [b"", b"\0", b"\0\0\0"])
-def test_what_is_written_is_read_with_the_same_width(info, padding):
+def test_sample_survives_a_round_trip_in_both_gid_widths(info, padding):
     assert ParticipantEntities.decode(info.encode() + padding) == info
 
 
@@ -83,7 +83,7 @@ def test_cut_samples_are_refused(info):
 
 
 @pytest.mark.parametrize(
-    ("data", "told"),
+    ("data", "reason"),
     [
         (b"", "no plain CDR (header missing)"),
         (b"\x00\x07\0\0" + bytes(20), "no plain CDR (header 00 07 00 00)"),
@@ -99,10 +99,10 @@ def test_cut_samples_are_refused(info):
         ),
     ],
 )
-def test_what_is_no_such_sample_is_refused_with_the_reason(data, told):
+def test_malformed_sample_is_rejected_with_the_reason(data, reason):
     with pytest.raises(DecodeError) as error:
         ParticipantEntities.decode(data)
-    assert told in str(error.value)
+    assert reason in str(error.value)
 
 
 def test_rubbish_raises_nothing_but_decode_errors():

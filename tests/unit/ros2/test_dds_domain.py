@@ -1,4 +1,4 @@
-"""What Cyclone DDS has against a configuration; it talks to nobody here: discovery is off."""
+"""Checks of Cyclone DDS's configuration; without a network: discovery is off."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_one_process_cannot_have_two_configurations_for_a_domain():
 
 
 @pytest.mark.parametrize(
-    ("own", "told"),
+    ("own", "message"),
     [
         (
             "<CycloneDDS><Domain><General><Colour/></General></Domain></CycloneDDS>",
@@ -62,14 +62,14 @@ def test_one_process_cannot_have_two_configurations_for_a_domain():
         ("<General><MaxMessageSize>lots</MaxMessageSize></General>", "lots: invalid value"),
         ("/no/such/file.xml", "can't open configuration file /no/such/file.xml"),
         # Cyclone DDS ends the process that gives it this.
-        ('<Discovery><Peers><Peer Address="nobody.invalid"/></Peers></Discovery>', "unknown addr"),
+        ('<Discovery><Peers><Peer Address="robot.invalid"/></Peers></Discovery>', "unknown addr"),
         ("<unfinished", "parser error"),
     ],
 )
-def test_a_configuration_that_is_refused_is_explained(own, told, capfd):
+def test_refused_configuration_is_explained(own, message, capfd):
     with pytest.raises(rosglass.ConversionError) as error:
         join(CYCLONEDDS_URI=own)
-    assert told in str(error.value)
+    assert message in str(error.value)
     assert capfd.readouterr().err == ""
 
 
@@ -118,7 +118,7 @@ def test_one_program_too_many_is_found_by_multicast(crowded, caplog):
         assert "found by multicast only" in caplog.text
 
 
-def test_one_program_too_many_is_refused_where_nobody_could_find_it(crowded):
+def test_program_beyond_the_last_participant_index_is_refused(crowded):
     with pytest.raises(rosglass.ConnectionLostError, match="120 programs of this machine"):
         join("dds://?domain=57&range=localhost")
 
@@ -144,8 +144,8 @@ def test_another_version_of_the_series_is_used_with_a_word_on_what_is_lost(
 
 def test_private_layouts_of_another_version_are_left_alone(monkeypatch):
     monkeypatch.setattr(cyclone, "distribution", lambda _: Package("11.3.0"))
-    told = "cyclonedds 11.3.0 is installed instead of 11.0.1"
-    assert cyclone_identity.reading.check(0) == cyclone_identity.writing.check(0) == told
+    reason = "cyclonedds 11.3.0 is installed instead of 11.0.1"
+    assert cyclone_identity.reading.check(0) == cyclone_identity.writing.check(0) == reason
 
 
 def test_another_series_is_refused(monkeypatch):
@@ -162,7 +162,7 @@ def _in_a_fork(answer):
     os._exit(0)
 
 
-def test_a_fork_is_told_to_start_anew():
+def test_fork_is_advised_to_spawn():
     with join():
         here, there = multiprocessing.Pipe()
         child = multiprocessing.get_context("fork").Process(target=_in_a_fork, args=(there,))

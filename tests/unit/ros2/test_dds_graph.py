@@ -22,7 +22,7 @@ OWN = b"\x01\x10" + bytes(10) + b"\x00\x00\x01\xc1"
 
 
 class Domain:
-    """A domain with participants that come and go, as discovery tells of them."""
+    """A domain with participants that come and go, as reported by discovery."""
 
     def __init__(self) -> None:
         self.changes = 0
@@ -45,8 +45,8 @@ class Domain:
 
     def participant(self, prefix, user_data=b"", **properties):
         guid = prefix + b"\x00\x00\x01\xc1"
-        told = tuple((f"__{name}", text) for name, text in properties.items())
-        return Discovered(True, guid, 1, guid, user_data, properties=told)
+        texts = tuple((f"__{name}", text) for name, text in properties.items())
+        return Discovered(True, guid, 1, guid, user_data, properties=texts)
 
     def leave(self, prefix):
         guid = prefix + b"\x00\x00\x01\xc1"
@@ -65,7 +65,7 @@ class Domain:
     def drop(self, guid):
         self.dds.put_endpoint(Discovered(False, guid, 1), reader=guid[-1] == 4)
 
-    def tell(self, prefix, *nodes, humble=False):
+    def announce(self, prefix, *nodes, humble=False):
         gid = prefix + b"\x00\x00\x01\xc1"
         return self.dds.put_entities(ParticipantEntities(gid, nodes, humble))
 
@@ -84,10 +84,10 @@ def readers(node, *guids):
 
 
 @pytest.mark.parametrize("order", ["endpoint first", "node first"])
-def test_endpoints_and_nodes_find_each_other_whoever_comes_first(domain, order):
+def test_endpoints_and_nodes_are_joined_in_any_order(domain, order):
     robot = domain.join()
     guid = robot + b"\x00\x00\x05\x03"
-    announced = lambda: domain.tell(robot, writers(TALKER, guid), readers(LISTENER))  # noqa: E731
+    announced = lambda: domain.announce(robot, writers(TALKER, guid), readers(LISTENER))  # noqa: E731
     if order == "node first":
         announced()
     domain.change(guid, "rt/chatter", user_data=b"typehash=RIHS01_ab;", qos=QoS.latched(3))
@@ -104,12 +104,12 @@ def test_endpoints_and_nodes_find_each_other_whoever_comes_first(domain, order):
 def test_components_that_come_and_go_leave_the_others_where_they_are(domain):
     base, front, lidar = (NodeName("/", name) for name in ("base", "front", "lidar"))
     container = domain.join()
-    domain.tell(container, writers(base), writers(front), writers(lidar))
+    domain.announce(container, writers(base), writers(front), writers(lidar))
     domain.seen.clear()
-    domain.tell(container, writers(base), writers(lidar))
+    domain.announce(container, writers(base), writers(lidar))
     assert domain.seen == [([base, lidar], {})]
     domain.seen.clear()
-    domain.tell(container, writers(front), writers(base), writers(lidar))
+    domain.announce(container, writers(front), writers(base), writers(lidar))
     assert domain.seen == [([base, front, lidar], {})]
     domain.leave(container)
     assert domain.graph.nodes() == []
@@ -117,19 +117,19 @@ def test_components_that_come_and_go_leave_the_others_where_they_are(domain):
 
 def test_two_nodes_of_one_name_in_a_participant_are_counted(domain):
     container = domain.join()
-    domain.tell(container, writers(TALKER), writers(TALKER))
+    domain.announce(container, writers(TALKER), writers(TALKER))
     assert domain.graph.duplicate_nodes() == {"/talker": 2}
-    domain.tell(container, writers(TALKER))
+    domain.announce(container, writers(TALKER))
     assert domain.graph.nodes() == [TALKER]
     assert domain.graph.duplicate_nodes() == {}
 
 
-def test_an_endpoint_that_is_not_told_of_yet_belongs_to_the_only_node(domain):
+def test_endpoint_of_no_announced_node_belongs_to_the_only_node(domain):
     robot = domain.join()
-    domain.tell(robot, writers(TALKER))
+    domain.announce(robot, writers(TALKER))
     domain.add(robot, "rt/chatter", reader=True)
     assert domain.graph.endpoints(SUBSCRIPTION, "/chatter")[0].node == TALKER
-    domain.tell(robot, writers(TALKER), readers(LISTENER))
+    domain.announce(robot, writers(TALKER), readers(LISTENER))
     assert domain.graph.endpoints(SUBSCRIPTION, "/chatter")[0].node.namespace == "/_dds"
 
 
@@ -148,7 +148,7 @@ def test_endpoints_of_unknown_nodes_show_under_their_process(domain, properties,
     robot = domain.join(b"", **properties)
     guid = domain.add(robot, "rt/chatter")
     assert domain.graph.endpoints(PUBLISHER, "/chatter")[0].node == NodeName("/_dds", name)
-    domain.tell(robot, writers(TALKER, guid))
+    domain.announce(robot, writers(TALKER, guid))
     assert domain.graph.nodes() == [TALKER]
 
 
@@ -158,31 +158,31 @@ def test_an_endpoint_may_come_before_its_participant(domain):
     assert domain.graph.nodes() == [NodeName("/_dds", prefix.hex())]
     domain.dds.put_participants([domain.participant(prefix, ProcessName="bridge", Pid="7")])
     assert domain.graph.nodes() == [NodeName("/_dds", "bridge_7")]
-    assert not domain.tell(b"\x09" * 12, writers(TALKER))
-    assert domain.tell(prefix, writers(TALKER))
+    assert not domain.announce(b"\x09" * 12, writers(TALKER))
+    assert domain.announce(prefix, writers(TALKER))
 
 
 def test_nodes_come_go_and_change_their_names(domain):
     robot = domain.join()
-    domain.tell(robot, writers(TALKER), readers(LISTENER))
-    domain.tell(robot, readers(LISTENER))
+    domain.announce(robot, writers(TALKER), readers(LISTENER))
+    domain.announce(robot, readers(LISTENER))
     assert domain.graph.nodes() == [LISTENER]
-    domain.tell(robot)
+    domain.announce(robot)
     assert domain.graph.nodes() == []
 
 
 def test_one_participant_may_have_two_nodes_of_one_name(domain):
     robot = domain.join()
-    domain.tell(robot, writers(TALKER), writers(TALKER))
-    domain.tell(robot, writers(TALKER))
+    domain.announce(robot, writers(TALKER), writers(TALKER))
+    domain.announce(robot, writers(TALKER))
     assert domain.graph.nodes() == [TALKER]
 
 
 def test_everything_goes_with_the_participant(domain):
     robot, other = domain.join(), domain.join()
     guid = domain.add(robot, "rt/chatter")
-    domain.tell(robot, writers(TALKER, guid))
-    domain.tell(other, readers(LISTENER))
+    domain.announce(robot, writers(TALKER, guid))
+    domain.announce(other, readers(LISTENER))
     assert domain.dds.peers == 2
     domain.leave(robot)
     domain.drop(guid)
@@ -196,7 +196,7 @@ def test_everything_goes_with_the_participant(domain):
 
 def test_a_participant_that_went_and_came_back_between_two_looks_keeps_its_nodes(domain):
     robot = domain.join()
-    domain.tell(robot, writers(TALKER))
+    domain.announce(robot, writers(TALKER))
     back = domain.participant(robot, b"enclave=/;")
     gone = Discovered(False, back.guid, 1, back.guid)
     domain.dds.put_participants([gone, back])
@@ -213,7 +213,7 @@ ADD = (
 @pytest.mark.parametrize("request_first", [True, False])
 def test_a_service_shows_when_both_its_topics_are_there(domain, server, request_first):
     robot = domain.join()
-    domain.tell(robot, writers(TALKER))
+    domain.announce(robot, writers(TALKER))
     (request, request_type), (reply, reply_type) = ADD
 
     def add_request():
@@ -242,8 +242,8 @@ def test_a_service_shows_when_both_its_topics_are_there(domain, server, request_
 def test_a_service_shows_the_hash_of_its_response_too(domain):
     robot = domain.join()
     (request, request_type), (reply, reply_type) = ADD
-    told = {"user_data": b"typehash=RIHS01_q;"}
-    domain.add(robot, request, request_type, reader=True, **told)
+    hashed = {"user_data": b"typehash=RIHS01_q;"}
+    domain.add(robot, request, request_type, reader=True, **hashed)
 
     def response_hash():
         return [end.response_hash for end in domain.graph.endpoints(SERVER, "/add")]
@@ -251,11 +251,11 @@ def test_a_service_shows_the_hash_of_its_response_too(domain):
     first = domain.add(robot, reply, reply_type, user_data=b"typehash=RIHS01_r;")
     assert response_hash() == ["RIHS01_r"]
     other = domain.add(robot, reply, reply_type, user_data=b"typehash=RIHS01_x;")
-    assert response_hash() == [""]  # whose is whose cannot be told
+    assert response_hash() == [""]  # ambiguous: either reply may belong to the request
     domain.drop(other)
     assert response_hash() == ["RIHS01_r"]
     domain.drop(first)
-    domain.add(robot, reply, reply_type, **told)
+    domain.add(robot, reply, reply_type, **hashed)
     assert response_hash() == [""]  # one hash for the whole service
 
 
@@ -275,7 +275,7 @@ def test_actions_show(domain):
     assert domain.graph.actions() == {"/x": ["p/action/Go"]}
 
 
-def test_what_is_not_of_ros_changes_nothing(domain):
+def test_topics_outside_ros_are_ignored(domain):
     robot = domain.join(b"")
     before = domain.changes
     for topic in ("Square", "ros_discovery_info", "rt", "rq/x", "", "rtps/x"):
@@ -286,7 +286,7 @@ def test_what_is_not_of_ros_changes_nothing(domain):
 
 
 def test_our_own_endpoints_show_at_once_and_stay_as_they_were_created(domain):
-    domain.tell(OWN[:12], writers(TALKER))
+    domain.announce(OWN[:12], writers(TALKER))
     guid = OWN[:12] + b"\x00\x00\x05\x04"
     ours = EndpointInfo(SUBSCRIPTION, "/chatter", "std_msgs/msg/String", TALKER, QoS(3), "", guid)
     domain.dds.put_own(ours)
@@ -300,26 +300,26 @@ def test_our_own_endpoints_show_at_once_and_stay_as_they_were_created(domain):
 def test_the_width_of_identities_follows_the_others_but_not_our_kind(domain):
     assert not domain.dds.humble
     wide = domain.join()
-    domain.tell(wide, writers(TALKER), humble=True)
+    domain.announce(wide, writers(TALKER), humble=True)
     assert domain.dds.humble
     ours = domain.join(PARTICIPANT_USER_DATA)
-    domain.tell(ours, writers(LISTENER))
+    domain.announce(ours, writers(LISTENER))
     assert domain.dds.humble
     narrow = domain.join()
-    domain.tell(narrow, writers(LISTENER))
+    domain.announce(narrow, writers(LISTENER))
     assert not domain.dds.humble
     domain.leave(narrow)
     assert domain.dds.humble
 
 
-def test_a_thousand_endpoints_told_again_and_again_change_only_what_is_new(domain):
+def test_repeated_announcements_of_a_thousand_endpoints_change_only_new_ones(domain):
     robot = domain.join()
     guids = [domain.add(robot, f"rt/t{number}") for number in range(1000)]
-    domain.tell(robot, writers(TALKER, *guids[:-1]), writers(LISTENER))
+    domain.announce(robot, writers(TALKER, *guids[:-1]), writers(LISTENER))
     before = domain.changes
-    domain.tell(robot, writers(TALKER, *guids[:-1]), writers(LISTENER, guids[-1]))
+    domain.announce(robot, writers(TALKER, *guids[:-1]), writers(LISTENER, guids[-1]))
     assert domain.changes == before + 1
-    domain.tell(robot, writers(TALKER, *guids[:-1]), writers(LISTENER, guids[-1]))
+    domain.announce(robot, writers(TALKER, *guids[:-1]), writers(LISTENER, guids[-1]))
     assert domain.changes == before + 1
     assert len(domain.graph.endpoints_of(TALKER)) == 999
 

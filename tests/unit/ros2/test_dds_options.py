@@ -82,7 +82,7 @@ def test_peers_are_dropped_with_a_warning_when_discovery_is_off(caplog):
 
 
 @pytest.mark.parametrize(
-    ("url", "told"),
+    ("url", "message"),
     [
         ("dds://?domain=233", "domain: expected a ROS domain: 0 to 232"),
         ("dds://?domain=-1", "domain: expected a ROS domain"),
@@ -106,14 +106,14 @@ def test_peers_are_dropped_with_a_warning_when_discovery_is_off(caplog):
         ("dds://?domain=1&domain=2", "domain: expected to be given once, not also 2"),
     ],
 )
-def test_bad_urls_are_refused_with_the_part_that_is_wrong(url, told):
+def test_bad_urls_are_refused_with_the_part_that_is_wrong(url, message):
     with pytest.raises(rosglass.ConversionError) as error:
         options(url)
-    assert told in str(error.value)
+    assert message in str(error.value)
 
 
 @pytest.mark.parametrize(
-    ("env", "told"),
+    ("env", "message"),
     [
         ({"ROS_DOMAIN_ID": "233"}, "environment: ROS_DOMAIN_ID: expected a ROS domain: 0 to 232"),
         ({"ROS_DOMAIN_ID": "two"}, "environment: ROS_DOMAIN_ID: expected a ROS domain"),
@@ -125,10 +125,10 @@ def test_bad_urls_are_refused_with_the_part_that_is_wrong(url, told):
         ({"ROS_STATIC_PEERS": "a b"}, "ROS_STATIC_PEERS: expected host names or IPv4 addresses"),
     ],
 )
-def test_bad_variables_are_named(env, told):
+def test_bad_variables_are_named(env, message):
     with pytest.raises(rosglass.ConversionError) as error:
         options("dds://", **env)
-    assert told in str(error.value)
+    assert message in str(error.value)
 
 
 def test_named_peers_contradict_a_range_from_the_environment():

@@ -1,4 +1,4 @@
-"""What happens at the same time over DDS, in the order that loses most; nobody else is there."""
+"""Races over DDS, in the order that loses most; without other participants."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from rosglass.wires.dds.services import DdsReplier
 
 ADD = "example_interfaces/srv/AddTwoInts"
 SERVICE = "/add"
-#: Of a writer that nobody here is.
+#: A sample of a writer that is unknown here.
 ELSEWHERE = Origin(b"\x00\x00\x12\x03", 1, None, bytes(12), taken=True)
 
 
@@ -198,7 +198,7 @@ def test_a_request_that_comes_again_is_carried_out_once(server, eventually):
     assert server.got == [10, 20, 11, 30]
 
 
-def test_what_is_known_of_a_readers_samples_goes_with_it():
+def test_recorded_origins_are_dropped_with_their_reader():
     one, two = Origins(), Origins()
     one.follow(0x1000)
     one._recorded[0x2000] = ELSEWHERE
@@ -222,8 +222,8 @@ def test_a_senders_guid_decides_whose_sample_it_is():
     assert not part.may_be_of(guid[:-1] + b"\x04")
 
 
-@pytest.mark.parametrize(("depth", "told"), [(2, 1), (100, 0)])
-def test_requests_are_waited_for_no_longer_than_they_can_come(monkeypatch, caplog, depth, told):
+@pytest.mark.parametrize(("depth", "warnings"), [(2, 1), (100, 0)])
+def test_requests_are_waited_for_no_longer_than_they_can_come(monkeypatch, caplog, depth, warnings):
     """The oldest are lost when too many wait; without that, several threads may receive some."""
     client = Discovered(False, b"\x01\x0f" + bytes(10) + b"\x00\x00\x12\x03", 0)  # Fast DDS's
     origins = [Origin(client.guid[12:], number, None, client.guid[:12]) for number in range(1, 7)]
@@ -255,7 +255,7 @@ def test_requests_are_waited_for_no_longer_than_they_can_come(monkeypatch, caplo
     assert not on_received(origins[4], b"")  # it would overtake the four
     assert lost_requests(caplog) == []
     receive([(b"", 0, 0, origins[2])])
-    lost = [f"/add: 2 requests are lost, as more than {depth} waited"] * told
+    lost = [f"/add: 2 requests are lost, as more than {depth} waited"] * warnings
     assert lost_requests(caplog) == lost
     receive([(b"", 0, 0, origins[3])])
     receive([(b"", 0, 0, origins[4])])
@@ -268,7 +268,7 @@ def lost_requests(caplog):
     return [record.getMessage() for record in caplog.records if "are lost" in record.getMessage()]
 
 
-def test_who_looked_first_for_counterparts_has_not_the_last_word(server):
+def test_slower_refresh_does_not_overwrite_a_newer_one(server):
     looked, go_on = threading.Event(), threading.Event()
     answers = [[1], [1, 2]]
 
@@ -295,7 +295,7 @@ def test_who_looked_first_for_counterparts_has_not_the_last_word(server):
     assert set(matched.by_guid) == {cyclone_dds + b"\1", cyclone_dds + b"\2"}
 
 
-def test_some_who_left_are_remembered(monkeypatch):
+def test_departed_endpoints_are_remembered_up_to_a_limit(monkeypatch):
     monkeypatch.setattr("rosglass.wires.dds.service_endpoints._MAX_DEPARTED", 2)
     here = [1]
     matched = MatchedEndpoints(
@@ -312,7 +312,7 @@ def test_some_who_left_are_remembered(monkeypatch):
     assert [matched.get(handle) is not None for handle in (1, 2, 3, 4)] == [False] * 3 + [True]
 
 
-def test_writing_after_the_end_is_told(node, middleware):
+def test_writing_after_the_end_raises(node, middleware):
     """The memory that this takes went with the node."""
     endpoint = EndpointInfo(
         EndpointKind.PUBLISHER, "/t", "std_msgs/msg/String", NodeName("/", "here")
@@ -326,8 +326,8 @@ def test_writing_after_the_end_is_told(node, middleware):
     writer.close()
 
 
-def test_nobody_is_left_without_ground(node, participant):
-    """Who makes something of a node is waited for; then nothing more is made."""
+def test_closing_waits_for_operations_in_progress(node, participant):
+    """Closing a node waits while its entities are in use; afterwards no more are created."""
     node_closed = threading.Thread(target=node.close)
     with participant.in_use():
         node_closed.start()
@@ -342,7 +342,7 @@ def test_nobody_is_left_without_ground(node, participant):
         cyclone.guid(participant.entity)
 
 
-def test_what_cannot_be_sent_is_not_waited_for(caplog):
+def test_unsendable_request_is_dropped_at_once(caplog):
     outbox, ended = Outbox(lambda _: None, in_order=True), []
 
     def fail() -> bool:
@@ -356,7 +356,7 @@ def test_what_cannot_be_sent_is_not_waited_for(caplog):
 
 
 @pytest.mark.parametrize("raised", [ValueError, SystemExit, CancelledError])
-def test_what_cannot_be_handed_on_holds_up_nothing_else(participant, caplog, eventually, raised):
+def test_failing_action_does_not_block_the_pump(participant, caplog, eventually, raised):
     topic = cyclone.create_topic(participant.entity, "rt/t", "T")
     policies = qos_of(QoS(), writer=False)
     reader = cyclone.create_reader(participant.entity, topic, policies, "topic /t")

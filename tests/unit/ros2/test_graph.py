@@ -58,7 +58,7 @@ def test_endpoints_of_a_topic(graph):
     assert graph.endpoints(SUBSCRIPTION, "/t") == []
 
 
-def test_only_real_changes_are_told(graph, changes):
+def test_only_real_changes_are_notified(graph, changes):
     graph.put_node("n", TALKER)
     graph.put_endpoint("e", endpoint(PUBLISHER))
     assert len(changes) == 2
@@ -111,7 +111,7 @@ def test_hidden_names_are_there_unless_they_are_not_wanted(graph):
     assert (list(graph.services()), graph.services(hidden=False)) == (["/_secret"], {})
 
 
-def test_what_a_node_has(graph):
+def test_endpoints_are_listed_by_node(graph):
     graph.put_endpoint(1, endpoint(PUBLISHER, "/a"))
     graph.put_endpoint(2, endpoint(SERVER, "/s", "p/srv/S"))
     graph.put_endpoint(3, endpoint(PUBLISHER, "/b", node=LISTENER))

@@ -1,4 +1,4 @@
-"""What the graph inside one process has besides the contract of all wires."""
+"""Details of the in-process graph beyond the contract of all wires."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class ClosedWhileOpening(LocalMiddleware):
         lambda wire: wire.announce(NODE),
     ],
 )
-def test_what_is_opened_while_closing_does_not_stay_in_the_graph(join, open_something):
+def test_endpoint_opened_while_closing_does_not_stay_in_the_graph(join, open_something):
     graph = Graph(lambda: None)
     join(graph=graph)
     wire = join(ClosedWhileOpening)
@@ -92,7 +92,7 @@ def test_no_node_of_a_closed_connection_is_announced(join):
     assert graph.nodes() == []
 
 
-def test_what_closes_while_a_node_joins_does_not_stay_in_its_graph(join):
+def test_endpoint_closed_while_a_node_joins_does_not_stay_in_its_graph(join):
     closing = []
 
     class CloseMeanwhile(Graph):

@@ -40,7 +40,7 @@ def test_names_expand_as_in_rcl(written, namespace, full):
 
 
 @pytest.mark.parametrize(
-    ("written", "told"),
+    ("written", "message"),
     [
         ("", "non-empty string"),
         (None, "non-empty string"),
@@ -63,10 +63,10 @@ def test_names_expand_as_in_rcl(written, namespace, full):
         ("x" * 300, "has 301 characters; at most 247"),
     ],
 )
-def test_bad_topic_names_are_refused_with_the_place_and_the_fix(written, told):
+def test_bad_topic_names_are_refused_with_the_place_and_the_fix(written, message):
     with pytest.raises(InvalidNameError) as error:
         expand(written, "talker", "/")
-    assert told in str(error.value)
+    assert message in str(error.value)
 
 
 @pytest.mark.parametrize("name", ["a", "talker_2", "_x", "A" * 255])
@@ -75,7 +75,7 @@ def test_good_node_names(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("name", "message"),
     [
         ("", "must not be empty"),
         (None, "must be a string"),
@@ -85,8 +85,8 @@ def test_good_node_names(name):
         ("a" * 256, "at most 255"),
     ],
 )
-def test_bad_node_names(name, told):
-    with pytest.raises(InvalidNameError, match=told):
+def test_bad_node_names(name, message):
+    with pytest.raises(InvalidNameError, match=message):
         validate_node_name(name)
 
 
@@ -96,7 +96,7 @@ def test_good_namespaces(namespace):
 
 
 @pytest.mark.parametrize(
-    ("namespace", "told"),
+    ("namespace", "message"),
     [
         ("", "write '/'"),
         ("arm", "write '/arm'"),
@@ -108,8 +108,8 @@ def test_good_namespaces(namespace):
         ("/" + "a" * 250, "at most 245"),
     ],
 )
-def test_bad_namespaces(namespace, told):
-    with pytest.raises(InvalidNameError, match=told):
+def test_bad_namespaces(namespace, message):
+    with pytest.raises(InvalidNameError, match=message):
         validate_namespace(namespace)
 
 
@@ -185,5 +185,5 @@ def test_actions_are_known_by_their_parts(name, type_name, expected):
         ("", None),
     ],
 )
-def test_dds_topics_are_told_apart(dds_topic, expected):
+def test_dds_topics_are_demangled(dds_topic, expected):
     assert demangle_topic(dds_topic) == expected

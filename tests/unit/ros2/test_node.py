@@ -73,8 +73,8 @@ def test_the_type_follows_a_robot_that_comes_back_with_another_one(node, middlew
 def test_a_given_type_stays_and_others_are_named(node, middleware, eventually):
     subscription = node.create_subscription("/t", STRING)
     middleware.appear(PUBLISHER, "/t", TWIST)
-    told = eventually(lambda: subscription.problem)
-    assert told == f"/robot publishes {TWIST} here, not {STRING}"
+    problem = eventually(lambda: subscription.problem)
+    assert problem == f"/robot publishes {TWIST} here, not {STRING}"
     assert subscription.type.name == STRING
 
 
@@ -83,9 +83,9 @@ def test_an_unknown_definition_is_a_problem_until_it_is_added(middleware, eventu
     node = Ros2Node(middleware, "fake://", "cockpit", library=library)
     middleware.appear(PUBLISHER, "/t", "secret_msgs/msg/Thing")
     subscription = node.create_subscription("/t", callback=id)
-    told = eventually(lambda: "decoded" in subscription.problem and subscription.problem)
-    assert "/robot publishes secret_msgs/msg/Thing, which cannot be decoded" in told
-    assert "tried again" in told
+    problem = eventually(lambda: "decoded" in subscription.problem and subscription.problem)
+    assert "/robot publishes secret_msgs/msg/Thing, which cannot be decoded" in problem
+    assert "tried again" in problem
     library.add_text("secret_msgs/msg/Thing", "int32 number\n")
     eventually(lambda: subscription.type)
     eventually(lambda: subscription.problem == "")
@@ -95,20 +95,20 @@ def test_an_unknown_definition_is_a_problem_until_it_is_added(middleware, eventu
 def test_another_definition_is_refused_with_both_hashes(node, middleware, eventually):
     fixed = node.create_subscription("/t", rosglass.load(STRING))
     middleware.appear(PUBLISHER, "/t", STRING, OTHER_HASH)
-    told = eventually(lambda: fixed.problem)
-    assert OTHER_HASH in told
-    assert hash_of(STRING) in told
+    problem = eventually(lambda: fixed.problem)
+    assert OTHER_HASH in problem
+    assert hash_of(STRING) in problem
     middleware.readers[0].receive(HELLO, OTHER_HASH)
     assert fixed.take() is None
     middleware.readers[0].receive(HELLO, "")
     assert fixed.take() is not None, "a robot without hashes is believed"
 
 
-def test_another_definition_is_refused_also_when_nobody_announced_it(node, middleware, eventually):
+def test_unannounced_definition_is_refused_too(node, middleware, eventually):
     subscription = node.create_subscription("/t", STRING)
     middleware.readers[0].receive(HELLO, OTHER_HASH)
-    told = eventually(lambda: subscription.problem)
-    assert OTHER_HASH in told
+    problem = eventually(lambda: subscription.problem)
+    assert OTHER_HASH in problem
     assert subscription.take() is None
 
 
@@ -142,7 +142,7 @@ def test_the_robots_version_of_a_type_is_taken_if_it_is_known(middleware, eventu
 # -- graph and status ----------------------------------------------------------------------------
 
 
-def test_status_changes_are_told_in_order_and_once(node, middleware, eventually):
+def test_status_changes_are_notified_in_order_and_once(node, middleware, eventually):
     seen = []
     node.on_status_change(seen.append)
     assert node.status().state is ConnectionState.CONNECTED

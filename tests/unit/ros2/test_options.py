@@ -40,7 +40,7 @@ def test_the_environment_fills_what_the_url_leaves_out():
 
 
 @pytest.mark.parametrize(
-    ("url", "told"),
+    ("url", "message"),
     [
         ("zenoh://r:0", "address: expected host:port, port 1 to 65535"),
         ("zenoh://r:99999", "address: expected host:port, port 1 to 65535"),
@@ -65,10 +65,10 @@ def test_the_environment_fills_what_the_url_leaves_out():
         ("zenoh://r?mode=peer&mode=client", "to be given once"),
     ],
 )
-def test_bad_urls_are_refused_with_the_part_that_is_wrong(url, told):
+def test_bad_urls_are_refused_with_the_part_that_is_wrong(url, message):
     with pytest.raises(rosglass.ConversionError) as error:
         ZenohOptions.parse(url, {})
-    assert told in str(error.value)
+    assert message in str(error.value)
 
 
 def test_a_bad_domain_in_the_environment_is_named():
@@ -107,7 +107,7 @@ def test_the_environment_chooses_the_world(env, url):
 
 
 @pytest.mark.parametrize(
-    ("env", "told"),
+    ("env", "message"),
     [
         ({}, "no robot was named: pass a URL to connect()"),
         (
@@ -117,15 +117,15 @@ def test_the_environment_chooses_the_world(env, url):
         ({"ROS_DISTRO": "noetic", "ROS_VERSION": "1"}, "no robot was named"),
     ],
 )
-def test_without_a_choice_the_user_is_told_the_choices(env, told):
+def test_missing_choice_is_reported_with_the_choices(env, message):
     with pytest.raises(rosglass.UnsupportedError) as error:
         default_url(env)
-    assert told in str(error.value)
+    assert message in str(error.value)
     assert "zenoh://127.0.0.1:7447, dds://?domain=0 or ros1://robot:11311" in str(error.value)
 
 
 @pytest.mark.parametrize(
-    ("url", "told"),
+    ("url", "message"),
     [
         ("mqtt://robot", "unknown scheme 'mqtt'; known: dds://"),
         ("zenho://robot", "unknown scheme 'zenho'; did you mean zenoh? Known: dds://"),
@@ -135,10 +135,10 @@ def test_without_a_choice_the_user_is_told_the_choices(env, told):
         ("", "no scheme"),
     ],
 )
-def test_other_worlds_are_refused_and_the_known_ones_listed(url, told):
+def test_unknown_scheme_is_refused_with_the_known_ones(url, message):
     with pytest.raises(rosglass.UnsupportedError) as error:
         rosglass.connect(url)
-    assert told in str(error.value)
+    assert message in str(error.value)
 
 
 @pytest.mark.parametrize(("url", "package"), [("dds://", "cyclonedds"), ("zenoh://", "zenoh")])
@@ -149,6 +149,6 @@ def test_a_middleware_that_is_not_installed_says_how_to_get_it(monkeypatch, url,
         rosglass.connect(url)
 
 
-def test_something_that_is_no_url_at_all():
+def test_url_of_another_type_is_refused():
     with pytest.raises(rosglass.ConversionError, match="url: expected a text"):
         rosglass.connect(7447)

@@ -14,7 +14,7 @@ from rosglass.ros2.parameter_files import dump, matches, parse, parse_value, rea
 if TYPE_CHECKING:
     from pathlib import Path
 
-#: What ros2cli's documentation of ``ros2 param dump`` shows, type for type.
+#: The example of ``ros2 param dump`` in ros2cli's documentation, type for type.
 DUMPED = """\
 /foo/test_node:
   ros__parameters:
@@ -278,7 +278,7 @@ def test_a_list_of_mappings_is_skipped_within_yaml_rules() -> None:
             parse(f"n: {{ros__parameters: {{a: [&x {{}}, {rest}", "f.yaml")
 
 
-def test_a_value_is_no_mapping() -> None:
+def test_value_that_is_a_mapping_is_refused() -> None:
     with pytest.raises(ParameterError, match="p:1:1: a parameter's value is a scalar or a list"):
         parse_value("{a: 1}", "p")
 

@@ -90,7 +90,7 @@ def test_an_empty_list_keeps_the_type_that_is_known(kind: ParameterType) -> None
         ("a\ud800", "cannot be written as UTF-8"),
     ],
 )
-def test_what_can_be_no_parameter_is_refused(value: Any, message: str) -> None:
+def test_invalid_value_is_refused(value: Any, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         typed("p", value)
 

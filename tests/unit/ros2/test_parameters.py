@@ -24,7 +24,7 @@ def parameters() -> Ros2Parameters:
     return Ros2Parameters("/arm", IMMEDIATE, {"given": 7, "wrong": "text"})
 
 
-def test_what_every_node_has_is_declared_from_the_start(parameters: Ros2Parameters) -> None:
+def test_parameters_of_every_node_are_declared_from_the_start(parameters: Ros2Parameters) -> None:
     assert parameters.names() == EVERYWHERE
     assert parameters.describe("start_type_description_service").read_only
     assert parameters.get("use_sim_time") is False
@@ -32,7 +32,7 @@ def test_what_every_node_has_is_declared_from_the_start(parameters: Ros2Paramete
     assert "other" not in parameters
 
 
-def test_what_the_program_was_started_with_wins(parameters: Ros2Parameters) -> None:
+def test_overrides_win_over_defaults(parameters: Ros2Parameters) -> None:
     assert parameters.declare("given", 1) == 7
     assert parameters.overrides == {"given": 7, "wrong": "text"}
     with pytest.raises(ParameterError, match=r"of type integer, .* 'text' .* was started with"):
@@ -40,7 +40,7 @@ def test_what_the_program_was_started_with_wins(parameters: Ros2Parameters) -> N
     assert "wrong" not in parameters
 
 
-def test_a_list_is_nobodys_to_change(parameters: Ros2Parameters) -> None:
+def test_lists_are_copied(parameters: Ros2Parameters) -> None:
     default = [1, 2]
     got = parameters.declare("list", default)
     default.append(3)
@@ -138,7 +138,7 @@ def test_read_only_parameters_stay(parameters: Ros2Parameters) -> None:
         lambda p: p.undeclare("Speed"),
     ],
 )
-def test_what_is_not_declared_is_named(
+def test_undeclared_parameter_is_named(
     parameters: Ros2Parameters, use: Callable[[Ros2Parameters], None]
 ) -> None:
     with pytest.raises(ParameterError, match=r"/arm: parameter 'Speed' is not declared; declare"):
@@ -148,7 +148,7 @@ def test_what_is_not_declared_is_named(
         use(parameters)
 
 
-def test_changes_are_told(parameters: Ros2Parameters) -> None:
+def test_changes_are_notified(parameters: Ros2Parameters) -> None:
     events: list[ParameterEvent] = []
     handle = parameters.on_change(events.append)
     parameters.declare("a", 1)
@@ -166,7 +166,7 @@ def test_changes_are_told(parameters: Ros2Parameters) -> None:
     assert len(events) == 4
 
 
-def test_changes_made_while_one_is_told_come_after_it(parameters: Ros2Parameters) -> None:
+def test_changes_made_in_a_callback_are_notified_afterwards(parameters: Ros2Parameters) -> None:
     seen: list[Any] = []
     parameters.declare("a", 0)
 
@@ -288,7 +288,7 @@ def test_files_that_do_not_fit(parameters: Ros2Parameters, tmp_path: Path) -> No
         parameters.load(file)
 
 
-def test_nobody_is_called_back_after_closing(parameters: Ros2Parameters) -> None:
+def test_no_callback_runs_after_closing(parameters: Ros2Parameters) -> None:
     events: list[ParameterEvent] = []
     parameters.on_change(events.append)
     parameters.on_set(lambda _: "never")

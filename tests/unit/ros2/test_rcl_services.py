@@ -1,4 +1,4 @@
-"""What every node has: parameters that others reach, its log, simulated time, renamed things."""
+"""The built-in parts of a node: remote parameters, log, simulated time, remapping."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ LOG, CLOCK = "rcl_interfaces/msg/Log", "rosgraph_msgs/msg/Clock"
 
 @pytest.fixture
 def start(url: str) -> Iterator[Callable[..., Ros2Node]]:
-    """Start a node with the built-in services that connect() gives it, told with --ros-args."""
+    """Start a node with the built-in services that connect() gives it, with --ros-args."""
     made: list[Ros2Node] = []
 
     def start(
         *arguments: str, name: str = "robot", namespace: str = "/", own_services: bool = True
     ) -> Ros2Node:
-        told = Arguments.parse(["--ros-args", *arguments])
-        name = told.node_name(name)
-        namespace = told.namespace(name, namespace)
+        parsed = Arguments.parse(["--ros-args", *arguments])
+        name = parsed.node_name(name)
+        namespace = parsed.namespace(name, namespace)
         middleware = SteeredMiddleware(url)
         node = Ros2Node(
-            middleware, "fake://", name, namespace, None, told, own_services=own_services
+            middleware, "fake://", name, namespace, None, parsed, own_services=own_services
         )
         node.fake = middleware
         made.append(node)
@@ -111,7 +111,7 @@ def test_a_callback_that_waits_does_not_hold_up_the_parameters(start, node) -> N
     release.set()
 
 
-def test_values_from_afar_are_validated(start, node) -> None:
+def test_remotely_set_values_are_validated(start, node) -> None:
     robot = start()
     robot.parameters.declare("a", 1)
     robot.parameters.on_set(lambda values: "too much" if values["a"] > 5 else "")
@@ -249,17 +249,17 @@ def test_the_librarys_own_loggers_have_levels_too(start) -> None:
 def test_logs_can_be_switched_off(start, node, caplog, eventually) -> None:
     robot = start("--disable-rosout-logs", "--disable-stdout-logs")
     messages = received(node, "/rosout", LOG)
-    robot.logger.error("nobody hears")
+    robot.logger.error("not published")
     eventually(lambda: node.logger.error("of another node") or messages)
     assert {message.msg for message in messages} == {"of another node"}
-    assert "nobody hears" not in caplog.text
+    assert "not published" not in caplog.text
     assert not [writer for writer in robot.fake.writers if writer.info.name == "/rosout"]
 
 
 # -- simulated time ----------------------------------------------------------------------------
 
 
-def test_time_is_simulated_from_the_start_or_from_afar(start, node, eventually) -> None:
+def test_time_is_simulated_from_the_start_or_switched_remotely(start, node, eventually) -> None:
     robot = start("-p", "use_sim_time:=true")
     assert robot.clock.is_simulated
     assert robot.now() == Time(0)
@@ -389,8 +389,8 @@ def test_impossible_transitions_are_explained(node, camera) -> None:
 
 
 def test_a_node_without_lifecycle_is_named(node) -> None:
-    client = node.create_lifecycle_client("/nobody")
-    with pytest.raises(ServiceUnavailableError, match="/nobody/get_available_transitions"):
+    client = node.create_lifecycle_client("/unmanaged")
+    with pytest.raises(ServiceUnavailableError, match="/unmanaged/get_available_transitions"):
         client.activate(timeout=0.05)
 
 

@@ -31,7 +31,7 @@ def accepted(*samples):
         "each twice",
         "history again",
         "all again",
-        "late ones are no repeats",
+        "late ones are not repeats",
         "late ones once",
         "joining late",
         "older than the first one seen",
@@ -58,7 +58,7 @@ def test_a_publisher_that_does_not_count_is_judged_by_its_time_stamps():
     assert accepted((A, 0, 1), (A, 0, 2), (A, 0, 2)) == [(A, 0, 1), (A, 0, 2)]
 
 
-def test_a_clock_set_back_is_no_repeat():
+def test_clock_set_back_does_not_count_as_repeat():
     samples = [(A, 1, 100), (A, 2, 50), (A, 3, 51)]
     assert accepted(*samples) == samples
 

@@ -220,7 +220,7 @@ def test_log_levels() -> None:
             parse("--log-level", bad)
 
 
-def test_where_the_log_goes() -> None:
+def test_log_output_is_switched_by_arguments() -> None:
     assert (parse().rosout, parse().stdout) == (True, True)
     arguments = parse("--disable-rosout-logs", "--disable-stdout-logs")
     assert (arguments.rosout, arguments.stdout) == (False, False)
@@ -260,6 +260,6 @@ def test_bad_lines_are_named(line: list[str], message: str) -> None:
 
 
 @pytest.mark.parametrize("arguments", ["--ros-args", [1], b"x", 7, iter(["--ros-args"])])
-def test_a_text_is_no_list_of_arguments(arguments: Any) -> None:
+def test_arguments_of_another_type_are_refused(arguments: Any) -> None:
     with pytest.raises(RosArgumentError, match="must be a list of texts"):
         Arguments.parse(arguments)

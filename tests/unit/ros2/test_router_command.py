@@ -41,7 +41,7 @@ def routers(monkeypatch):
         (["--open"], "tcp/[::]:7447", "zenoh://[::1]:7447", True),
     ],
 )
-def test_where_it_listens_is_printed_and_warned_about(
+def test_listening_address_is_printed_and_open_ones_are_warned_of(
     routers, capsys, arguments, listen, url, warned
 ):
     assert main(["router", *arguments]) == 0
@@ -51,6 +51,6 @@ def test_where_it_listens_is_printed_and_warned_about(
     assert ("open to the network" in shown.err) is warned
 
 
-def test_an_address_that_is_none_is_refused(routers, capsys):
+def test_invalid_address_is_refused(routers, capsys):
     assert main(["router", "--listen", "7447"]) == 1
     assert "listen: expected an address such as tcp/127.0.0.1:7447" in capsys.readouterr().err

@@ -79,7 +79,7 @@ def test_calls_in_flight_are_answered_in_any_order(client, requester):
     assert client.pending == 8
     for number in range(8, 0, -1):
         requester.reply(number, answer(number))
-    requester.reply(7, answer(0))  # twice, and one that nobody asked for
+    requester.reply(7, answer(0))  # twice, and one that was not requested
     requester.reply(99, answer(0))
     assert [call.result(0).sum for call in calls] == list(range(1, 9))
     assert client.pending == 0
@@ -93,7 +93,7 @@ def test_eight_requests_are_open_at_a_time_and_the_others_follow_in_order(client
     assert calls[10].cancel()
     requester.reply(3, answer())
     assert len(requester.sent) == 9
-    calls[0].cancel()  # its place is free: nobody waits for the answer any more
+    calls[0].cancel()  # frees its slot
     assert len(requester.sent) == 10
     for number in range(1, 20):
         requester.reply(number, answer(number))
@@ -214,7 +214,7 @@ def test_no_reply_overtakes_one_that_waited(monkeypatch):
     assert pacer.on_reply(b"w")
 
 
-def test_the_middleware_is_told_how_long_a_reply_is_of_use(client, requester):
+def test_middleware_receives_the_timeout_of_a_call(client, requester):
     requester.linked = True
     client.call_async(timeout=5)
     client.call_async(timeout=None)
@@ -253,7 +253,7 @@ def test_an_error_in_place_of_a_reply(client, requester):
 
 
 @pytest.mark.parametrize(
-    ("data", "told"),
+    ("data", "reason"),
     [
         (b"", "ADD_Response"),
         (b"\0\1\0\0abc", "at byte 4"),
@@ -261,13 +261,13 @@ def test_an_error_in_place_of_a_reply(client, requester):
         (b"\7\7\0\0" + bytes(8), "ADD_Response"),
     ],
 )
-def test_a_reply_that_cannot_be_decoded(client, requester, middleware, data, told):
+def test_a_reply_that_cannot_be_decoded(client, requester, middleware, data, reason):
     requester.linked = True
     middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01)
     call = client.call_async()
     requester.reply(1, data)
-    told = told.replace("ADD", ADD)
-    with pytest.raises(rosglass.ServiceError, match=told) as caught:
+    reason = reason.replace("ADD", ADD)
+    with pytest.raises(rosglass.ServiceError, match=reason) as caught:
         call.result(0)
     assert "/robot answered the call of /add with bytes that are no" in str(caught.value)
 
@@ -287,8 +287,10 @@ def test_calls_end_soon_when_their_server_is_gone(client, requester, middleware,
     key = middleware.appear(SERVER, "/add", ADD, rosglass.load(ADD).rihs01, gid=b"1" * 16)
     call = client.call_async(timeout=60)
     middleware.graph.remove(key)
-    told = "server of /add went away before it answered the request sent .* may have carried it out"
-    with pytest.raises(rosglass.ConnectionLostError, match=told):
+    reason = (
+        "server of /add went away before it answered the request sent .* may have carried it out"
+    )
+    with pytest.raises(rosglass.ConnectionLostError, match=reason):
         call.result(30)
 
 
@@ -342,7 +344,7 @@ def test_patient_calls_wait_for_their_server_to_be_back(node, middleware, monkey
 
 
 @pytest.mark.parametrize("reason", [SERVER_LEFT, CALL_DROPPED])
-def test_a_middleware_that_knows_that_nobody_will_answer(client, requester, reason):
+def test_call_ends_when_the_middleware_reports_a_lost_server(client, requester, reason):
     requester.linked = True
     call = client.call_async()
     requester.reply(1, None, reason)
@@ -379,7 +381,7 @@ def test_a_middleware_that_cannot_send(client, requester, caplog):
 # -- types ---------------------------------------------------------------------------------------
 
 
-def test_a_type_that_nobody_has_is_named(node, middleware, eventually):
+def test_unavailable_type_is_named(node, middleware, eventually):
     client = node.create_service_client("/x")
     middleware.appear(SERVER, "/x", "nowhere_msgs/srv/Nothing")
     eventually(
@@ -401,22 +403,22 @@ def test_several_types_of_one_service_are_named(node, middleware, eventually):
 def test_a_server_with_another_type_is_named(client, middleware, caplog, eventually):
     middleware.requesters[0].linked = True
     middleware.appear(SERVER, "/add", TRIGGER)
-    told = f"/robot offers {TRIGGER} here, not {ADD}: it cannot be called"
-    assert client.problem == told
+    problem = f"/robot offers {TRIGGER} here, not {ADD}: it cannot be called"
+    assert client.problem == problem
     assert not client.ready
-    with pytest.raises(rosglass.ServiceUnavailableError, match=told):
+    with pytest.raises(rosglass.ServiceUnavailableError, match=problem):
         client.call(timeout=0.01)
     assert middleware.requesters[0].sent == []
-    eventually(lambda: caplog.text.count(told) == 1)
+    eventually(lambda: caplog.text.count(problem) == 1)
 
 
 def test_a_server_with_another_definition_is_named(client, middleware, eventually):
     middleware.requesters[0].linked = True
     middleware.appear(SERVER, "/add", ADD, OTHER_HASH)
-    told = (
+    problem = (
         f"/robot has {ADD}, which cannot be used: no definition of {ADD} has the hash {OTHER_HASH}"
     )
-    eventually(lambda: told in client.problem)
+    eventually(lambda: problem in client.problem)
     assert not client.ready
 
 
@@ -454,16 +456,16 @@ def test_the_version_that_the_server_announces_is_taken(middleware, tmp_path, ev
 def test_several_servers_are_named_and_called(client, connect, eventually, caplog):
     for name in ("one", "two"):
         connect(name).create_service_server("/add", ADD, add)
-    told = "/one, /two all offer /add: each executes every request"
-    eventually(lambda: told in client.problem)
+    warning = "/one, /two all offer /add: each executes every request"
+    eventually(lambda: warning in client.problem)
     assert client.call({"a": 1}).sum == 1
-    eventually(lambda: caplog.text.count(told) == 1)
+    eventually(lambda: caplog.text.count(warning) == 1)
 
 
 # -- readiness -----------------------------------------------------------------------------------
 
 
-def test_a_change_that_only_the_middleware_sees_is_told(client, requester, eventually):
+def test_change_that_only_the_middleware_sees_is_notified(client, requester, eventually):
     changes = []
     client.on_ready_change(changes.append)
     requester.linked = True
@@ -487,13 +489,13 @@ def test_giving_up_in_asyncio_cancels_the_call(client, requester, eventually):
 
 def test_threads_that_everything_waits_for_must_not_wait(node, robot, client, eventually):
     refused = []
-    told = "this callback runs in a thread that receives .* take call_async"
+    reason = "this callback runs in a thread that receives .* take call_async"
 
     def wait(*_):
-        with pytest.raises(rosglass.UnsupportedError, match=f"/add: {told}"):
+        with pytest.raises(rosglass.UnsupportedError, match=f"/add: {reason}"):
             client.call(timeout=60)
         assert client.wait_for_server(60)  # it is there
-        with pytest.raises(rosglass.UnsupportedError, match=f"/nothing: {told}"):
+        with pytest.raises(rosglass.UnsupportedError, match=f"/nothing: {reason}"):
             nothing.wait_for_server(60)
         refused.append(threading.current_thread())
 
@@ -522,7 +524,7 @@ def test_ctrl_c_gives_the_call_up(client, requester, monkeypatch):
 # -- serving -------------------------------------------------------------------------------------
 
 
-def test_rubbish_is_named_once_per_client_and_disturbs_nobody(robot, client, caplog):
+def test_undecodable_requests_are_logged_once_per_client(robot, client, caplog):
     robot.create_service_server("/add", ADD, add)
     replier = robot.fake.repliers[0]
     for _ in range(3):
@@ -531,9 +533,9 @@ def test_rubbish_is_named_once_per_client_and_disturbs_nobody(robot, client, cap
     for number in range(200):
         replier.handle_request(RequestId(number.to_bytes(16, "big"), 1), b"")
     assert client.call({"a": 1}, timeout=30).sum == 1
-    told = [r.getMessage() for r in caplog.records if "refusing requests" in r.getMessage()]
-    assert len(told) == 100
-    assert f"the request is not a {ADD}_Request: " in told[0]
+    messages = [r.getMessage() for r in caplog.records if "refusing requests" in r.getMessage()]
+    assert len(messages) == 100
+    assert f"the request is not a {ADD}_Request: " in messages[0]
     assert len(replier.failures) == 206
 
 
@@ -552,7 +554,7 @@ def test_a_request_may_come_while_the_server_is_made(robot, monkeypatch):
     assert [request.sequence for request, _ in robot.fake.repliers[0].replies] == [1]
 
 
-def test_a_client_gone_wild_cannot_fill_the_memory(robot, middleware, client, caplog):
+def test_flooding_client_cannot_fill_the_memory(robot, middleware, client, caplog):
     release = threading.Event()
     robot.create_service_server("/add", ADD, lambda _: release.wait(30) and None)
     replier = robot.fake.repliers[0]
@@ -585,8 +587,8 @@ def test_another_version_of_the_response_alone_is_named_and_taken(middleware, ev
         middleware.graph.put_endpoint("s", server)
         eventually(lambda: f"/robot has {ADD}, which cannot be used" in client.problem)
         assert f"has the hash {theirs.response.rihs01}" in client.problem
-        told = f"(of its response: {theirs.response.rihs01}, ours is {ours.response.rihs01})"
-        assert f"another definition of {ADD} {told}: it cannot be called" in fixed.problem
+        hashes = f"(of its response: {theirs.response.rihs01}, ours is {ours.response.rihs01})"
+        assert f"another definition of {ADD} {hashes}: it cannot be called" in fixed.problem
         assert not client.ready
         library.add_version(theirs.definition)
         eventually(lambda: client.type.rihs01 == theirs.rihs01)

@@ -1,4 +1,4 @@
-"""Topics beyond sending and receiving: who matches, what went wrong, what nobody can decode."""
+"""Topics beyond sending and receiving: matching, problems, messages that cannot be decoded."""
 
 from __future__ import annotations
 
@@ -71,9 +71,9 @@ def asker(middleware):
 def test_a_publisher_names_subscriptions_of_other_definitions(node, asker, eventually):
     publisher = node.create_publisher("/t", STRING)
     asker(type_hash=OTHER, node="other")
-    told = eventually(lambda: publisher.problem)
+    problem = eventually(lambda: publisher.problem)
     definition = f"/other has another definition of {STRING} ({OTHER}; ours is {hash_of(STRING)})"
-    assert f"{definition}: it receives nothing from us" in told
+    assert f"{definition}: it receives nothing from us" in problem
     assert publisher.subscription_count() == 0
 
 
@@ -83,13 +83,13 @@ def test_subscriptions_with_another_definition_receive_us_where_names_match(
     middleware.matches_hashes = False
     publisher = node.create_publisher("/t", STRING)
     asker(type_hash=OTHER, node="other")
-    told = eventually(lambda: publisher.problem)
-    assert "it receives our messages all the same" in told
-    assert "receives nothing" not in told
+    problem = eventually(lambda: publisher.problem)
+    assert "it receives our messages all the same" in problem
+    assert "receives nothing" not in problem
     assert publisher.subscription_count() == 1
 
 
-def test_a_subscription_says_who_left_and_when_the_connection_is_lost(
+def test_subscription_names_the_publisher_that_left_and_a_lost_connection(
     node, middleware, robot, eventually, caplog
 ):
     subscription = node.create_subscription("/t", STRING)
@@ -99,13 +99,13 @@ def test_a_subscription_says_who_left_and_when_the_connection_is_lost(
     key = robot()
     assert came.wait(30)
     middleware.graph.remove(key)
-    told = eventually(lambda: subscription.problem)
-    assert re.fullmatch(r"it has had no publisher since \d\d:\d\d:\d\d, when /robot left", told)
+    problem = eventually(lambda: subscription.problem)
+    assert re.fullmatch(r"it has had no publisher since \d\d:\d\d:\d\d, when /robot left", problem)
     assert [r for r in caplog.records if r.levelname == "WARNING"] == []
     middleware.become(ConnectionState.LOST, "connection to the router lost")
-    eventually(lambda: subscription.problem == f"{told}; connection to the router lost")
+    eventually(lambda: subscription.problem == f"{problem}; connection to the router lost")
     middleware.become(ConnectionState.CONNECTED)
-    eventually(lambda: subscription.problem == told)
+    eventually(lambda: subscription.problem == problem)
     robot()
     eventually(lambda: not subscription.problem)
     middleware.become(ConnectionState.LOST, "connection to the router lost")
@@ -151,7 +151,7 @@ def test_a_publisher_that_comes_later_with_less_is_received_all_the_same(
     assert subscription.publisher_count() == 2
     second.receive(HELLO)
     assert subscription.wait(30).data == HELLO
-    # What is stronger comes only after nobody was there, as nothing is lost by it then.
+    # A stricter QoS is requested only while no publisher is matched, so that nothing is lost.
     for key in keys:
         middleware.graph.remove(key)
     eventually(lambda: subscription.publisher_count() == 0)
@@ -218,7 +218,7 @@ def test_the_middlewares_word_on_liveliness_is_believed(node, middleware, robot,
     eventually(lambda: [e.change for e in events] == [1, -1])
 
 
-def test_samples_that_never_come_are_counted_and_told(node, middleware, eventually):
+def test_lost_samples_are_counted_and_notified(node, middleware, eventually):
     subscription = node.create_subscription("/t", STRING)
     events = []
     subscription.on_samples_lost(events.append)
@@ -236,7 +236,7 @@ def test_a_watchdog_counts_all_that_it_overslept(monkeypatch):
     monkeypatch.setattr(timers_module, "time", SimpleNamespace(monotonic=lambda: now[0]))
 
     class Late:
-        """Timers that run the job when told to."""
+        """Timers that run the job when the test says so."""
 
         def after(self, delay, job):
             self.job = job
@@ -258,7 +258,7 @@ def test_a_watchdog_counts_all_that_it_overslept(monkeypatch):
 # -- who is waiting ------------------------------------------------------------------------------
 
 
-def test_samples_that_nobody_waits_for_are_fetched_when_somebody_looks(node, middleware):
+def test_samples_are_fetched_on_demand_without_a_waiting_reader(node, middleware):
     subscription = node.create_subscription("/t", STRING)
     (reader,) = middleware.readers
     assert not reader.eager
@@ -270,9 +270,7 @@ def test_samples_that_nobody_waits_for_are_fetched_when_somebody_looks(node, mid
     assert reader.waiting == []
 
 
-def test_who_waits_is_told_at_once_and_who_waited_last_not_for_ever(
-    node, middleware, eventually, monkeypatch
-):
+def test_waiting_makes_the_reader_eager_for_a_while(node, middleware, eventually, monkeypatch):
     monkeypatch.setattr("rosglass.comm.subscription._AWAITED_S", 0.0)
     subscription = node.create_subscription("/t", STRING)
     (reader,) = middleware.readers
@@ -311,12 +309,12 @@ def test_patient_callbacks_get_samples_late_and_may_look_themselves(node, middle
     assert reader.eager
 
 
-# -- bytes that nobody understands ---------------------------------------------------------------
+# -- bytes that cannot be decoded ---------------------------------------------------------------
 
 
 @pytest.fixture
 def lost_node(middleware):
-    """A node with a library of its own, and nobody who could be asked for definitions."""
+    """A node with a library of its own, and no other node to fetch definitions from."""
     library = Library()
     made = Ros2Node(middleware, "fake://", "cockpit", library=library)
     made.library = library
@@ -325,7 +323,7 @@ def lost_node(middleware):
     made.close()
 
 
-def test_what_cannot_be_decoded_comes_as_bytes_with_the_reason(
+def test_undecodable_message_is_handed_on_as_bytes_with_the_reason(
     lost_node, middleware, robot, eventually
 ):
     robot(type_name=SECRET, type_hash=HASH)
@@ -461,9 +459,7 @@ def test_a_robot_that_comes_back_with_another_version_is_understood(
     assert subscription.problem == ""
 
 
-def test_a_version_that_nobody_announced_is_understood_when_it_comes(
-    versions, middleware, eventually
-):
+def test_unannounced_version_is_decoded_when_it_arrives(versions, middleware, eventually):
     node, ours, theirs = versions
     subscription = node.create_subscription("/t", "pkg/msg/T")
     assert subscription.type == ours
@@ -475,7 +471,7 @@ def test_a_version_that_nobody_announced_is_understood_when_it_comes(
     assert eventually(arrived).message().old == 2
 
 
-def test_a_version_that_nobody_defines_comes_as_bytes_beside_the_others(
+def test_undefined_version_is_handed_on_as_bytes_beside_the_others(
     versions, middleware, eventually
 ):
     node, ours, _ = versions
@@ -506,7 +502,7 @@ def test_a_name_that_only_the_robot_knows_is_enough_once_it_is_seen(
 # -- ourselves -----------------------------------------------------------------------------------
 
 
-def test_what_the_node_publishes_itself_can_be_left_out(node, middleware):
+def test_own_messages_can_be_ignored(node, middleware):
     subscription = node.create_subscription("/t", STRING, ignore_local=True)
     everything = node.create_subscription("/t", STRING)
     publisher = node.create_publisher("/t", STRING)

@@ -1,4 +1,4 @@
-"""What a node tells others about types: ~/get_type_description."""
+"""Type descriptions that a node serves: ~/get_type_description."""
 
 from __future__ import annotations
 
@@ -87,10 +87,10 @@ def test_by_name_and_by_hash(name: str, ask: Callable[..., Any], library: Librar
         answer = ask(name, type_hash)
         assert answer.successful
         assert answer.failure_reason == ""
-        told = answer.type_description.to_dict()
-        assert told == type_description(definition)
+        description = answer.type_description.to_dict()
+        assert description == type_description(definition)
         sources = [source.to_dict() for source in answer.type_sources]
-        found = add_type_sources(parse_type_description(told), sources, verbatim=True)
+        found = add_type_sources(parse_type_description(description), sources, verbatim=True)
         assert rihs01(found) == rihs01(definition)
 
 
@@ -165,7 +165,7 @@ def test_closing(ask: Callable[..., Any]) -> None:
         TypeDescriptionServer(core_of(client.node)).open()
 
 
-def test_a_bare_library_is_no_obstacle(url: str, connect: Callable[..., Any]) -> None:
+def test_bare_library_does_not_prevent_the_service(url: str, connect: Callable[..., Any]) -> None:
     """The node's own services need types that its library may not have."""
     client = connect("asker").create_service_client("/robot/get_type_description", TRIGGER)
     bare = Library(MemoryProvider())

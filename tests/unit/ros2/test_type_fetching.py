@@ -211,7 +211,7 @@ def test_a_node_that_appears_late_has_time_to_show_its_service(
     assert promise.result().rihs01 == hash_of(STATE)
 
 
-def test_what_failed_before_says_nothing_of_a_new_node(join: Callable[..., Ros2Node]) -> None:
+def test_earlier_failure_does_not_apply_to_a_new_node(join: Callable[..., Ros2Node]) -> None:
     library = robot_library()
     user = join("cockpit", serves=False)
     subscription = user.create_subscription("/state")
@@ -233,7 +233,7 @@ def test_local_types_are_taken_when_the_robot_has_the_same(join: Callable[..., R
     local = rosglass.load("std_msgs/msg/String", library=library)
     use(user, "std_msgs/msg/String", local.rihs01, "robot")
     assert user.fetch_type("std_msgs/String") is local
-    # Nobody uses it: what is known is right, once the graph had time to show.
+    # No node uses it: the local definition is right, once the graph had time to show.
     assert user.fetch_type("std_msgs/msg/Bool").name == "std_msgs/msg/Bool"
 
 
@@ -260,7 +260,7 @@ def test_several_versions_must_be_chosen(join: Callable[..., Ros2Node]) -> None:
     assert user.fetch_type(STATE, hash=hash_of(STATE, new)).rihs01 == hash_of(STATE, new)
 
 
-def test_nobody_uses_it(join: Callable[..., Ros2Node]) -> None:
+def test_unused_type_is_not_found(join: Callable[..., Ros2Node]) -> None:
     user = join("cockpit", serves=False)
     with pytest.raises(TypeNotFoundError, match=r"within 0\.2 s: no node in the graph uses it"):
         user.fetch_type(STATE, timeout=0.2)
@@ -312,7 +312,7 @@ def test_a_publisher_without_hash_is_named(
         lambda: "announces no type hash" in subscription.problem and subscription.problem
     )
     assert "/talker announces no type hash and sends no definitions" in problem
-    # Another node with a hash tells what it most likely is.
+    # The hash of another node shows the most likely definition.
     join("robot", robot_library())
     use(user, STATE, hash_of(STATE), "robot")
     eventually(lambda: user.fake.readers)
@@ -328,20 +328,20 @@ def test_the_second_node_is_asked_when_the_first_fails(join: Callable[..., Ros2N
     assert user.fetch_type(STATE).rihs01 == hash_of(STATE)
 
 
-def test_what_nodes_answer_is_told(join: Callable[..., Ros2Node]) -> None:
+def test_answers_of_nodes_are_reported(join: Callable[..., Ros2Node]) -> None:
     answer(join("first", serves=False), lambda _: NO)
     user = join("cockpit", serves=False)
     use(user, STATE, hash_of(STATE), "first")
     use(user, STATE, hash_of(STATE), "second")
     with pytest.raises(TypeNotFoundError) as caught:
         user.fetch_type(STATE)
-    told = str(caught.value)
-    assert "/first: it answered: Type not in use  [31m;" in told  # nothing that moves a cursor
-    assert "/second has no get_type_description service" in told
+    message = str(caught.value)
+    assert "/first: it answered: Type not in use  [31m;" in message  # nothing that moves a cursor
+    assert "/second has no get_type_description service" in message
 
 
 def test_why_dds_nodes_do_not_know_their_services(join: Callable[..., Ros2Node]) -> None:
-    """rcl looks types up by the service's own hash, which nobody announces over DDS."""
+    """rcl looks types up by the service's own hash, which is not announced over DDS."""
     answer(join("robot", serves=False), lambda _: NO)
     user = join("cockpit", serves=False)
     use(user, ASK, hash_of(ASK + "_Request"), "robot", EndpointKind.SERVICE_SERVER)
@@ -360,12 +360,12 @@ def test_answers_as_rcl_gives_them(join: Callable[..., Ros2Node]) -> None:
     types = Types(robot_library("uint8 IDLE=0\t# \u00e4\nuint8 state 3\nmy_msgs/Part[] parts"), "")
     known = {}
     for name in (STATE, ASK):
-        told = told_by(types.library, name)
-        for source in told["type_sources"]:
+        described = description_of(types.library, name)
+        for source in described["type_sources"]:
             text = source["raw_file_contents"]
             lines = (str(line.encode())[2:-1] for line in text.splitlines())
             source["raw_file_contents"] = "\n".join(lines)[: len(text)]
-        known[hash_of(name, types.library)] = {**told, "extra_information": []}
+        known[hash_of(name, types.library)] = {**described, "extra_information": []}
     robot = join("robot", serves=False)
     answer(robot, lambda request: known.get(request.type_hash, NO))
     user = join("cockpit", serves=False)
@@ -379,7 +379,7 @@ def test_answers_as_rcl_gives_them(join: Callable[..., Ros2Node]) -> None:
     assert user.fetch_type(ASK).rihs01 == hash_of(ASK)
 
 
-def test_a_node_that_does_not_answer_holds_nobody_up(join: Callable[..., Ros2Node]) -> None:
+def test_silent_node_does_not_block_the_others(join: Callable[..., Ros2Node]) -> None:
     silent = join("a_silent", serves=False)
     answer(silent, lambda _: rosglass.comm.Promise(cancellable=True))
     join("second", robot_library())
@@ -396,29 +396,31 @@ def test_a_node_that_does_not_answer_holds_nobody_up(join: Callable[..., Ros2Nod
         user.fetch_type(STATE, hash=other, timeout=0.3)
 
 
-def told_by(library: Library, name: str = STATE) -> dict[str, Any]:
+def description_of(library: Library, name: str = STATE) -> dict[str, Any]:
     return describe(Types(library, "fake://"), name, "", sources=True)
 
 
 def spoiled() -> dict[str, Any]:
-    told = told_by(robot_library())
-    told["type_description"]["type_description"]["fields"][0]["type"]["type_id"] = 95
-    return told
+    described = description_of(robot_library())
+    described["type_description"]["type_description"]["fields"][0]["type"]["type_id"] = 95
+    return described
 
 
 def huge() -> dict[str, Any]:
-    told = told_by(robot_library())
-    told["type_sources"] = [dict(told["type_sources"][0], raw_file_contents="x" * (9 << 20))]
-    return told
+    described = description_of(robot_library())
+    described["type_sources"] = [
+        dict(described["type_sources"][0], raw_file_contents="x" * (9 << 20))
+    ]
+    return described
 
 
 LIES: dict[str, tuple[Callable[[], dict[str, Any]], str]] = {
     "another definition": (
-        lambda: told_by(robot_library("int64 state")),
+        lambda: description_of(robot_library("int64 state")),
         f"/liar: .* sent a definition of {STATE} with the hash .* where .* is announced",
     ),
     "another type": (
-        lambda: told_by(robot_library(), "my_msgs/msg/Part"),
+        lambda: description_of(robot_library(), "my_msgs/msg/Part"),
         "/liar: .* sent a definition of my_msgs/msg/Part .* where .* is announced",
     ),
     "rubbish": (spoiled, "/liar: .* field state has type id 95, which means nothing"),
@@ -460,7 +462,7 @@ def test_liars_are_not_believed(
     assert subscription.type.constants["IDLE"] == 0
 
 
-def test_a_node_that_is_killed_meanwhile(
+def test_node_that_is_killed_while_it_is_asked_is_replaced(
     join: Callable[..., Ros2Node], eventually: Callable[..., Any]
 ) -> None:
     robot = join("robot", serves=False)
@@ -474,7 +476,7 @@ def test_a_node_that_is_killed_meanwhile(
     robot.close()
     join("robot", robot_library())
     use(user, STATE, hash_of(STATE), "robot")
-    # Nobody may have answered for a second meanwhile: then it was opaque first.
+    # Without an answer for a second, it was opaque first.
     eventually(lambda: not isinstance(subscription.type, OpaqueType | None))
     eventually(lambda: not subscription.problem, lambda: subscription.problem)
 
@@ -511,7 +513,7 @@ def test_giving_up_asks_no_more(
     assert [request.type_name for request in asked] == [ASK]
 
 
-def test_the_cache_answers_when_nobody_else_does(
+def test_cache_serves_when_no_node_answers(
     join: Callable[..., Ros2Node],
     eventually: Callable[..., Any],
     monkeypatch: pytest.MonkeyPatch,
@@ -579,7 +581,7 @@ def test_a_message_that_is_a_service_is_not_asked_for_for_ever(
     assert len(rounds) < 20
 
 
-def test_whoever_asks_at_any_time_gets_an_answer(join: Callable[..., Ros2Node]) -> None:
+def test_concurrent_requests_are_all_answered(join: Callable[..., Ros2Node]) -> None:
     """Promises come from any thread, while others of the same type are kept and handed over."""
     robot = join("robot", robot_library())
     robot.create_publisher("/state", STATE)

@@ -69,7 +69,7 @@ def test_samples_that_waited_in_a_program_that_stalled_are_received_late(monkeyp
 
 
 @pytest.mark.parametrize("jump", JUMPS)
-def test_the_lifespan_of_latched_samples_is_none_of_the_system_clock(monkeypatch, jump):
+def test_lifespan_of_latched_samples_does_not_follow_the_system_clock(monkeypatch, jump):
     qos = QoS(durability=Durability.TRANSIENT_LOCAL, lifespan=Duration.from_seconds(600))
     node, clock = NodeName("/", "robot"), time.time_ns
     end = EndpointInfo(EndpointKind.PUBLISHER, "/map", "std_msgs/msg/String", node, qos)

@@ -115,7 +115,7 @@ def test_a_bad_configuration_file_is_named(tmp_path, content):
     assert str(file) in str(error.value)
 
 
-def test_a_router_listens_where_it_is_told_and_nowhere_else():
+def test_router_listens_only_where_configured():
     config = router_config("tcp/127.0.0.1:7447")
     assert setting(config, "mode") == "router"
     assert setting(config, "listen/endpoints") == ["tcp/127.0.0.1:7447"]

@@ -97,7 +97,7 @@ def test_tokens_of_other_programs_and_versions_are_understood(change, attribute,
 
 
 @pytest.mark.parametrize(
-    ("key", "told"),
+    ("key", "message"),
     [
         ("", "at least 9 parts"),
         ("0/chatter/x", "at least 9 parts"),
@@ -109,8 +109,8 @@ def test_tokens_of_other_programs_and_versions_are_understood(change, attribute,
         (SEEN.replace(",10:", ",ten:"), "invalid literal"),
     ],
 )
-def test_malformed_tokens_are_refused(key, told):
-    with pytest.raises(ValueError, match=told):
+def test_malformed_tokens_are_refused(key, message):
+    with pytest.raises(ValueError, match=message):
         Token.parse(key)
 
 
@@ -160,7 +160,7 @@ def test_attachments():
 
 
 @pytest.mark.parametrize("data", [b"", b"x" * 33, bytes(32), bytes(34), b"sequence_number"])
-def test_foreign_attachments_tell_nothing(data):
+def test_foreign_attachments_are_ignored(data):
     assert Attachment.decode(data) == NO_ATTACHMENT
 
 

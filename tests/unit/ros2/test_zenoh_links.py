@@ -12,7 +12,7 @@ from rosglass.wires.zenoh.session import Heartbeat, limit_silence  # noqa: E402
 
 
 class FakeSession:
-    """Answers questions for tokens when told to; knows links."""
+    """Answers liveliness queries when the test says so; knows links."""
 
     def __init__(self, links=()):
         self.questions = []
@@ -31,7 +31,7 @@ class FakeSession:
 
 
 class FakeChannel:
-    """What a question returns: open, ended, or with an error in it."""
+    """The reply channel of a query: open, ended, or with an error in it."""
 
     state = "open"
 

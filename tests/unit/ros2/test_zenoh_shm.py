@@ -32,7 +32,7 @@ def test_bigger_payloads_get_a_bigger_pool(monkeypatch):
     assert [payload.to_bytes()[:1] for payload in kept] == [b"\x01", b"\x02", b"\x03", b"\x08"]
 
 
-def test_a_full_pool_is_no_error(monkeypatch):
+def test_full_pool_does_not_raise(monkeypatch):
     monkeypatch.setattr(endpoints, "_MIN_POOL_SIZE", 4 * BIG)
     monkeypatch.setattr(endpoints, "_MIN_POOL_PAYLOADS", 2)
     shared = SharedMemory()
@@ -43,7 +43,7 @@ def test_a_full_pool_is_no_error(monkeypatch):
     assert shared.place((b"x" * BIG,)) is not None
 
 
-def test_a_machine_without_room_is_told_once(monkeypatch, caplog):
+def test_machine_without_shared_memory_is_logged_once(monkeypatch, caplog):
     monkeypatch.setattr(endpoints, "_free", lambda: 1_000_000)
     shared = SharedMemory()
     with caplog.at_level(logging.WARNING):
@@ -52,7 +52,7 @@ def test_a_machine_without_room_is_told_once(monkeypatch, caplog):
     assert "no shared memory for messages of 100000 bytes" in caplog.text
 
 
-def test_a_pool_is_no_bigger_than_what_the_user_may_lock(monkeypatch, caplog):
+def test_pool_is_not_larger_than_the_user_may_lock(monkeypatch, caplog):
     monkeypatch.setattr(endpoints, "lockable_bytes", lambda: 6 * 2**20)
     shared = SharedMemory()
     assert shared.place((b"x" * 2**20,)) is not None
