@@ -91,7 +91,7 @@ def leaves() -> dict[str, argparse.ArgumentParser]:
     return found
 
 
-#: Whose arguments need no explanation: their values are listed.
+#: Commands whose arguments need no explanation: their values are listed.
 PLAIN = {"completion"}
 
 
@@ -124,7 +124,7 @@ def test_wrong_usage_exits_with_2(arguments: list[str], capsys: pytest.CaptureFi
 
 
 @pytest.mark.parametrize(
-    ("line", "usage", "told"),
+    ("line", "usage", "unrecognized"),
     [
         ("rviz --overly x", "rosglass rviz", "--overly; did you mean --overlay?"),
         ("run a.qml --wach=yes", "rosglass run", "--wach=yes; did you mean --watch?"),
@@ -135,13 +135,13 @@ def test_wrong_usage_exits_with_2(arguments: list[str], capsys: pytest.CaptureFi
     ],
 )
 def test_misspelt_options_are_explained_by_their_command(
-    line: str, usage: str, told: str, capsys: pytest.CaptureFixture[str]
+    line: str, usage: str, unrecognized: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit, match="2"):
         main(line.split())
     said = capsys.readouterr().err
     assert said.startswith(f"usage: {usage} ")
-    assert f"{usage}: error: unrecognized arguments: {told}" in said
+    assert f"{usage}: error: unrecognized arguments: {unrecognized}" in said
 
 
 def test_missing_extra_names_the_fix(
@@ -156,7 +156,7 @@ def test_missing_extra_names_the_fix(
 
 
 @pytest.mark.parametrize(
-    ("line", "ours", "told", "rest"),
+    ("line", "ours", "ros_args", "rest"),
     [
         ("run a.qml", "run a.qml", "", ""),
         ("run a.qml -- -x --ros-args", "run a.qml", "", "-x --ros-args"),
@@ -166,9 +166,9 @@ def test_missing_extra_names_the_fix(
     ],
 )
 def test_ros_args_and_the_arguments_of_others_are_set_apart(
-    line: str, ours: str, told: str, rest: str
+    line: str, ours: str, ros_args: str, rest: str
 ) -> None:
-    assert _split(line.split()) == (ours.split(), told.split(), rest.split())
+    assert _split(line.split()) == (ours.split(), ros_args.split(), rest.split())
 
 
 def test_bad_ros_args_are_named(capsys: pytest.CaptureFixture[str]) -> None:
@@ -176,7 +176,7 @@ def test_bad_ros_args_are_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert "rosglass: --ros-args, argument 3: 'a' has no ':='" in capsys.readouterr().err
 
 
-def test_commands_that_are_no_nodes_take_no_ros_args(capsys: pytest.CaptureFixture[str]) -> None:
+def test_commands_without_a_node_take_no_ros_args(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as exit_info:
         main(["router", "--ros-args", "-r", "a:=b"])
     assert exit_info.value.code == 2
@@ -219,7 +219,7 @@ def test_bags_as_in_ros2(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
     assert "none.mcap does not exist" in capsys.readouterr().err
 
 
-def test_values_without_quotes_are_told_apart_from_types() -> None:
+def test_unquoted_values_are_not_taken_for_types() -> None:
     with pytest.raises(rosglass.Error, match="one pair of quotes: 'a: 1'"):
         split_type(["a:", "1"])
 
@@ -245,7 +245,7 @@ def test_output_that_cannot_be_written_is_said() -> None:
 def test_ctrl_c_while_modules_are_loaded_leaves_no_traceback() -> None:
     done = run_python(
         "import sys, signal\n"
-        # Whoever starts the tests in the background may have it ignored.
+        # The test run may ignore it, if it was started in the background.
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "class Finder:\n"
         "    def find_spec(self, name, *_):\n"
@@ -291,14 +291,14 @@ def test_knocking_at_a_router(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not is_loopback("zenoh://10.0.0.1")
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells")
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux lists them")
 def test_interfaces() -> None:
     found = interfaces()
     assert found is not None
     assert [one.name for one in found if one.is_loopback] in ([], ["lo"])
 
 
-def test_ctrl_c_during_an_import_that_tells_it_in_its_own_way() -> None:
+def test_ctrl_c_during_an_import_that_converts_it() -> None:
     done = run_python(
         "import sys\n"
         "from rosglass.cli import main, program\n"
@@ -340,7 +340,7 @@ def test_definitions_from_a_folder(tmp_path: Path) -> None:
         ({"ROS_MASTER_URI": "robot"}, "ros1://"),
     ],
 )
-def test_where_the_simulated_robot_is(
+def test_url_of_the_simulated_robot_follows_the_environment(
     said: dict[str, str], url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("ROSGLASS_URL", "ROS_DISTRO", "ROS_DOMAIN_ID", "ROS_MASTER_URI"):

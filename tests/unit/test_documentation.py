@@ -1,4 +1,4 @@
-"""What the documentation shows for the shell: every command of rosglass and make is accepted."""
+"""Shell commands in the documentation: every command of rosglass and make is accepted."""
 
 from __future__ import annotations
 

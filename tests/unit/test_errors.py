@@ -17,13 +17,13 @@ def test_values_of_any_size_are_shown_in_short(name: str) -> None:
     kind = getattr(errors, name)
     more: tuple[str, ...] = ("is wrong",) if kind is errors.DecodeError else ()
     more = (LONG, "a number") if issubclass(kind, errors.ConversionError) else more
-    told = str(kind(f"/topic: {LONG!r} is no number; give one", *more))
-    assert len(told) < 1000
-    assert "xxx... (10000" in told
+    text = str(kind(f"/topic: {LONG!r} is not a number; give one", *more))
+    assert len(text) < 1000
+    assert "xxx... (10000" in text
     assert isinstance(kind("a", *more), rosglass.Error)
 
 
-def test_what_people_read_stays_as_it_is() -> None:
+def test_readable_text_is_not_shortened() -> None:
     definition = "\n".join(f"float64 field{number} # metres" for number in range(1000))
     text = f"/topic: theirs:\n{definition}"
     assert str(rosglass.TypeNotFoundError(text)) == text
@@ -33,11 +33,11 @@ def test_what_people_read_stays_as_it_is() -> None:
 
 def test_long_lines_and_errors_about_errors() -> None:
     words = "word " * 20_000
-    told = str(rosglass.ServiceError(words))
-    assert told.endswith("... (100000 characters)")
-    assert len(told) < 2100
-    assert str(rosglass.ServiceError(told)) == told
-    assert str(pickle.loads(pickle.dumps(rosglass.ServiceError(told)))) == told
+    text = str(rosglass.ServiceError(words))
+    assert text.endswith("... (100000 characters)")
+    assert len(text) < 2100
+    assert str(rosglass.ServiceError(text)) == text
+    assert str(pickle.loads(pickle.dumps(rosglass.ServiceError(text)))) == text
     assert rosglass.ServiceError(1, "two").args == (1, "two")
 
 

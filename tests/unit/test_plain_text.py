@@ -1,6 +1,6 @@
 """Texts in our interfaces, examples and documentation are plain: robots' are not interpreted.
 
-Qt takes a text that looks like HTML for rich text, fetches its pictures, and shows what it likes.
+Qt takes a text that looks like HTML for rich text, fetches its images, and may show anything.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ CONTROLS = {
     *("Switch", "MenuItem", "Menu", "Action", "ItemDelegate", "CheckDelegate", "SwitchDelegate"),
     *("RadioDelegate", "SwipeDelegate", "ToolTip", "ComboBox", "GroupBox", "Dialog"),
 }
-#: What texts of controls may be made of, besides what is written there: nothing of a robot.
+#: Expressions that texts of controls may contain besides literals: nothing of a robot.
 OURS = {"isOn", "replay.playing", "replay.rate", "modelData.name", "label.text"}
 LITERAL = r'(?:"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\')'
 
@@ -138,5 +138,5 @@ def test_texts_are_plain() -> None:
         ("ComboBox { model: frames; delegate: ItemDelegate { } }", False),
     ],
 )
-def test_what_is_rich_is_found(text: str, wrong: bool) -> None:
+def test_rich_text_is_found(text: str, wrong: bool) -> None:
     assert any(problem(element) for element in elements(text, "a")) == wrong

@@ -1,4 +1,4 @@
-"""Where a camera is that looks at a point; needs no RViz."""
+"""The position of a camera that looks at a point; needs no RViz."""
 
 from __future__ import annotations
 

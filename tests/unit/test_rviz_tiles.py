@@ -1,4 +1,4 @@
-"""Where a picture over RViz's view has something on it."""
+"""The tiles of an interface over RViz's view that are not transparent."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_a_panel_is_one_rectangle_cut_at_the_edge() -> None:
     assert cover(covered_tiles(picture(100, 70)), 100, 70) == []
 
 
-# Other tests may take the processor meanwhile.
+# Other tests may use the processor at the same time.
 @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
 @given(
     st.integers(1, 200),
@@ -121,7 +121,7 @@ def test_coverage_is_kept_up_to_date(
     assert (covered == covered_tiles(now)).all()
 
 
-def test_uncovered_tells_waste_and_what_is_left_out() -> None:
+def test_uncovered_returns_waste_or_none_if_incomplete() -> None:
     tiles = covered_tiles(picture(64, 64, (0, 0, 16, 16)))
     assert uncovered(tiles, [Rect(0, 0, 32, 32)]) == 12
     assert uncovered(tiles, [Rect(16, 0, 32, 32)]) is None

@@ -1,4 +1,4 @@
-"""What `make demo` says on machines where something is missing."""
+"""Messages of `make demo` on machines where something is missing."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_make_sets_up_what_it_needs(checkout: Path, target: str) -> None:
     script = checkout / "scripts/setup.sh"
     script.write_text('echo "asked for $*"; exit 1\n')
     script.chmod(0o755)
-    # `make test` runs this test: what it tells the makes below it is not for this one.
+    # `make test` runs this test: its variables for nested makes are not for this one.
     outside = {name: text for name, text in os.environ.items() if not name.startswith("MAKE")}
     done = subprocess.run(
         ["make", target],
@@ -88,7 +88,7 @@ def test_make_sets_up_what_it_needs(checkout: Path, target: str) -> None:
     assert line.endswith("dev] Error 1")
 
 
-def test_what_the_readme_installs_is_enough_for_the_commands_that_it_shows() -> None:
+def test_extras_installed_by_the_readme_suffice_for_its_commands() -> None:
     project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     (cockpit,) = re.findall(r'^cockpit = \["rosglass\[(.*)\]"\]', project, re.MULTILINE)
     assert {"zenoh", "dds", "qml", "camera", "bags"} <= set(cockpit.split(","))

@@ -1,4 +1,4 @@
-"""What the library warns of, and what nodes log, is seen in programs without a log of their own."""
+"""Warnings and node logs are visible in programs without logging set-up."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ node.close()
     ],
     ids=["nothing configured", "configured", "own handler", "silent"],
 )
-def test_what_a_node_logs_is_seen_once(
+def test_node_log_is_printed_once(
     url: str, arrangement: str, later: str, error: str, info: str, tmp_path: Path
 ) -> None:
     if url == "replay:":

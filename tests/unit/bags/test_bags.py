@@ -83,14 +83,14 @@ def test_a_recording_cut_short_plays_what_it_holds(tmp_path, caplog, cut):
 
 
 @pytest.mark.parametrize("content", [b"", b"nonsense" * 20, b"\x89MCAP0\r\n\x01\x02\x03"])
-def test_what_is_no_mcap_file_is_refused(tmp_path, content):
+def test_invalid_mcap_file_is_refused(tmp_path, content):
     path = tmp_path / "x.mcap"
     path.write_bytes(content)
     with pytest.raises(BagError, match=r"x\.mcap"):
         open_bag(path).close()
 
 
-def test_what_is_no_recording_is_refused(tmp_path):
+def test_path_without_recording_is_refused(tmp_path):
     with pytest.raises(BagError, match="does not exist"):
         open_bag(tmp_path / "none.mcap")
     with pytest.raises(BagError, match="cannot be read as a recording"):

@@ -48,7 +48,7 @@ module lab_msgs {
   };
 };
 """
-#: What only IDL can say: a letter, and a name that .msg does not allow.
+#: A type that only IDL can define: with a char field, and a name that .msg does not allow.
 DRUM = """
 module lab_msgs { module msg {
     typedef double double__3[3];
@@ -135,7 +135,7 @@ def test_an_idl_type_is_recorded_as_msg_which_all_read(tmp_path, library, name, 
     assert (first.stamp.sec, first.rope) == (7, 1.5)
 
 
-def test_what_msg_cannot_say_is_recorded_as_idl(tmp_path, library):
+def test_idl_only_type_is_recorded_as_idl(tmp_path, library):
     name, path = "lab_msgs/msg/Drum", tmp_path / "lab.mcap"
     fields = {"winch": VALUES, "letter": 65, "drumSpeed": 2.5, "axis": [1, 2, 3], "names": ["a"]}
     recorded = record(path, library, name, fields)

@@ -20,7 +20,7 @@ import rosglass
 from rosglass.bags import open_bag
 
 STRING = "std_msgs/msg/String"
-#: What a length, an offset or a count may be said to be.
+#: Values that replace a length, an offset or a count.
 SIZES = (0, 1, 2**31 - 1, 2**31, 2**32 - 1, 2**40, 2**63 - 1, 2**64 - 1)
 MUTANTS = 80
 #: Bytes by which this process may grow.

@@ -1,4 +1,4 @@
-"""What a recording says when its file cannot be written."""
+"""Errors of a recording whose file cannot be written."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rosglass.bags.mcap_file import McapFile
 
 @pytest.mark.parametrize("full", ["message", "end"])
 def test_a_disk_that_is_full_when_the_file_is_closed(tmp_path, monkeypatch, full):
-    """What the file's buffer holds is written by closing it, again after a failed write."""
+    """Closing writes the file's buffer, again after a failed write."""
     crashes = []
     monkeypatch.setattr(threading, "excepthook", crashes.append)
     close, failure = McapFile.close, OSError(errno.ENOSPC, "No space left on device")

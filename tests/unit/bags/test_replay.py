@@ -191,7 +191,7 @@ def test_a_lap_lasts_as_long_as_what_was_selected(tmp_path, play, seconds, topic
     assert took >= 0.99 * lap * (sent - 1)
 
 
-def test_what_is_published_reaches_nobody_and_says_so(drive, play):
+def test_publishing_to_a_recording_is_a_problem(drive, play):
     node = play(drive, "?paused=true")
     found = listen(node, "/cmd")
     with node.create_publisher("/cmd", STRING) as publisher:
@@ -246,7 +246,7 @@ def test_a_topic_that_was_left_out_is_received_as_soon_as_it_is_chosen(drive, pl
     assert chatter.publisher_count() == 1
 
 
-def test_another_type_than_recorded_is_told(drive, play):
+def test_other_type_than_recorded_is_a_problem(drive, play):
     node = play(drive)
     other = node.create_subscription("/chatter", "std_msgs/msg/Bool")
     eventually(lambda: other.problem)
@@ -341,7 +341,7 @@ def test_a_ros_1_definition_with_another_md5_is_reported(tmp_path, play, capsys)
 
 
 @pytest.mark.parametrize(
-    ("rest", "error", "told"),
+    ("rest", "error", "message"),
     [
         ("", ConversionError, r"a recording such as replay:drive\.mcap"),
         ("nothing.mcap", BagError, r"nothing\.mcap does not exist"),
@@ -351,9 +351,9 @@ def test_a_ros_1_definition_with_another_md5_is_reported(tmp_path, play, capsys)
         ("drive.mcap?loop=maybe", ConversionError, "options such as rate=2"),
     ],
 )
-def test_what_cannot_be_played_is_refused(drive, monkeypatch, rest, error, told):
+def test_unplayable_url_is_refused(drive, monkeypatch, rest, error, message):
     monkeypatch.chdir(drive.parent)
-    with pytest.raises(error, match=told):
+    with pytest.raises(error, match=message):
         rosglass.connect(f"replay:{rest}")
 
 
@@ -372,7 +372,7 @@ def test_closing_ends_everything(drive, play):
 
 
 @pytest.mark.parametrize(
-    ("command", "told"),
+    ("command", "output"),
     [
         (["topic", "list"], "/chatter"),
         (["topic", "echo", "/chatter", "--once"], "data: '"),
@@ -380,14 +380,14 @@ def test_closing_ends_everything(drive, play):
         (["service", "list"], ""),
     ],
 )
-def test_commands_look_at_recordings(drive, capsys, command, told):
+def test_commands_list_contents_of_recordings(drive, capsys, command, output):
     from rosglass.cli import main
 
     main([*command, "--url", f"replay:{drive}"])
-    assert told in capsys.readouterr().out
+    assert output in capsys.readouterr().out
 
 
-def test_a_durability_that_was_not_recorded_is_no_problem(drive, play):
+def test_unrecorded_durability_causes_no_problem(drive, play):
     node = play(drive, "?rate=20")
     found: list[str] = []
     subscription = node.create_subscription(

@@ -186,7 +186,7 @@ def test_an_end_that_lies_before_the_messages_ends_playing(tmp_path):
 
 #: Texts as recorders in the field wrote them, each with the md5 sum of what was meant.
 BROKEN = {
-    "a line that is no definition": ("Header header\nfloat64 data\n\\n\n\n", "own_msgs/Level"),
+    "a line that is not a definition": ("Header header\nfloat64 data\n\\n\n\n", "own_msgs/Level"),
     "a comment on two lines": (
         "Header header\n# \note this\nfloat64 temperature\nfloat64 variance\n",
         "sensor_msgs/Temperature",
@@ -281,7 +281,7 @@ def test_play_takes_its_file_behind_names_of_topics(tmp_path, capsys):
     assert "--remap '/words' is not of the form /old:=/new" in err
 
 
-def test_what_a_format_cannot_hold_is_refused(tmp_path):
+def test_unsupported_format_is_refused(tmp_path):
     with pytest.raises(BagError, match=r"name it \.mcap"):
         create(tmp_path / "a.bag", "cdr", "")
     assert not (tmp_path / "a.bag").exists()

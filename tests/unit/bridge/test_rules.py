@@ -1,4 +1,4 @@
-"""What a bridge is told to relay, and what its documentation says."""
+"""Rules of a bridge, and the examples of its documentation."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_all_means_what_is_of_interest():
     assert Rules(["*", "/a->"]).other_name(1, "/a") == ""
 
 
-def test_an_expression_that_is_none():
+def test_invalid_expression_is_rejected():
     with pytest.raises(ConversionError, match="exclude"):
         Rules(["*"], exclude="(")
     with pytest.raises(InvalidNameError, match=r"\['/a'\]"):
@@ -79,7 +79,7 @@ def sample(size):
     return Sample(bytes(size), "ros1", load("std_msgs/String", ros=1), 0)
 
 
-def test_what_waits_is_bounded_and_counted():
+def test_outbox_is_bounded_and_counts_losses():
     may_go, began = threading.Event(), threading.Event()
     sent = []
 

@@ -37,7 +37,7 @@ def test_the_nearest_are_matched_not_the_first():
     assert feed(matcher, (0, 33)) == [[33, 30]]
 
 
-def test_what_is_further_apart_than_the_slop_is_dropped():
+def test_messages_further_apart_than_the_slop_are_dropped():
     matcher: ApproximateTime[int] = ApproximateTime(2, 10, 20 * MS)
     assert feed(matcher, (0, 0), (1, 30), (0, 60), (1, 90)) == []
     assert matcher.dropped == 3
@@ -110,8 +110,8 @@ def test_the_same_rate_with_jitter_loses_nothing(seed):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"), [((1,), "two"), ((2, 0), "at least 1"), ((2, 1, -1), "0 or more")]
+    ("arguments", "message"), [((1,), "two"), ((2, 0), "at least 1"), ((2, 1, -1), "0 or more")]
 )
-def test_what_makes_no_sense_is_refused(arguments, told):
-    with pytest.raises(ConversionError, match=told):
+def test_invalid_argument_is_rejected(arguments, message):
+    with pytest.raises(ConversionError, match=message):
         ApproximateTime(*arguments)

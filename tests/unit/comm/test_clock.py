@@ -63,7 +63,7 @@ def test_system_time_is_the_default(clock: Clock) -> None:
     assert clock.now().seconds > 1e9
 
 
-def test_simulated_time_is_zero_until_told(clock: Clock) -> None:
+def test_simulated_time_is_zero_until_it_is_set(clock: Clock) -> None:
     clock.simulate(True)
     assert clock.is_simulated
     assert clock.now() == Time(0)
@@ -101,8 +101,10 @@ def test_sleeping_while_simulated_time_stands_still_says_so_once(clock: Clock, c
     clock.advance(seconds(10))
     thread, results = in_background(lambda: clock.sleep(2.0))
     eventually(lambda: caplog.messages)
-    (told,) = caplog.messages
-    assert told == "tester sleeps by simulated time, which stands at 10.000 s: is /clock published?"
+    (message,) = caplog.messages
+    assert (
+        message == "tester sleeps by simulated time, which stands at 10.000 s: is /clock published?"
+    )
     clock.advance(seconds(12))
     thread.join(10)
     assert results == [True]
@@ -143,7 +145,7 @@ def test_sleeping_in_simulated_time_waits_for_the_simulation(clock: Clock) -> No
     assert results == [True]
 
 
-def test_a_sleeper_is_told_when_the_clock_changes_or_closes(clock: Clock) -> None:
+def test_sleeper_wakes_when_the_clock_changes_or_closes(clock: Clock) -> None:
     thread, results = in_background(lambda: clock.sleep(100))
     clock.simulate(True)
     thread.join(5)
@@ -155,7 +157,7 @@ def test_a_sleeper_is_told_when_the_clock_changes_or_closes(clock: Clock) -> Non
     assert "tester" in str(results[0])
 
 
-def test_jumps_are_told(clock: Clock) -> None:
+def test_jumps_are_notified(clock: Clock) -> None:
     jumps: list[Jump] = []
     ahead: list[Jump] = []
     handle = clock.on_jump(jumps.append)

@@ -24,7 +24,7 @@ def endpoint(node, gid=b""):
 A, B = endpoint("a"), endpoint("b")
 
 
-def told(appearances):
+def events_of(appearances):
     events = []
     handle = appearances.add(
         lambda e: events.append((e.endpoint.node.name, e.change, e.count, e.total)), IMMEDIATE
@@ -32,9 +32,9 @@ def told(appearances):
     return events, handle
 
 
-def test_who_comes_and_goes_is_told_with_counts():
+def test_listener_is_notified_of_each_change_with_counts():
     appearances = EndpointListeners()
-    events, _ = told(appearances)
+    events, _ = events_of(appearances)
     for now in ([A], [A, B], [B], [B, A], []):
         appearances.update(now, Matched)
     assert events == [
@@ -47,9 +47,9 @@ def test_who_comes_and_goes_is_told_with_counts():
     ]
 
 
-def test_who_came_and_went_since_the_last_look_is_told():
+def test_changes_between_two_updates_are_notified():
     appearances = EndpointListeners()
-    events, _ = told(appearances)
+    events, _ = events_of(appearances)
     known = endpoint("known", b"k")
     appearances.update([known], Matched, [A])
     appearances.update([B], Matched, [A, known, A, B])
@@ -64,11 +64,11 @@ def test_who_came_and_went_since_the_last_look_is_told():
     ]
 
 
-def test_those_who_are_there_are_told_to_each_new_listener_once():
+def test_new_listener_is_notified_of_present_endpoints_once():
     appearances = EndpointListeners()
-    first, _ = told(appearances)
+    first, _ = events_of(appearances)
     appearances.update([A], Matched)
-    second, _ = told(appearances)
+    second, _ = events_of(appearances)
     for _ in range(2):
         appearances.update([A], Matched)
     assert first == second == [("a", 1, 1, 1)]
@@ -76,7 +76,7 @@ def test_those_who_are_there_are_told_to_each_new_listener_once():
 
 def test_twins_are_counted():
     appearances = EndpointListeners()
-    events, _ = told(appearances)
+    events, _ = events_of(appearances)
     appearances.update([A, A], Matched)
     appearances.update([A], Matched)
     assert [event[2] for event in events] == [1, 2, 1]
@@ -85,7 +85,7 @@ def test_twins_are_counted():
 def test_closing_ends_it_and_frees_it():
     appearances, known = EndpointListeners(), endpoint("c")
     references = sys.getrefcount(known)
-    events, handle = told(appearances)
+    events, handle = events_of(appearances)
     assert appearances
     appearances.update([known], Matched)
     handle.close()
@@ -95,16 +95,16 @@ def test_closing_ends_it_and_frees_it():
     assert sys.getrefcount(known) == references
 
 
-def test_events_that_are_none_are_counted_and_not_told():
+def test_ignored_events_are_counted_but_not_notified():
     appearances = EndpointListeners()
-    events, _ = told(appearances)
+    events, _ = events_of(appearances)
     appearances.update([A], Matched)
     appearances.update([], lambda *_: None)
     appearances.update([B], Matched)
     assert events == [("a", 1, 1, 1), ("b", 1, 1, 2)]
 
 
-def test_a_problem_is_told_when_it_changes():
+def test_problem_is_notified_when_it_changes():
     seen = []
     sub = Subscription("/t", None, QoS(), IMMEDIATE)
     sub.on_problem_change(seen.append)

@@ -1,4 +1,4 @@
-"""Executors whose post() raises: what they are given is not lost, and nobody else suffers."""
+"""Executors whose post() raises: their jobs are not lost, and other listeners are unaffected."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ def test_one_timer_that_fails_stops_neither_itself_nor_the_others(kind, caplog):
 
 
 @pytest.mark.parametrize("merge", [False, True])
-def test_every_listener_is_told_although_one_executor_raises(merge, caplog):
+def test_every_listener_is_notified_although_one_executor_raises(merge, caplog):
     listeners, seen, other, came = Listeners(merge=merge, where="/t"), [], [], threading.Event()
 
     def last(value):

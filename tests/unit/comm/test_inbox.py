@@ -1,4 +1,4 @@
-"""What waits, what is dropped, who is called back: with several threads and little memory."""
+"""Waiting, dropping and calling back, with several threads and little memory."""
 
 from __future__ import annotations
 
@@ -303,7 +303,7 @@ def test_rates_fall_at_once_when_samples_stop(monkeypatch, rate):
         deliver(sub, sample(bytes(10)))
     assert sub.statistics().frequency == pytest.approx(rate, rel=0.01)
     clock[0] += max(0.04, 1 / rate)
-    assert sub.statistics().frequency > rate / 2, "one that is a little late is no silence"
+    assert sub.statistics().frequency > rate / 2, "a slightly late sample is not silence"
     clock[0] += 1.5
     falling = sub.statistics()
     assert 0 < falling.frequency < rate

@@ -15,7 +15,7 @@ S = 1000 * MS
 
 @pytest.fixture
 def offset(monkeypatch):
-    """The system's clock against one that nobody sets, in nanoseconds."""
+    """The difference of the system's clock to one that is never set, in nanoseconds."""
     value = [0]
     monkeypatch.setattr(module, "_offset", lambda: value[0])
     return value
@@ -34,7 +34,7 @@ def test_the_fastest_sample_is_the_measure_whatever_the_clocks_say(offset, skew)
     assert found == pytest.approx([0, 0, 49, 0], abs=0.3)
 
 
-def test_what_a_silent_link_kept_back_is_late_and_what_follows_is_not(offset):
+def test_samples_held_back_by_a_silent_link_are_late(offset):
     live = [(number * 100 + 1, number * 100) for number in range(10)]
     kept = [(10_000, number * 100) for number in range(10, 100)]
     after = [(number * 100 + 1, number * 100) for number in range(101, 110)]
@@ -95,7 +95,7 @@ def test_unknown_publishers_and_many_of_them(offset):
     assert 1 <= len(known) <= 2048
 
 
-def test_subscriptions_tell_latency_and_lateness(offset):
+def test_subscriptions_report_latency_and_lateness(offset):
     sub = Subscription("/t", None, QoS(), IMMEDIATE)
     assert sub.statistics().latency is None
     assert sub.statistics().lateness is None
@@ -146,7 +146,7 @@ def topic(monkeypatch, offset):
     "form", [{}, {"wire": "cdr"}, {"wire": "cdr", "byteorder": "big"}], ids=["1", "2", "2 big"]
 )
 @pytest.mark.parametrize("skew", [0, 90_000, -90_000])
-def test_the_stamps_of_headers_tell_what_was_held_back(topic, form, skew):
+def test_header_stamps_reveal_held_back_messages(topic, form, skew):
     live = [stamped(100_000 + n * 100 + skew, 100_000 + n * 100, **form) for n in range(10)]
     kept = [stamped(111_000 + skew, 101_000 + n * 100, **form) for n in range(100)]
     after = [stamped(111_000 + n * 100 + skew, 111_000 + n * 100, **form) for n in range(5)]

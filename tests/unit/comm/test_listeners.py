@@ -1,4 +1,4 @@
-"""Callbacks that are told about a value."""
+"""Callbacks that are notified of a value."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from rosglass.comm.log_limits import LogOnce
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "expected"),
     [({}, [1, 2, 3, 4]), ({"merge": True}, [4]), ({"depth": 3}, [2, 3, 4]), ({"depth": 9}, None)],
 )
-def test_how_many_values_wait_for_a_slow_callback(options, told):
+def test_how_many_values_wait_for_a_slow_callback(options, expected):
     listeners, executor, seen = Listeners(**options), Manual(), []
     listeners.add(seen.append, executor)
-    told = told or [1, 2, 3, 4]
+    expected = expected or [1, 2, 3, 4]
     kept = [listeners.notify(value) for value in (1, 2, 3, 4)]
-    assert kept.count(True) == len(told)
+    assert kept.count(True) == len(expected)
     executor.run()
-    assert seen == told
+    assert seen == expected
     assert listeners.notify(5)
     executor.run()
-    assert seen == [*told, 5]
+    assert seen == [*expected, 5]
 
 
 async def later(value):
@@ -45,17 +45,17 @@ async def later(value):
 
 
 @pytest.mark.parametrize(
-    ("callback", "executor", "told"),
+    ("callback", "executor", "parameter"),
     [(5, Manual(), "callback"), (later, Manual(), "callback"), (print, 5, "executor")],
 )
-def test_what_cannot_be_called_is_refused_and_the_place_named(callback, executor, told):
+def test_invalid_callback_is_refused_with_the_topic(callback, executor, parameter):
     listeners = Listeners(where="/scan")
-    with pytest.raises(rosglass.ConversionError, match=f"/scan: {told}: "):
+    with pytest.raises(rosglass.ConversionError, match=f"/scan: {parameter}: "):
         listeners.add(callback, executor)
     assert not listeners
 
 
-def test_closed_and_cleared_listeners_are_not_told():
+def test_closed_and_cleared_listeners_are_not_notified():
     listeners, executor, seen = Listeners(), Manual(), []
     first = listeners.add(lambda value: seen.append(("first", value)), executor)
     listeners.add(lambda value: seen.append(("second", value)), executor)
@@ -79,7 +79,7 @@ def hasty_threads():
 
 
 @pytest.mark.usefixtures("hasty_threads")
-def test_listeners_come_and_go_in_several_threads_while_values_are_told():
+def test_listeners_may_be_added_and_closed_in_several_threads_during_notification():
     listeners, seen, rounds = Listeners(), [], 300
     listeners.add(seen.append, IMMEDIATE)
     failures = []
@@ -112,7 +112,7 @@ def in_threads(job, count=4):
 
 
 @pytest.mark.usefixtures("hasty_threads")
-def test_who_appears_is_told_to_listeners_that_come_and_go_in_several_threads():
+def test_new_endpoint_is_notified_to_listeners_added_in_several_threads():
     appearances, rounds = EndpointListeners(), 200
     there = EndpointInfo(EndpointKind.PUBLISHER, "/t", "p/msg/T", NodeName("/", "a"), gid=b"there")
     stayed, over = [], threading.Event()
@@ -140,7 +140,7 @@ def test_who_appears_is_told_to_listeners_that_come_and_go_in_several_threads():
 
 
 @pytest.mark.usefixtures("hasty_threads")
-def test_of_several_threads_one_logs():
+def test_log_once_is_true_in_one_thread_only():
     log_once, rounds = LogOnce(1000), 300
     firsts = in_threads(lambda _: [log_once.is_first(about) for about in range(rounds)])
     assert [sum(made) for made in zip(*firsts, strict=True)] == [1] * rounds
@@ -148,7 +148,7 @@ def test_of_several_threads_one_logs():
     assert [few.is_first(about) for about in "aabca"] == [True, False, True, False, False]
 
 
-def test_who_read_a_value_is_told_that_it_changed_back_before_anyone_looked():
+def test_value_that_was_read_is_notified_when_it_changes_back():
     value, seen = [False], []
     listeners = ChangeListeners(lambda: value[0], False)
     listeners.add(seen.append, IMMEDIATE)
@@ -160,7 +160,7 @@ def test_who_read_a_value_is_told_that_it_changed_back_before_anyone_looked():
     assert not listeners.update()
 
 
-def test_a_value_that_was_read_and_told_is_told_once():
+def test_value_that_was_read_and_notified_is_notified_once():
     value, seen = [False], []
     listeners = ChangeListeners(lambda: value[0], False)
     listeners.add(seen.append, IMMEDIATE)

@@ -1,4 +1,4 @@
-"""What a node's log leaves behind: no handlers, no threads, no lock."""
+"""A node's log leaves no handlers, threads or locks behind."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What comes later."""
+"""Promises: results that arrive later."""
 
 from __future__ import annotations
 
@@ -51,18 +51,18 @@ def test_odd_timeouts_are_refused(promise, timeout):
 
 def test_giving_up():
     promise = Promise(cancellable=True)
-    told = []
-    promise.on_done(told.append)
+    done = []
+    promise.on_done(done.append)
     assert promise.cancel()
     assert promise.cancel()
     promise.set_result(1)
-    assert told == [promise]
+    assert done == [promise]
     assert concurrent.futures.wait([promise], 0).done == {promise}
     with pytest.raises(concurrent.futures.CancelledError):
         promise.result()
 
 
-def test_what_cannot_be_given_up_stays():
+def test_promise_that_cannot_be_cancelled_survives_a_timeout():
     promise = Promise(cancellable=False)
 
     async def main():
@@ -77,13 +77,13 @@ def test_what_cannot_be_given_up_stays():
 def test_callbacks_run_where_they_should():
     home, elsewhere = Dispatcher("home"), Dispatcher("elsewhere")
     promise = Promise(executor=home, cancellable=False)
-    told = concurrent.futures.Future(), concurrent.futures.Future(), []
-    promise.on_done(lambda _: told[0].set_result(threading.current_thread().name))
-    promise.on_done(lambda _: told[1].set_result(threading.current_thread().name), elsewhere)
-    promise.on_done(told[2].append, IMMEDIATE)
+    results = concurrent.futures.Future(), concurrent.futures.Future(), []
+    promise.on_done(lambda _: results[0].set_result(threading.current_thread().name))
+    promise.on_done(lambda _: results[1].set_result(threading.current_thread().name), elsewhere)
+    promise.on_done(results[2].append, IMMEDIATE)
     promise.set_result(None)
-    assert told[2] == [promise]
-    assert [future.result(30) for future in told[:2]] == ["home", "elsewhere"]
+    assert results[2] == [promise]
+    assert [future.result(30) for future in results[:2]] == ["home", "elsewhere"]
     late = concurrent.futures.Future()
     promise.on_done(late.set_result)
     assert late.result(30) is promise
@@ -91,16 +91,16 @@ def test_callbacks_run_where_they_should():
     elsewhere.close()
 
 
-def test_asyncio_is_imported_only_by_those_who_use_it():
+def test_asyncio_is_imported_only_on_use():
     code = "import rosglass.ros2, sys; print('asyncio' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"
 
 
 def test_a_thread_that_receives_may_look_but_not_wait(monkeypatch):
-    """What it waits for could never arrive."""
+    """Its result could never arrive."""
     monkeypatch.setattr("rosglass.comm.handle._RECEIVING", (__name__,))
-    told = []
+    results = []
 
     def receive():
         promise = Promise("/add has not answered", cancellable=True)
@@ -108,16 +108,16 @@ def test_a_thread_that_receives_may_look_but_not_wait(monkeypatch):
         for wait in (promise.result, promise.exception, subscription.wait):
             with pytest.raises(UnsupportedError) as refused:
                 wait()
-            told.append(str(refused.value))
+            results.append(str(refused.value))
         with pytest.raises(TimeoutError):
             promise.result(0)
         assert subscription.wait(0) is None
         promise.set_result(3)
-        told.append(promise.result())
+        results.append(promise.result())
 
     thread = threading.Thread(target=receive, daemon=True)
     thread.start()
     thread.join(5)
     waiting = ["/add has not answered", "/add has not answered", "/chatter"]
-    assert [text.partition(":")[0] for text in told[:3]] == waiting
-    assert told[3:] == [3]
+    assert [text.partition(":")[0] for text in results[:3]] == waiting
+    assert results[3:] == [3]

@@ -13,7 +13,7 @@ LATCHED = QoS.latched()
 
 
 @pytest.mark.parametrize(
-    ("requested", "offered", "told"),
+    ("requested", "offered", "expected"),
     [
         (QoS(), QoS(), ""),
         (BEST_EFFORT, QoS(), ""),
@@ -38,14 +38,14 @@ LATCHED = QoS.latched()
         (QoS(lifespan=SECOND), QoS(), ""),
     ],
 )
-def test_incompatibility_names_the_policies_that_dds_would_refuse(requested, offered, told):
-    assert requested.incompatibility(offered) == told
+def test_incompatibility_names_the_policies_that_dds_would_refuse(requested, offered, expected):
+    assert requested.incompatibility(offered) == expected
 
 
 def test_several_conflicts_are_all_named():
-    told = LATCHED.incompatibility(BEST_EFFORT)
-    assert "reliability" in told
-    assert "durability" in told
+    conflict = LATCHED.incompatibility(BEST_EFFORT)
+    assert "reliability" in conflict
+    assert "durability" in conflict
 
 
 @pytest.mark.parametrize("depth", [0, -1, 1.0, "3", True, None, 2**31])
@@ -56,7 +56,7 @@ def test_depth_must_be_a_positive_integer(depth):
     assert isinstance(raised.value, TypeError)
 
 
-def test_the_name_of_a_preset_is_no_depth_and_its_profile_is_named():
+def test_preset_name_as_depth_is_refused_naming_the_profile():
     with pytest.raises(ArgumentError, match=r"use QoS.preset\('sensor_data'\), got 'sensor_data'"):
         QoS("sensor_data")
     with pytest.raises(ArgumentError, match=r"a profile such as QoS.sensor_data\(\)"):
@@ -75,7 +75,7 @@ def test_presets_are_ros_2s():
 
 
 @pytest.mark.parametrize(
-    ("policy", "value", "told"),
+    ("policy", "value", "expected"),
     [
         ("reliability", "reliable", "Reliability.RELIABLE or Reliability.BEST_EFFORT"),
         ("durability", 3, "Durability.VOLATILE or"),
@@ -86,8 +86,8 @@ def test_presets_are_ros_2s():
         ("lease_duration", Duration(0), "above zero"),
     ],
 )
-def test_policies_are_checked_where_they_are_written(policy, value, told):
-    with pytest.raises(ArgumentError, match=f"QoS: {policy}: expected .*{told}"):
+def test_policies_are_checked_where_they_are_written(policy, value, expected):
+    with pytest.raises(ArgumentError, match=f"QoS: {policy}: expected .*{expected}"):
         QoS(**{policy: value})
 
 
@@ -109,7 +109,7 @@ def test_a_command_expires_at_the_sender_and_peers_are_not_asked_to_judge_its_ag
 
 
 @pytest.mark.parametrize(
-    ("policies", "told"),
+    ("policies", "expected"),
     [
         ({"durability": Durability.TRANSIENT_LOCAL}, "latched messages are received late"),
         ({"durability": Durability.BEST_AVAILABLE}, "latched messages are received late"),
@@ -118,8 +118,8 @@ def test_a_command_expires_at_the_sender_and_peers_are_not_asked_to_judge_its_ag
         ({"send_timeout": 0.3}, "a Duration above zero"),
     ],
 )
-def test_a_send_timeout_that_contradicts_the_profile_is_refused(policies, told):
-    with pytest.raises(ArgumentError, match=f"QoS: send_timeout: expected .*{told}"):
+def test_a_send_timeout_that_contradicts_the_profile_is_refused(policies, expected):
+    with pytest.raises(ArgumentError, match=f"QoS: send_timeout: expected .*{expected}"):
         QoS(**{"send_timeout": SECOND, **policies})
 
 
@@ -137,7 +137,7 @@ BEST = QoS.best_available()
 MANUAL = QoS(liveliness=Liveliness.MANUAL_BY_TOPIC)
 
 
-def test_what_is_decided_stays_as_it_is():
+def test_decided_policies_are_kept():
     for profile in (QoS(), LATCHED, BEST_EFFORT, MANUAL):
         assert profile.is_decided
         assert profile.for_subscription([BEST_EFFORT]) is profile
@@ -202,7 +202,7 @@ def test_single_policies_can_be_left_open():
 
 
 @pytest.mark.parametrize("other", [QoS(), LATCHED, BEST_EFFORT, MANUAL, QoS(deadline=SECOND), BEST])
-def test_what_is_available_conflicts_with_nobody(other):
+def test_best_available_conflicts_with_no_profile(other):
     assert BEST.conflicts(other) == {}
     assert other.conflicts(BEST) == {}
 

@@ -1,4 +1,4 @@
-"""What users of rclpy and rospy write is answered with what it is here."""
+"""Names of rclpy and rospy are answered with their counterpart in rosglass."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def with_subclasses(kind):
 
 
 @pytest.mark.parametrize("kind", rclpy_names.MEMBERS)
-def test_what_takes_the_place_of_a_member_is_there(kind):
+def test_counterpart_of_a_member_exists(kind):
     found = class_of(kind)
     for name, instead in rclpy_names.MEMBERS[kind].items():
         assert not hasattr(found, name)
@@ -59,7 +59,7 @@ def test_errors_about_members_cover_up_no_member_and_make_no_attribute_slow(kind
 
 
 @pytest.mark.parametrize("name", rclpy_names.FUNCTIONS)
-def test_what_takes_the_place_of_a_function_is_there(name):
+def test_counterpart_of_a_function_exists(name):
     with pytest.raises(AttributeError, match=f"{name!r}: use ") as raised:
         getattr(rosglass, name)
     check(str(raised.value).partition(": use ")[2], rosglass)
@@ -76,8 +76,8 @@ def check(instead, kind):
 
 
 def test_each_kind_of_object_says_it(node):
-    told = r"use node\.create_service_client\(name, type\)"
-    with pytest.raises(AttributeError, match=told):
+    message = r"use node\.create_service_client\(name, type\)"
+    with pytest.raises(AttributeError, match=message):
         node.create_client(TRIGGER, "/reset")
     with pytest.raises(AttributeError, match=r"Publisher has no get_subscription_count: use sub"):
         node.create_publisher("/chat", TEXT).get_subscription_count()
@@ -122,18 +122,18 @@ def test_an_error_in_a_property_is_not_covered_up(node):
 @pytest.mark.parametrize("given", ["name", "type"])
 def test_name_and_type_swapped(node, method, name, kind, more, given):
     first = kind if given == "name" else rosglass.load(kind)
-    told = f"{method}() takes the name first, then the type: {method}({name!r}, {kind!r}, ...)"
-    with pytest.raises(InvalidNameError, match=f"^{re.escape(told)}$"):
+    message = f"{method}() takes the name first, then the type: {method}({name!r}, {kind!r}, ...)"
+    with pytest.raises(InvalidNameError, match=f"^{re.escape(message)}$"):
         getattr(node, method)(first, name, *more)
 
 
 def test_classes_of_rclpy_and_rospy_and_callbacks_as_types(node):
     rclpy = type("String", (), {"__module__": "std_msgs.msg._string"})
     rospy = type("String", (), {"__module__": "std_msgs.msg._String", "_type": "std_msgs/String"})
-    told = re.escape(f"create_subscription('/chat', {TEXT!r}, ...)")
-    with pytest.raises(TypeNotFoundError, match=told):
+    message = re.escape(f"create_subscription('/chat', {TEXT!r}, ...)")
+    with pytest.raises(TypeNotFoundError, match=message):
         node.create_subscription("/chat", rclpy, print)
-    with pytest.raises(InvalidNameError, match=told):
+    with pytest.raises(InvalidNameError, match=message):
         node.create_subscription(rclpy, "/chat", print)
     with pytest.raises(TypeNotFoundError, match=r"'std_msgs/String', \.\.\."):
         node.create_subscription("/chat", rospy, print)

@@ -17,7 +17,7 @@ ADD: Any = load("rospy_tutorials/AddTwoInts", ros=1)
 
 
 class Core:
-    """What a server needs of its node."""
+    """The parts of a node that a server needs."""
 
     forked = False
     dispatcher = IMMEDIATE

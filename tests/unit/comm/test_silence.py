@@ -1,4 +1,4 @@
-"""Noticing that who has sent regularly does so no more."""
+"""Detecting a regular publisher that has fallen silent."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ def regular(rate: int, looks: int = 20) -> list[int]:
     return [rate * number for number in range(looks)]
 
 
-def test_who_sends_regularly_is_missed_after_a_second():
+def test_regular_publisher_is_missed_after_a_second():
     counts = regular(30)
     problems = look(SilenceMonitor(), [*counts, counts[-1], counts[-1]])
     assert problems[:-2] == [""] * len(counts)
     assert "nothing was received from /robot since " in problems[-2]
     assert "(it sent 30 per second before); is it frozen, or cut off?" in problems[-2]
-    assert problems[-1] == problems[-2]  # or it would be told again and again
+    assert problems[-1] == problems[-2]  # or it would be notified again and again
 
 
 @pytest.mark.parametrize("last", [1, 7, 29])
-def test_who_falls_silent_between_two_looks_is_missed(last):
+def test_publisher_that_falls_silent_between_two_checks_is_missed(last):
     counts = regular(30)
     end = counts[-1] + last
     problems = look(SilenceMonitor(), [*counts, end, end, end])
     assert "(it sent 30 per second before)" in problems[-1]
 
 
-def test_who_sends_slowly_is_missed_after_five_of_its_intervals():
+def test_slow_publisher_is_missed_after_five_of_its_intervals():
     counts = regular(1)
     problems = look(SilenceMonitor(), [*counts, *[counts[-1]] * 6])
     assert problems[len(counts) : -2] == [""] * 4
@@ -52,7 +52,7 @@ def test_the_next_message_ends_it_at_once():
     assert not silence.problem
 
 
-def test_who_was_missed_has_to_be_regular_anew():
+def test_missed_publisher_has_to_become_regular_again():
     silence, counts = SilenceMonitor(), regular(30)
     look(silence, [*counts, counts[-1], counts[-1]])
     assert not any(look(silence, [counts[-1] + 1] * 60, 100.0))
@@ -69,7 +69,7 @@ def test_who_was_missed_has_to_be_regular_anew():
     ],
     ids=["one message", "none", "every three seconds", "for some seconds", "now and then"],
 )
-def test_nobody_else_is_missed(counts):
+def test_irregular_publisher_is_not_missed(counts):
     assert not any(look(SilenceMonitor(), counts))
 
 

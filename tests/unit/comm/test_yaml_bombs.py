@@ -92,7 +92,7 @@ def test_no_yaml_takes_time_or_memory_out_of_proportion(tmp_path):
     assert [one for one in found if one[3] > 10.0] == [], "seconds of CPU"
 
 
-def test_what_people_write_is_read():
+def test_ordinary_yaml_is_read():
     text = "base: &base {x: 1, y: 2}\narm: {<<: *base, y: 3}\nlist: [*base, *base]\n---\n- 1"
     arm = {"x": 1, "y": 3}
     base = {"x": 1, "y": 2}

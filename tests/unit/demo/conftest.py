@@ -45,19 +45,19 @@ class Settings:
     """Parameters that anybody may set."""
 
     def __init__(self) -> None:
-        self.told: list[Callable[[Any], None]] = []
+        self.callbacks: list[Callable[[Any], None]] = []
 
     def declare(self, name: str, value: Any, descriptor: Any) -> Any:
         assert descriptor.range.low <= value <= descriptor.range.high
         return value
 
     def on_change(self, callback: Callable[[Any], None]) -> Listener:
-        self.told.append(callback)
+        self.callbacks.append(callback)
         return Listener()
 
     def set(self, **values: Any) -> None:
-        for tell in self.told:
-            tell(ParameterEvent("/robot", {}, values, ()))
+        for callback in self.callbacks:
+            callback(ParameterEvent("/robot", {}, values, ()))
 
 
 class StubNode:

@@ -1,4 +1,4 @@
-"""The rendered camera picture, its burnt-in clock and its frame code."""
+"""The rendered camera image, its burnt-in clock and its frame code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The coloured cloud: where its points are, what colours they have, and when they are told."""
+"""The coloured cloud: positions and colours of its points, and when it is published."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ def message(cloud: Cloud) -> Any:
     return type_.decode(bytes(data), wire="cdr")
 
 
-def points(told: Any) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+def points(cloud: Any) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """Read places and colours as PCL's programs do."""
-    fields = {f.name: f for f in told.fields}
+    fields = {f.name: f for f in cloud.fields}
     assert all(f.datatype == 7 and f.count == 1 for f in fields.values())
     names = ("x", "y", "z", "rgb")
     layout = np.dtype(
@@ -49,36 +49,36 @@ def points(told: Any) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
             "names": names,
             "formats": ["<f4", "<f4", "<f4", "<u4"],
             "offsets": [fields[name].offset for name in names],
-            "itemsize": told.point_step,
+            "itemsize": cloud.point_step,
         }
     )
-    rows = np.frombuffer(bytes(told.data), layout)
+    rows = np.frombuffer(bytes(cloud.data), layout)
     rgb = rows["rgb"]
     colours = np.column_stack([rgb >> 16 & 255, rgb >> 8 & 255, rgb & 255])
     return np.column_stack([rows[name] for name in names[:3]]), colours
 
 
-def test_nothing_is_told_before_anything_was_seen(cloud: Cloud) -> None:
-    told = message(cloud)
-    assert (told.width, told.height, len(told.data)) == (0, 1, 0)
+def test_cloud_is_empty_before_anything_was_seen(cloud: Cloud) -> None:
+    sent = message(cloud)
+    assert (sent.width, sent.height, len(sent.data)) == (0, 1, 0)
 
 
 def test_its_layout_is_consistent(cloud: Cloud) -> None:
     look(cloud, -3.6, -1.8)
-    told = message(cloud)
-    assert told.header.frame_id == "map"
-    assert told.header.stamp.sec == 12
-    assert told.width > 100
-    assert told.row_step == told.width * told.point_step == len(told.data)
-    assert not told.is_bigendian
-    places, _ = points(told)
+    sent = message(cloud)
+    assert sent.header.frame_id == "map"
+    assert sent.header.stamp.sec == 12
+    assert sent.width > 100
+    assert sent.row_step == sent.width * sent.point_step == len(sent.data)
+    assert not sent.is_bigendian
+    places, _ = points(sent)
     assert np.isfinite(places).all()
     assert np.abs(places[:, 0]).max() <= WORLD.half_length + 0.5
     assert places[:, 2].min() >= -0.01
     assert places[:, 2].max() < 4
 
 
-def test_what_is_in_sight_is_told_and_kept(cloud: Cloud) -> None:
+def test_visible_points_are_added_and_kept(cloud: Cloud) -> None:
     assert look(cloud, -3.6, -1.8)
     assert not look(cloud, -3.6, -1.8), "nothing is new"
     first = {tuple(place) for place in points(message(cloud))[0].tolist()}
@@ -115,5 +115,5 @@ def test_bare_ground_is_left_to_the_map(cloud: Cloud) -> None:
     look(cloud, -3.6, -1.8)
     places, colours = points(message(cloud))
     flat = places[:, 2] < 0.01
-    assert flat.any(), "markings are told"
+    assert flat.any(), "markings are included"
     assert (np.ptp(colours[flat], axis=1) > 10).all()

@@ -1,4 +1,4 @@
-"""What an equipped robot has: description, cloud, cameras, battery, and a stop that holds."""
+"""Equipment of a robot: description, cloud, cameras, battery, and a stop that holds."""
 
 from __future__ import annotations
 
@@ -54,16 +54,16 @@ def test_there_is_no_such_mode(stub_node: type[StubNode]) -> None:
 @pytest.mark.parametrize("name", CAMERAS)
 def test_cameras_show_different_moving_pictures(alive: tuple[Any, Robot], name: str) -> None:
     node, _ = alive
-    told = node.last(f"/{name}_camera/image_raw")
-    assert (told.height, told.width, told.step, told.encoding) == (240, 320, 960, "rgb8")
-    assert told.header.frame_id == f"{name}_camera_link"
-    picture = np.frombuffer(bytes(told.data), np.uint8).reshape(240, 320, 3)
+    image = node.last(f"/{name}_camera/image_raw")
+    assert (image.height, image.width, image.step, image.encoding) == (240, 320, 960, "rgb8")
+    assert image.header.frame_id == f"{name}_camera_link"
+    picture = np.frombuffer(bytes(image.data), np.uint8).reshape(240, 320, 3)
     assert picture.std() > 10
     others = [node.last(f"/{other}_camera/image_raw") for other in CAMERAS if other != name]
-    assert all(bytes(other.data) != bytes(told.data) for other in others)
+    assert all(bytes(other.data) != bytes(image.data) for other in others)
 
 
-def test_nothing_is_drawn_while_nobody_looks(alive: tuple[Any, Robot], lives_on: Any) -> None:
+def test_nothing_is_drawn_without_subscribers(alive: tuple[Any, Robot], lives_on: Any) -> None:
     node, robot = alive
     topics = ["/points", *(f"/{name}_camera/image_raw" for name in CAMERAS)]
     for topic in topics:
@@ -113,9 +113,9 @@ def test_the_emergency_stop_ends_the_mission_and_holds(
     eventually(lambda: node.last("/mission/state").data == "waiting for mode autonomous")
 
 
-def test_the_battery_tells_charge_and_voltage(alive: tuple[Any, Robot]) -> None:
-    told = alive[0].last("/battery_state")
-    assert 0 < told.percentage <= 1
-    assert told.charge == pytest.approx(told.percentage * told.capacity)
-    assert 18 < told.voltage < 30
-    assert told.present
+def test_battery_reports_charge_and_voltage(alive: tuple[Any, Robot]) -> None:
+    battery = alive[0].last("/battery_state")
+    assert 0 < battery.percentage <= 1
+    assert battery.charge == pytest.approx(battery.percentage * battery.capacity)
+    assert 18 < battery.voltage < 30
+    assert battery.present

@@ -33,7 +33,7 @@ PATIENCE = 3000
 
 
 class Rig:
-    """A robot whose time passes whenever somebody looks at it."""
+    """A robot whose time advances with each look at it."""
 
     def __init__(self, node: Any, mode: str = "supervised") -> None:
         self.node = node
@@ -57,16 +57,16 @@ class Rig:
         pytest.fail(f"did not happen: {self.simulation.state}")
 
     def send(self, x: float, y: float, frame: str = "map") -> tuple[int, str]:
-        """Send a goal; returns what the robot says of it."""
+        """Send a goal; returns its status and text."""
         self.node.command(
             "/move_base_simple/goal",
             header={"frame_id": frame},
             pose={"position": {"x": x, "y": y}, "orientation": {"w": 1.0}},
         )
-        return self.told
+        return self.goal_status
 
     @property
-    def told(self) -> tuple[int, str]:
+    def goal_status(self) -> tuple[int, str]:
         (status,) = self.node.publishers["/move_base/status"].sent[-1].status_list
         return status.status, status.text
 
@@ -85,7 +85,7 @@ class Goal:
     def __init__(self, name: str, at: Any = None) -> None:
         self.goal = type("Goal", (), {"behavior_name": name})
         self.is_cancel_requested = False
-        self.told: list[str] = []
+        self.feedback: list[str] = []
         #: Why it was aborted.
         self.reason = ""
         self._at = at
@@ -94,8 +94,8 @@ class Goal:
         self.reason = text
 
     def publish_feedback(self, feedback: dict[str, str]) -> None:
-        self.told.append(feedback["current_state"])
-        if self._at is not None and len(self.told) == 5:
+        self.feedback.append(feedback["current_state"])
+        if self._at is not None and len(self.feedback) == 5:
             self._at(self)
 
 
@@ -135,7 +135,7 @@ def test_the_mission_leads_round_in_mode_autonomous(rig: Rig) -> None:
     assert [(p.pose.position.x, p.pose.position.y) for p in path.poses][:-1] == list(WAYPOINTS)
 
 
-def test_who_drives_takes_over(rig: Rig) -> None:
+def test_manual_drive_takes_over(rig: Rig) -> None:
     rig.node.ask("/mode/autonomous")
     rig.operation.take_over()
     assert rig.operation.mode == "supervised"
@@ -148,8 +148,8 @@ def test_a_goal_is_driven_to(rig: Rig) -> None:
     x, y = rig.place
     assert rig.send(x + 1.0, y) == (ACTIVE, "on the way to the goal")
     assert rig.proceed() == "driving to the goal"
-    rig.until(lambda: rig.told[0] != ACTIVE)
-    assert rig.told == (SUCCEEDED, "the goal is reached")
+    rig.until(lambda: rig.goal_status[0] != ACTIVE)
+    assert rig.goal_status == (SUCCEEDED, "the goal is reached")
     assert math.dist(rig.place, (x + 1.0, y)) < 0.3
     assert rig.proceed() == "waiting for mode autonomous"
 
@@ -179,13 +179,13 @@ def test_goals_that_are_refused(rig: Rig) -> None:
         (lambda rig: rig.behave(Goal("Flippers up")), PREEMPTED, "'Flippers up' was started"),
     ],
 )
-def test_what_ends_a_goal_is_told(rig: Rig, event: Any, status: int, reason: str) -> None:
+def test_goal_ends_with_the_reason(rig: Rig, event: Any, status: int, reason: str) -> None:
     x, y = rig.place
     rig.send(x + 1.0, y)
     event(rig)
     rig.proceed()
-    assert rig.told[0] == status
-    assert reason in rig.told[1]
+    assert rig.goal_status[0] == status
+    assert reason in rig.goal_status[1]
     assert rig.operation.goal.position is None
 
 
@@ -193,13 +193,13 @@ def test_the_newest_goal_counts(rig: Rig) -> None:
     x, y = rig.place
     rig.send(x + 1.0, y)
     assert rig.send(x, y)[0] == ACTIVE
-    told = rig.node.publishers["/move_base/status"].sent
-    assert told[-2].status_list[0].text == "another goal came"
-    assert told[-2].status_list[0].goal_id.id != told[-1].status_list[0].goal_id.id
+    statuses = rig.node.publishers["/move_base/status"].sent
+    assert statuses[-2].status_list[0].text == "another goal came"
+    assert statuses[-2].status_list[0].goal_id.id != statuses[-1].status_list[0].goal_id.id
     rig.operation.goal.end(SUCCEEDED, "x")
-    count = len(told)
+    count = len(statuses)
     rig.operation.goal.end(ABORTED, "nothing is driven to")
-    assert len(told) == count
+    assert len(statuses) == count
 
 
 @pytest.mark.parametrize("name", BEHAVIOURS)
@@ -208,7 +208,7 @@ def test_behaviours(rig: Rig, name: str) -> None:
     goal = Goal(name)
     assert rig.behave(goal)["outcome"].endswith("m driven")
     state = rig.simulation.state
-    assert goal.told or name == "Flippers flat"
+    assert goal.feedback or name == "Flippers flat"
     turned = math.remainder(state.yaw - before.yaw, math.tau)
     if name == "Look around":
         assert turned == pytest.approx(0.0, abs=0.3)
@@ -222,11 +222,11 @@ def test_behaviours(rig: Rig, name: str) -> None:
 
 
 def test_behaviours_that_are_refused(rig: Rig) -> None:
-    told = rig.behave(Goal("Dance"))
-    assert told.startswith("there is no behaviour 'Dance'; there are Look around, ")
+    result = rig.behave(Goal("Dance"))
+    assert result.startswith("there is no behaviour 'Dance'; there are Look around, ")
     rig.node.ask("/mode/safe")
-    told = rig.behave(Goal("Turn around"))
-    assert told == "no behaviours in mode safe; choose another mode"
+    result = rig.behave(Goal("Turn around"))
+    assert result == "no behaviours in mode safe; choose another mode"
     rig.node.ask("/mode/supervised")
     refused: list[str] = []
 
@@ -247,7 +247,7 @@ def test_behaviours_that_are_refused(rig: Rig) -> None:
         (lambda rig: rig.operation.close(), "the robot ends"),
     ],
 )
-def test_what_ends_a_behaviour(rig: Rig, event: Any, reason: str) -> None:
+def test_behaviour_ends_with_the_reason(rig: Rig, event: Any, reason: str) -> None:
     assert reason in rig.behave(Goal("Look around", lambda _: event(rig)))
     rig.simulation.advance(1.0)
     assert rig.simulation.state.turn == pytest.approx(0.0, abs=0.01)
@@ -259,7 +259,7 @@ def test_a_behaviour_is_cancelled(rig: Rig) -> None:
     assert rig.behave(Goal("Flippers up"))["outcome"] == "0.0 m driven"
 
 
-def test_everything_is_told_again_and_again(
+def test_state_is_published_again_and_again(
     stub_node: type[StubNode], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """An operator must see within a second that the robot is silent."""

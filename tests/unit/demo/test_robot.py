@@ -83,7 +83,7 @@ def test_raw_and_compressed_pictures_are_the_same(node: StubNode) -> None:
     assert np.abs(plain.astype(int) - picture).mean() < 6
 
 
-def test_nothing_is_compressed_while_nobody_listens(node: StubNode) -> None:
+def test_images_are_not_compressed_without_subscribers(node: StubNode) -> None:
     recorder = node.publishers["/camera/image_raw/compressed"]
     recorder.listeners = 0
     for _ in range(2):  # what was begun before is over
@@ -143,7 +143,7 @@ def test_a_release_names_a_number_published_after_the_stop(node: StubNode, robot
     release(node, old)
     assert robot.state.emergency_stop, "what releases the first stop does not undo the second"
     node.command("/emergency_stop", data=False)
-    assert robot.state.emergency_stop, "nobody can know what an old false was meant for"
+    assert robot.state.emergency_stop, "an old false may be meant for an earlier stop"
     release(node)
     assert not robot.state.emergency_stop
     assert node.last("/emergency_stop/state").data is False

@@ -1,4 +1,4 @@
-"""Compressed pictures: right colours, honest about corruption, never fooled by sizes."""
+"""Compressed images: right colours, errors for corrupt data, no trust in declared sizes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def encode(suffix: str, pixels: np.ndarray) -> bytes:
 
 
 def picture(colour: tuple[int, ...] = RED, dtype: type = np.uint8) -> np.ndarray:
-    """A plain picture in OpenCV's order of channels (blue first)."""
+    """A plain image in OpenCV's order of channels (blue first)."""
     return np.full((16, 24, len(colour)), colour[2::-1] + colour[3:], dtype)
 
 
@@ -71,7 +71,7 @@ def thumbnail() -> bytes:
     return b"\xff\xe1" + struct.pack(">H", 2 + len(inner)) + inner
 
 
-#: What cameras append to a complete image.
+#: Bytes that cameras append to a complete image.
 TAILS = {
     "nothing": b"",
     "padding to a block": bytes(4096),
@@ -132,7 +132,7 @@ def test_a_bayer_pattern_in_the_format_is_restored(pattern: str, suffix: str, dt
             assert decompress(data, text).encoding == f"bayer_{pattern}{bits}"
             middle = shown(data, text)[4:-4, 4:-4].astype(int)
             np.testing.assert_allclose(middle, np.broadcast_to(RED, middle.shape), atol=40)
-    # What was compressed is no mosaic.
+    # The compressed image is not a Bayer mosaic.
     for text in (f"bayer_{pattern}8; {kind} compressed mono8", f"bayer_{pattern}8", "bayer; x"):
         assert decompress(data, text).encoding == f"mono{bits}"
     colors = encode(suffix, picture())

@@ -161,7 +161,7 @@ def test_garbled_data_never_crash(kind: str, encoding: str) -> None:
         (message("png", depths(), 0.0, 0), "32FC1", "parameters 0.0, 0.0"),
     ],
 )
-def test_what_is_wrong_is_named_without_allocating(data: bytes, format: str, reason: str) -> None:
+def test_faulty_image_is_rejected_without_allocating(data: bytes, format: str, reason: str) -> None:
     tracemalloc.start()
     try:
         with pytest.raises((DecodeError, UnsupportedError), match=reason):

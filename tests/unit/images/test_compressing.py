@@ -1,4 +1,4 @@
-"""Pictures compressed here come out as they went in."""
+"""Images survive compressing and decompressing."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def test_there_and_back(encoding, kind):
             compress(picture(encoding), encoding, kind)
         return
     given = picture(encoding)
-    data, told = compress(given, encoding, kind, 95)
-    assert told.startswith(f"{encoding}; {kind} compressed")
-    raw = decompress(data, told)
+    data, text = compress(given, encoding, kind, 95)
+    assert text.startswith(f"{encoding}; {kind} compressed")
+    raw = decompress(data, text)
     assert raw.encoding in DECODED.get(encoding, (encoding,))
     found = np.asarray(raw.data).reshape(given.shape)
     if raw.encoding[0] != encoding[0]:
@@ -44,13 +44,13 @@ def test_there_and_back(encoding, kind):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (("yuv422",), "'yuv422' cannot be compressed here; these can: rgb8"),
         (("rgb8", "gif"), "'jpeg' or 'png', not 'gif'"),
         (("rgb8", "jpeg", 0), "1 to 100, not 0"),
     ],
 )
-def test_what_cannot_be_compressed_is_refused(arguments, told):
-    with pytest.raises(UnsupportedError, match=told):
+def test_unsupported_arguments_are_refused(arguments, message):
+    with pytest.raises(UnsupportedError, match=message):
         compress(picture("rgb8"), *arguments)

@@ -1,4 +1,4 @@
-"""Pictures of every encoding come out with the right colours, bad ones with a reason."""
+"""Images of every encoding have the right colours; bad ones are rejected with a reason."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rosglass.errors import DecodeError, UnsupportedError
 from rosglass.images import ENCODINGS, PixelFormat, RawImage, convert
 
 W, H = 8, 4
-#: Red, green, blue of the test picture: left half one colour, right half another.
+#: Red, green, blue of the test image: left half one colour, right half another.
 LEFT, RIGHT = (200, 60, 20), (10, 90, 250)
 
 

@@ -1,4 +1,4 @@
-"""Pictures are made smaller by averaging, where their encoding allows it."""
+"""Images are reduced by averaging, where their encoding allows it."""
 
 from __future__ import annotations
 
@@ -45,6 +45,6 @@ def test_something_is_always_left() -> None:
     assert reduce(whole, 1) is whole
 
 
-def test_what_contradicts_itself_is_refused() -> None:
+def test_inconsistent_image_is_rejected() -> None:
     with pytest.raises(DecodeError, match="data has 10"):
         reduce(RawImage(16, 12, "rgb8", 48, bytes(10)), 2)

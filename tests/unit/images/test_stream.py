@@ -1,4 +1,4 @@
-"""A stream decodes every packet of a video, shows the newest picture, says what it waits for."""
+"""A stream decodes every packet of a video, shows the newest frame, says what it waits for."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def test_every_packet_is_decoded_and_the_newest_picture_shown(rig: Rig, decoder:
     assert rig.node.qos.depth > 1
 
 
-def test_waiting_is_told_and_is_no_fault(rig: Rig) -> None:
+def test_waiting_is_reported_but_not_counted_as_fault(rig: Rig) -> None:
     send(rig, "late")
     rig.until(lambda: "key frame" in rig.stream.problem)
     assert rig.stream.statistics().invalid == 0
@@ -161,7 +161,7 @@ def test_waiting_is_told_and_is_no_fault(rig: Rig) -> None:
     assert rig.stream.statistics().invalid == 1
 
 
-def test_a_backlog_is_given_up_and_the_decoder_told(rig: Rig, decoder: Counting) -> None:
+def test_backlog_is_dropped_and_the_decoder_notified(rig: Rig, decoder: Counting) -> None:
     decoder.gate.clear()
     send(rig, "p0")
     assert decoder.entered.wait(30)

@@ -1,4 +1,4 @@
-"""Which topic a camera's pictures are received from."""
+"""The choice of the topic that a camera's images are received from."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_choice(topic: str, preferred: str, published: dict, expected: str) -> N
     assert choice.base == "/cam"
 
 
-def test_nothing_published_yet_is_no_error() -> None:
+def test_missing_publisher_is_not_an_error() -> None:
     assert choose("/cam", "raw", {"/other": [RAW]}) is None
 
 
@@ -46,7 +46,7 @@ def test_nothing_published_yet_is_no_error() -> None:
         ("raw", {"/cam": ["std_msgs/msg/String"]}, "carries std_msgs/msg/String, not images"),
     ],
 )
-def test_what_cannot_be_shown_is_named(preferred: str, published: dict, reason: str) -> None:
+def test_unusable_transport_is_named(preferred: str, published: dict, reason: str) -> None:
     with pytest.raises(UnsupportedError, match=reason):
         choose("/cam", preferred, published)
 

@@ -1,4 +1,4 @@
-"""Videos: pictures come back in order with their stamps; losses never show a smeared picture."""
+"""Videos: frames come back in order with their stamps; losses never show a smeared frame."""
 
 from __future__ import annotations
 
@@ -299,7 +299,7 @@ def test_theora_without_headers_or_key_frame_waits() -> None:
     with pytest.raises(NoPictureError, match="first key frame"):
         theora(camera, 5)
     check(theora(camera, 7), 4)
-    # Headers that are sent again are no new stream.
+    # Repeated headers do not start a new stream.
     assert theora(camera, 2, packetno=7) is None
     check(theora(camera, 8), 5)
 

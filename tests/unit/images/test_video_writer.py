@@ -38,7 +38,7 @@ def add(writer: VideoWriter, *pictures: tuple[Any, float], **options: Any) -> No
 
 
 def decode(path: Path) -> list[tuple[float, Any]]:
-    """Return times and pictures of a video."""
+    """Return times and images of the frames of a video."""
     with av.open(str(path)) as container:
         return [(frame.time, frame.to_ndarray(format="rgb24")) for frame in container.decode()]
 
@@ -56,7 +56,7 @@ def test_pictures_keep_times_and_colours(tmp_path: Path, suffix: str) -> None:
     status = writer.close(14.5)
     assert (status.frames, status.dropped, status.duration, status.problem) == (4, 0, 4.5, "")
     found = decode(path)
-    # The last picture is shown until the end.
+    # The last frame is shown until the end.
     assert [round(time, 2) for time, _ in found] == [0.0, 0.25, 3.0, 4.5]
     assert found[0][1].shape == (48, 64, 3)
     assert near(found[0][1][20, 8], RED)

@@ -123,7 +123,7 @@ def test_saved_as_jpeg_and_of_a_part(tmp_path: Path) -> None:
     np.testing.assert_allclose(back.astype(int), 90, atol=2)
 
 
-def test_what_cannot_be_saved_is_named(tmp_path: Path) -> None:
+def test_unsaveable_view_is_named(tmp_path: Path) -> None:
     with pytest.raises(UnsupportedError, match=r"\.gif'.*these work: \.png"):
         save(frame("rgb8"), tmp_path / "a.gif")
     with pytest.raises(UnsupportedError, match="without an ending"):

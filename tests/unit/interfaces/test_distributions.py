@@ -115,7 +115,7 @@ def test_preferred_distribution(monkeypatch: pytest.MonkeyPatch) -> None:
     assert gid_size(Library(distribution="humble")) == 24
     monkeypatch.setenv("ROS_DISTRO", "humble")
     assert gid_size(Library()) == 24
-    monkeypatch.setenv("ROS_DISTRO", "rolling")  # unknown ones are nobody's mistake
+    monkeypatch.setenv("ROS_DISTRO", "rolling")  # unknown ones are not an error
     assert gid_size(Library()) == 16
     with pytest.raises(UnsupportedError, match="no definitions of a distribution 'hydro'; known:"):
         Library(distribution="hydro")

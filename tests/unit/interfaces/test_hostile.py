@@ -1,4 +1,4 @@
-"""Definitions made to hang, crash or exhaust whoever reads them."""
+"""Definitions made to hang, crash or exhaust their reader."""
 
 from __future__ import annotations
 

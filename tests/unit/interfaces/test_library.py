@@ -94,9 +94,9 @@ def test_bad_world(library: Library) -> None:
         ("std_msgs/Strin", 1, "Did you mean std_msgs/String? "),
         ("std_msgs/msg/Strin", 1, "Did you mean std_msgs/msg/String? "),
         ("bond/Status", 2, "ROS 1 has it."),
-        ("nobody_msgs/Knows", 2, "looked in distribution sets (jazzy, kilted"),
-        ("nobody_msgs/Knows", 1, "looked in distribution sets (noetic)"),
-        ("nobody_msgs/Knows", 1, "Library.add_path('nobody_msgs')"),
+        ("missing_msgs/Knows", 2, "looked in distribution sets (jazzy, kilted"),
+        ("missing_msgs/Knows", 1, "looked in distribution sets (noetic)"),
+        ("missing_msgs/Knows", 1, "Library.add_path('missing_msgs')"),
     ],
 )
 def test_unknown_types(library: Library, name: str, ros: int, words: str) -> None:
@@ -313,12 +313,12 @@ def test_prefer_received_definitions_over_the_one_in_use(library: Library) -> No
     assert message(library, "sensor_msgs/Temperature").fields[1].type.name == "float32"
 
 
-def test_prefer_nobody_known(library: Library) -> None:
+def test_unknown_source_cannot_be_preferred(library: Library) -> None:
     with pytest.raises(UnsupportedError, match="there are: wire, workspace, folders, distribution"):
         library.prefer("robot")
 
 
-def test_variants_of_distributions_are_no_conflict(
+def test_variants_of_distributions_do_not_conflict(
     library: Library, write: Callable[..., Path]
 ) -> None:
     """A sourced Humble workspace has a Gid that differs from Jazzy's, and is right."""
@@ -354,7 +354,7 @@ def test_definition_by_hash_that_is_the_usual_one(library: Library) -> None:
     assert library.definition("std_msgs/String", 1, hash="*") is usual
 
 
-def test_nobody_has_the_hash(library: Library) -> None:
+def test_unknown_hash_is_a_conflict(library: Library) -> None:
     with pytest.raises(DefinitionConflictError) as caught:
         library.definition("std_msgs/String", hash="RIHS01_00")
     assert "has the hash RIHS01_00 that the peer announces: rosbags jazzy has RIHS01_df66" in str(

@@ -181,7 +181,7 @@ def test_defaults(line: str, default: object) -> None:
     assert type(field.default) is type(default)
 
 
-def test_no_default_is_none() -> None:
+def test_field_without_default_has_none() -> None:
     assert parse_message("int32 x # 5", "my_msgs/Odd").fields[0].default is None
 
 

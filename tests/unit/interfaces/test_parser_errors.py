@@ -132,7 +132,7 @@ def test_names_of_definitions(name: str, ros: int, words: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["Odd", "a/b/C", "a/msg/B/c", "", "a/", "/B", "a b/C", "a/../B"])
-def test_names_that_are_none(name: str) -> None:
+def test_invalid_names_are_rejected(name: str) -> None:
     with pytest.raises(InvalidNameError, match="is not a type name"):
         parse("int32 x", name)
 

@@ -53,9 +53,9 @@ def test_service_of_ros2(end: str) -> None:
 
 @pytest.mark.parametrize("text", ["int32 x", "int32 x\n---", "int32 x\n--- anything\n\n"])
 def test_service_of_ros1_may_end_early(text: str) -> None:
-    service = parse_service(text, "my_msgs/Tell", ros=1)
-    assert service.request.name == "my_msgs/srv/TellRequest"
-    assert service.response.name == "my_msgs/srv/TellResponse"
+    service = parse_service(text, "my_msgs/Say", ros=1)
+    assert service.request.name == "my_msgs/srv/SayRequest"
+    assert service.response.name == "my_msgs/srv/SayResponse"
     assert (len(service.request.fields), len(service.response.fields)) == (1, 0)
 
 
@@ -232,7 +232,7 @@ def test_kinds_of_a_short_name(library: Library) -> None:
         ("std_srvs/srv/Empty_Request", 1),
     ],
 )
-def test_what_is_not_implied(library: Library, name: str, ros: int) -> None:
+def test_names_that_are_not_implied_are_unknown(library: Library, name: str, ros: int) -> None:
     with pytest.raises((TypeNotFoundError, ValueError)):
         library.definition(name, ros)
 

@@ -1,4 +1,4 @@
-"""What robots sent is kept on disk, and believed only as far as its hash goes."""
+"""Types that robots sent are kept on disk, and used only if their hash fits."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def spoil(change: Callable[[Any], None]) -> Callable[[str], str]:
         ),
     ],
 )
-def test_what_has_another_hash_is_thrown_away(
+def test_entry_with_another_hash_is_discarded(
     cache: TypeCache, change: Callable[[str], str]
 ) -> None:
     definition = sent()
@@ -155,7 +155,7 @@ def test_switched_off(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         ("linux", {"ROSGLASS_TYPE_CACHE": "OFF"}, ""),
     ],
 )
-def test_where_it_is(
+def test_folder_follows_platform_and_environment(
     platform: str,
     environment: dict[str, str],
     expected: str,
@@ -171,7 +171,7 @@ def test_where_it_is(
 
 
 @pytest.mark.parametrize("kind", ["a file", "forbidden"])
-def test_folders_that_cannot_be_written_are_no_error(kind: str, tmp_path: Path) -> None:
+def test_unwritable_folder_is_not_an_error(kind: str, tmp_path: Path) -> None:
     folder = tmp_path / "cache"
     if kind == "a file":
         folder.write_text("")

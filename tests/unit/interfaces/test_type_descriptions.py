@@ -101,7 +101,7 @@ def test_every_standard_type_comes_back_whole(distribution: str) -> None:
     "suffix",
     ["_SendGoal", "_GetResult", "_FeedbackMessage", "_SendGoal_Request", "_GetResult_Event"],
 )
-def test_what_an_action_implies(suffix: str) -> None:
+def test_types_implied_by_an_action_are_described(suffix: str) -> None:
     definition = Library().definition(f"example_interfaces/action/Fibonacci{suffix}")
     described = parse_type_description(sent(definition))
     assert type(described) is type(definition)
@@ -140,7 +140,7 @@ def test_every_kind_of_field() -> None:
     )
 
 
-def test_source_says_who_sent_it() -> None:
+def test_source_names_the_sender() -> None:
     description = sent(Library().definition("std_srvs/srv/SetBool"))
     described = parse_type_description(description, provider="wire /talker")
     for part in (described, *parts(described)):
@@ -187,7 +187,7 @@ def test_a_head_comment_is_written_once(text):
 
 
 def mangle(text: str) -> str:
-    """What rosidl's generator makes of a text: escaped, and cut to the original's length."""
+    """Change a text as rosidl's generator does: escaped, and cut to the original's length."""
     lines = (str(line.encode())[2:-1] for line in text.splitlines())
     return "\n".join(lines)[: len(text)]
 
@@ -237,7 +237,7 @@ def test_texts_that_the_generator_escaped_and_cut(end: str) -> None:
     assert "LAST" not in found.text
 
 
-def test_a_constant_cut_in_two_is_no_constant() -> None:
+def test_constant_cut_in_two_is_left_out() -> None:
     text = "# \t\t\nuint8 state\nuint8 MAXIMUM=123"
     assert mangle(text).endswith("MAXIMUM=1")
     found = with_text(message(text), mangle(text))
@@ -252,7 +252,7 @@ def test_a_constant_cut_in_two_is_no_constant() -> None:
         "uint8 state\nfloat32 speed\nuint8 EVIL=1",
         "uint8 state\nfloat32 speed\nstring note\nstring more\nuint8 EVIL=1",
         "uint8 state\nfloat32 speed\nstring comment\nuint8 EVIL=1",
-        "this is no definition",
+        "this is not a definition",
         "uint8 a\n---\nuint8 EVIL=1",
         "",
         "\\",

@@ -77,7 +77,7 @@ def test_local_definitions_stay_as_they_are(library: Library) -> None:
     assert len(two.nested["std_msgs/msg/String"].fields) == 1
 
 
-def test_what_it_needs_comes_along(library: Library) -> None:
+def test_parts_of_a_version_are_added_with_it(library: Library) -> None:
     definition = sent("my_msgs/msg/State", "my_msgs/Part[] parts", ("my_msgs/msg/Part", "int8 a"))
     library.add_version(definition)
     part = library.definition("my_msgs/msg/Part")
@@ -110,7 +110,7 @@ def test_services_are_announced_by_the_hash_of_their_request_too(library: Librar
 
 
 @pytest.mark.parametrize("suffix", ["_Request", "_Response", "_Event"])
-def test_what_services_imply(library: Library, suffix: str) -> None:
+def test_types_implied_by_services_have_versions(library: Library, suffix: str) -> None:
     definition = sent("my_msgs/srv/Ask", "string question\n---\nmy_msgs/Part[] answer",
                       ("my_msgs/msg/Part", "int8 a"))  # fmt: skip
     assert isinstance(definition, ServiceDefinition)
@@ -125,7 +125,7 @@ def test_what_services_imply(library: Library, suffix: str) -> None:
     "suffix",
     ["_SendGoal", "_GetResult", "_FeedbackMessage", "_SendGoal_Request", "_GetResult_Event"],
 )
-def test_what_actions_imply(library: Library, suffix: str) -> None:
+def test_types_implied_by_actions_have_versions(library: Library, suffix: str) -> None:
     definition = sent("my_msgs/action/Go", "int8 where\n---\nmy_msgs/Part p\n---\nfloat32 done",
                       ("my_msgs/msg/Part", "int8 a"))  # fmt: skip
     assert isinstance(definition, ActionDefinition)
@@ -145,7 +145,7 @@ def test_only_complete_ros2_definitions(library: Library) -> None:
         library.definition("my_msgs/msg/State")
 
 
-def test_a_hash_nobody_has_names_what_there_is(library: Library) -> None:
+def test_unknown_hash_is_reported_with_the_known_versions(library: Library) -> None:
     library.add_version(sent("std_msgs/msg/String", "string data\nuint8 urgency"))
     with pytest.raises(DefinitionConflictError, match="rosbags jazzy"):
         library.definition("std_msgs/msg/String", hash="RIHS01_" + "0" * 64)

@@ -258,15 +258,15 @@ def _in_child(job: dict[str, Any], pipe: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
         USES[job["use"]](job["types"], job["ros"])
-        told = "used"
+        outcome = "used"
     except Error as error:
-        told = f"refused: {error}"
+        outcome = f"refused: {error}"
     except MemoryError:
-        told = "out of memory"
+        outcome = "out of memory"
     except BaseException as error:
-        told = f"raised {type(error).__name__}: {error}"
+        outcome = f"raised {type(error).__name__}: {error}"
     spent = time.process_time() - begun
-    os.write(pipe, json.dumps([told[:2000], round(spent, 3), _memory() - before]).encode())
+    os.write(pipe, json.dumps([outcome[:2000], round(spent, 3), _memory() - before]).encode())
     os._exit(0)
 
 
@@ -283,10 +283,10 @@ def main() -> None:
             _in_child(job, writing)
         os.close(writing)
         _, status = os.waitpid(child, 0)
-        told = os.read(reading, 1 << 16)
+        outcome = os.read(reading, 1 << 16)
         os.close(reading)
         signal = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
-        print(told.decode() or json.dumps([f"ended by signal {signal}", CPU_S, 0]), flush=True)
+        print(outcome.decode() or json.dumps([f"ended by signal {signal}", CPU_S, 0]), flush=True)
 
 
 if __name__ == "__main__":

@@ -252,7 +252,7 @@ def plain(value: Any) -> Any:
 
 
 def difference(ours: Any, theirs: Any, path: str = "") -> str:
-    """Where two values differ, in words; empty when they are the same.
+    """Return where two values differ, in words; empty when they are the same.
 
     NaN equals NaN, 0.0 differs from -0.0, True differs from 1.
     """

@@ -136,7 +136,7 @@ class Rosbags:
 
 
 class FromObjects:
-    """What peers share whose messages are objects with attributes and lists."""
+    """Base of peers whose messages are objects with attributes and lists."""
 
     types: Types
 

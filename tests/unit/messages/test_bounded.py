@@ -1,4 +1,4 @@
-"""What a definition costs, whatever its shape: a second and 200 MB, or it is refused by name."""
+"""The cost of a definition of any shape: at most a second and 200 MB, or it is refused by name."""
 
 from __future__ import annotations
 
@@ -86,8 +86,8 @@ def bounded() -> Iterator[Callable[[str, int, list[Any]], tuple[str, float, int]
 
     def use(how: str, ros: int, types: list[Any]) -> tuple[str, float, int]:
         print(json.dumps({"use": how, "ros": ros, "types": types}), file=program.stdin, flush=True)
-        told, seconds, memory = json.loads(program.stdout.readline())
-        return told, seconds, memory
+        outcome, seconds, memory = json.loads(program.stdout.readline())
+        return outcome, seconds, memory
 
     yield use
     program.stdin.close()
@@ -99,8 +99,12 @@ def bounded() -> Iterator[Callable[[str, int, list[Any]], tuple[str, float, int]
 def test_bombs_are_used_or_refused(bounded: Any, bomb: str, number: int, use: str) -> None:
     # Every bomb in both ROS versions and every use as well, but not each with each.
     ros = ROS[(number + list(USES).index(use)) % 2]
-    told, _, _ = bounded(use, ros, BOMBS[bomb])
-    assert told == "used" or ("b/msg/T" in told and "more than" in told) or "64 levels" in told
+    outcome, _, _ = bounded(use, ros, BOMBS[bomb])
+    assert (
+        outcome == "used"
+        or ("b/msg/T" in outcome and "more than" in outcome)
+        or "64 levels" in outcome
+    )
 
 
 def fields(draw: Any, number: int, count: int) -> list[Any]:
@@ -131,8 +135,8 @@ def definitions(draw: Any) -> list[Any]:
 def test_definitions_of_any_shape_are_used_or_refused(
     bounded: Any, types: list[Any], use: str, ros: int
 ) -> None:
-    told, _, _ = bounded(use, ros, types)
-    assert told == "used" or told.startswith("refused: ")
+    outcome, _, _ = bounded(use, ros, types)
+    assert outcome == "used" or outcome.startswith("refused: ")
 
 
 class Slow(dict[str, Definition]):

@@ -34,7 +34,7 @@ def test_a_message_may_be_changed_and_the_others_stay(point):
 
 @pytest.mark.parametrize("damage", [lambda data: data[:-1], lambda _: b""], ids=["cut", "empty"])
 @pytest.mark.parametrize("place", [0, 2, 4])
-def test_damage_is_left_to_who_reads_the_fields(point, place, damage):
+def test_damage_is_reported_when_fields_are_read(point, place, damage):
     data = some(point)
     data[place] = damage(data[place])
     assert point.decode_small(data) is None

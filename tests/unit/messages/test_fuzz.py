@@ -201,7 +201,7 @@ def limited_memory() -> Iterator[None]:
 
 
 def attempt(action: Callable[[Any], Any], argument: Any) -> tuple[bool, Any]:
-    """Whether `action` accepted its argument, and its result or its error."""
+    """Return whether `action` accepted its argument, and its result or its error."""
     try:
         return True, action(argument)
     except DecodeError as error:
@@ -283,7 +283,7 @@ def test_validate_and_decode_judge_wide_strings_alike(width: int | None) -> None
 
 
 def plain(leaf: Any) -> Any:
-    """What a path leads to, lists of messages as lists of dicts."""
+    """Return the value of a path, lists of messages as lists of dicts."""
     if isinstance(leaf, Sequence) and leaf and isinstance(leaf[0], rosglass.Message):
         return [corpus.plain(item.to_dict()) for item in leaf]
     return [] if isinstance(leaf, Sequence) and not leaf and leaf != "" else corpus.plain(leaf)
@@ -296,7 +296,7 @@ def at(value: Any, path: str) -> Any:
 
 
 @pytest.mark.parametrize(("name", "ros"), CASES)
-def test_what_rosbags_accepts_reads_the_same_here(name: str, ros: int) -> None:
+def test_messages_that_rosbags_accepts_read_the_same_here(name: str, ros: int) -> None:
     kind, wire, other = load(name, ros), WIRE[ros], rosbags(ros)
     compared = 0
     # Counting to four thousand million empty messages is what rosbags does with the last one.

@@ -48,7 +48,7 @@ def test_fields_are_read_by_attribute_item_and_path() -> None:
 
 
 def test_untouched_message_is_its_bytes() -> None:
-    # Padding that nobody asked for survives only if the bytes are not written anew.
+    # Unnecessary padding survives only if the bytes are not written anew.
     padded = load("std_msgs/msg/String").encode(data="abc") + b"\0\0"
     message = load("std_msgs/msg/String").decode(padded)
     assert load("std_msgs/msg/String").encode(message) is padded
@@ -85,7 +85,7 @@ def test_first_access_may_be_a_write() -> None:
     assert again.header.frame_id == "imu"
 
 
-def test_what_does_not_fit_is_refused_when_encoding() -> None:
+def test_unencodable_value_is_refused_when_encoding() -> None:
     message = PATH.decode(way())
     message.poses[3].pose.position.x = "far"
     for encode in (PATH.encode, PATH.encode_parts):

@@ -9,7 +9,7 @@ import rosglass
 from rosglass.messages import OpaqueType
 
 HASH = "RIHS01_" + "ab" * 32
-SECRET = OpaqueType("secret_msgs/msg/Thing", HASH, "nobody has it")
+SECRET = OpaqueType("secret_msgs/msg/Thing", HASH, "no node has it")
 
 
 def test_name_and_hash_are_known():
@@ -43,7 +43,7 @@ def test_name_and_hash_are_known():
     ],
 )
 def test_whatever_needs_the_definition_says_why_there_is_none(use):
-    with pytest.raises(rosglass.TypeNotFoundError, match=r"secret_msgs/msg/Thing.*nobody has it"):
+    with pytest.raises(rosglass.TypeNotFoundError, match=r"secret_msgs/msg/Thing.*no node has it"):
         use(SECRET)
 
 

@@ -76,7 +76,7 @@ def plain(value: Any) -> Any:
 
 
 def reference(path: str) -> Any:
-    """What Python makes of the path, `[*]` being all elements."""
+    """Return Python's value of the path, `[*]` being all elements."""
     head, star, tail = path.partition("[*].")
     if star:
         return [eval(f"item{bracketed(tail)}", {"item": item}) for item in reference(head)]

@@ -1,4 +1,4 @@
-"""Where a peer is wrong and we differ on purpose: one test per fault, the peer's words first.
+"""Faults of peers where we differ on purpose: one test per fault, the peer's words first.
 
 Each test pins the peer's behaviour too, so that a fixed peer shows up here and the work-around in
 ``peers.py`` can go.

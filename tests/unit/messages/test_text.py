@@ -27,7 +27,7 @@ def test_json_is_strict_and_says_what_it_cannot() -> None:
         name=["grüße", "\udcff"], position=[float("nan"), float("inf"), float("-inf"), 0.1]
     )
     text = message.to_json()
-    value = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    value = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
     assert value["position"] == ["NaN", "Infinity", "-Infinity", 0.1]
     assert value["name"] == ["grüße", "\N{REPLACEMENT CHARACTER}"]
     assert "grüße" in text

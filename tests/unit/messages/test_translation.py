@@ -146,7 +146,7 @@ def test_arrays_beyond_a_bound_are_refused():
         there.encode(ours.encode({"dimensions": [1.0] * 4}))
 
 
-def test_what_is_lost_is_named():
+def test_untranslated_fields_are_named():
     there = Translation(load("visualization_msgs/MarkerArray"))
     assert "markers[].mesh_file" in there.left_out
     assert there.type == load("visualization_msgs/MarkerArray", ros=1)
@@ -258,8 +258,8 @@ def test_services(ros, name, other):
     asked = found.type.request.create(sample_values(found.type.request))
     server.request.validate(server.request.encode(found.request.convert(asked)))
     answer = server.response.create(sample_values(server.response))
-    told = found.type.response.encode(found.response.convert(answer))
-    assert told == found.response.encode(server.response.encode(answer))
+    translated = found.type.response.encode(found.response.convert(answer))
+    assert translated == found.response.encode(server.response.encode(answer))
 
 
 def test_a_message_without_fields_whose_counterpart_has_some():

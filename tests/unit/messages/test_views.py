@@ -100,7 +100,7 @@ def test_a_view_reads_as_its_bytes_do(wire: str, order: str) -> None:
 
 @pytest.mark.parametrize("path", ["parts", "parts[3]", "even[2]", "values", "even[*].x", "bits"])
 @pytest.mark.parametrize(("wire", "order"), FORMATS)
-def test_what_a_path_returns_does_not_follow_a_buffer_that_changes(
+def test_value_of_a_path_does_not_follow_a_changing_buffer(
     wire: str, order: str, path: str
 ) -> None:
     data = KIND.encode(VALUE, wire=wire, byteorder=order)
@@ -121,7 +121,7 @@ def test_wide_strings_are_read_from_views(width: int) -> None:
 
 
 @pytest.mark.parametrize(("wire", "order"), FORMATS)
-def test_damage_is_told_as_in_bytes(wire: str, order: str) -> None:
+def test_damage_is_reported_as_in_bytes(wire: str, order: str) -> None:
     data = KIND.encode(VALUE, wire=wire, byteorder=order)
     chance = random.Random(3)
     damaged = [data[:size] for size in range(0, len(data), 7)]

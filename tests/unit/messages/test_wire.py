@@ -197,7 +197,7 @@ def test_wstring_bytes() -> None:
         kind.encode(a="", wstring_width=3)
 
 
-def test_wstring_width_is_told_by_the_padding_when_nothing_else_does() -> None:
+def test_wstring_width_follows_from_the_padding_if_nothing_else_shows_it() -> None:
     kind = MessageType.from_text("t/msg/W", "wstring a")
     # One character: 2 bytes and 2 of padding, or 4 bytes. The header's options count the padding.
     assert kind.decode(hexed("0001 0002 01000000 41000000")).a == "A"

@@ -1,4 +1,4 @@
-"""What a scene draws, as far as pictures of RViz do not show it: test_against_rviz.py."""
+"""Drawables, as far as comparisons with RViz do not cover them (test_against_rviz.py)."""
 
 from __future__ import annotations
 
@@ -103,6 +103,6 @@ def _add_to_itself() -> None:
         (_add_to_itself, "Group.add.*: expected a drawable, or a group"),
     ],
 )
-def test_what_cannot_be_drawn_is_an_error_that_names_it(call: Any, error: str) -> None:
+def test_invalid_drawable_is_refused_by_name(call: Any, error: str) -> None:
     with pytest.raises(Error, match=error):
         call()

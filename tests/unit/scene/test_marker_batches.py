@@ -110,7 +110,7 @@ def test_batches_have_room_for_a_bounded_number_of_points_and_letters() -> None:
     assert texts.drawable.count == Labels.MAX_COUNT
 
 
-def test_what_is_far_from_the_origin_is_not_rounded() -> None:
+def test_positions_far_from_the_origin_are_not_rounded() -> None:
     utm = np.array([476_000.123, 5_429_000.456, 0.0])
     origin = np.round(utm, -3).tolist()
     texts, lines = TextBatch(origin, None), LineBatch(0.1, origin, None)

@@ -721,7 +721,7 @@ def test_unknown_formats(name: str) -> None:
         load_mesh(b"data", name)
 
 
-def test_files_that_are_none(tmp_path: Path) -> None:
+def test_missing_and_special_files_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match=r"a\.stl: the mesh can't be read: .*No such file"):
         load_mesh(tmp_path / "a.stl")
     with pytest.raises(MeshError, match="this is no file"):

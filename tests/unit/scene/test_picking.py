@@ -13,7 +13,7 @@ def test_a_ray_does_not_pass_between_two_triangles() -> None:
     box = Mesh(BOX)
     box.owner = "box"
     camera = OrbitView().camera(400, 300)
-    # The camera looks along the diagonal of the upper side, in the middle of the picture.
+    # The camera looks along the diagonal of the upper side, in the middle of the frame.
     near, far = camera.project((0.5, 0.5, 0.5)), camera.project((-0.5, -0.5, 0.5))
     rows = range(round(far.y) + 2, round(near.y) - 1)
     missed = [y for y in rows if pick(Group(box).drawables(), camera, 200, y) is None]
@@ -34,7 +34,7 @@ def test_a_text_is_picked_where_it_is_drawn(align: str, found: set[str]) -> None
     labels.owner = "text"
     labels.set_texts(["a long text"], [(0, 0, 0)], 40.0)
     camera = OrbitView().camera(400, 300)
-    # A little beside its place, in the middle of the picture.
+    # A little beside its position, in the middle of the frame.
     around = {"left": (-20, 1), "right": (20, 1), "above": (1, -15), "below": (1, 15)}
     hits = {
         name: pick(Group(labels).drawables(), camera, 200 + x, 150 + y)

@@ -271,7 +271,7 @@ REPACKED: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 
 
 @pytest.mark.parametrize("name", REPACKED)
-def test_what_the_card_cannot_read_is_repacked(name: str) -> None:
+def test_layouts_that_the_gpu_cannot_read_are_repacked(name: str) -> None:
     columns, options = REPACKED[name]
     found = cloud(columns, **options)
     vertices = found.vertex_data()
@@ -306,7 +306,7 @@ def test_packed_colors_of_a_big_endian_cloud() -> None:
     assert channel(found.vertex_data(COLOR)).tolist() == [[3, 2, 1, 4]]
 
 
-def test_padding_after_the_only_row_is_no_vertex() -> None:
+def test_padding_after_the_only_row_does_not_count_as_vertex() -> None:
     found = cloud(random_points(6), row_padding=5)
     vertices = found.vertex_data()
     assert np.shares_memory(vertices.data, found.data)

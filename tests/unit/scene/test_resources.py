@@ -1,4 +1,4 @@
-"""Files that robot descriptions name: packages, URIs, and pictures of any size."""
+"""Files that robot descriptions name: packages, URIs, and images of any size."""
 
 from __future__ import annotations
 
@@ -27,7 +27,9 @@ def mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return file
 
 
-def test_where_files_are(mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_resources_are_found_by_uri_and_path(
+    mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert locate_resource("package://my_arm/meshes/upper arm.stl") == mesh
     assert locate_resource(mesh.as_uri()) == mesh  # with %20
     assert locate_resource(f"file://localhost{mesh}") == mesh
@@ -132,7 +134,7 @@ def test_pictures_that_are_too_large(size: tuple[int, int]) -> None:
     assert check_texture((8192, 8192)) == (8192, 8192)
 
 
-def test_what_is_no_picture(tmp_path: Path) -> None:
+def test_invalid_texture_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(UnsupportedError, match=r"wood: this is no PNG, .*; convert it to PNG"):
         check_texture(b"some text that is long enough", "wood")
     with pytest.raises(ResourceError, match="there is no such file"):

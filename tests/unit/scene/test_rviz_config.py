@@ -379,7 +379,9 @@ def test_values_keep_their_types(value: object) -> None:
         ({1: 2}, "X: a key must be a text, got 1"),
     ],
 )
-def test_what_rviz_cannot_read_is_not_saved(value: object, fault: str, tmp_path: Path) -> None:
+def test_value_that_rviz_cannot_read_is_not_saved(
+    value: object, fault: str, tmp_path: Path
+) -> None:
     new = RvizConfig()
     offset = {"Offset": {"X": value}}
     new.displays.append(DisplayConfig.new("Grid", name="My Grid", settings=offset))
@@ -535,7 +537,7 @@ def test_colors(value: str, expected: tuple[int, ...]) -> None:
     "value",
     [None, 3, "", "1; 2", "1; 2; 3; 4", "1; 2; x", "#12", "#1234567", "9" * 9999, "²; 1; 1", {}],
 )
-def test_colors_that_are_none(value: object) -> None:
+def test_invalid_colors_are_rejected(value: object) -> None:
     with pytest.raises(Error, match=r"Color: expected a colour, e\.g\. '255; 128; 0', got"):
         read_color(value)
 

@@ -204,12 +204,12 @@ def test_joints_that_are_not_one_number_stay_at_their_origin() -> None:
         ),
     ],
 )
-def test_what_is_refused(body: str, message: str) -> None:
+def test_invalid_robot_is_rejected(body: str, message: str) -> None:
     with pytest.raises(UrdfError, match=message):
         robot(body)
 
 
-def test_what_is_left_of_xacro_costs_only_itself() -> None:
+def test_xacro_elements_are_left_out_with_a_warning() -> None:
     found = robot(
         '<xacro:property name="r" value="1"/>\n<xacro:include/><xacro:include/>' + links("a")
     )
@@ -263,7 +263,7 @@ def test_xml_that_urdfdom_reads_as_well(text: str | bytes) -> None:
     ],
     ids=range(15),
 )
-def test_what_is_no_urdf(text: str | bytes, message: str) -> None:
+def test_malformed_urdf_is_rejected(text: str | bytes, message: str) -> None:
     with pytest.raises(UrdfError, match=message):
         parse_urdf(text, "source")
 

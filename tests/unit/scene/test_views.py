@@ -405,7 +405,7 @@ def test_keys_focus_and_reset() -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_what_is_looked_at_is_seen_in_the_middle(name: str) -> None:
+def test_focus_appears_in_the_middle(name: str) -> None:
     view = create_view(name)
     view.update_target(place(1, 2, 0.5, yaw=0.3))
     point = (2, 3, 0.5)
@@ -540,7 +540,7 @@ def test_any_view_takes_over_from_any_other(old: str, new: str) -> None:
     if "TopDownOrtho" in (old, new):
         if {old, new} <= {"TopDownOrtho", "Orbit"}:
             assert near(after.project((2, 3, 0.5))[:2], (400, 300), 0.1)
-    # Where the camera looks straight down, the ground below the picture's middle is not seen.
+    # Where the camera looks straight down, the ground below the frame's middle is not visible.
     elif old != "FrameAligned" or new not in on_ground:
         assert near(after.eye, before.eye, 0.02)
         assert near(after.pose[:3, :3], before.pose[:3, :3], 0.02)

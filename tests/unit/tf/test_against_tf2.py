@@ -57,14 +57,14 @@ def some_transforms(dice: random.Random) -> list[list[Any]]:
         if dice.random() < 0.4:
             static.add(name)
     parents["lost"] = "nowhere"
-    told: list[list[Any]] = []
+    samples: list[list[Any]] = []
     for name, parent in parents.items():
         place = [dice.uniform(-5, 5) for _ in range(3)]
         turn = some_rotation(dice)
         if name in static:
-            told.append([parent, name, START, [*place, *turn], "/static", True])
+            samples.append([parent, name, START, [*place, *turn], "/static", True])
             continue
-        # Some tell more than is kept, some are silent early, some tell one thing only.
+        # Some transforms cover more than the cache, some end early, some have a single stamp.
         first, last = dice.choice(
             [(-12.0, 5.0), (0.0, 5.0), (0.0, 2.0), (1.0, 5.0)] * 3 + [(3.0, 3.0)]
         )
@@ -74,19 +74,19 @@ def some_transforms(dice: random.Random) -> list[list[Any]]:
             place = [x + dice.gauss(0, 0.1) for x in place]
             turn = some_rotation(dice) if dice.random() < 0.2 else [-x for x in turn]
             authority = dice.choice(["/one", "/two"])
-            told.append([parent, name, stamp, [*place, *turn], authority, False])
+            samples.append([parent, name, stamp, [*place, *turn], authority, False])
             if dice.random() < 0.05:
-                told.append([parent, name, stamp, [*place, *turn], "/again", False])
+                samples.append([parent, name, stamp, [*place, *turn], "/again", False])
             time += period
         if name == "link3":
-            told.append(["map", name, START + 5 * NS + 500, [*place, *turn], "/moved", False])
+            samples.append(["map", name, START + 5 * NS + 500, [*place, *turn], "/moved", False])
     # Late ones, in any order; and outdated ones, which are refused.
-    late = [item for item in told if not item[5] and dice.random() < 0.1]
+    late = [item for item in samples if not item[5] and dice.random() < 0.1]
     dice.shuffle(late)
-    told = [item for item in told if item not in late] + late
-    for item in dice.sample(told, 20):
-        told.append([*item[:2], START - 40 * NS, *item[3:]])
-    return told
+    samples = [item for item in samples if item not in late] + late
+    for item in dice.sample(samples, 20):
+        samples.append([*item[:2], START - 40 * NS, *item[3:]])
+    return samples
 
 
 def some_queries(dice: random.Random, transforms: list[list[Any]], count: int) -> list[list[Any]]:

@@ -92,7 +92,7 @@ def test_a_fixed_frame_and_two_times() -> None:
 
 
 @pytest.mark.parametrize("name", ["", "/base", None, 3, []])
-def test_names_that_are_none(name: object) -> None:
+def test_invalid_names_are_rejected(name: object) -> None:
     buffer = TransformBuffer()
     put(buffer, "map", "base")
     with pytest.raises(InvalidArgumentException):
@@ -126,7 +126,7 @@ def test_two_trees() -> None:
 
 
 @pytest.mark.parametrize("time", [1.5, 3, "now"])
-def test_times_that_are_none(time: object) -> None:
+def test_invalid_times_are_rejected(time: object) -> None:
     buffer = TransformBuffer()
     put(buffer, "map", "base")
     with pytest.raises(InvalidArgumentException, match=r"rosglass\.Time"):
@@ -134,7 +134,7 @@ def test_times_that_are_none(time: object) -> None:
 
 
 @pytest.mark.parametrize("time", [0, -1.0, "10", True, math.nan, Duration(-1)])
-def test_cache_times_that_are_none(time: object) -> None:
+def test_invalid_cache_times_are_rejected(time: object) -> None:
     with pytest.raises(ConversionError, match="cache_time"):
         TransformBuffer(time)  # type: ignore[arg-type]
 
@@ -188,12 +188,12 @@ def test_many_frames_at_once_are_where_each_of_them_is() -> None:
 
 def test_a_leading_slash_is_left_out() -> None:
     buffer = TransformBuffer()
-    told: list[str] = []
-    buffer.on_tree_change(lambda: told.append("tree"))
+    notified: list[str] = []
+    buffer.on_tree_change(lambda: notified.append("tree"))
     put(buffer, "/map", "/base")
     put(buffer, "/map", "/base", 2.0)
     assert list(buffer.tree()) == ["base", "map"]
-    assert told == ["tree"]
+    assert notified == ["tree"]
 
 
 @pytest.mark.parametrize(
@@ -222,7 +222,7 @@ def test_transforms_that_are_refused(
     assert "/one" in caplog.text
 
 
-def test_numbers_from_the_network_that_are_none() -> None:
+def test_non_finite_numbers_are_ignored() -> None:
     buffer = TransformBuffer()
     for bad in (math.nan, math.inf):
         entry = ("map", bad, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -372,7 +372,7 @@ def test_a_frame_that_turned_round_with_its_clock(clock: list[float]) -> None:
     assert buffer.tree()["base"].parent == "odom"
 
 
-def test_who_is_late_among_those_in_time_does_not_turn_time_back(clock: list[float]) -> None:
+def test_late_publisher_among_punctual_ones_does_not_turn_time_back(clock: list[float]) -> None:
     """Two publishers of a frame, one of them with a clock that is behind, or an old message."""
     buffer = TransformBuffer()
     for step in range(20):
@@ -387,7 +387,7 @@ def test_who_is_late_among_those_in_time_does_not_turn_time_back(clock: list[flo
     assert buffer.lookup_transform("map", "base").stamp == at(519)
 
 
-def test_what_was_late_before_does_not_count_after_clearing(clock: list[float]) -> None:
+def test_earlier_late_data_does_not_count_after_clearing(clock: list[float]) -> None:
     buffer = TransformBuffer()
     put(buffer, "map", "base", 500.0)
     put(buffer, "map", "base", 100.0)
@@ -516,7 +516,7 @@ def test_names_are_bounded_for_each_publisher(
     assert refused == ["too many"] * 5, "odom and base made room"
     assert len(buffer.frame_names()) == 50_000
     now += 11.0
-    # Whose frames are still in use does not matter; it may be those of who has most.
+    # A publisher's frames may be dropped although they are in use: the one with most frames loses.
     assert not send([f"/six{number}" for number in range(10_000)], "/six")
     assert not send(["late"], "/seven")
     assert len(buffer.frame_names()) < 11_000

@@ -35,7 +35,7 @@ NAME = "tf2_msgs/msg/TFMessage"
 
 
 class Node:
-    """What tf needs of a node; keeps what is published."""
+    """The parts of a node that tf needs; keeps published messages."""
 
     def __init__(self, ros: int = 2) -> None:
         self.wire = "ros1" if ros == 1 else "cdr"
@@ -75,8 +75,8 @@ class Node:
 
         def send(data: bytes) -> None:
             self.sent.append((topic, data))
-            for told in self.receivers:
-                told()
+            for callback in self.receivers:
+                callback()
 
         return SimpleNamespace(
             topic=topic,
@@ -138,7 +138,7 @@ def test_frames_that_a_bridge_passes_on_are_not_late_because_others_are_stamped_
 
 
 @pytest.mark.parametrize("ros", [1, 2])
-def test_several_broadcasters_of_a_node_tell_all_together(ros: int) -> None:
+def test_several_broadcasters_of_a_node_send_all_transforms_together(ros: int) -> None:
     node: Any = Node(ros)
     first, second = StaticTransformBroadcaster(node), StaticTransformBroadcaster(node)
     elsewhere = StaticTransformBroadcaster(node, "/other")
@@ -167,7 +167,7 @@ def test_several_broadcasters_of_a_node_tell_all_together(ros: int) -> None:
         StaticTransformBroadcaster(node)
 
 
-def test_who_receives_static_transforms_at_once_may_send_some() -> None:
+def test_callback_of_static_transforms_may_send_some() -> None:
     """Also from another thread, and waiting for it: no lock is held while they are sent."""
     node: Any = Node()
     broadcaster = StaticTransformBroadcaster(node)
@@ -240,12 +240,12 @@ def test_namespaces(namespace: str, topic: str) -> None:
     assert StaticTransformBroadcaster(node, namespace).publisher.topic == f"{topic}_static"
 
 
-def test_a_namespace_that_is_none() -> None:
+def test_invalid_namespace_is_rejected() -> None:
     with pytest.raises(InvalidNameError):
         TransformListener(Node(), namespace=None)  # type: ignore[arg-type]
 
 
-def test_half_a_listener_is_none() -> None:
+def test_failed_listener_closes_its_other_subscription() -> None:
     node: Any = Node()
     node.refused = "/tf_static"
     with pytest.raises(NodeClosedError):
@@ -253,7 +253,7 @@ def test_half_a_listener_is_none() -> None:
     assert node.subscriptions["/tf"].closed
 
 
-def test_what_cannot_be_sent() -> None:
+def test_invalid_transforms_are_not_sent() -> None:
     node: Any = Node()
     for kind in (TransformBroadcaster, StaticTransformBroadcaster):
         broadcaster = kind(node)

@@ -63,12 +63,12 @@ def test_messages_of_both_worlds(ros: int) -> None:
         {"frame_id": None},
     ],
 )
-def test_what_is_no_transform(fields: dict[str, object]) -> None:
+def test_invalid_fields_are_rejected(fields: dict[str, object]) -> None:
     with pytest.raises(InvalidArgumentException, match=next(iter(fields))):
         Transform(**fields)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("message", [None, {}, {"header": 3, "transform": 4}, "tf"])
-def test_what_is_no_message(message: object) -> None:
+def test_other_messages_are_rejected(message: object) -> None:
     with pytest.raises(InvalidArgumentException, match="TransformStamped"):
         Transform.from_message(message)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Lookups that wait, and callbacks that are told of changes."""
+"""Lookups that wait, and callbacks that are notified of changes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def put(buffer: TransformBuffer, parent: str, child: str, stamp: int = 5) -> Non
     buffer.set_transform(Transform(stamp=Time(stamp), frame_id=parent, child_frame_id=child))
 
 
-def test_what_is_there_comes_at_once() -> None:
+def test_available_transform_is_returned_at_once() -> None:
     buffer = TransformBuffer()
     put(buffer, "map", "base")
     assert buffer.wait_for_transform("map", "base", timeout=0).stamp == Time(5)
@@ -60,7 +60,7 @@ def test_too_late() -> None:
     with pytest.raises(TimeoutException, match=r"arm.*within 0.01 s.*does not exist") as caught:
         buffer.wait_for_transform("map", "arm", timeout=0.01)
     assert isinstance(caught.value, TimeoutError)
-    # As in tf2, a lookup tells what stands in the way.
+    # As in tf2, a lookup raises the actual error.
     with pytest.raises(LookupException):
         buffer.lookup_transform("map", "arm", timeout=0.01)
     with pytest.raises(ExtrapolationException):
@@ -103,38 +103,38 @@ def test_closing_ends_all_waiting() -> None:
 def test_changes_between_two_frames() -> None:
     buffer = TransformBuffer()
     put(buffer, "map", "base")
-    told: list[str] = []
-    handle = buffer.on_change("map", "hand", lambda: told.append("hand"))
-    buffer.on_change("map", "base", lambda: told.append("base"))
+    notified: list[str] = []
+    handle = buffer.on_change("map", "hand", lambda: notified.append("hand"))
+    buffer.on_change("map", "base", lambda: notified.append("base"))
     put(buffer, "map", "wheel")
-    assert told == []
+    assert notified == []
     put(buffer, "base", "arm")
-    assert told == []
+    assert notified == []
     put(buffer, "arm", "hand")  # connects them
-    assert told == ["hand"]
+    assert notified == ["hand"]
     put(buffer, "map", "base", 6)
-    assert sorted(told) == ["base", "hand", "hand"]
-    told.clear()
+    assert sorted(notified) == ["base", "hand", "hand"]
+    notified.clear()
     buffer.clear()
-    assert sorted(told) == ["base", "hand"]
-    told.clear()
+    assert sorted(notified) == ["base", "hand"]
+    notified.clear()
     handle.close()
     handle.close()
     put(buffer, "map", "base", 7)
-    assert told == ["base"]
+    assert notified == ["base"]
 
 
 def test_changes_of_the_tree() -> None:
     buffer = TransformBuffer()
-    told: list[str] = []
-    buffer.on_tree_change(lambda: told.append("tree"))
-    buffer.on_update(lambda: told.append("any"))
+    notified: list[str] = []
+    buffer.on_tree_change(lambda: notified.append("tree"))
+    buffer.on_update(lambda: notified.append("any"))
     put(buffer, "map", "base")
-    assert told == ["any", "tree"]
+    assert notified == ["any", "tree"]
     put(buffer, "map", "base", 6)
-    assert told == ["any", "tree", "any"]
+    assert notified == ["any", "tree", "any"]
     put(buffer, "odom", "base", 7)
-    assert told[3:] == ["any", "tree"]
+    assert notified[3:] == ["any", "tree"]
 
 
 def test_callbacks_may_look_up_and_fill() -> None:
@@ -151,7 +151,7 @@ def test_callbacks_may_look_up_and_fill() -> None:
     assert [transform.stamp for transform in found] == [Time(5), Time(9)]
 
 
-def test_what_cannot_be_called() -> None:
+def test_invalid_callback_is_rejected() -> None:
     buffer = TransformBuffer()
     with pytest.raises(ConversionError):
         buffer.on_change("map", "base", None)  # type: ignore[arg-type]

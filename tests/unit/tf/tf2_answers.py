@@ -16,7 +16,7 @@ def answer(function, *arguments):
     try:
         found = function(*arguments)
     except tf2_py.TransformException as error:
-        return {"error": type(error).__name__, "told": str(error)}
+        return {"error": type(error).__name__, "message": str(error)}
     p, q = found.transform.translation, found.transform.rotation
     return {
         "value": [p.x, p.y, p.z, q.x, q.y, q.z, q.w],
