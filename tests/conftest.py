@@ -1,4 +1,4 @@
-"""What holds for all tests."""
+"""Options and fixtures of all tests."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ pytest.register_assert_rewrite("overlay_contract", "view_contract")
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
 
-# No test finds what robots told the developer's own programs, nor leaves anything there; the
+# No test uses the developer's own cache of types, nor leaves anything there; the
 # processes that tests start inherit this.
 os.environ["ROSGLASS_TYPE_CACHE"] = "off"
 
@@ -34,7 +34,7 @@ FAILED = pytest.StashKey[bool]()
 #: One case in this many of each exhaustive test runs without ``--exhaustive``.
 EXHAUSTIVE_SHARE = 10
 
-# Whoever starts the tests in the background has Ctrl-C ignored, in everything they start as well.
+# A shell that starts the tests in the background ignores Ctrl-C, in all their processes as well.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
@@ -124,7 +124,7 @@ def run_command(
 
 @pytest.fixture
 def start_command_at() -> Iterator[Callable[..., subprocess.Popen[str]]]:
-    """Start a command as a process of its own, as somebody does who presses Ctrl-C."""
+    """Start a command in a process of its own, to send it Ctrl-C (SIGINT)."""
     started = []
 
     def start(url: str, *arguments: str) -> subprocess.Popen[str]:
@@ -146,7 +146,7 @@ def start_command_at() -> Iterator[Callable[..., subprocess.Popen[str]]]:
 def pytest_runtest_makereport(
     item: pytest.Item,
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Let processes of tests tell each other what was logged: lone surrogates cannot be sent."""
+    """Let xdist's workers send captured logs: lone surrogates cannot be sent."""
     report = yield
     item.stash[FAILED] = report.failed or (report.when != "setup" and item.stash[FAILED])
     report.sections = [

@@ -42,7 +42,7 @@ class Wire:
 
     @property
     def is_ros1(self) -> bool:
-        """Whether ROS 1 talks over this wire."""
+        """True if ROS 1 uses this wire."""
         return self.name == "tcpros"
 
     @property

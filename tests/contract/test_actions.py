@@ -55,7 +55,7 @@ def test_a_goal_succeeds_with_feedback_and_result(offer, client, console, wire, 
     assert status is goal.status is GoalStatus.SUCCEEDED
     assert list(result.sequence) == [0, 1, 2, 3, 4]
     eventually(lambda: done == [goal])
-    if not wire.is_ros1:  # which tells no client when a goal was accepted
+    if not wire.is_ros1:  # where clients do not learn when a goal was accepted
         assert statuses.pop(0) is GoalStatus.ACCEPTED
         assert abs((console.now() - goal.accepted).seconds) < 30
     assert statuses == [GoalStatus.EXECUTING, GoalStatus.SUCCEEDED]
@@ -131,7 +131,7 @@ def test_odd_names_and_types_are_refused(robot, wire, create):
             getattr(robot, create)(name, kind, *more)
 
 
-def test_what_does_not_fit_is_refused_naming_the_field_and_not_sent(offer, client):
+def test_invalid_goal_is_refused_naming_the_field_and_not_sent(offer, client):
     orders = []
     offer(lambda goal: orders.append(goal.goal.order))
     with pytest.raises(rosglass.ConversionError, match="order: expected an integer"):
@@ -140,7 +140,7 @@ def test_what_does_not_fit_is_refused_naming_the_field_and_not_sent(offer, clien
     assert orders == [2]
 
 
-def test_the_status_of_goals_is_there_for_who_comes_late(offer, client, connect, topic, wire):
+def test_status_of_goals_is_available_to_late_subscriptions(offer, client, connect, topic, wire):
     offer()
     goal = client.send_goal({"order": 2})
     assert goal.result(30).status is GoalStatus.SUCCEEDED
@@ -207,7 +207,7 @@ def test_odd_times_to_cancel_before_are_refused(client, time_):
         client.cancel_before(time_)
 
 
-def test_what_cannot_be_sent_is_refused_and_not_sent(offer, client):
+def test_invalid_goal_or_option_is_refused_and_not_sent(offer, client):
     executed = []
     offer(lambda goal: executed.append(goal.id))
     for goal, options, reason in (
@@ -319,8 +319,8 @@ def test_closing_the_client_leaves_goals_to_the_server(offer, console, client, c
     assert goal.acceptance.result(30)
     (client if close == "client" else console).close()
     client.close()
-    told = f"client of {client.name} was closed before the goal ended, which continues"
-    with pytest.raises(rosglass.NodeClosedError, match=told):
+    message = f"client of {client.name} was closed before the goal ended, which continues"
+    with pytest.raises(rosglass.NodeClosedError, match=message):
         goal.result(30)
     assert [each.id for each in server.goals] == [goal.id]
     assert client.problem == "the client is closed"
@@ -355,7 +355,7 @@ def test_several_goals_run_at_once(offer, client):
     assert goals[0].status.is_active
 
 
-def test_what_ends_a_goal_as_failed(offer, client, caplog):
+def test_failing_callback_aborts_the_goal(offer, client, caplog):
     def fail(goal):
         if goal.goal.order == 1:
             raise ValueError("the arm is off")
@@ -376,7 +376,7 @@ def test_what_ends_a_goal_as_failed(offer, client, caplog):
     assert "sequence: expected" in caplog.text
 
 
-def test_what_a_running_goal_may_and_may_not_do(offer, client, wire):
+def test_operations_that_do_not_fit_the_state_of_a_goal_raise(offer, client, wire):
     kept, caught = [], []
 
     def execute(goal):
@@ -398,7 +398,7 @@ def test_what_a_running_goal_may_and_may_not_do(offer, client, wire):
     offer(execute)
     goal = client.send_goal()
     assert list(goal.result(30).result.sequence) == [3]
-    for text, told in zip(
+    for text, message in zip(
         caught,
         [
             "there was no request to cancel goal",
@@ -408,10 +408,10 @@ def test_what_a_running_goal_may_and_may_not_do(offer, client, wire):
         ],
         strict=True,
     ):
-        assert told in text
+        assert message in text
     (theirs,) = kept
     assert (theirs.id, theirs.status) == (goal.id, GoalStatus.SUCCEEDED)
-    if not wire.is_ros1:  # which tells no client when a goal was accepted
+    if not wire.is_ros1:  # where clients do not learn when a goal was accepted
         assert theirs.accepted == goal.accepted
     assert theirs.id_text == goal.id_text
     assert f"{goal.id_text} succeeded" in repr(theirs)
@@ -421,7 +421,7 @@ def test_what_a_running_goal_may_and_may_not_do(offer, client, wire):
             late()
 
 
-def test_what_execute_returns_after_the_end_is_logged(offer, client, caplog, eventually):
+def test_return_value_after_the_end_is_logged(offer, client, caplog, eventually):
     def execute(goal):
         goal.succeed()
         return {"sequence": [1]}
@@ -442,14 +442,14 @@ def test_leaving_a_goals_block_ends_it(offer, client):
 
 
 @pytest.mark.parametrize(
-    ("decision", "told"),
+    ("decision", "warning"),
     [
         (None, "accept returned None instead of True or False; rejecting goal"),
         (1, "accept returned 1 instead of True or False; rejecting goal"),
         (ValueError("broken"), "accept failed; rejecting goal"),
     ],
 )
-def test_a_goal_is_accepted_by_true_alone(offer, client, decision, told, caplog):
+def test_goal_is_accepted_by_true_alone(offer, client, decision, warning, caplog):
     def accept(goal):
         if isinstance(decision, Exception):
             raise decision
@@ -458,18 +458,18 @@ def test_a_goal_is_accepted_by_true_alone(offer, client, decision, told, caplog)
     offer(accept=accept)
     with pytest.raises(rosglass.GoalRejectedError):
         client.send_goal().result(30)
-    assert told in caplog.text
+    assert warning in caplog.text
 
 
 @pytest.mark.parametrize(
-    ("decision", "told"),
+    ("decision", "warning"),
     [
         (True, ""),
         (None, "cancel returned None instead of True or False; cancelling goal"),
         (ValueError("broken"), "cancel failed; cancelling goal"),
     ],
 )
-def test_a_goal_is_cancelled_unless_the_user_refuses(offer, client, decision, told, caplog):
+def test_goal_is_cancelled_unless_the_callback_refuses(offer, client, decision, warning, caplog):
     seen = []
 
     def cancel(goal):
@@ -484,7 +484,7 @@ def test_a_goal_is_cancelled_unless_the_user_refuses(offer, client, decision, to
     assert goal.cancel().result(30).accepted == (goal.id,)
     assert goal.result(30).status is GoalStatus.CANCELED
     assert seen == [(goal.id, "robot callbacks")]
-    assert told in caplog.text
+    assert warning in caplog.text
 
 
 def test_a_goal_goes_on_when_the_user_refuses_to_cancel_it(offer, client, eventually):
@@ -565,7 +565,7 @@ def test_a_goal_cancelled_before_its_turn_is_not_started(offer, client):
 
 
 def test_a_future_lets_a_goal_go_on_without_a_thread(offer, client, eventually):
-    """Told of a request to cancel by a promise: what user interfaces need."""
+    """A promise announces the cancel request, as user interfaces need it."""
     goals, asked, answers = [], [], [Future(), Future()]
 
     def execute(goal):
@@ -624,7 +624,7 @@ def test_coroutines_execute_goals_in_their_loop(robot, console, topic, wire):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         ({"execute": None}, "callback: expected something that can be called"),
         ({"accept": 7}, "accept: expected a plain function, or None"),
@@ -633,9 +633,9 @@ def test_coroutines_execute_goals_in_their_loop(robot, console, topic, wire):
         ({"execute": asyncio.sleep}, "created inside a running event loop"),
     ],
 )
-def test_callbacks_that_cannot_run_are_refused_at_creation(robot, topic, wire, arguments, told):
+def test_invalid_callbacks_are_refused_at_creation(robot, topic, wire, arguments, message):
     options = {"execute": count, **arguments}
-    with pytest.raises(rosglass.ArgumentError, match=f"{topic}: .*{told}"):
+    with pytest.raises(rosglass.ArgumentError, match=f"{topic}: .*{message}"):
         robot.create_action_server(topic, wire.count, **options)
     assert topic not in robot.actions()
 

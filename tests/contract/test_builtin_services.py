@@ -1,4 +1,4 @@
-"""What every node has by itself, its log on ``/rosout`` and simulated time, on every wire."""
+"""The built-in parts of every node: its log on ``/rosout`` and simulated time, on every wire."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TEXT = "std_msgs/msg/String"
 
 @pytest.fixture
 def log(robot, console, eventually):
-    """What the console hears of the robot's log; the link to it is there."""
+    """The messages of the robot's log that the console receives; it is connected."""
     found = []
     console.create_subscription("/rosout", None, found.append, QoS(depth=10_000))
 
@@ -53,7 +53,7 @@ def test_messages_say_where_they_were_logged_and_how_severe_they_are(robot, log,
     assert first.line > 20
 
 
-def test_what_a_text_of_ros_cannot_hold_is_written_in_other_words(robot, log, eventually):
+def test_characters_that_a_string_cannot_hold_are_escaped(robot, log, eventually):
     robot.logger.getChild("gripper.left").error("Grüße\0\udc80")
     robot.logger.critical("x" * 100_000)
     try:

@@ -1,4 +1,4 @@
-"""Who is there, what they offer, and the end of it, on every wire."""
+"""Nodes, their endpoints, and closing them, on every wire."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def wire_type(wire):
     return f"{package}/srv/{name}"
 
 
-def test_what_a_node_has_is_listed(robot, console, topic, eventually):
+def test_endpoints_of_a_node_are_listed(robot, console, topic, eventually):
     robot.create_publisher(topic, TEXT)
     eventually(
         lambda: topic in [end.name for end in console.endpoints("/robot")],
@@ -150,7 +150,7 @@ def test_a_closed_node_does_nothing_more(connect, topic):
 
 
 @pytest.mark.parametrize("take", [copy.copy, copy.deepcopy, pickle.dumps])
-def test_what_lives_in_the_graph_cannot_be_copied(console, topic, take):
+def test_nodes_and_endpoints_cannot_be_copied(console, topic, take):
     for made in (
         console,
         console.create_publisher(topic, TEXT),
@@ -223,7 +223,7 @@ def own_threads():
 
 
 @pytest.mark.parametrize("use", [publish, call, act])
-def test_what_is_closed_leaves_nothing_behind(
+def test_closed_endpoints_leave_nothing_behind(
     robot, console, topic, wire, eventually, use, monkeypatch
 ):
     monkeypatch.setattr("rosglass.wires.tcpros.core._IDLE_TIMEOUT_S", 0.2)

@@ -146,7 +146,7 @@ time.sleep(0.1)
 def test_a_program_ends_by_itself_without_closing_its_node(wire, end):
     code, output = run(FORGETFUL.format(url=wire.url, text=TEXT, image=IMAGE) + end)
     if end:
-        # Python forgets why it ends when another thread runs exec() meanwhile, as for dataclasses.
+        # Python forgets why it ends if another thread runs exec() at that time, as for dataclasses.
         assert code in (-signal.SIGINT, 1), output
     else:
         assert (code, output) == (0, "")
@@ -174,7 +174,7 @@ if child == 0:
             use()
         except rosglass.NodeClosedError as error:
             assert "does not work after a fork; connect again" in str(error), error
-            print("told", flush=True)
+            print("refused", flush=True)
     print(node.status(), flush=True)
     try:
         rosglass.connect({url!r}, "child").close()
@@ -192,10 +192,10 @@ node.close()
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
-def test_a_fork_is_told_and_leaves_its_parent_alone(wire):
+def test_fork_is_refused_and_leaves_its_parent_alone(wire):
     code, output = run(FORK.format(url=wire.url, add=wire.add, text=TEXT))
     assert code == 0, output
     status = "CLOSED: left behind by a fork; connect again here"
     # The libraries of DDS and Zenoh do not work in a fork at all.
     again = "start anew" if wire.name in ("dds", "zenoh") else "connected anew"
-    assert output.splitlines() == ["told"] * 3 + [status, again, "['before', 'after']"]
+    assert output.splitlines() == ["refused"] * 3 + [status, again, "['before', 'after']"]

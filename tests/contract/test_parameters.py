@@ -62,7 +62,7 @@ def test_a_declared_parameter_is_read_set_described_and_forgotten(own):
         parameters.get(speed)
 
 
-def test_of_several_threads_that_declare_a_parameter_one_succeeds(own):
+def test_one_of_several_threads_declares_a_parameter(own):
     described = ParameterDescriptor(description="In m/s.")
 
     def declare(name):
@@ -89,7 +89,7 @@ def test_values_keep_their_types(own, client, eventually, value):
     assert client.describe([name])[name].type.name == own.all.describe(name).type.name
 
 
-def test_what_can_be_no_parameter_is_refused_before_it_is_set(own, client):
+def test_invalid_value_is_refused_before_it_is_set(own, client):
     name = own.name("odd")
     for value in (object(), 2**70, "\0", [1, object()]):
         with pytest.raises(ParameterError):

@@ -23,7 +23,7 @@ SHORT = Duration.from_seconds(0.2)
 # -- profiles that do not match --------------------------------------------------------------------
 
 
-def test_profiles_that_do_not_match_are_told_to_both(
+def test_incompatible_profiles_are_reported_to_both_sides(
     wire, robot, console, topic, eventually, caplog
 ):
     subscription = console.create_subscription(topic, TEXT, qos=QoS.latched())
@@ -77,7 +77,7 @@ def test_a_publisher_names_subscriptions_of_other_types(robot, console, topic, e
 # -- what is available -----------------------------------------------------------------------------
 
 
-def test_what_is_available_is_decided_by_who_is_there(robot, console, topic, eventually):
+def test_best_available_follows_the_present_endpoints(robot, console, topic, eventually):
     robot.create_publisher(topic, TEXT, BEST_EFFORT)
     eventually(lambda: console.publishers(topic))
     subscription = console.create_subscription(topic, TEXT, qos=QoS.best_available(7))
@@ -88,7 +88,7 @@ def test_what_is_available_is_decided_by_who_is_there(robot, console, topic, eve
     assert usual.qos == QoS()
 
 
-def test_what_is_available_adapts_to_who_comes(robot, console, topic, eventually):
+def test_best_available_adapts_to_new_endpoints(robot, console, topic, eventually):
     latched = robot.create_publisher(topic, TEXT, QoS.latched())
     latched.publish(data="kept")
     eventually(lambda: console.publishers(topic))

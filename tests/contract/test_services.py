@@ -247,7 +247,7 @@ def test_calls_from_many_threads(offer, client):
         ({}, float("nan"), "timeout: expected seconds"),
     ],
 )
-def test_what_does_not_fit_is_refused_and_not_sent(offer, client, way, request_, timeout, reason):
+def test_invalid_request_is_refused_and_not_sent(offer, client, way, request_, timeout, reason):
     seen = []
     offer(lambda request: seen.append(request.a))
     with pytest.raises(rosglass.ConversionError, match=reason):
@@ -266,7 +266,7 @@ def test_bad_names_are_refused(robot, wire, create, name):
 
 
 @pytest.mark.parametrize("create", ["create_service_client", "create_service_server"])
-def test_what_is_no_service_type_is_refused(robot, wire, create):
+def test_invalid_service_type_is_refused(robot, wire, create):
     more = (add,) if create.endswith("server") else ()
     other = rosglass.load(TRIGGER, ros=2 if wire.is_ros1 else 1)
     for kind, error, reason in (
@@ -378,7 +378,7 @@ def test_a_service_error_of_a_callback_refuses_the_request(offer, client, wire, 
     with refused(wire, "the call of .* failed: .*not homed$"):
         client.call(timeout=patience(wire))
     errors = [record for record in caplog.records if record.levelname == "ERROR"]
-    assert bool(errors) != wire.is_ros1, "as with rospy, the client alone is told"
+    assert bool(errors) != wire.is_ros1, "as with rospy, only the client gets the error"
 
 
 @pytest.mark.parametrize(
@@ -581,12 +581,10 @@ def test_readiness_changes_are_reported(offer, client, eventually):
     eventually(lambda: seen == [True, False], lambda: seen)
     assert not client.ready
     with pytest.raises(rosglass.ConversionError, match="callback"):
-        client.on_ready_change("told")
+        client.on_ready_change("callback")
 
 
-def test_who_found_the_server_is_told_when_it_leaves_at_once(
-    offer, console, topic, wire, eventually
-):
+def test_client_is_notified_when_server_leaves_immediately(offer, console, topic, wire, eventually):
     for _ in range(3):
         server, seen = offer(), []
         late = console.create_service_client(topic, wire.add)

@@ -86,7 +86,7 @@ def test_a_picture_outlives_the_node_that_received_it(link, console):
 
 
 @pytest.mark.parametrize("given", ["fields", "dict", "message", "bytes", "sample"])
-def test_what_can_be_published(link, wire, given):
+def test_all_forms_of_messages_can_be_published(link, wire, given):
     publisher, subscription = link(TWIST)
     message = publisher.type.create(linear={"x": 1.5})
     if given == "fields":
@@ -110,7 +110,7 @@ def publisher_wire(wire):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "fields", "told"),
+    ("arguments", "fields", "message"),
     [
         ((None,), {}, "a message, a dict or keyword fields"),
         (({"data": 7},), {}, "data: expected"),
@@ -119,9 +119,9 @@ def publisher_wire(wire):
         (("hello",), {}, "expected"),
     ],
 )
-def test_values_that_do_not_fit_are_refused_and_not_sent(link, arguments, fields, told):
+def test_invalid_message_is_refused_and_not_sent(link, arguments, fields, message):
     publisher, subscription = link()
-    with pytest.raises(rosglass.ConversionError, match=told):
+    with pytest.raises(rosglass.ConversionError, match=message):
         publisher.publish(*arguments, **fields)
     publisher.publish(data="next")
     assert subscription.wait(30).message().data == "next"
@@ -190,7 +190,7 @@ def test_a_subscription_without_type_waits_for_the_first_publisher(
     assert subscription.type.name == TEXT
 
 
-def test_a_latched_message_comes_to_whoever_is_late(robot, console, topic):
+def test_latched_message_reaches_late_subscriptions(robot, console, topic):
     publisher = robot.create_publisher(topic, TEXT, QoS.latched())
     publisher.publish(data="old")
     publisher.publish(data="latest")
@@ -278,7 +278,7 @@ def test_an_event_loop_is_woken_once_for_what_it_takes(link, eventually):
     assert woken == ["a", "closed"]
 
 
-def test_what_nobody_waits_for_is_there_when_somebody_looks(link):
+def test_messages_without_a_waiting_reader_are_there_on_demand(link):
     publisher, subscription = link(qos=1)
     began = time.monotonic()
     behind = []
@@ -287,7 +287,7 @@ def test_what_nobody_waits_for_is_there_when_somebody_looks(link):
         if number % 20 == 19 and (sample := subscription.take()) is not None:
             behind.append(number - int(sample.message().data))
     frequency = 120 / (time.monotonic() - began)
-    assert sorted(behind)[len(behind) // 2] <= 10, "the newest, although nobody was waiting"
+    assert sorted(behind)[len(behind) // 2] <= 10, "the newest, although no reader was waiting"
     statistics = subscription.statistics()
     assert statistics.received >= 0.9 * 120
     assert statistics.frequency == pytest.approx(frequency, rel=0.3)
@@ -433,8 +433,8 @@ def test_publishers_that_are_there_already_are_reported_first(link, eventually):
     _, subscription = link()
     for _ in range(2):
         events = []
-        subscription.on_matched(lambda e, told=events: told.append((e.change, e.count)))
-        eventually(lambda told=events: told == [(1, 1)])
+        subscription.on_matched(lambda e, seen=events: seen.append((e.change, e.count)))
+        eventually(lambda seen=events: seen == [(1, 1)])
 
 
 @pytest.fixture
@@ -518,11 +518,11 @@ def test_a_subscription_says_which_publisher_left(robot, console, topic, eventua
     assert subscription.problem == ""
     publisher.close()
     left = re.compile(r"it has had no publisher since \d\d:\d\d:\d\d, when /robot left")
-    told = eventually(lambda: left.fullmatch(subscription.problem), lambda: subscription.problem)
+    problem = eventually(lambda: left.fullmatch(subscription.problem), lambda: subscription.problem)
     assert [r for r in caplog.records if r.levelname == "WARNING"] == []
     assert robot.create_publisher(topic, TEXT)
     eventually(lambda: not subscription.problem)
-    eventually(lambda: problems[-2:] == [told.group(), ""], lambda: problems)
+    eventually(lambda: problems[-2:] == [problem.group(), ""], lambda: problems)
 
 
 def test_a_publisher_of_ones_own_is_not_missed(robot, topic, eventually):
@@ -643,7 +643,7 @@ def test_types_that_cannot_be_used_are_refused_at_creation(robot, wire, create):
 
 @pytest.mark.parametrize("create", ["create_publisher", "create_subscription"])
 @pytest.mark.parametrize("qos", [-1, "sensor_data", 1.5])
-def test_profiles_that_are_none_are_refused(console, topic, create, qos):
+def test_invalid_profiles_are_refused(console, topic, create, qos):
     with pytest.raises(rosglass.ArgumentError, match=f"^{topic}: qos: expected"):
         getattr(console, create)(topic, TEXT, qos=qos)
 

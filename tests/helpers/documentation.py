@@ -93,7 +93,7 @@ class Reader:
 
 
 def _is(value: Any, shown: Any) -> bool:
-    """Whether a value is the one shown, which ends in three dots where it was too long."""
+    """Return True if a value is the one shown, which ends in three dots where it was too long."""
     if isinstance(shown, str) and shown.endswith("..."):
         return isinstance(value, str) and value.startswith(shown[:-3])
     return bool(value == shown)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class Manual(Executor):
-    """Runs jobs when told to.
+    """Runs jobs on request.
 
     Attributes:
         jobs: Those that have not run.
@@ -25,7 +25,7 @@ class Manual(Executor):
         self.jobs.append(job)
 
     def run(self) -> None:
-        """Run the jobs that wait, and not those that come meanwhile."""
+        """Run the jobs that wait, but not those that they add."""
         jobs, self.jobs = self.jobs, []
         for job in jobs:
             job()

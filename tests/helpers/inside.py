@@ -1,4 +1,4 @@
-"""What is inside nodes and elements, for tests of their parts: the one place that reaches in."""
+"""Access to the inside of nodes and elements, for tests of their parts, in one place."""
 
 from __future__ import annotations
 

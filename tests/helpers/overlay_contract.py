@@ -1,4 +1,4 @@
-"""What the object ``rviz`` does over any 3D view: RViz's, and that of a ``SceneView``.
+"""The object ``rviz`` over any 3D view: RViz's, and that of a ``SceneView``.
 
 ``tests/rviz/test_overlay_contract.py`` and ``tests/scene/test_overlay_contract.py`` collect these
 tests; the fixture `over` of each folder is a :class:`Over`.
@@ -121,11 +121,11 @@ def test_displays_are_listed(over: Over) -> None:
 
 def test_displays_are_added_and_removed(over: Over) -> None:
     here = over.qml(
-        """Item { property var told: []
+        """Item { property var log: []
         property int count: rviz.displays.length
         property Connections c: Connections { target: rviz
-            function onDisplayAdded(d) { told.push("added " + d.name) }
-            function onDisplayRemoved(d) { told.push("removed " + d.name + " " + d.exists) } } }"""
+            function onDisplayAdded(d) { log.push("added " + d.name) }
+            function onDisplayRemoved(d) { log.push("removed " + d.name + " " + d.exists) } } }"""
     )
     before = here.root.property("count")
     made = here.run(
@@ -135,10 +135,10 @@ def test_displays_are_added_and_removed(over: Over) -> None:
     assert made == ["Origin", "rviz/Axes", False, True]
     assert here.root.property("count") == before + 1
     here.run(
-        "const d = rviz.display('Origin'); rviz.removeDisplay('Origin'); root.told.push(d.name)"
+        "const d = rviz.display('Origin'); rviz.removeDisplay('Origin'); root.log.push(d.name)"
     )
-    told = [text for text in here.run("return root.told") if "Overlay" not in text]
-    assert told == ["added Origin", "removed Origin false", "Origin"]
+    log = [text for text in here.run("return root.log") if "Overlay" not in text]
+    assert log == ["added Origin", "removed Origin false", "Origin"]
     assert here.root.property("count") == before
     assert here.run("return rviz.addDisplay('rviz/Axes').name") == "Axes"
     here.run("rviz.display('Axes').remove()")
@@ -283,14 +283,14 @@ TOOLS = ["rviz/Interact", "rviz/MoveCamera", "rviz/Select"]
 def test_tools(over: Over) -> None:
     over.use_tools(TOOLS)
     here = over.qml(
-        """Item { property var told: []
+        """Item { property var entries: []
         property Connections c: Connections { target: rviz.toolManager
-            function onToolAdded(tool) { told.push("added " + tool.classId) }
+            function onToolAdded(tool) { entries.push("added " + tool.classId) }
             function onToolRemoved(tool) {
-                told.push("removed " + tool.classId + " " + tool.exists) }
-            function onToolChanged(tool) { told.push("changed " + tool.classId) }
-            function onToolsChanged() { told.push("tools " + rviz.toolManager.tools.length) } }
-        function log() { const t = told; told = []; return t } }"""
+                entries.push("removed " + tool.classId + " " + tool.exists) }
+            function onToolChanged(tool) { entries.push("changed " + tool.classId) }
+            function onToolsChanged() { entries.push("tools " + rviz.toolManager.tools.length) } }
+        function log() { const t = entries; entries = []; return t } }"""
     )
     run = here.run
     assert run("return rviz.toolManager.tools.map(t => t.classId)") == TOOLS
@@ -549,9 +549,9 @@ def test_a_frame_is_followed(over: Over) -> None:
 
 def test_position_trackers(over: Over) -> None:
     here = over.qml(
-        """Item { property var tracker: null; property var told: []
+        """Item { property var tracker: null; property var positions: []
         function track() { tracker = rviz.createPositionTracker(0, 0, 0)
-            tracker.positionChanged.connect(p => told.push([p.x, p.y, p.z])) } }""",
+            tracker.positionChanged.connect(p => positions.push([p.x, p.y, p.z])) } }""",
         scale=2.0,
     )
     over.look_down()
@@ -565,7 +565,7 @@ def test_position_trackers(over: Over) -> None:
     # It follows the camera, the point, and the overlay's scale.
     over.access.view.move_eye_and_focus((0, 0, 20), (0, 0, 0), animate=False)
     over.wait(lambda: abs(run(where)[2] - 20) < 0.1)
-    assert run("return root.told.length") > 0
+    assert run("return root.positions.length") > 0
     run("root.tracker.point = Qt.vector3d(0, 0, 5)")
     assert run(where)[2] == pytest.approx(15, abs=0.1)
     assert run("return root.tracker.point") == {"x": 0, "y": 0, "z": 5}
@@ -678,18 +678,18 @@ def test_screenshots(over: Over, tmp_path: Path) -> None:
 
 def test_configs(over: Over, tmp_path: Path) -> None:
     here = over.qml(
-        """Item { property var told: []
+        """Item { property var loaded: []
         property Connections c: Connections { target: rviz
-            function onConfigLoaded(file) { told.push(file) } } }"""
+            function onConfigLoaded(file) { loaded.push(file) } } }"""
     )
     file = tmp_path / "saved.rviz"
     here.run("rviz.display('Grid').name = 'Saved grid'; rviz.view.saveView('Kept')")
     here.run(f"rviz.saveConfig('{file}')")
     assert "Saved grid" in file.read_text()
     here.run("rviz.display('Saved grid').name = 'Grid'; rviz.view.removeView('Kept')")
-    here.run(f"root.told = []; rviz.loadConfig('{file.as_uri()}')")
-    over.wait(lambda: here.run("return root.told"))
-    assert here.run("return root.told") == [str(file)]
+    here.run(f"root.loaded = []; rviz.loadConfig('{file.as_uri()}')")
+    over.wait(lambda: here.run("return root.loaded"))
+    assert here.run("return root.loaded") == [str(file)]
     assert here.run("return rviz.displays.map(d => d.name)") == ["Saved grid", *over.own_displays]
     assert here.run("return rviz.view.savedViews") == ["Kept"]
     here.run("rviz.view.removeView('Kept')")
@@ -790,7 +790,7 @@ def test_functions_of_a_file_end_when_it_is_reloaded(over: Over) -> None:
 
 
 def test_overlays_come_and_go(over: Over) -> None:
-    """What they followed is not followed any longer."""
+    """An overlay that is removed stops following tools, the view and displays."""
     for _ in range(3):
         here = over.qml("Item { property var t: [rviz.toolManager, rviz.view, rviz.displays] }")
         over.remove(here.overlay)

@@ -1,4 +1,4 @@
-"""Compares pictures of 3D scenes: what is where, and in which colour."""
+"""Compares images of 3D scenes: positions and colours of shapes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _HUES = ("red", "yellow", "green", "cyan", "blue", "magenta")
 
 
 class Patch(NamedTuple):
-    """What a picture has of one hue.
+    """The pixels of one hue in an image.
 
     Attributes:
         count: Pixels.
@@ -38,11 +38,11 @@ def drawn(picture: NDArray[np.uint8]) -> NDArray[Any]:
 def unmatched(
     one: NDArray[np.uint8], other: NDArray[np.uint8], within: int = 3, tolerance: int = 36
 ) -> NDArray[Any]:
-    """Return which drawn pixels of a picture have no similar one nearby in another picture.
+    """Return which drawn pixels of an image have no similar one nearby in another image.
 
     Args:
-        one: The picture.
-        other: The other picture, of the same size.
+        one: The image.
+        other: The other image, of the same size.
         within: Pixels that count as near, in each direction.
         tolerance: By how much red, green and blue may differ.
     """
@@ -60,7 +60,7 @@ def unmatched(
 
 
 def patches(picture: NDArray[np.uint8], least: int = 30) -> dict[str, Patch]:
-    """Return what a picture has of each hue; hues of fewer pixels are left out."""
+    """Return an image's pixels of each hue; hues of fewer pixels are left out."""
     colours = picture.astype(np.float32)
     high, low = colours.max(axis=2), colours.min(axis=2)
     span = np.maximum(high - low, 1)

@@ -1,4 +1,4 @@
-"""What a node's own threads do to a subscription, for tests without a node."""
+"""The part of a node's own threads in a subscription, for tests without a node."""
 
 from __future__ import annotations
 

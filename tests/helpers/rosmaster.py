@@ -82,7 +82,7 @@ class RosMaster:
         return self._process.pid
 
     def kill(self) -> None:
-        """Kill it: nodes get no farewell, and the next one has forgotten everything."""
+        """Kill it: nodes are not notified, and the next one has forgotten everything."""
         if self._process:
             self._process.kill()
             self._process.wait()

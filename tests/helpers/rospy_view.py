@@ -15,8 +15,8 @@ import std_msgs.msg
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
-told = {}
-told_lock = threading.Lock()
+messages = {}
+messages_lock = threading.Lock()
 subscribers, transforms = {}, {}
 
 
@@ -35,20 +35,20 @@ def do_call(service, type, request, times=1):
 
 def do_listen(topic, mode):
     def heard(message):
-        with told_lock:
-            told.setdefault(topic, []).append(message.mode if mode else message.data)
+        with messages_lock:
+            messages.setdefault(topic, []).append(message.mode if mode else message.data)
 
     if topic in subscribers:
         subscribers[topic].unregister()
-    with told_lock:
-        told[topic] = []
+    with messages_lock:
+        messages[topic] = []
     kind = hector_rviz_plugins.msg.ViewMode if mode else std_msgs.msg.String
     subscribers[topic] = rospy.Subscriber(topic, kind, heard)
 
 
 def do_heard(topic):
-    with told_lock:
-        return told.get(topic, [])
+    with messages_lock:
+        return messages.get(topic, [])
 
 
 def do_tf(parent, child, translation, rotation):

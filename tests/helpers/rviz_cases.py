@@ -1,4 +1,4 @@
-"""What the 3D view and RViz are both shown, for tests/scene/test_against_rviz.py."""
+"""The scenes that the 3D view and RViz both show, for tests/scene/test_against_rviz.py."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ VIEWS = {
         "Roll": 0.0,
         "Yaw": 0.1,
     },
-    # Along x, as the camera: RViz lights its picture from the view's side.
+    # Along x, as the camera: RViz's light comes from the view's side.
     "Orbit along x": {
         **_VIEW,
         "Class": "rviz/Orbit",
@@ -105,7 +105,7 @@ VIEWS = {
 
 
 class Message(NamedTuple):
-    """What a topic publishes."""
+    """A message, or several, that a topic publishes."""
 
     topic: str
     type: str
@@ -121,7 +121,7 @@ class Case:
         messages: What topics publish.
         views: Names of VIEWS.
         has_texts: Whether texts are drawn, which have another font in RViz.
-        repeats: Whether messages are sent again until the pictures agree: RViz drops depth images
+        repeats: Whether messages are sent again until the images agree: RViz drops depth images
             before the first camera info, servers of markers say they are there, and images and
             efforts fade when they are not sent any more.
         panel: Name of the display whose panel is compared instead of the view.
@@ -290,12 +290,12 @@ ROBOT = ROBOT.replace("MESHES", str(MESHES)).replace(
         for link in LINKS[1:]
     ),
 )
-#: Where the robots of these prefixes are, along y.
+#: Positions along y of the robots of these prefixes.
 ROBOTS = {"": -2.0, "second/": 0.0, "third/": 2.0}
-#: Of a TF display: robots and cameras are not shown.
+#: Settings of a TF display: robots and cameras are not shown.
 FRAMES = {f"{prefix}{link}": {"Value": False} for prefix in ROBOTS for link in LINKS}
 FRAMES["camera"] = {"Value": False}
-#: Of a camera at (-4, 0, 1.5) of the map, that looks along x and a little down.
+#: The message of a camera at (-4, 0, 1.5) of the map, that looks along x and a little down.
 CAMERA_INFO = {
     "header": {"frame_id": "camera"}, "width": 160, "height": 120,
     "K": [140.0, 0, 75, 0, 140.0, 62, 0, 0, 1], "R": [1.0, 0, 0, 0, 1, 0, 0, 0, 1],

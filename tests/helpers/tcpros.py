@@ -1,4 +1,4 @@
-"""What ROS 1 nodes ask each other, for tests that ask it themselves."""
+"""Requests between ROS 1 nodes, for tests that send them themselves."""
 
 from __future__ import annotations
 

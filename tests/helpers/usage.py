@@ -1,4 +1,4 @@
-"""What this process uses, for tests that nothing is left behind."""
+"""Resources that this process uses, for tests that nothing is left behind."""
 
 from __future__ import annotations
 

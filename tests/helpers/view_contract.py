@@ -235,7 +235,7 @@ def test_service_errors_say_why_the_camera_is_not_moved(
     assert "finite" in robot.call("move_eye", "MoveEye", eye={"x": math.inf})
     assert "finite" in robot.call("move_eye", "MoveEye", eye={"y": math.nan})
     assert "look somewhere" in robot.call("move_eye_and_focus", "MoveEyeAndFocus")
-    # A robot's mistakes are no errors of ours.
+    # A robot's mistakes are not logged as errors of ours.
     assert [record for record in caplog.records if record.levelname == "ERROR"] == []
     assert near(view.eye, (4, 0, 3))
 
@@ -281,14 +281,14 @@ def test_the_camera_follows_a_frame(robot: Robot, camera: Camera) -> None:
 
 def test_a_lost_frame_is_reported_once(robot: Robot, camera: Camera) -> None:
     view = camera.view
-    told: list[str] = []
-    view.problem_changed.connect(told.append)
+    problems: list[str] = []
+    view.problem_changed.connect(problems.append)
     robot.tf("lost_rover", 1.0, 2.0, 0.0)
     camera.wait(lambda: robot.call("set_tracked_frame", "TrackFrame", frame="lost_rover") == "done")
     camera.set_fixed_frame("elsewhere")
     camera.wait(lambda: view.problem != "")
     camera.wait.nothing_happens(0.3)
-    assert len(told) == 1
+    assert len(problems) == 1
     assert "elsewhere" in view.problem
     # It can be moved all the same.
     view.move_eye((7, 7, 7), animate=False)
@@ -444,7 +444,7 @@ def test_a_second_node_of_the_name_ends_ours(camera: Camera, master: str) -> Non
         assert "new node registered with same name" in session.detail
         camera.wait(lambda: not camera.services.is_open)
         assert camera.services.problem == session.detail
-    # It does not come back by itself, but when it is told to.
+    # It does not come back by itself, but on request.
     session.shutdown()
     camera.connect()
     camera.wait(lambda: session.state == "connected" and camera.services.is_open)

@@ -74,7 +74,7 @@ def nothing_happens(seconds: float, *, turn: Callable[[], object] = _sleep) -> N
 def _describe(condition: Callable[[], Any], value: object, said: object) -> str:
     try:
         source = " ".join(inspect.getsource(condition).split())
-    except (OSError, TypeError):  # a method of C, or of a class that is no function
+    except (OSError, TypeError):  # a method of C, or of a class, which is not a function
         source = repr(condition)
     lines = [source, f"is {_short.repr(value)}", str(said)]
     if inspect.isfunction(condition):

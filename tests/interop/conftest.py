@@ -61,8 +61,8 @@ class Process:
             except queue.Empty:
                 if otherwise:
                     return otherwise["otherwise"]
-                told = "".join(self.output[-40:])
-                pytest.fail(f"no {key!r} from {self.popen.args} within {timeout} s:\n{told}")
+                output = "".join(self.output[-40:])
+                pytest.fail(f"no {key!r} from {self.popen.args} within {timeout} s:\n{output}")
             if key in event:
                 return event[key]
             self._skipped.append(event)

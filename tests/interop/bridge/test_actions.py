@@ -33,7 +33,7 @@ def test_an_action_of_ros1(served, connect):
     assert client.type.name == "actionlib/action/Test"
     heard, states = [], []
     goal = client.send_goal(
-        {"goal": 5}, on_feedback=lambda told: heard.append(told.feedback),
+        {"goal": 5}, on_feedback=lambda feedback: heard.append(feedback.feedback),
         on_status_change=states.append,
     )  # fmt: skip
     status, result = goal.result(30)
@@ -46,18 +46,18 @@ def test_an_action_of_ros1(served, connect):
         client.send_goal({"goal": 0}).result(30)
     first = threading.Event()
     goal = client.send_goal(
-        {"goal": 10_000}, on_feedback=lambda told: told.feedback > 0 and first.set()
+        {"goal": 10_000}, on_feedback=lambda feedback: feedback.feedback > 0 and first.set()
     )
     assert first.wait(30)
     assert goal.cancel(30).result(30).accepted == (goal.id,)
     status, result = goal.result(30)
     assert status is GoalStatus.CANCELED
     assert result.result > 0
-    (told,) = served.status().relays
-    assert (told.kind, told.count, told.refused) == ("action", 3, 1)
+    (relay,) = served.status().relays
+    assert (relay.kind, relay.count, relay.refused) == ("action", 3, 1)
 
 
-def test_a_server_that_does_not_decide_holds_up_nobody(served, connect):
+def test_slow_server_does_not_block_other_goals(served, connect):
     client = connect("ros2", "client").create_action_client("/count")
     slow = client.send_goal({"goal": -2}, timeout=30)
     quick = client.send_goal({"goal": 3}, timeout=30)
@@ -67,7 +67,7 @@ def test_a_server_that_does_not_decide_holds_up_nobody(served, connect):
     assert slow.result(30).status is GoalStatus.CANCELED
 
 
-def test_what_is_cancelled_when_the_bridge_ends(served, connect, rospy_peer):
+def test_goals_are_cancelled_when_the_bridge_ends(served, connect, rospy_peer):
     client = connect("ros2", "client").create_action_client("/count")
     first = threading.Event()
     goal = client.send_goal({"goal": 10_000}, on_feedback=lambda _: first.set(), timeout=30)
@@ -108,9 +108,9 @@ def offered(bridge, connect, rospy_peer):
 def ended(peer, key):
     """Return how a goal of the peer ends."""
     while True:
-        told = peer.event(f"state {key}")
-        if told["state"] == "DONE":
-            return told["terminal"], told["result"]
+        state = peer.event(f"state {key}")
+        if state["state"] == "DONE":
+            return state["terminal"], state["result"]
 
 
 @pytest.mark.parametrize(

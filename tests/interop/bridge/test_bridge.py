@@ -93,7 +93,7 @@ def test_latched_both_ways(bridge, connect, rospy_peer):
     assert late.wait(30).message().data == "one"
     rospy_peer.call("subscribe", topic="/map_two", type="std_msgs/String")
     assert rospy_peer.event("received")["value"] == {"data": "two"}
-    # What is latched goes with whoever published it.
+    # A latched message goes with its publisher.
     keeper.close()
     eventually(lambda: ("/map_two", "<-") not in relays(made))
     ours = connect("ros1", "latecomer").create_subscription("/map_two", STRING)
@@ -226,8 +226,8 @@ def test_services_of_ros2(bridge, connect, rospy_peer):
     adder = connect("ros1", "adder").create_service_client("/sum")
     found = adder.call({"a": 2, "b": -5}, timeout=30)
     assert found.sum == -3
-    (told,) = rospy_peer.call("call", service="/never", type="std_srvs/Trigger")
-    assert "within 1 s" in told
+    (error,) = rospy_peer.call("call", service="/never", type="std_srvs/Trigger")
+    assert "within 1 s" in error
 
 
 def test_a_service_that_both_offer_is_left_alone(bridge, connect):
@@ -242,7 +242,7 @@ def test_a_service_that_both_offer_is_left_alone(bridge, connect):
     assert one.create_service_client("/both").call().success
 
 
-def test_what_does_not_fit_is_refused_and_told(bridge, connect, caplog):
+def test_untranslatable_message_is_refused_and_logged(bridge, connect, caplog):
     made = bridge(["/late"])
     talker = connect("ros2", "past").create_publisher("/late", "std_msgs/msg/Header")
     listener = connect("ros1", "present").create_subscription("/late")
@@ -330,22 +330,22 @@ def test_the_router_restarts(bridge, connect, rospy_peer, free_port):
 
 
 def test_a_ros2_client_that_is_not_ours(bridge, start_peer, router, rospy_peer, peer_values):
-    bridge(["/chatter", "/told"])
+    bridge(["/chatter", "/orders"])
     rospy_peer.call("subscribe", topic="/chatter", type="std_msgs/String")
-    peer = start_peer("sdk", router, publish={"/chatter": STRING}, subscribe={"/told": STRING})
+    peer = start_peer("sdk", router, publish={"/chatter": STRING}, subscribe={"/orders": STRING})
     value = rospy_peer.event("received", 30)["value"]
     assert value == {"data": peer_values.VALUES[STRING]["data"]}
     rospy_peer.call("unsubscribe", topic="/chatter")
     rospy_peer.call(
-        "publish", topic="/told", type="std_msgs/String", value={"data": "from rospy"},
+        "publish", topic="/orders", type="std_msgs/String", value={"data": "from rospy"},
         rate=10, count=0,
     )  # fmt: skip
-    assert peer.event("received", 30) == "/told"
-    rospy_peer.call("unpublish", topic="/told")
+    assert peer.event("received", 30) == "/orders"
+    rospy_peer.call("unpublish", topic="/orders")
 
 
 def test_a_chain_of_bridges(bridge, connect, start_master):
-    """What one bridge brings is not its own to those who go on to a third world."""
+    """Relayed topics are not relayed back by a bridge to a third network."""
     far = start_master().url
     bridge(["*"])
     bridge(["*"], urls=(far, ""))
@@ -401,8 +401,8 @@ def test_from_ros1_to_dds(bridge, connect, rospy_peer, dds_domain):
     found = viewer.wait(30).message()
     assert (found.width, found.data[-1], len(found.data)) == (640, 9, 640 * 480 * 3)
     node.create_service_server("/far/go", "std_srvs/srv/Trigger", lambda _: {"message": "gone"})
-    (told,) = rospy_peer.call("call", service="/far/go", type="std_srvs/Trigger", timeout=30)
-    assert told == {"success": False, "message": "gone"}
+    (response,) = rospy_peer.call("call", service="/far/go", type="std_srvs/Trigger", timeout=30)
+    assert response == {"success": False, "message": "gone"}
 
 
 def test_a_publisher_comes_back_with_another_type(bridge, connect):
@@ -424,7 +424,7 @@ def test_a_publisher_comes_back_with_another_type(bridge, connect):
         talker.close()
 
 
-def test_a_type_that_cannot_be_is_told_once(bridge, connect, caplog):
+def test_untranslatable_type_is_logged_once(bridge, connect, caplog):
     made = bridge(["/case", "/later"])
     kind = MessageType.from_text("own_msgs/msg/Case", "int8 a\nint8 A\n", ros=1)
     one = connect("ros1", "case")
@@ -513,6 +513,6 @@ def test_a_service_called_from_the_shell(bridge, connect, tool):
     )
     eventually(lambda: "/shell/set" in tool("rosservice", "list"))
     assert tool("rosservice", "type", "/shell/set").strip() == "std_srvs/SetBool"
-    told = tool("rosservice", "call", "/shell/set", "true")
-    assert "success: True" in told
-    assert "ok" in told
+    output = tool("rosservice", "call", "/shell/set", "true")
+    assert "success: True" in output
+    assert "ok" in output

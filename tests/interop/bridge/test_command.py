@@ -62,7 +62,7 @@ def test_it_lists_what_maps(master, router, connect):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         ((), "nothing is to be relayed"),
         (("--all", "--topic", "/a"), "exclude each other"),
@@ -71,23 +71,23 @@ def test_it_lists_what_maps(master, router, connect):
         (("--topic", "/a", "--type", "/a:=nowhere_msgs/Thing"), "nowhere_msgs"),
     ],
 )
-def test_nonsense(arguments, told):
+def test_nonsense(arguments, message):
     done = run("ros1://127.0.0.1", "zenoh://127.0.0.1", *arguments, status=1)
-    assert told in done.stderr
+    assert message in done.stderr
 
 
-def test_what_is_nowhere_is_told(master, router, connect, start_program):
+def test_topic_without_publisher_is_reported(master, router, connect, start_program):
     two = connect("ros2", "two")
     two.create_publisher("/odometry", STRING)
     command = (*COMMAND, master.url, router.url, "--topic", "/odometri")
     process = start_program(*command, env=dict(os.environ))
-    told = "/odometri ->: no publisher; did you mean /odometry?"
-    eventually(lambda: any(told in line for line in process.output))
+    message = "/odometri ->: no publisher; did you mean /odometry?"
+    eventually(lambda: any(message in line for line in process.output))
     two.create_publisher("/odometri", STRING)
     eventually(lambda: any("/odometri ->: well again" in line for line in process.output))
 
 
-def test_nobody_answers(router, free_port):
+def test_bridge_without_master_times_out(router, free_port):
     url = f"ros1://127.0.0.1:{free_port}"
     done = run(url, router.url, "--all", "--timeout", "1", status=1)
     assert url in done.stderr

@@ -43,7 +43,7 @@ def test_three_worlds_in_a_ring(bridge, connect, start_master):
         return ears[2].wait(0.1)
 
     eventually(arrives)
-    eventually(lambda: sum("form a ring" in told for told in problems(*made)) == 2,
+    eventually(lambda: sum("form a ring" in problem for problem in problems(*made)) == 2,
              what=lambda: str([one.status() for one in made]))  # fmt: skip
     talker.publish(data="begin")
     for ear in ears:
